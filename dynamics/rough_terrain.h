@@ -1,0 +1,43 @@
+#pragma once
+// The field's benchmark: a plastic, point-mass wheel on rough terrain (Byl & Tedrake 2009).
+
+#include <optional>
+#include <span>
+#include <utility>
+
+namespace metastable::dynamics {
+
+/// Each step meets its own slope gamma_k ~ N(mean, sd^2), independent. State: x = omega^2 at the apex [rad^2/s^2];
+///   x' = cos^2(2a) [x + G (1 - cos(a + gamma))] - G (1 - cos(a - gamma)),  G = 2 g / l,  rest if x' <= 0.
+/// One phase, one noise score. Satisfies markov::ReturnMap.
+class RoughTerrainWheel {
+ public:
+  struct Options {
+    double mean_slope = 0;         ///< [rad]
+    double sd_slope = 0;           ///< [rad], >= 0
+    double half_leg_angle = 0.39269908169872414;  ///< a [rad], pi/8: eight legs
+    double gravity = 9.8;          ///< g [m/s^2]
+    double leg_length = 1.0;       ///< l [m]
+  };
+  /// @throws std::invalid_argument naming the quantity and its range
+  explicit RoughTerrainWheel(Options options);
+
+  const Options& options() const { return options_; }
+  /// Next state for a given slope [rad]; may be <= 0 (rest).
+  double next(double state, double slope) const;
+  /// Fixed point of the noise-free map [rad^2/s^2]. @throws std::domain_error if it does not exist (it would rest).
+  double fixed_point() const;
+
+  std::pair<double, double> state_interval(int phase) const;  ///< {0, highest landing possible}
+  int phases() const { return 1; }
+  int noise_dimension() const { return 1; }
+  std::optional<double> landing(double state, int phase, std::span<const double> score) const;
+  /// From the error function at the slope where x' = 0: full relative accuracy.
+  std::optional<double> rest_probability(double state, int phase) const;
+  std::pair<double, double> landing_range(double state, int phase) const;
+
+ private:
+  Options options_;
+};
+
+}  // namespace metastable::dynamics

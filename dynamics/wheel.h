@@ -1,0 +1,49 @@
+#pragma once
+// The rimless wheel and the ramp it rolls down.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace metastable::dynamics {
+
+/// Leg lengths of the paper's wheel [m], in the order they land (caption of Fig. 1).
+std::vector<double> paper_leg_lengths();
+
+/// A rimless wheel. Defaults are the paper's, SI units.
+struct Wheel {
+  std::vector<double> leg_length = paper_leg_lengths();  ///< L_i [m], in the order they land; 3 or more, each > 0
+  double hub_mass = 1.39;                                ///< M [kg], > 0
+  /// Inertia about the stance foot, I [kg m^2], > 0. Not given: see stance_inertia().
+  std::optional<double> inertia;
+  /// Radius of gyration about the hub, r_g [m], >= 0. Not given: each law has its own default.
+  std::optional<double> radius_of_gyration;
+  std::optional<double> contact_mass;                    ///< m_c [kg] of the Kelvin-Voigt contact (25); default M
+  double ramp_stiffness = 9000.0;                        ///< K_r [N/m], > 0
+  double gravity = 9.81;                                 ///< g [m/s^2], > 0
+
+  int legs() const { return static_cast<int>(leg_length.size()); }
+  /// Angle between neighbouring legs, alpha = 2 pi / legs [rad].
+  double leg_angle() const;
+  double mean_leg_length() const;
+  bool equal_legs() const;
+  /// @throws std::invalid_argument naming the quantity, its value and the allowed range.
+  void validate() const;
+};
+
+/// Both feet on the ramp: stance leg `first`, landing leg `second` (physics: "One collision").
+struct Triangle {
+  double chord = 0;        ///< c [m], distance between the feet
+  double hub_height = 0;   ///< h [m], of the hub over the ramp = y_cp
+  double beta_first = 0;   ///< angle of the stance leg to the ramp [rad]
+  double beta_second = 0;  ///< angle of the landing leg to the ramp [rad]
+  double contact_x = 0;    ///< x_cp [m] = second leg * cos(beta_second), a distance; negative only if the foot lies uphill of the hub
+};
+/// @param first, second leg lengths [m]; @param leg_angle alpha [rad]
+Triangle triangle(double first, double second, double leg_angle);
+
+/// Steepest slope at which a wheel of `legs` legs still has a barrier, alpha / 2 [rad].
+double steepest_slope(int legs);
+
+}  // namespace metastable::dynamics

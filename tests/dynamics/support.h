@@ -1,0 +1,59 @@
+#pragma once
+// What several tests of dynamics/ share.
+
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <rapidcheck.h>
+
+#include "dynamics/contact_law.h"
+#include "dynamics/wheel_map.h"
+
+namespace metastable::dynamics::test {
+
+inline constexpr double degree = std::numbers::pi / 180;
+
+/// Uniform real in [lower, upper], ends included now and then.
+inline double uniform(double lower, double upper) {
+  // At full size: RapidCheck's ranges start small otherwise.
+  const int n = *rc::gen::resize(rc::kNominalSize, rc::gen::inRange(0, (1 << 20) + 1));
+  return lower + (upper - lower) * n / (1 << 20);
+}
+
+/// Eight equal legs of the paper's mean length.
+inline Wheel even_wheel() {
+  Wheel wheel;
+  wheel.leg_length.assign(8, 0.1519);
+  return wheel;
+}
+
+/// A collision between two legs at v0 = c omega and u0.
+inline Collision make_collision(double first, double second, double omega, double tangential, double slope = 7.02 * degree,
+                                double angle = std::numbers::pi / 4) {
+  const Triangle t = triangle(first, second, angle);
+  Collision c;
+  c.stance_length = first;
+  c.landing_length = second;
+  c.contact_x = t.contact_x;
+  c.contact_y = t.hub_height;
+  c.chord = t.chord;
+  c.normal_speed = t.chord * omega;
+  c.tangential_speed = tangential;
+  c.slope = slope;
+  return c;
+}
+
+/// The message of the invalid_argument that f throws; a note if it throws nothing.
+template <class F>
+std::string message_of(F f) {
+  try {
+    f();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+}  // namespace metastable::dynamics::test
