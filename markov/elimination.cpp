@@ -1,0 +1,238 @@
+#include "markov/elimination.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace metastable::markov {
+namespace {
+
+using Index = Eigen::Index;
+using Vector = Eigen::Map<Eigen::VectorXd>;
+using ConstVector = Eigen::Map<const Eigen::VectorXd>;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Block = Eigen::Map<RowMajor, 0, Eigen::OuterStride<>>;
+
+/// Pivots eliminated together before the rest of a full matrix is updated in one product.
+constexpr std::size_t kPanel = 64;
+/// Below this size, or below this fill of the square, the row-by-row elimination is used.
+constexpr std::size_t kBlockedSize = 2 * kPanel;
+constexpr double kBlockedFill = 0.6;
+
+/// row += weight * source, over columns [from, to).
+void add_multiple(double* row, double weight, const double* source, std::size_t from, std::size_t to) {
+  const auto count = static_cast<Index>(to - from);
+  Vector(row + from, count) += weight * ConstVector(source + from, count);
+}
+
+double sum(const double* row, std::size_t from, std::size_t to) {
+  return ConstVector(row + from, static_cast<Index>(to - from)).sum();
+}
+
+}  // namespace
+
+/// Row i holds, left of the diagonal, the probabilities at which the chain watched on states 0 .. i leaves i, and,
+/// right of it, the expected visits to j > i before the chain is back among 0 .. i (the entries of U). What is stored
+/// on the diagonal is never read.
+struct Elimination::Factors {
+  explicit Factors(const Chain& chain);
+
+  /// Row i, to be indexed by column low[i] .. high[i] (offset[i] >= i >= low[i]: no row is shorter than its diagonal).
+  double* row(std::size_t i) { return entries.data() + offset[i] - low[i]; }
+  const double* row(std::size_t i) const { return entries.data() + offset[i] - low[i]; }
+  std::size_t size() const { return kill.size(); }
+  void check_right_side(std::span<const double> rhs) const;
+
+  std::vector<std::size_t> low, high;  ///< row i occupies columns low[i] .. high[i], i among them
+  std::vector<std::size_t> offset;     ///< where low[i] of row i is stored
+  std::vector<double> entries;
+  std::vector<double> kill;  ///< of the chain watched on 0 .. i, when i is eliminated
+  std::vector<double> exit;  ///< rate of leaving i in that chain (the diagonal of D)
+
+ private:
+  std::size_t find_envelope(const Chain& chain);
+  void eliminate_rows(std::size_t first, std::size_t last, std::size_t top);
+  void eliminate_panels();
+  double exit_rate(std::size_t n) const;
+
+  std::vector<std::size_t> top_;  ///< first row whose envelope reaches column n
+};
+
+/// Envelopes after fill; returns the number of entries. Only low[] can change: a pivot n adds columns below n to rows
+/// that reach at least to n.
+std::size_t Elimination::Factors::find_envelope(const Chain& chain) {
+  const std::size_t n = chain.size();
+  low.resize(n);
+  high.resize(n);
+  top_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) top_[i] = i;
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto columns = chain.columns(i);
+    low[i] = columns.empty() ? i : std::min<std::size_t>(i, columns.front());
+    high[i] = columns.empty() ? i : std::max<std::size_t>(i, columns.back());
+    top_[high[i]] = std::min(top_[high[i]], i);
+  }
+  for (std::size_t i = n; i-- > 1;) top_[i - 1] = std::min(top_[i - 1], top_[i]);
+  std::size_t total = 0;
+  for (std::size_t pivot = n; pivot-- > 0;) {
+    total += high[pivot] - low[pivot] + 1;
+    for (std::size_t i = top_[pivot]; i < pivot; ++i) {
+      if (high[i] >= pivot) low[i] = std::min(low[i], low[pivot]);
+    }
+  }
+  return total;
+}
+
+Elimination::Factors::Factors(const Chain& chain) : kill(chain.kill().begin(), chain.kill().end()) {
+  const std::size_t n = chain.size();
+  std::size_t total = find_envelope(chain);
+  const bool blocked = n >= kBlockedSize && static_cast<double>(total) > kBlockedFill * static_cast<double>(n * n);
+  if (blocked) {
+    total = n * n;
+    std::fill(low.begin(), low.end(), 0);
+    std::fill(high.begin(), high.end(), n - 1);
+  }
+  offset.resize(n);
+  entries.assign(total, 0.0);
+  std::size_t used = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    offset[i] = used;
+    used += high[i] - low[i] + 1;
+    const auto columns = chain.columns(i);
+    const auto values = chain.values(i);
+    double* entry = row(i);
+    for (std::size_t e = 0; e < columns.size(); ++e) entry[columns[e]] = values[e];
+  }
+  exit.resize(n);
+  if (blocked) {
+    eliminate_panels();
+  } else {
+    eliminate_rows(0, n, 0);
+  }
+}
+
+double Elimination::Factors::exit_rate(std::size_t n) const {
+  const double rate = kill[n] + sum(row(n), low[n], n);
+  if (!(rate >= std::numeric_limits<double>::min())) {
+    throw ConvergenceError("elimination", rate,
+                           "state " + std::to_string(n) + " is left too rarely for double precision");
+  }
+  return rate;
+}
+
+/// Eliminates the pivots last-1 .. first from the rows from `top` on.
+void Elimination::Factors::eliminate_rows(std::size_t first, std::size_t last, std::size_t top) {
+  for (std::size_t n = last; n-- > first;) {
+    exit[n] = exit_rate(n);
+    const double* pivot = row(n);
+    for (std::size_t i = std::max(top, top_[n]); i < n; ++i) {
+      if (high[i] < n) continue;
+      double* target = row(i);
+      if (target[n] == 0) continue;
+      target[n] /= exit[n];
+      add_multiple(target, target[n], pivot, low[n], n);
+      kill[i] += target[n] * kill[n];
+    }
+  }
+}
+
+/// The same on a full square, a panel of pivots at a time: the panel's rows among themselves, the visits of the rows
+/// above to the panel, and then all that these visits lead to as one matrix product.
+void Elimination::Factors::eliminate_panels() {
+  const std::size_t n = size();
+  std::fill(top_.begin(), top_.end(), 0);
+  for (std::size_t last = n; last > 0;) {
+    const std::size_t first = last > kPanel ? last - kPanel : 0;
+    eliminate_rows(first, last, first);
+    for (std::size_t i = 0; i < first; ++i) {
+      double* target = row(i);
+      for (std::size_t pivot = last; pivot-- > first;) {
+        target[pivot] /= exit[pivot];
+        add_multiple(target, target[pivot], row(pivot), first, pivot);
+        kill[i] += target[pivot] * kill[pivot];
+      }
+    }
+    if (first > 0) {
+      const Eigen::OuterStride<> stride(static_cast<Index>(n));
+      const auto rows = static_cast<Index>(first);
+      const auto pivots = static_cast<Index>(last - first);
+      const Block visits(row(0) + first, rows, pivots, stride);
+      const Block onward(row(first), pivots, rows, stride);
+      Block(row(0), rows, rows, stride).noalias() += visits * onward;
+    }
+    last = first;
+  }
+}
+
+void Elimination::Factors::check_right_side(std::span<const double> rhs) const {
+  if (rhs.size() != size()) {
+    throw std::invalid_argument("elimination: right side of size " + std::to_string(rhs.size()) + " for " +
+                                std::to_string(size()) + " states");
+  }
+  for (std::size_t i = 0; i < rhs.size(); ++i) {
+    if (!(rhs[i] >= 0) || std::isinf(rhs[i])) {
+      throw std::invalid_argument("elimination: entry " + std::to_string(i) + " of the right side is " +
+                                  std::to_string(rhs[i]) + ", not a finite number >= 0");
+    }
+  }
+}
+
+namespace {
+
+std::vector<double> checked(std::vector<double> solution) {
+  for (const double entry : solution) {
+    if (!std::isfinite(entry)) {
+      throw ConvergenceError("elimination", entry, "the solution exceeds the range of double precision");
+    }
+  }
+  return solution;
+}
+
+}  // namespace
+
+Elimination::Elimination(const Chain& chain) {
+  const std::vector<std::uint8_t> can_rest = classify(chain).can_rest;
+  const auto stuck = std::find(can_rest.begin(), can_rest.end(), 0);
+  if (stuck != can_rest.end()) {
+    throw std::domain_error("elimination: rest cannot be reached from state " +
+                            std::to_string(stuck - can_rest.begin()));
+  }
+  factors_ = std::make_unique<Factors>(chain);
+}
+
+Elimination::~Elimination() = default;
+Elimination::Elimination(Elimination&&) noexcept = default;
+Elimination& Elimination::operator=(Elimination&&) noexcept = default;
+
+std::size_t Elimination::size() const { return factors_->size(); }
+
+std::vector<double> Elimination::solve(std::span<const double> rhs) const {
+  const Factors& f = *factors_;
+  f.check_right_side(rhs);
+  std::vector<double> x(rhs.begin(), rhs.end());
+  const auto dot = [&x](const double* row, std::size_t from, std::size_t to) {
+    const auto count = static_cast<Index>(to - from);
+    return ConstVector(row + from, count).dot(ConstVector(x.data() + from, count));
+  };
+  for (std::size_t i = x.size(); i-- > 0;) x[i] += dot(f.row(i), i + 1, f.high[i] + 1);
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = (x[i] + dot(f.row(i), f.low[i], i)) / f.exit[i];
+  return checked(std::move(x));
+}
+
+std::vector<double> Elimination::solve_left(std::span<const double> rhs) const {
+  const Factors& f = *factors_;
+  f.check_right_side(rhs);
+  std::vector<double> y(rhs.begin(), rhs.end());
+  for (std::size_t i = y.size(); i-- > 0;) {
+    y[i] /= f.exit[i];
+    add_multiple(y.data(), y[i], f.row(i), f.low[i], i);
+  }
+  for (std::size_t i = 0; i < y.size(); ++i) add_multiple(y.data(), y[i], f.row(i), i + 1, f.high[i] + 1);
+  return checked(std::move(y));
+}
+
+}  // namespace metastable::markov

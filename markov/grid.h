@@ -1,0 +1,37 @@
+#pragma once
+// Cells on the state axis.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace metastable::markov {
+
+/// Cells [edge_i, edge_{i+1}) for one phase. States above the last edge count into the last cell, states below the
+/// first (rounding only: survivors lie above it) into the first.
+class Grid {
+ public:
+  /// @param edges strictly ascending, at least 2. @throws std::invalid_argument otherwise.
+  explicit Grid(std::vector<double> edges);
+  /// n equal cells.
+  static Grid uniform(double lower, double upper, std::size_t cells);
+
+  std::size_t cells() const { return edges_.size() - 1; }
+  double lower(std::size_t cell) const { return edges_[cell]; }
+  double width(std::size_t cell) const { return edges_[cell + 1] - edges_[cell]; }
+  double midpoint(std::size_t cell) const { return 0.5 * (edges_[cell] + edges_[cell + 1]); }
+  std::span<const double> edges() const { return edges_; }
+  /// Cell of a state: a table look-up and a short scan, O(1).
+  std::uint32_t cell(double state) const;
+
+  /// Every cell split in two at its midpoint.
+  Grid halved() const;
+
+ private:
+  std::vector<double> edges_;
+  std::vector<std::uint32_t> table_;
+  double table_scale_ = 0;
+};
+
+}  // namespace metastable::markov

@@ -1,0 +1,17 @@
+#pragma once
+// Splitting independent work over threads. Results must not depend on which thread does what.
+
+#include <cstddef>
+#include <functional>
+
+namespace metastable::markov {
+
+/// Number of threads to use when `requested` is 0: the machine's hardware concurrency, at least 1.
+int thread_count(int requested);
+
+/// Calls work(i) once for every i in [0, count) on `threads` threads (0: as many as the machine has).
+/// The first exception thrown by a call is rethrown here after all threads have stopped; calls not yet
+/// started are then skipped.
+void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& work);
+
+}  // namespace metastable::markov

@@ -1,0 +1,174 @@
+#pragma once
+// The only thing markov/ knows of the world: a stochastic return map.
+
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace metastable::markov {
+
+/// Landing value that stands for "came to rest" wherever landings are written into arrays.
+inline constexpr double rest_landing = -std::numeric_limits<double>::infinity();
+
+/// A stochastic return map: from the state just before one event to the state just before the next.
+///
+/// States are real numbers (for a wheel: omega^2 [rad^2/s^2] just before a collision).
+/// Phases count 0 .. phases()-1; the event at phase p is followed by the event at phase (p + 1) % phases().
+/// Noise is a vector of noise_dimension() independent standard normal scores. A score keeps both tails of
+/// its probability exact: its quantile level is Phi(z) and the complement Phi(-z).
+///
+///   state_interval(phase)          {lowest, highest} state a survivor can have before the event at `phase`;
+///                                  highest may be +infinity (then the grid finds its own upper edge)
+///   landing(state, phase, noise)   the next state, or nothing when the system comes to rest
+///
+/// Members used when present (see AnyReturnMap for their meaning): rest_probability, landing_range,
+/// tabulate, duration, advance, assumptions, violates.
+template <class M>
+concept ReturnMap = requires(const M& map, double state, int phase, std::span<const double> noise) {
+  { map.state_interval(phase) } -> std::convertible_to<std::pair<double, double>>;
+  { map.phases() } -> std::convertible_to<int>;
+  { map.noise_dimension() } -> std::convertible_to<int>;
+  { map.landing(state, phase, noise) } -> std::convertible_to<std::optional<double>>;
+};
+
+/// Many draws of the noise at one phase, ready to be applied to any state.
+class NoiseTable {
+ public:
+  virtual ~NoiseTable() = default;
+  /// next[k] = landing of state origin + width * offset[k] under draw first + k, for k < next.size();
+  /// rest_landing where the system comes to rest. offset.size() == next.size().
+  virtual void land(double origin, double width, std::span<const double> offset, std::size_t first,
+                    std::span<double> next) const = 0;
+};
+
+/// Any return map, held by shared pointer; cheap to copy, immutable, safe to share between threads.
+class AnyReturnMap {
+ public:
+  template <ReturnMap M>
+  AnyReturnMap(M map) : self_(std::make_shared<Model<M>>(std::move(map))) {}  // NOLINT(google-explicit-constructor)
+
+  std::pair<double, double> state_interval(int phase) const { return self_->state_interval(phase); }
+  int phases() const { return self_->phases(); }
+  int noise_dimension() const { return self_->noise_dimension(); }
+  std::optional<double> landing(double state, int phase, std::span<const double> noise) const {
+    return self_->landing(state, phase, noise);
+  }
+  /// Exact probability of coming to rest from `state` (relative accuracy, tails included); nothing if unknown.
+  std::optional<double> rest_probability(double state, int phase) const { return self_->rest_probability(state, phase); }
+  /// {infimum, supremum} of the landing over the whole support of the noise; the infimum is rest_landing
+  /// when rest is possible, the supremum is rest_landing when it is certain. Nothing if unknown.
+  std::optional<std::pair<double, double>> landing_range(double state, int phase) const {
+    return self_->landing_range(state, phase);
+  }
+  /// Draws prepared for repeated use; noise is row-major, one row of noise_dimension() scores a draw.
+  std::unique_ptr<NoiseTable> tabulate(int phase, std::span<const double> noise) const {
+    return self_->tabulate(phase, noise);
+  }
+  /// Time [s] between the event at `phase` and the next one, given the next event's state; nothing if unknown.
+  std::optional<double> duration(double next_state, int phase) const { return self_->duration(next_state, phase); }
+  /// Distance [m] from the event at `phase` to the next one; nothing if unknown.
+  std::optional<double> advance(int phase) const { return self_->advance(phase); }
+  /// Names of the modelling assumptions that single events may violate.
+  std::vector<std::string> assumptions() const { return self_->assumptions(); }
+  /// Whether assumption number `which` is violated by the event in which `state` meets `noise` at `phase`.
+  bool violates(int which, double state, int phase, std::span<const double> noise) const {
+    return self_->violates(which, state, phase, noise);
+  }
+
+ private:
+  struct Base {
+    virtual ~Base() = default;
+    virtual std::pair<double, double> state_interval(int phase) const = 0;
+    virtual int phases() const = 0;
+    virtual int noise_dimension() const = 0;
+    virtual std::optional<double> landing(double, int, std::span<const double>) const = 0;
+    virtual std::optional<double> rest_probability(double, int) const = 0;
+    virtual std::optional<std::pair<double, double>> landing_range(double, int) const = 0;
+    virtual std::unique_ptr<NoiseTable> tabulate(int, std::span<const double>) const = 0;
+    virtual std::optional<double> duration(double, int) const = 0;
+    virtual std::optional<double> advance(int) const = 0;
+    virtual std::vector<std::string> assumptions() const = 0;
+    virtual bool violates(int, double, int, std::span<const double>) const = 0;
+  };
+
+  // Draw by draw through landing(): serves every map that has no faster way.
+  template <class M>
+  struct PlainTable final : NoiseTable {
+    PlainTable(const M& m, int p, std::span<const double> n) : map(m), phase(p), noise(n.begin(), n.end()) {}
+    void land(double origin, double width, std::span<const double> offset, std::size_t first,
+              std::span<double> next) const override {
+      const auto dimension = static_cast<std::size_t>(map.noise_dimension());
+      for (std::size_t k = 0; k < next.size(); ++k) {
+        const std::span<const double> row(noise.data() + (first + k) * dimension, dimension);
+        const std::optional<double> landed = map.landing(origin + width * offset[k], phase, row);
+        next[k] = landed.value_or(rest_landing);
+      }
+    }
+    const M& map;
+    int phase;
+    std::vector<double> noise;
+  };
+
+  template <class Table>
+  struct OwnTable final : NoiseTable {
+    explicit OwnTable(Table t) : table(std::move(t)) {}
+    void land(double origin, double width, std::span<const double> offset, std::size_t first,
+              std::span<double> next) const override {
+      table.land(origin, width, offset, first, next);
+    }
+    Table table;
+  };
+
+  template <class M>
+  struct Model final : Base {
+    explicit Model(M m) : map(std::move(m)) {}
+    std::pair<double, double> state_interval(int phase) const override { return map.state_interval(phase); }
+    int phases() const override { return map.phases(); }
+    int noise_dimension() const override { return map.noise_dimension(); }
+    std::optional<double> landing(double state, int phase, std::span<const double> noise) const override {
+      return map.landing(state, phase, noise);
+    }
+    std::optional<double> rest_probability(double state, int phase) const override {
+      if constexpr (requires { map.rest_probability(state, phase); }) return map.rest_probability(state, phase);
+      else return std::nullopt;
+    }
+    std::optional<std::pair<double, double>> landing_range(double state, int phase) const override {
+      if constexpr (requires { map.landing_range(state, phase); }) return map.landing_range(state, phase);
+      else return std::nullopt;
+    }
+    std::unique_ptr<NoiseTable> tabulate(int phase, std::span<const double> noise) const override {
+      if constexpr (requires { map.tabulate(phase, noise); })
+        return std::make_unique<OwnTable<decltype(map.tabulate(phase, noise))>>(map.tabulate(phase, noise));
+      else
+        return std::make_unique<PlainTable<M>>(map, phase, noise);
+    }
+    std::optional<double> duration(double next_state, int phase) const override {
+      if constexpr (requires { map.duration(next_state, phase); }) return map.duration(next_state, phase);
+      else return std::nullopt;
+    }
+    std::optional<double> advance(int phase) const override {
+      if constexpr (requires { map.advance(phase); }) return map.advance(phase);
+      else return std::nullopt;
+    }
+    std::vector<std::string> assumptions() const override {
+      if constexpr (requires { map.assumptions(); }) return map.assumptions();
+      else return {};
+    }
+    bool violates(int which, double state, int phase, std::span<const double> noise) const override {
+      if constexpr (requires { map.violates(which, state, phase, noise); })
+        return map.violates(which, state, phase, noise);
+      else return false;
+    }
+    M map;
+  };
+
+  std::shared_ptr<const Base> self_;
+};
+
+}  // namespace metastable::markov

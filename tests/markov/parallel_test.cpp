@@ -1,0 +1,36 @@
+#include "markov/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <vector>
+
+namespace metastable::markov {
+namespace {
+
+TEST(Parallel, EveryIndexIsCalledOnce) {
+  for (const int threads : {1, 2, 7}) {
+    std::vector<std::atomic<int>> calls(1000);
+    parallel_for(calls.size(), threads, [&](std::size_t i) { ++calls[i]; });
+    for (const auto& count : calls) EXPECT_EQ(count.load(), 1);
+  }
+  parallel_for(0, 2, [](std::size_t) { FAIL(); });
+}
+
+TEST(Parallel, AnExceptionComesBackToTheCaller) {
+  for (const int threads : {1, 3})
+    EXPECT_THROW(parallel_for(100, threads,
+                              [](std::size_t i) {
+                                if (i == 17) throw std::runtime_error("seventeen");
+                              }),
+                 std::runtime_error);
+}
+
+TEST(Parallel, ThreadCountIsAtLeastOne) {
+  EXPECT_EQ(thread_count(3), 3);
+  EXPECT_GE(thread_count(0), 1);
+}
+
+}  // namespace
+}  // namespace metastable::markov
