@@ -1,0 +1,83 @@
+#include "analysis/experiment_folder.h"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+std::string_view outcome_name(dynamics::Outcome outcome) {
+  switch (outcome) {
+    case dynamics::Outcome::rest: return "rest";
+    case dynamics::Outcome::end_of_ramp: return "end_of_ramp";
+    case dynamics::Outcome::max_collisions: return "max_collisions";
+  }
+  throw std::logic_error("unknown outcome");
+}
+
+std::string toml_text(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+std::string toml_spread(const Spread& spread) { return fmt::format("{{ mean = {}, sd = {} }}", spread.mean, spread.sd); }
+
+}  // namespace
+
+std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const SimulationOptions& options) {
+  if (options.trials < 1 || options.trials > 1000000)
+    throw std::invalid_argument(fmt::format("trials: {} is outside 1..1000000", options.trials));
+  if (options.collisions < 1 || options.collisions > 100000)
+    throw std::invalid_argument(fmt::format("collisions: {} is outside 1..100000", options.collisions));
+  const dynamics::WheelMap map = setting.map();
+  const dynamics::TruncatedNormal launch = setting.launch();
+  const dynamics::TrialOptions trial{.first_landing_leg = setting.first_landing_leg,
+                                     .max_collisions = options.collisions,
+                                     .ramp_length = setting.ramp_length,
+                                     .seed = options.seed};
+  std::vector<dynamics::Trial> trials(static_cast<std::size_t>(options.trials));
+  markov::parallel_for(trials.size(), options.threads,
+                       [&](std::size_t t) { trials[t] = dynamics::simulate_trial(map, launch, trial, t); });
+  return trials;
+}
+
+ExperimentFiles experiment_files(const Setting& setting, const std::vector<dynamics::Trial>& trials,
+                                 const std::string& title, const std::vector<std::string>& comment) {
+  const std::string condition = fmt::format("{}", setting.slope_deg);
+  ExperimentFiles files;
+  std::string& toml = files.experiment_toml;
+  for (const std::string& line : comment) toml += "# " + line + "\n";
+  toml += fmt::format("title = {}\n\n[wheel]\nhub_mass_kg = {}\nleg_lengths_m = [", toml_text(title),
+                      setting.wheel.hub_mass);
+  for (std::size_t i = 0; i < setting.wheel.leg_length.size(); ++i)
+    toml += fmt::format("{}{}", i == 0 ? "" : ", ", setting.wheel.leg_length[i]);
+  toml += "]\n";
+  if (setting.wheel.inertia) toml += fmt::format("inertia_kg_m2 = {}\n", *setting.wheel.inertia);
+  if (setting.law != dynamics::Law::published)
+    toml += fmt::format("radius_of_gyration_m = {}\n",
+                        dynamics::contact_model(setting.wheel, setting.law).radius_of_gyration);
+  toml += fmt::format("\n[contact]\nlaw = \"{}\"\nrestitution = {}\nfriction = {}\n", dynamics::law_name(setting.law),
+                      toml_spread(setting.restitution), toml_spread(setting.friction));
+  toml += fmt::format(
+      "\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\ninitial_speed_rad_s = {}\nfirst_landing_leg = {}\n",
+      condition, setting.slope_deg, setting.ramp_length, toml_spread(setting.initial_speed), setting.first_landing_leg);
+
+  files.collisions_csv = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
+  files.trials_csv = "condition,trial,outcome\n";
+  for (std::size_t t = 0; t < trials.size(); ++t) {
+    for (const dynamics::TrialCollision& c : trials[t].collisions)
+      files.collisions_csv += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", condition, t + 1, c.number, c.leg,
+                                          c.time, c.position, c.omega_minus, c.omega_plus);
+    files.trials_csv += fmt::format("{},{},{}\n", condition, t + 1, outcome_name(trials[t].outcome));
+  }
+  return files;
+}
+
+}  // namespace metastable::analysis

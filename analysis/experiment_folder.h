@@ -1,0 +1,33 @@
+#pragma once
+// Simulated trials as an experiment folder (experiment.toml, collisions.csv, trials.csv).
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "analysis/setting.h"
+#include "dynamics/trials.h"
+
+namespace metastable::analysis {
+
+struct SimulationOptions {
+  int trials = 50;       ///< 1 .. 1000000
+  int collisions = 16;   ///< most collisions of a trial, 1 .. 100000
+  std::uint64_t seed = 1;
+  int threads = 0;       ///< the same bits on any number
+};
+
+/// Trials 0 .. trials-1 under `setting`. @throws std::invalid_argument naming the option and its range
+std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const SimulationOptions& options);
+
+/// The three files of an experiment folder with one condition, as text. Speeds in rad/s, lengths in m, times in s.
+struct ExperimentFiles {
+  std::string experiment_toml;
+  std::string collisions_csv;
+  std::string trials_csv;
+};
+/// @param title, comment  of experiment.toml; the comment's lines come first, each behind "# "
+ExperimentFiles experiment_files(const Setting& setting, const std::vector<dynamics::Trial>& trials,
+                                 const std::string& title, const std::vector<std::string>& comment);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,301 @@
+#include "analysis/metastability.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include "analysis/chain_summary.h"
+#include "analysis/rest_reachability.h"
+#include "markov/chain_pool.h"
+#include "markov/discretization.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr std::size_t pilot_cells = 96;
+constexpr std::size_t pilot_samples = 4096;
+constexpr std::size_t first_cells = 128;
+constexpr std::size_t first_samples = 4096;
+constexpr int sizes = 3;  // cell sizes a ladder holds: cells, cells / 2, cells / 4
+
+markov::DrawOptions draw_options(const StudyOptions& options, std::size_t samples, int replicate) {
+  return {.count = samples,
+          .seed = options.seed,
+          .replicate = static_cast<std::uint32_t>(replicate),
+          .sequence = options.sequence,
+          .weighting = options.weighting,
+          .tail = options.tail};
+}
+
+// Nested cells for the whole range, coarsest first.
+std::vector<markov::StateSpace> nested(markov::StateSpace coarsest) {
+  std::vector<markov::StateSpace> spaces{std::move(coarsest)};
+  while (spaces.size() < sizes) spaces.push_back(spaces.back().halved());
+  return spaces;
+}
+
+// Everything sampled at one resolution: the chain of all replicates' draws per cell size, and each replicate's answer.
+struct Ladder {
+  std::vector<markov::StateSpace> spaces;
+  std::vector<markov::SampledChain> pooled;  // per cell size, coarsest first
+  std::vector<ExpectedSteps> replicate;      // at the finest size; empty when rest is not reached
+  bool rest_resolved = true;
+};
+
+class Study {
+ public:
+  Study(const Problem& problem, const StudyOptions& options) : problem_(problem), options_(options) {}
+
+  Metastability run() {
+    const RestReachability reach = rest_reachability(problem_);
+    Metastability result = reach.certain ? finite() : infinite_case();
+    result.safe_state = reach.safe_state;
+    return result;
+  }
+
+ private:
+  Metastability finite() {
+    for (;;) {
+      const std::optional<Pilot> pilot = solve_pilot();
+      if (pilot) {
+        std::optional<Metastability> result = refine(*pilot);
+        if (result) return *std::move(result);
+      }
+      // Rest is possible, but no draw came to it: look deeper into the tails, as far as doubles go.
+      if (options_.weighting == markov::Weighting::plain || options_.tail <= 1e-300) return unresolved();
+      options_.tail = std::max(1e-300, options_.tail * options_.tail * options_.tail);
+    }
+  }
+
+  struct Pilot {
+    markov::StateSpace space;
+    std::vector<double> nu, h, after;
+  };
+
+  std::optional<Pilot> solve_pilot() {
+    tell(0, "pilot");
+    for (double reach = 1.2;; reach *= reach > 3 ? 10 : 1.5) {
+      markov::StateSpace space =
+          markov::covering_space(problem_.map, problem_.launch, pilot_cells, options_.seed, reach);
+      const markov::SampledChain sampled = markov::discretize(
+          problem_.map, space, problem_.launch, {.draws = draw_options(options_, pilot_samples, 0), .threads = options_.threads});
+      if (!rests(sampled)) return std::nullopt;
+      const markov::ChainSolver solver(sampled.chain);
+      const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
+      if (markov::top_share(space, quasi.distribution) < 1e-10 || reach > 1e6)
+        return Pilot{std::move(space), quasi.distribution, quasi.survival_weight, sampled.launch.after};
+    }
+  }
+
+  static bool rests(const markov::SampledChain& sampled) {
+    const markov::Reachability reach = markov::classify(sampled.chain);
+    return std::all_of(reach.must_rest.begin(), reach.must_rest.end(), [](auto yes) { return yes != 0; });
+  }
+
+  // All replicates at one resolution, in batches of as many as there are threads; sums run in replicate order.
+  Ladder climb(const Pilot& pilot, std::size_t cells, std::size_t samples, double work_before, double work_after) {
+    Ladder ladder{nested(markov::graded_space(pilot.space, pilot.nu, pilot.h, pilot.after, cells >> (sizes - 1))), {}, {}};
+    std::vector<markov::ChainPool> pools(sizes);
+    const auto replicates = static_cast<std::size_t>(options_.replicates);
+    const auto threads = static_cast<std::size_t>(markov::thread_count(options_.threads));
+    const std::size_t batch = std::min(threads, replicates);
+    const int inner = static_cast<int>(std::max<std::size_t>(1, threads / batch));
+    std::vector<ExpectedSteps> steps(replicates);
+    for (std::size_t first = 0; first < replicates; first += batch) {
+      tell(work_before + (work_after - work_before) * static_cast<double>(first) / static_cast<double>(replicates),
+           fmt::format("{} cells, {} samples", cells, samples));
+      const std::size_t count = std::min(batch, replicates - first);
+      std::vector<std::vector<markov::SampledChain>> chains(count);
+      parallel(count, [&](std::size_t k) {
+        const auto draws = draw_options(options_, samples, static_cast<int>(first + k));
+        for (const markov::StateSpace& space : ladder.spaces)
+          chains[k].push_back(markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = inner}));
+        if (rests(chains[k].back())) {
+          steps[first + k] = expected_steps(problem_.map, ladder.spaces.back(), chains[k].back(), {draws});
+        } else {
+          steps[first + k].from_start = infinite;
+        }
+      });
+      for (std::vector<markov::SampledChain>& one : chains)
+        for (std::size_t s = 0; s < sizes; ++s) pools[s].add(one[s]);
+    }
+    for (const markov::ChainPool& pool : pools) {
+      ladder.pooled.push_back(pool.mean());
+      ladder.rest_resolved = ladder.rest_resolved && rests(ladder.pooled.back());
+    }
+    for (const ExpectedSteps& one : steps) ladder.rest_resolved = ladder.rest_resolved && std::isfinite(one.from_start);
+    ladder.replicate = std::move(steps);
+    return ladder;
+  }
+
+  std::optional<Metastability> refine(const Pilot& pilot) {
+    const bool free_cells = options_.cells == 0, free_samples = options_.samples == 0;
+    std::size_t cells = free_cells ? first_cells : (options_.cells + 3) / 4 * 4;
+    std::size_t samples = free_samples ? first_samples : options_.samples;
+    const std::size_t most_cells = problem_.map.phases() > 1 ? options_.largest_cells / 2 : options_.largest_cells;
+    for (double done = 0;;) {
+      const double next = free_cells || free_samples ? done + 0.5 * (1 - done) : 0.95;
+      const Ladder ladder = climb(pilot, cells, samples, done, next);
+      done = next;
+      if (!ladder.rest_resolved) return std::nullopt;
+      Metastability result = assess(ladder, cells, samples);
+      const bool met = result.discretization_error + result.sampling_error <= options_.tolerance;
+      bool refined = false;
+      if (!met && free_cells && result.discretization_error > options_.tolerance / 3 && cells < most_cells) {
+        cells *= 2;
+        refined = true;
+      }
+      if (!met && free_samples && result.sampling_error > options_.tolerance / 2 && samples < options_.largest_samples) {
+        samples *= 4;
+        refined = true;
+      }
+      if (refined) continue;
+      if (met) {
+        result.status = Status::converged;
+      } else if (!free_cells && !free_samples) {
+        result.status = Status::fixed_resolution;
+      } else {
+        result.status = Status::tolerance_not_met;
+        result.message = fmt::format(
+            "tolerance {} not met: the interval's half-width is {:.2g} (discretization {:.2g}, sampling {:.2g}) at {} "
+            "cells and {} samples",
+            options_.tolerance, result.discretization_error + result.sampling_error, result.discretization_error,
+            result.sampling_error, cells, samples);
+      }
+      tell(0.96, "summary");
+      summarize(problem_, ladder.spaces.back(), ladder.pooled.back(), options_, result);
+      return result;
+    }
+  }
+
+  // Expected steps with their errors from the ladder.
+  Metastability assess(const Ladder& ladder, std::size_t cells, std::size_t samples) const {
+    std::vector<markov::DrawOptions> draws;
+    for (int r = 0; r < options_.replicates; ++r) draws.push_back(draw_options(options_, samples, r));
+    std::vector<ExpectedSteps> pooled;
+    for (std::size_t s = 0; s < sizes; ++s)
+      pooled.push_back(expected_steps(problem_.map, ladder.spaces[s], ladder.pooled[s], draws));
+
+    Metastability result;
+    result.cells = cells;
+    result.samples = samples;
+    result.replicates = options_.replicates;
+    const auto estimate = [&](double ExpectedSteps::* which, double& discretization, double& sampling) {
+      std::vector<double> log_replicate;
+      for (const ExpectedSteps& one : ladder.replicate) log_replicate.push_back(std::log(one.*which));
+      const double fine = std::log(pooled[2].*which), middle = std::log(pooled[1].*which),
+                   coarse = std::log(pooled[0].*which);
+      const double extrapolated = fine + (fine - middle) / 3, before = middle + (middle - coarse) / 3;
+      discretization = std::abs(extrapolated - before);
+      sampling = t_half_width(log_replicate);
+      const double half = discretization + sampling;
+      return Estimate{std::exp(extrapolated), std::exp(extrapolated - half), std::exp(extrapolated + half)};
+    };
+    double unused_d = 0, unused_s = 0;
+    result.from_start = estimate(&ExpectedSteps::from_start, result.discretization_error, result.sampling_error);
+    result.from_quasi_stationary = estimate(&ExpectedSteps::from_quasi_stationary, unused_d, unused_s);
+    result.worst_start = estimate(&ExpectedSteps::worst_start, unused_d, unused_s);
+    const Estimate& quasi = result.from_quasi_stationary;
+    result.failure_rate = {1 / quasi.value, 1 / quasi.upper, 1 / quasi.lower};
+    for (const ExpectedSteps& one : ladder.replicate) result.replicate_log_steps.push_back(std::log(one.from_start));
+    return result;
+  }
+
+  static double t_half_width(const std::vector<double>& sample) {
+    const auto n = static_cast<double>(sample.size());
+    const double mean = std::accumulate(sample.begin(), sample.end(), 0.0) / n;
+    double square = 0;
+    for (const double x : sample) square += (x - mean) * (x - mean);
+    const boost::math::students_t t(n - 1);
+    return boost::math::quantile(t, 0.975) * std::sqrt(square / (n - 1) / n);
+  }
+
+  // Rest is out of reach for some launches: no first passage, but a stationary regime.
+  Metastability infinite_case() {
+    Metastability result;
+    result.status = Status::rest_unreachable;
+    result.message = status_text(Status::rest_unreachable);
+    result.cells = options_.cells == 0 ? 4 * first_cells : options_.cells;
+    result.samples = options_.samples == 0 ? 4 * first_samples : options_.samples;
+    result.replicates = 1;
+    tell(0.1, "stationary distribution");
+    const markov::StateSpace space =
+        markov::covering_space(problem_.map, problem_.launch, result.cells, options_.seed);
+    const markov::SampledChain sampled =
+        markov::discretize(problem_.map, space, problem_.launch,
+                           {.draws = draw_options(options_, result.samples, 0), .threads = options_.threads});
+    tell(0.7, "summary");
+    summarize_endless(problem_, space, sampled, options_, result);
+    return result;
+  }
+
+  Metastability unresolved() const {
+    Metastability result;
+    result.status = Status::rest_unresolved;
+    result.samples = options_.samples == 0 ? first_samples : options_.samples;
+    result.cells = options_.cells == 0 ? first_cells : options_.cells;
+    result.replicates = options_.replicates;
+    result.phases = problem_.map.phases();
+    result.message = options_.weighting == markov::Weighting::plain
+                         ? "rest is possible, but no plain draw came to it: use weighted draws"
+                         : "rest is possible, but only by noise beyond probabilities of 1e-300";
+    result.from_start = result.from_quasi_stationary = result.worst_start = {infinite, 1.0, infinite};
+    result.failure_rate = {0, 0, 1};
+    result.sampling_error = infinite;
+    return result;
+  }
+
+  void parallel(std::size_t count, const std::function<void(std::size_t)>& work) const {
+    markov::parallel_for(count, options_.threads, work);
+  }
+  void tell(double done, const std::string& what) const {
+    if (options_.progress) options_.progress(done, what);
+  }
+
+  const Problem& problem_;
+  StudyOptions options_;
+};
+
+}  // namespace
+
+void StudyOptions::validate() const {
+  if (cells != 0 && (cells < 8 || cells > 4096))
+    throw std::invalid_argument(fmt::format("cells: {} is outside 8..4096", cells));
+  if (samples != 0 && (samples < 16 || samples > (1u << 24)))
+    throw std::invalid_argument(fmt::format("samples: {} is outside 16..{}", samples, 1u << 24));
+  if (!(tolerance > 0 && tolerance < 1))
+    throw std::invalid_argument(fmt::format("tolerance: {} is outside (0, 1)", tolerance));
+  if (threads < 0 || threads > 1024) throw std::invalid_argument(fmt::format("threads: {} is outside 0..1024", threads));
+  if (replicates < 2 || replicates > 64)
+    throw std::invalid_argument(fmt::format("replicates: {} is outside 2..64", replicates));
+  if (!(tail >= 1e-300 && tail <= 1e-3)) throw std::invalid_argument(fmt::format("tail: {} is outside [1e-300, 1e-3]", tail));
+  if (!(mixing_distance > 0 && mixing_distance < 1))
+    throw std::invalid_argument(fmt::format("mixing distance: {} is outside (0, 1)", mixing_distance));
+  if (eigenvalues < 1 || eigenvalues > 64)
+    throw std::invalid_argument(fmt::format("eigenvalues: {} is outside 1..64", eigenvalues));
+}
+
+Metastability study(const Problem& problem, const StudyOptions& options) {
+  options.validate();
+  return Study(problem, options).run();
+}
+
+std::string status_text(Status status) {
+  switch (status) {
+    case Status::converged: return "converged";
+    case Status::tolerance_not_met: return "tolerance not met";
+    case Status::fixed_resolution: return "fixed resolution";
+    case Status::rest_unreachable: return "infinite: rest is unreachable";
+    case Status::rest_unresolved: return "rest not resolved";
+  }
+  throw std::logic_error("unknown status");
+}
+
+}  // namespace metastable::analysis

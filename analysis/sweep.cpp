@@ -1,0 +1,96 @@
+#include "analysis/sweep.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::array<std::pair<Parameter, std::string_view>, 5> names = {{
+    {Parameter::slope, "slope"},
+    {Parameter::restitution_mean, "restitution-mean"},
+    {Parameter::restitution_sd, "restitution-sd"},
+    {Parameter::friction_mean, "friction-mean"},
+    {Parameter::friction_sd, "friction-sd"},
+}};
+
+void set(Setting& setting, Parameter parameter, double value) {
+  switch (parameter) {
+    case Parameter::slope: setting.slope_deg = value; return;
+    case Parameter::restitution_mean: setting.restitution.mean = value; return;
+    case Parameter::restitution_sd: setting.restitution.sd = value; return;
+    case Parameter::friction_mean: setting.friction.mean = value; return;
+    case Parameter::friction_sd: setting.friction.sd = value; return;
+  }
+}
+
+}  // namespace
+
+Parameter parameter_from_name(std::string_view name) {
+  for (const auto& [parameter, known] : names)
+    if (known == name) return parameter;
+  throw std::invalid_argument(fmt::format(
+      "sweep parameter: '{}' is none of slope, restitution-mean, restitution-sd, friction-mean, friction-sd", name));
+}
+
+std::string_view parameter_name(Parameter parameter) {
+  return std::find_if(names.begin(), names.end(), [&](const auto& entry) { return entry.first == parameter; })->second;
+}
+
+std::string_view parameter_unit(Parameter parameter) { return parameter == Parameter::slope ? "deg" : "1"; }
+
+std::vector<double> axis_values(double first, double last, double step) {
+  if (!(step > 0) || !(last >= first) || !std::isfinite(first) || !std::isfinite(last))
+    throw std::invalid_argument(fmt::format("range {}:{}:{}: needs first <= last and step > 0", first, last, step));
+  const double count = std::floor((last - first) / step + 1e-3);
+  if (count >= 100000) throw std::invalid_argument(fmt::format("range {}:{}:{}: more than 100000 values", first, last, step));
+  std::vector<double> values;
+  // Rounded to the decimals a reader typed, so that 5:12:0.25 gives 5.25 and not 5.2500000000000004.
+  for (double i = 0; i <= count; ++i) values.push_back(std::stod(fmt::format("{:.12g}", first + i * step)));
+  return values;
+}
+
+std::size_t sweep_size(const std::vector<Axis>& axes) {
+  std::size_t size = 1;
+  for (const Axis& axis : axes) size *= axis.values.size();
+  return size;
+}
+
+Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::size_t index, std::vector<double>* at) {
+  Setting setting = base;
+  std::vector<double> place(axes.size());
+  for (std::size_t a = axes.size(); a-- > 0;) {
+    place[a] = axes[a].values[index % axes[a].values.size()];
+    index /= axes[a].values.size();
+    set(setting, axes[a].parameter, place[a]);
+  }
+  if (at != nullptr) *at = std::move(place);
+  return setting;
+}
+
+void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
+           const std::function<void(std::size_t, const SweepPoint&)>& done) {
+  const std::size_t size = sweep_size(axes);
+  const auto batch = static_cast<std::size_t>(markov::thread_count(options.threads));
+  StudyOptions single = options;
+  single.threads = 1;
+  single.progress = nullptr;
+  for (std::size_t first = begin; first < size; first += batch) {
+    const std::size_t count = std::min(batch, size - first);
+    std::vector<SweepPoint> points(count);
+    markov::parallel_for(count, options.threads, [&](std::size_t k) {
+      const Setting setting = sweep_setting(base, axes, first + k, &points[k].at);
+      points[k].study = study(setting.problem(), single);
+    });
+    for (std::size_t k = 0; k < count; ++k) done(first + k, points[k]);
+  }
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,50 @@
+#pragma once
+// Expected steps over a grid of settings.
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "analysis/metastability.h"
+#include "analysis/setting.h"
+
+namespace metastable::analysis {
+
+/// What a sweep may vary.
+enum class Parameter { slope, restitution_mean, restitution_sd, friction_mean, friction_sd };
+
+/// "slope", "restitution-mean", ... @throws std::invalid_argument naming them all
+Parameter parameter_from_name(std::string_view name);
+std::string_view parameter_name(Parameter parameter);
+std::string_view parameter_unit(Parameter parameter);  ///< "deg" or "1"
+
+struct Axis {
+  Parameter parameter = Parameter::slope;
+  std::vector<double> values;  ///< ascending, not empty
+};
+
+/// Values first, first + step, ..., up to last (with a rounding allowance of a thousandth of a step).
+/// @throws std::invalid_argument for step <= 0, last < first or more than 100000 values
+std::vector<double> axis_values(double first, double last, double step);
+
+/// One point of a sweep.
+struct SweepPoint {
+  std::vector<double> at;  ///< one value per axis
+  Metastability study;
+};
+
+/// Number of points of the product of the axes.
+std::size_t sweep_size(const std::vector<Axis>& axes);
+
+/// The setting of point `index` (last axis fastest) and its coordinates.
+/// A launch that depends on the slope comes from `base`: sweeps keep base.initial_speed.
+Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::size_t index, std::vector<double>* at = nullptr);
+
+/// Studies points begin .. end-1 in order, calling done(index, point) after each (from this thread); done may throw.
+/// Points run side by side on the options' threads, each single-threaded: the numbers do not depend on that.
+void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
+           const std::function<void(std::size_t, const SweepPoint&)>& done);
+
+}  // namespace metastable::analysis
