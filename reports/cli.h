@@ -1,0 +1,10 @@
+#pragma once
+// The command line: parses, calls, and turns failures into exit codes.
+
+namespace metastable::reports {
+
+/// Exit codes: 0 done; 2 wrong option, key, value or file (one line on standard error); 3 a solver failed; 1 anything
+/// else; 130 or 143 interrupted.
+int run(int argc, const char* const* argv);
+
+}  // namespace metastable::reports

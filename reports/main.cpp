@@ -1,0 +1,3 @@
+#include "reports/cli.h"
+
+int main(int argc, char** argv) { return metastable::reports::run(argc, argv); }

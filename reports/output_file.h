@@ -1,0 +1,48 @@
+#pragma once
+// Output files that are either whole or not there.
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+
+namespace metastable::reports {
+
+/// An output that cannot be written; the message names the path and the reason. A user error: exit code 2.
+class OutputError : public std::invalid_argument {
+ public:
+  OutputError(const std::filesystem::path& path, const std::string& reason);
+};
+
+/// A file written under a temporary name beside its target and renamed on commit(). Without commit() the target is
+/// left as it was and the temporary is removed. "-" is standard output, written on commit(). A target that is no
+/// regular file (a pipe, /dev/null) is written directly; a symbolic link is followed.
+class OutputFile {
+ public:
+  /// @throws OutputError if the folder does not exist or cannot be written to: at once, before any long computation.
+  explicit OutputFile(const std::filesystem::path& path);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  /// Where to write. Formatting is independent of the locale.
+  std::ostream& stream();
+  /// @throws OutputError if anything could not be written. Call once; the stream is closed afterwards.
+  void commit();
+
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path target_;     // path_ with symbolic links resolved; empty: standard output
+  std::filesystem::path temporary_;  // empty: nothing to rename or remove
+  std::ofstream file_;
+  std::ostringstream buffer_;  // standard output until commit
+};
+
+/// The whole of `content` into `path` ("-": standard output), or nothing. @throws OutputError
+void write_file(const std::filesystem::path& path, std::string_view content);
+
+/// Creates a folder and its parents where they are missing. @throws OutputError
+void make_folder(const std::filesystem::path& path);
+
+}  // namespace metastable::reports

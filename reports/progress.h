@@ -1,0 +1,44 @@
+#pragma once
+// A progress line for long work.
+
+#include <chrono>
+#include <cstddef>
+#include <iosfwd>
+#include <mutex>
+#include <string>
+
+namespace metastable::reports {
+
+/// True if standard error is a terminal.
+bool stderr_is_terminal();
+
+/// "label  37 % (37 of 100), about 12 s left" on one line of a terminal, redrawn at most ten times a second and wiped
+/// at the end. Writes nothing where there is no terminal. advance() may be called from any thread.
+class Progress {
+ public:
+  /// On standard error. @param total units of work, >= 1
+  Progress(std::string label, std::size_t total);
+  /// On any stream. @param visible false: write nothing
+  Progress(std::string label, std::size_t total, std::ostream& out, bool visible);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// `units` more are done. @throws Interrupted (see interrupt.h)
+  void advance(std::size_t units = 1);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void draw(Clock::time_point now);
+
+  std::mutex mutex_;
+  std::string label_;
+  std::size_t total_;
+  std::size_t done_ = 0;
+  std::ostream& out_;
+  bool visible_;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point last_draw_{};
+};
+
+}  // namespace metastable::reports

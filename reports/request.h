@@ -1,0 +1,59 @@
+#pragma once
+// What the command line asks for, as data: one struct a command.
+
+#include <string>
+#include <vector>
+
+#include "analysis/metastability.h"
+#include "analysis/setting.h"
+#include "analysis/sweep.h"
+
+namespace metastable::reports {
+
+/// metastable steps
+struct StepsRequest {
+  analysis::Setting setting;
+  analysis::StudyOptions study;
+  std::string json;     ///< file, "-" for standard output, "" for none
+  std::string command;  ///< the command line, for provenance
+};
+
+/// metastable compare
+struct CompareRequest {
+  std::vector<analysis::Setting> settings;  ///< one a slope
+  analysis::StudyOptions study;
+  int collisions = 16;  ///< of a measured trial
+  std::string json;
+  std::string command;
+};
+
+/// metastable sweep
+struct SweepRequest {
+  analysis::Setting setting;
+  std::vector<analysis::Axis> axes;
+  analysis::StudyOptions study;
+  std::string out = "sweep.csv";  ///< the figure goes beside it, with the ending .svg
+  std::string command;
+};
+
+/// metastable simulate
+struct SimulateRequest {
+  analysis::Setting setting;
+  int trials = 50;
+  int collisions = 16;
+  std::uint64_t seed = 1;
+  int threads = 0;
+  std::string out;  ///< folder
+  std::string command;
+};
+
+/// metastable report
+struct ReportRequest {
+  std::vector<analysis::Setting> settings;  ///< one a ramp
+  analysis::StudyOptions study;
+  int energy_trials = 1000;  ///< trials behind the energy-loss table
+  std::string out = "report";
+  std::string command;
+};
+
+}  // namespace metastable::reports

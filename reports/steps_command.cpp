@@ -1,0 +1,31 @@
+#include "reports/steps_command.h"
+
+#include <fmt/format.h>
+
+#include "reports/output_file.h"
+#include "reports/study_json.h"
+#include "reports/study_progress.h"
+#include "reports/study_text.h"
+#include "reports/version.h"
+
+namespace metastable::reports {
+
+void run_steps(const StepsRequest& request) {
+  std::optional<OutputFile> json;
+  if (!request.json.empty()) json.emplace(request.json);
+  const analysis::Metastability study = [&] {
+    Progress progress("steps", study_units);
+    analysis::StudyOptions options = request.study;
+    options.progress = study_progress(progress);
+    return analysis::study(request.setting.problem(), options);
+  }();
+  const RestThresholds thresholds = rest_thresholds(request.setting, study);
+  if (json) {
+    const Provenance provenance{request.command, request.setting.describe(), request.study.seed, version()};
+    json->stream() << steps_json(request.setting, study, thresholds, provenance);
+    json->commit();
+  }
+  if (request.json != "-") fmt::print("{}", study_text(request.setting, study, thresholds));
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,31 @@
+#pragma once
+// Results as JSON.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/comparison.h"
+#include "analysis/metastability.h"
+#include "analysis/setting.h"
+#include "reports/table.h"
+
+namespace metastable::reports {
+
+/// What else is known of a setting's rest: thresholds beside its study.
+struct RestThresholds {
+  std::optional<double> safe_speed;      ///< launches at least this fast never come to rest [rad/s]
+  std::optional<double> safe_slope_deg;  ///< steeper ramps have such launches [deg]
+};
+RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis::Metastability& study);
+
+/// The result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as many
+/// digits as a double holds. Keys as in the README ("steps --json").
+std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
+                       const RestThresholds& thresholds, const Provenance& provenance);
+
+/// The result of `compare`: "settings" (each as in steps_json) and "contrasts".
+std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,
+                         const Provenance& provenance);
+
+}  // namespace metastable::reports

@@ -1,0 +1,93 @@
+#include "reports/study_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace metastable::reports {
+namespace {
+
+// Six significant digits, trailing zeros dropped: what a terminal line holds.
+std::string show(double value) { return std::isinf(value) ? "infinite" : fmt::format("{:.6g}", value); }
+
+// As many digits as the interval supports, and one more.
+std::string to_the_digit(double value, double half_width) {
+  const int digits = half_width > 0 ? static_cast<int>(std::ceil(std::log10(std::abs(value) / half_width))) + 2 : 12;
+  return fmt::format("{:.{}g}", value, std::clamp(digits, 3, 12));
+}
+
+std::string line(const std::string& name, const std::string& value) { return fmt::format("  {:<38}{}\n", name, value); }
+
+std::string total_line(const std::string& name, const analysis::Accumulated& total) {
+  return line(name, fmt::format("mean {}, sd {}, median {}, 5 to 95 %: {} to {}", show(total.mean), show(total.sd),
+                                show(total.quantile[2]), show(total.quantile.front()), show(total.quantile.back())));
+}
+
+}  // namespace
+
+std::string estimate_text(const analysis::Estimate& estimate) {
+  if (std::isinf(estimate.value)) return "infinite";
+  const double half = 0.5 * (estimate.upper - estimate.lower);
+  return fmt::format("{} (95 % interval {} to {})", to_the_digit(estimate.value, half),
+                     to_the_digit(estimate.lower, half), to_the_digit(estimate.upper, half));
+}
+
+std::string thresholds_text(const RestThresholds& thresholds) {
+  std::string text = thresholds.safe_speed
+                         ? fmt::format("rest is unreachable for launches of {:.4g} rad/s and faster",
+                                       *thresholds.safe_speed)
+                         : std::string("rest is reachable from every speed");
+  text += thresholds.safe_slope_deg
+              ? fmt::format("; with this contact, rest is reachable from every speed only up to {:.3f} deg",
+                            *thresholds.safe_slope_deg)
+              : std::string("; so it is, with this contact, at every slope");
+  return text;
+}
+
+std::string study_text(const analysis::Setting& setting, const analysis::Metastability& study,
+                       const RestThresholds& thresholds) {
+  const bool endless = study.status == analysis::Status::rest_unreachable;
+  std::string text = setting.describe() + "\n\n";
+  if (study.status == analysis::Status::rest_unresolved) return text + "  " + study.message + "\n";
+  if (endless) {
+    text += line("expected steps before failure", study.message);
+  } else {
+    text += line("expected steps before failure", estimate_text(study.from_start));
+    text += line("  from the metastable regime", estimate_text(study.from_quasi_stationary));
+    text += line("  from the worst start", estimate_text(study.worst_start));
+    text += line("failure rate per step", fmt::format("{:.6g}", study.failure_rate.value));
+    text += total_line("steps", study.steps);
+    if (study.seconds) text += total_line("seconds", *study.seconds);
+    if (study.metres) text += total_line("metres", *study.metres);
+  }
+  if (study.reach_end) text += line(fmt::format("reaches the end of {} m", setting.ramp_length), show(*study.reach_end));
+  text += line(endless ? "stationary speed" : "quasi-stationary speed",
+               fmt::format("{:.4f} rad/s, sd {:.4f}", study.observable_mean, study.observable_sd));
+  if (!endless)
+    text += line("stationary speed, relaunched", fmt::format("{:.4f} rad/s, sd {:.4f}", study.restart_mean, study.restart_sd));
+  std::string moduli;
+  for (const double modulus : study.eigenvalue_moduli) moduli += fmt::format("{}{:.6g}", moduli.empty() ? "" : ", ", modulus);
+  text += line("eigenvalue moduli per step", moduli);
+  std::string mixing = fmt::format("{:.4g} steps (spectral)", study.mixing_steps);
+  if (study.total_variation_steps) mixing += fmt::format(", {} from the launch (total variation)", *study.total_variation_steps);
+  text += line("mixing", mixing);
+  text += "\n";
+  text += line("rest", thresholds_text(thresholds));
+  for (const analysis::Share& share : study.violations)
+    text += line(fmt::format("collisions with '{}'", share.name),
+                 endless ? fmt::format("{:.3g} %", 100 * share.quasi_stationary)
+                         : fmt::format("{:.3g} % in the metastable regime, {:.3g} % until rest",
+                                       100 * share.quasi_stationary, 100 * share.until_rest));
+  text += line("resolution", fmt::format("{} cells x {} legs, {} draws a cell, {} replicates", study.cells, study.phases,
+                                         study.samples, study.replicates));
+  if (!endless) {
+    text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)", study.discretization_error,
+                                               study.sampling_error));
+    text += line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.solver_disagreement));
+    if (!study.message.empty()) text += "\n" + study.message + "\n";
+  }
+  return text;
+}
+
+}  // namespace metastable::reports
