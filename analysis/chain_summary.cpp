@@ -60,8 +60,21 @@ void describe_survivors(const Problem& problem, const markov::StateSpace& space,
   result.observable_sd = all.sd;
 }
 
-// Moduli per step of the eigenvalues of a chain watched once a revolution of `period` steps.
-std::vector<double> moduli_per_step(const markov::Chain& revolution, int period, int count) {
+// Does the noise leave the landings of the launches alone? Then the chain is an orbit smeared over cells: nilpotent but
+// for rounding, without a spectrum beyond lambda_1 that means anything.
+bool noise_free(const Problem& problem) {
+  for (const double score : {-2.0, -1.0, 0.0, 1.0, 2.0}) {
+    const auto range = problem.map.landing_range(problem.launch.state(score), problem.launch.phase);
+    if (!range || range->first != range->second) return false;
+  }
+  return true;
+}
+
+// Moduli per step of the eigenvalues of a chain watched once a revolution of `period` steps; lambda_1's alone for a map
+// without noise.
+std::vector<double> moduli_per_step(const Problem& problem, const markov::Chain& revolution, int period, int count,
+                                    double failure_rate) {
+  if (noise_free(problem)) return {1 - failure_rate};
   std::vector<double> moduli;
   for (const std::complex<double>& value : markov::leading_eigenpairs(revolution, count).values)
     moduli.push_back(std::pow(std::abs(value), 1.0 / period));
@@ -140,7 +153,7 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
   for (std::size_t n = 0; n < shown; ++n) result.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.reach_end = survival.at(*problem.last_event);
 
-  result.eigenvalue_moduli = moduli_per_step(solver.revolution(), result.period, options.eigenvalues);
+  result.eigenvalue_moduli = moduli_per_step(problem, solver.revolution(), result.period, options.eigenvalues, quasi.failure_rate);
   result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
   result.total_variation_steps =
       markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
@@ -175,7 +188,7 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   const markov::Period period = markov::find_period(closed);
   result.period = period.period;
   result.eigenvalue_moduli =
-      moduli_per_step(markov::revolution_chain(closed, period), period.period, options.eigenvalues);
+      moduli_per_step(problem, markov::revolution_chain(closed, period), period.period, options.eigenvalues, 0.0);
   result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
   describe_survivors(problem, space, stationary, result);
   result.restart_mean = result.observable_mean;

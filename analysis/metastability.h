@@ -87,7 +87,7 @@ struct Metastability {
   std::vector<double> survival;         ///< P(steps > n), n = 0, 1, ...: up to 64 values, or to the course's end if longer
   std::optional<double> reach_end;      ///< probability of surviving the last event of the course
 
-  std::vector<double> eigenvalue_moduli;  ///< per step, falling
+  std::vector<double> eigenvalue_moduli;  ///< per step, falling; lambda_1 alone for a map without noise
   double mixing_steps = 0;                ///< spectral, 1 / ln(lambda_1 / |lambda_2|)
   std::optional<int> total_variation_steps;  ///< from the launch to within mixing_distance
   std::vector<PhaseDistribution> quasi_stationary;  ///< per phase

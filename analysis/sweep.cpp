@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <stdexcept>
 #include <utility>
 
@@ -78,19 +80,27 @@ Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::s
 void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
            const std::function<void(std::size_t, const SweepPoint&)>& done) {
   const std::size_t size = sweep_size(axes);
-  const auto batch = static_cast<std::size_t>(markov::thread_count(options.threads));
+  if (begin >= size) return;
   StudyOptions single = options;
   single.threads = 1;
   single.progress = nullptr;
-  for (std::size_t first = begin; first < size; first += batch) {
-    const std::size_t count = std::min(batch, size - first);
-    std::vector<SweepPoint> points(count);
-    markov::parallel_for(count, options.threads, [&](std::size_t k) {
-      const Setting setting = sweep_setting(base, axes, first + k, &points[k].at);
-      points[k].study = study(setting.problem(), single);
-    });
-    for (std::size_t k = 0; k < count; ++k) done(first + k, points[k]);
-  }
+  std::mutex mutex;
+  std::map<std::size_t, SweepPoint> waiting;  // finished before an earlier point
+  std::size_t next = begin;
+  bool stopped = false;  // done() threw: later points are not reported
+  markov::parallel_for(size - begin, options.threads, [&](std::size_t k) {
+    SweepPoint point;
+    const Setting setting = sweep_setting(base, axes, begin + k, &point.at);
+    point.study = study(setting.problem(), single);
+    const std::scoped_lock lock(mutex);
+    waiting.emplace(begin + k, std::move(point));
+    while (!stopped && !waiting.empty() && waiting.begin()->first == next) {
+      stopped = true;
+      done(next++, waiting.begin()->second);
+      stopped = false;
+      waiting.erase(waiting.begin());
+    }
+  });
 }
 
 }  // namespace metastable::analysis

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <deque>
 #include <functional>
@@ -355,6 +356,12 @@ int parse_and_run(int argc, const char* const* argv) {
     command.declare(options.back());
     sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")->type_name("FILE");
     subcommands.push_back(sub);
+  }
+  if (argc < 2 || (argv[1][0] != '-' && std::none_of(all.begin(), all.end(), [&](const Command& c) { return c.name == argv[1]; }))) {
+    std::string names;
+    for (const Command& command : all) names += (names.empty() ? "" : ", ") + command.name;
+    throw std::invalid_argument(argc < 2 ? fmt::format("a subcommand is needed: {}", names)
+                                         : fmt::format("'{}' is none of the subcommands {}", argv[1], names));
   }
   try {
     app.parse(argc, argv);

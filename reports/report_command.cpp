@@ -117,7 +117,8 @@ class Report {
     const std::vector<double> values = analysis::axis_values(0.05, 0.2, 0.05);
     grid(slope_id("spreads", setting), fmt::format("Spreads of restitution and friction at {} deg", setting.slope_deg),
          fmt::format("Expected steps over the spreads of η and μ, {} deg", setting.slope_deg),
-         "Going right friction scatters more, going up restitution does: the faster number falls is the source that matters.",
+         "Going right friction scatters more, going up restitution does; the direction in which the number changes faster holds "
+         "the source that matters.",
          setting, {analysis::Parameter::restitution_sd, values}, {analysis::Parameter::friction_sd, values});
   }
 

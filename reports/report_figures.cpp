@@ -72,6 +72,7 @@ Figure density_figure(const std::vector<Studied>& settings, const Provenance& pr
   figure.title = "Speed of survivors before a collision";
   figure.x = {"ω before a collision", "rad/s"};
   figure.y = {"quasi-stationary density", "s/rad"};
+  figure.legend = Legend::below;
   figure.provenance = provenance;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     Series series = density(settings[i].study, static_cast<int>(i));
@@ -86,11 +87,18 @@ Figure survival_figure(const std::vector<Studied>& settings, const Provenance& p
   figure.id = "survival";
   figure.title = "Probability of still rolling";
   figure.x = {"steps n", ""};
-  figure.y = {"P(steps > n)", "", true};
+  figure.y = {.label = "P(steps > n)", .logarithmic = true, .high = 1.0};
   figure.legend = Legend::bottom_left;
   figure.provenance = provenance;
+  bool any_endless = false;
   for (std::size_t i = 0; i < settings.size(); ++i) {
+    const bool endless = settings[i].study.status == analysis::Status::rest_unreachable;
     Series series{label(settings[i].setting), Style::steps, {}, {}, {}, {}, static_cast<int>(i)};
+    if (endless) {
+      series.label += " (never rests)";
+      if (any_endless) series.style = Style::dashed;  // over the one before it
+      any_endless = true;
+    }
     const std::vector<double>& survival = settings[i].study.survival;
     for (std::size_t n = 0; n < std::min(survival.size(), survival_steps); ++n) {
       series.x.push_back(static_cast<double>(n));

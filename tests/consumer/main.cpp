@@ -1,9 +1,11 @@
-// The paper's wheel and a two-state chain with a known answer, through the installed headers and libraries.
+// The README's program and a two-state chain with a known answer, through the installed headers and libraries.
 #include <cmath>
 #include <cstdio>
 #include <numbers>
 #include <vector>
 
+#include "analysis/metastability.h"
+#include "analysis/setting.h"
 #include "dynamics/wheel.h"
 #include "markov/chain.h"
 #include "markov/solver.h"
@@ -24,5 +26,13 @@ int main() {
     std::printf("expected steps %.6f and %.6f\n", steps[0], steps[1]);
     right = right && std::abs(steps[0] - 20.0 / 7) < 1e-12 && std::abs(steps[1] - 16.0 / 7) < 1e-12;
   }
+
+  metastable::analysis::Setting setting;
+  setting.slope_deg = 9.59;
+  setting.initial_speed = {5.83, 0.28};
+  const auto study = metastable::analysis::study(setting.problem(), {.tolerance = 0.005});
+  std::printf("%.3f steps before failure (95 %%: %.3f to %.3f)\n", study.from_start.value, study.from_start.lower,
+              study.from_start.upper);
+  right = right && std::abs(study.from_start.value - 6.13) < 0.03;
   return right ? 0 : 1;
 }

@@ -1,0 +1,249 @@
+// The program as its users meet it: arguments in, exit code, streams and files out.
+
+#include "reports/cli.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "reports/interrupt.h"
+
+namespace metastable::reports {
+namespace {
+
+struct Ran {
+  int code = 0;
+  std::string out, err;
+};
+
+Ran metastable(std::vector<std::string> words) {
+  std::vector<const char*> argv{"metastable"};
+  for (const std::string& word : words) argv.push_back(word.c_str());
+  Ran ran;
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  ran.code = run(static_cast<int>(argv.size()), argv.data());
+  ran.out = testing::internal::GetCapturedStdout();
+  ran.err = testing::internal::GetCapturedStderr();
+  return ran;
+}
+
+std::string content(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class CommandLine : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              ("cli-" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::string file(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::vector<std::string> left_behind() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_)) names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  std::filesystem::path folder_;
+};
+
+const std::vector<std::string> quick{"--legs", "0.1519", "--cells", "32", "--samples", "256"};
+
+std::vector<std::string> with(std::vector<std::string> words, const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+// A wrong option, key or value: exit code 2 and one line that names it and what is allowed.
+TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
+  struct Case {
+    std::vector<std::string> words;
+    std::string named;
+  };
+  const std::vector<Case> cases = {
+      {{}, "subcommand"},
+      {{"stepz"}, "stepz"},
+      {{"steps", "--bogus", "1"}, "--bogus"},
+      {{"steps", "--slope", "abc"}, "--slope: 'abc' is not a number"},
+      {{"steps", "--slope", "25", "--initial-speed", "7,0.1"}, "slope: 25 deg is outside (0, 22.5) deg"},
+      {{"steps", "--slope", "8"}, "--initial-speed: must be given at 8 deg"},
+      {{"steps", "--initial-speed=-3,0.1"}, "initial speed: mean -3 rad/s is below 0"},
+      {{"steps", "--restitution", "0.4,-0.1"}, "--restitution: sd -0.1 is below 0"},
+      {{"steps", "--friction", "-5,0.01"}, "friction"},
+      {{"steps", "--legs", "0.15,0.15"}, "--legs: 2 legs are fewer than 3"},
+      {{"steps", "--legs", "0.15", "--leg-count", "2"}, "--leg-count: '2' is not a whole number in 3..1000"},
+      {{"steps", "--cells", "7"}, "--cells: '7' is not a whole number in 8..4096"},
+      {{"steps", "--tolerance", "2"}, "tolerance: 2 is outside (0, 1)"},
+      {{"steps", "--law", "sticky"}, "published, coulomb"},
+      {{"steps", "--method", "guess"}, "--method: 'guess'"},
+      {{"steps", "--seed", "1", "--seed", "2"}, "--seed: given 2 times"},
+      {{"steps", "--json", path("no/such/folder/x.json")}, "no/such/folder"},
+      {{"steps", "--config", path("missing.toml")}, "missing.toml"},
+      {{"steps", "--config", file("key.toml", "slope = 7.02\nslop = 3\n")}, "key.toml:2: unknown key 'slop'"},
+      {{"steps", "--config", file("toml.toml", "slope = = 3\n")}, "toml.toml:1"},
+      {{"steps", "--contact-list", file("list.csv", "restitution,friction\n0.4,0.3\n1.4,0.3\n")}, "list.csv:3: column restitution"},
+      {{"compare", "--slopes", "7.02"}, "--slopes: 1 given where at least 2"},
+      {{"compare", "--slopes", "7.02,9.59", "--initial-speed", "7,0.1"}, "--initial-speed: given 1 times for 2 slopes"},
+      {{"sweep"}, "no range given"},
+      {{"sweep", "--slope", "5:12:0"}, "--slope: range 5:12:0"},
+      {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")}, "slope: 25 deg"},
+      {{"simulate"}, "--out: a folder must be given"},
+      {{"simulate", "--trials", "0", "--out", path("t")}, "--trials: '0' is not a whole number in 1..1000000"},
+  };
+  for (const Case& one : cases) {
+    const Ran ran = metastable(one.words);
+    std::string words;
+    for (const std::string& word : one.words) words += word + " ";
+    EXPECT_EQ(ran.code, 2) << words;
+    EXPECT_NE(ran.err.find(one.named), std::string::npos) << words << "\n" << ran.err;
+    EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << words << "\n" << ran.err;
+    EXPECT_EQ(ran.out, "") << words;
+  }
+  for (const std::string& name : left_behind()) EXPECT_TRUE(name.ends_with(".toml") || name.ends_with(".csv")) << name;
+  EXPECT_FALSE(std::filesystem::exists(path("s.csv")));
+}
+
+TEST_F(CommandLine, StepsWritesTheKeysThatWerePromised) {
+  const Ran ran = metastable({"steps", "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto json = nlohmann::json::parse(ran.out);
+  EXPECT_EQ(json.at("schema"), 1);
+  EXPECT_EQ(json.at("slope_deg"), 7.02);
+  EXPECT_EQ(json.at("method"), "sampled");
+  const auto& steps = json.at("expected_steps");
+  for (const char* key : {"from_start", "from_quasi_stationary", "worst_start", "sd", "median"})
+    EXPECT_TRUE(steps.at(key).is_number()) << key;
+  EXPECT_LT(steps.at("interval_95")[0].get<double>(), steps.at("from_start").get<double>());
+  EXPECT_GT(steps.at("interval_95")[1].get<double>(), steps.at("from_start").get<double>());
+  for (const char* key : {"failure_rate_per_step", "mixing_steps", "reach_ramp_end"}) EXPECT_TRUE(json.at(key).is_number()) << key;
+  EXPECT_EQ(json.at("eigenvalue_moduli").size(), 6u);
+  EXPECT_TRUE(json.at("quasi_stationary").at("mean_rad_s").is_number());
+  EXPECT_TRUE(json.at("quasi_stationary").at("sd_rad_s").is_number());
+  EXPECT_TRUE(json.at("error").at("discretization").is_number());
+  EXPECT_TRUE(json.at("error").at("sampling").is_number());
+}
+
+TEST_F(CommandLine, InfiniteIsAWord) {
+  const Ran json = metastable(with({"steps", "--law", "coulomb", "--json", "-"}, quick));
+  ASSERT_EQ(json.code, 0) << json.err;
+  EXPECT_EQ(nlohmann::json::parse(json.out).at("expected_steps").at("from_start"), "infinite");
+  const Ran text = metastable(with({"steps", "--law", "coulomb"}, quick));
+  EXPECT_NE(text.out.find("infinite: rest is unreachable"), std::string::npos);
+}
+
+TEST_F(CommandLine, ConfigFileAndOptionsGiveTheSameBytesAndOptionsWin) {
+  const std::string config = file("c.toml",
+                                  "slope = 9.59\nlegs = 0.1519\nfriction = [0.3, 0.1]\ncells = 32\nsamples = 256\n"
+                                  "initial-speed = [5.83, 0.28]\n");
+  const Ran by_file = metastable({"steps", "--config", config});
+  const Ran by_options = metastable(with({"steps", "--slope", "9.59", "--friction", "0.3,0.1"}, quick));
+  ASSERT_EQ(by_file.code, 0) << by_file.err;
+  EXPECT_EQ(by_file.out, by_options.out);
+  const Ran overridden = metastable({"steps", "--config", config, "--friction", "0.4,0.1"});
+  EXPECT_NE(overridden.out, by_file.out);
+  EXPECT_NE(overridden.out.find("mu ~ N(0.4, 0.1^2)"), std::string::npos);
+}
+
+TEST_F(CommandLine, ComparePrintsTheContrast) {
+  const Ran ran = metastable(with({"compare", "--json", path("c.json")}, quick));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(ran.out.find("9.59 deg takes"), std::string::npos);
+  EXPECT_NE(ran.out.find("measured trials of 16 collisions"), std::string::npos);
+  const auto json = nlohmann::json::parse(content(path("c.json")));
+  EXPECT_EQ(json.at("settings").size(), 2u);
+  EXPECT_TRUE(json.at("contrasts")[0].at("ratio").at("value").is_number());
+}
+
+TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
+  const std::vector<std::string> words = with({"sweep", "--friction-sd", "0.1:0.2:0.05", "--friction-mean", "0.3,0.4"}, quick);
+  ASSERT_EQ(metastable(with(words, {"--out", path("whole.csv")})).code, 0);
+  const std::string whole = content(path("whole.csv"));
+  EXPECT_TRUE(std::filesystem::exists(path("whole.svg")));
+  // Cut in the middle of the fourth row.
+  std::size_t at = 0;
+  for (int line = 0; line < 9; ++line) at = whole.find('\n', at) + 1;
+  std::ofstream(path("part.csv.partial")) << whole.substr(0, at + 5);
+  const Ran resumed = metastable(with(words, {"--out", path("part.csv"), "--threads", "1"}));
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_NE(resumed.out.find("taken over"), std::string::npos);
+  EXPECT_EQ(content(path("part.csv")), whole);
+  EXPECT_FALSE(std::filesystem::exists(path("part.csv.partial")));
+  // Another sweep does not write over it.
+  const Ran other = metastable(with({"sweep", "--friction-sd", "0.1,0.3"}, with(quick, {"--out", path("part.csv")})));
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.err.find("another sweep"), std::string::npos);
+  EXPECT_EQ(content(path("part.csv")), whole);
+}
+
+TEST_F(CommandLine, SimulateWritesAnExperimentOnce) {
+  const std::vector<std::string> words{"simulate", "--trials", "5", "--out", path("trials")};
+  const Ran ran = metastable(words);
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  for (const char* name : {"experiment.toml", "collisions.csv", "trials.csv"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "trials" / name)) << name;
+  const Ran again = metastable(words);
+  EXPECT_EQ(again.code, 2);
+  EXPECT_NE(again.err.find("already holds"), std::string::npos);
+}
+
+// The whole report, twice, on one thread and on two: the same bytes in every file.
+TEST_F(CommandLine, ReportIsTheSameBytesOnAnyNumberOfThreads) {
+  const auto report = [&](const std::string& name, const std::string& threads) {
+    return metastable(with({"report", "--out", path(name), "--threads", threads, "--energy-trials", "20"}, quick));
+  };
+  const Ran one = report("one", "1"), two = report("two", "2");
+  ASSERT_EQ(one.code, 0) << one.err;
+  ASSERT_EQ(two.code, 0) << two.err;
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ / "one")) {
+    if (!entry.is_regular_file()) continue;
+    ++files;
+    const auto relative = std::filesystem::relative(entry.path(), folder_ / "one");
+    EXPECT_EQ(content(entry.path()), content(folder_ / "two" / relative)) << relative;
+  }
+  EXPECT_EQ(files, 1u + 6 * 3 + 8);  // page; six tables three ways; figures
+  const std::string csv = content(folder_ / "one" / "tables" / "ramps.csv");
+  for (const char* part : {"# seed: 1", "# version: ", "# settings: ", "infinite"})
+    EXPECT_NE(csv.find(part), std::string::npos) << part;
+}
+
+TEST_F(CommandLine, InterruptLeavesNoFileAndItsOwnExitCode) {
+  catch_interrupts();
+  std::raise(SIGINT);  // as if Ctrl-C came before the first result
+  const Ran ran = metastable(with({"steps", "--json", path("x.json")}, quick));
+  clear_interrupt();
+  EXPECT_EQ(ran.code, 130);
+  EXPECT_TRUE(left_behind().empty());
+}
+
+TEST_F(CommandLine, HelpAndVersion) {
+  EXPECT_EQ(metastable({"--help"}).code, 0);
+  const Ran version = metastable({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_TRUE(version.out.starts_with("metastable 0.1.0"));
+  for (const char* command : {"steps", "compare", "sweep", "simulate", "report"}) {
+    const Ran help = metastable({command, "--help"});
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find("--config"), std::string::npos) << command;
+  }
+}
+
+}  // namespace
+}  // namespace metastable::reports
