@@ -4,25 +4,13 @@
 
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <stdexcept>
 
+#include "analysis/t_interval.h"
+
 namespace metastable::analysis {
 namespace {
-
-struct Spreadout {
-  double mean = 0, half_width = 0;
-};
-
-Spreadout t_interval(const std::vector<double>& sample) {
-  const auto n = static_cast<double>(sample.size());
-  double mean = 0, square = 0;
-  for (const double x : sample) mean += x / n;
-  for (const double x : sample) square += (x - mean) * (x - mean);
-  const boost::math::students_t t(n - 1);
-  return {mean, boost::math::quantile(t, 0.975) * std::sqrt(square / (n - 1) / n)};
-}
 
 struct MeanVariance {
   double mean = 0, variance = 0;

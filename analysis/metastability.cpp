@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 #include "analysis/chain_summary.h"
 #include "analysis/rest_reachability.h"
+#include "analysis/t_interval.h"
 #include "markov/chain_pool.h"
 #include "markov/discretization.h"
 #include "markov/parallel.h"
@@ -194,7 +193,7 @@ class Study {
                    coarse = std::log(pooled[0].*which);
       const double extrapolated = fine + (fine - middle) / 3, before = middle + (middle - coarse) / 3;
       discretization = std::abs(extrapolated - before);
-      sampling = t_half_width(log_replicate);
+      sampling = t_interval(log_replicate).half_width;
       const double half = discretization + sampling;
       return Estimate{std::exp(extrapolated), std::exp(extrapolated - half), std::exp(extrapolated + half)};
     };
@@ -206,15 +205,6 @@ class Study {
     result.failure_rate = {1 / quasi.value, 1 / quasi.upper, 1 / quasi.lower};
     for (const ExpectedSteps& one : ladder.replicate) result.replicate_log_steps.push_back(std::log(one.from_start));
     return result;
-  }
-
-  static double t_half_width(const std::vector<double>& sample) {
-    const auto n = static_cast<double>(sample.size());
-    const double mean = std::accumulate(sample.begin(), sample.end(), 0.0) / n;
-    double square = 0;
-    for (const double x : sample) square += (x - mean) * (x - mean);
-    const boost::math::students_t t(n - 1);
-    return boost::math::quantile(t, 0.975) * std::sqrt(square / (n - 1) / n);
   }
 
   // Rest is out of reach for some launches: no first passage, but a stationary regime.

@@ -15,13 +15,22 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::array<std::pair<Parameter, std::string_view>, 5> names = {{
-    {Parameter::slope, "slope"},
-    {Parameter::restitution_mean, "restitution-mean"},
-    {Parameter::restitution_sd, "restitution-sd"},
-    {Parameter::friction_mean, "friction-mean"},
-    {Parameter::friction_sd, "friction-sd"},
+struct Known {
+  Parameter parameter;
+  std::string_view name, label;
+};
+
+constexpr std::array<Known, 5> known = {{
+    {Parameter::slope, "slope", "slope γ"},
+    {Parameter::restitution_mean, "restitution-mean", "mean of restitution η"},
+    {Parameter::restitution_sd, "restitution-sd", "sd of restitution η"},
+    {Parameter::friction_mean, "friction-mean", "mean of friction μ"},
+    {Parameter::friction_sd, "friction-sd", "sd of friction μ"},
 }};
+
+const Known& entry(Parameter parameter) {
+  return *std::find_if(known.begin(), known.end(), [&](const Known& one) { return one.parameter == parameter; });
+}
 
 void set(Setting& setting, Parameter parameter, double value) {
   switch (parameter) {
@@ -36,15 +45,15 @@ void set(Setting& setting, Parameter parameter, double value) {
 }  // namespace
 
 Parameter parameter_from_name(std::string_view name) {
-  for (const auto& [parameter, known] : names)
-    if (known == name) return parameter;
+  for (const Known& one : known)
+    if (one.name == name) return one.parameter;
   throw std::invalid_argument(fmt::format(
       "sweep parameter: '{}' is none of slope, restitution-mean, restitution-sd, friction-mean, friction-sd", name));
 }
 
-std::string_view parameter_name(Parameter parameter) {
-  return std::find_if(names.begin(), names.end(), [&](const auto& entry) { return entry.first == parameter; })->second;
-}
+std::string_view parameter_name(Parameter parameter) { return entry(parameter).name; }
+
+std::string_view parameter_label(Parameter parameter) { return entry(parameter).label; }
 
 std::string_view parameter_unit(Parameter parameter) { return parameter == Parameter::slope ? "deg" : "1"; }
 

@@ -18,7 +18,8 @@ enum class Parameter { slope, restitution_mean, restitution_sd, friction_mean, f
 /// "slope", "restitution-mean", ... @throws std::invalid_argument naming them all
 Parameter parameter_from_name(std::string_view name);
 std::string_view parameter_name(Parameter parameter);
-std::string_view parameter_unit(Parameter parameter);  ///< "deg" or "1"
+std::string_view parameter_unit(Parameter parameter);   ///< "deg" or "1"
+std::string_view parameter_label(Parameter parameter);  ///< for axes: "slope γ", "sd of friction μ", ...
 
 struct Axis {
   Parameter parameter = Parameter::slope;

@@ -23,17 +23,6 @@ std::string label(const analysis::Setting& setting) {
   return fmt::format("{}, {} deg", dynamics::law_name(setting.law), setting.slope_deg);
 }
 
-std::string heading(analysis::Parameter parameter) {
-  switch (parameter) {
-    case analysis::Parameter::slope: return "slope";
-    case analysis::Parameter::restitution_mean: return "mean of restitution η";
-    case analysis::Parameter::restitution_sd: return "sd of restitution η";
-    case analysis::Parameter::friction_mean: return "mean of friction μ";
-    case analysis::Parameter::friction_sd: return "sd of friction μ";
-  }
-  return "";
-}
-
 // Cells carry mass over x = omega^2; spread evenly over equal bins of omega.
 Series density(const analysis::Metastability& study, int colour) {
   double low = std::numeric_limits<double>::infinity(), high = 0;
@@ -163,8 +152,8 @@ Figure grid_figure(const std::string& id, const std::string& title, const analys
   Figure figure;
   figure.id = id;
   figure.title = title;
-  figure.x = {heading(across.parameter), ""};
-  figure.y = {heading(down.parameter), ""};
+  figure.x = {std::string(analysis::parameter_label(across.parameter)), ""};
+  figure.y = {std::string(analysis::parameter_label(down.parameter)), ""};
   figure.provenance = provenance;
   HeatMap map{across.values, down.values, {}, "expected steps", true};
   for (std::size_t i = 0; i < down.values.size(); ++i) {

@@ -20,17 +20,6 @@ Cell cell(const std::optional<double>& value) {
   return "";
 }
 
-std::string heading(analysis::Parameter parameter) {
-  switch (parameter) {
-    case analysis::Parameter::slope: return "slope";
-    case analysis::Parameter::restitution_mean: return "mean of η";
-    case analysis::Parameter::restitution_sd: return "sd of η";
-    case analysis::Parameter::friction_mean: return "mean of μ";
-    case analysis::Parameter::friction_sd: return "sd of μ";
-  }
-  return "";
-}
-
 }  // namespace
 
 Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance) {
@@ -83,9 +72,9 @@ Table grid_table(const std::string& id, const std::string& title, const analysis
   table.id = id;
   table.title = title;
   table.provenance = provenance;
-  table.columns = {{heading(down.parameter), "", NumberFormat::general, 3}};
+  table.columns = {{std::string(analysis::parameter_label(down.parameter)), "", NumberFormat::general, 3}};
   for (const double value : across.values)
-    table.columns.push_back({fmt::format("{} {}", heading(across.parameter), value), "steps", NumberFormat::significant, 3});
+    table.columns.push_back({fmt::format("{} {}", analysis::parameter_label(across.parameter), value), "steps", NumberFormat::significant, 3});
   for (std::size_t i = 0; i < down.values.size(); ++i) {
     std::vector<Cell> row{down.values[i]};
     for (std::size_t j = 0; j < across.values.size(); ++j)

@@ -84,16 +84,7 @@ double value_of(const std::string& row, std::size_t index) {
   return text == "infinite" ? std::numeric_limits<double>::infinity() : std::stod(text);
 }
 
-std::string axis_label(analysis::Parameter parameter) {
-  switch (parameter) {
-    case analysis::Parameter::slope: return "slope";
-    case analysis::Parameter::restitution_mean: return "mean of restitution";
-    case analysis::Parameter::restitution_sd: return "sd of restitution";
-    case analysis::Parameter::friction_mean: return "mean of friction";
-    case analysis::Parameter::friction_sd: return "sd of friction";
-  }
-  return "";
-}
+std::string axis_label(analysis::Parameter parameter) { return std::string(analysis::parameter_label(parameter)); }
 
 std::string axis_unit(analysis::Parameter parameter) { return parameter == analysis::Parameter::slope ? "deg" : ""; }
 
