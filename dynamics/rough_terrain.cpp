@@ -83,6 +83,22 @@ std::optional<double> RoughTerrainWheel::rest_probability(double state, int) con
          normal_cdf((options_.mean_slope - joined.best - reach) / options_.sd_slope);
 }
 
+void RoughTerrainWheel::landing_density(double state, int, std::span<const double> next, std::span<double> density) const {
+  const double sd = options_.sd_slope;
+  if (sd == 0)
+    throw std::invalid_argument("method integrated: a constant slope leaves no density; use the sampled method");
+  const Joined joined(options_);
+  const double reach = joined.gain * joined.amplitude, level = joined.extreme(state, 0);
+  for (std::size_t k = 0; k < next.size(); ++k) {
+    const double cosine = (next[k] - level) / reach;
+    density[k] = 0;
+    if (!(std::abs(cosine) < 1)) continue;
+    const double angle = std::acos(cosine), speed = reach * std::sqrt((1 - cosine) * (1 + cosine));
+    for (const double slope : {joined.best - angle, joined.best + angle})
+      density[k] += normal_density((slope - options_.mean_slope) / sd) / (sd * speed);
+  }
+}
+
 std::pair<double, double> RoughTerrainWheel::landing_range(double state, int) const {
   const auto landed = [](double x) { return x > 0 ? x : -infinity; };
   if (options_.sd_slope == 0) {

@@ -10,6 +10,7 @@
 #include <boost/math/special_functions/ellint_rf.hpp>
 #include <fmt/format.h>
 
+#include "dynamics/landing_density.h"
 #include "dynamics/landing_range.h"
 #include "dynamics/rest_probability.h"
 
@@ -109,6 +110,11 @@ std::optional<double> WheelMap::landing(double state, int phase, std::span<const
 std::optional<double> WheelMap::rest_probability(double state, int phase) const {
   if (!noise_.is_empirical() && noise_.correlation() != 0) return std::nullopt;
   return dynamics::rest_probability(*this, state, phase);
+}
+
+void WheelMap::landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const {
+  const LandingDensity at(*this, state, phase);
+  std::transform(next.begin(), next.end(), density.begin(), at);
 }
 
 std::pair<double, double> WheelMap::landing_range(double state, int phase) const {

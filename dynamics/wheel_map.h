@@ -64,6 +64,9 @@ class WheelMap {
   /// Exact, by quadrature over eta and the distribution function of mu in closed form (independent eta, mu, or a list);
   /// nothing for a correlated pair.
   std::optional<double> rest_probability(double state, int phase) const;
+  /// Density of the landing at each of the next states [1/(rad^2/s^2)]: density[k] belongs to next[k] (LandingDensity).
+  /// @throws std::invalid_argument where the noise leaves none in closed form (names the reason and the sampled method)
+  void landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const;
   /// Infimum and supremum of the landing over the support of (eta, mu); -infinity stands for rest.
   std::pair<double, double> landing_range(double state, int phase) const;
   /// Time of the stance that begins at `phase` and ends at next_state [s], closed form (Carlson's R_F, the elliptic

@@ -28,7 +28,7 @@ inline constexpr double rest_landing = -std::numeric_limits<double>::infinity();
 ///   landing(state, phase, noise)   the next state, or nothing when the system comes to rest
 ///
 /// Members used when present (see AnyReturnMap for their meaning): rest_probability, landing_range,
-/// tabulate, duration, advance, assumptions, violates.
+/// landing_density, tabulate, duration, advance, assumptions, violates.
 template <class M>
 concept ReturnMap = requires(const M& map, double state, int phase, std::span<const double> noise) {
   { map.state_interval(phase) } -> std::convertible_to<std::pair<double, double>>;
@@ -66,6 +66,12 @@ class AnyReturnMap {
   std::optional<std::pair<double, double>> landing_range(double state, int phase) const {
     return self_->landing_range(state, phase);
   }
+  /// Density of the landing from `state` at each of the next states: density[k] belongs to next[k] (equal sizes), with
+  /// relative accuracy, tails included; over all next states it integrates to 1 - rest_probability. False, and nothing
+  /// written, if the map does not tell. May throw std::invalid_argument where this map's noise has no density.
+  bool landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const {
+    return self_->landing_density(state, phase, next, density);
+  }
   /// Draws prepared for repeated use; noise is row-major, one row of noise_dimension() scores a draw.
   std::unique_ptr<NoiseTable> tabulate(int phase, std::span<const double> noise) const {
     return self_->tabulate(phase, noise);
@@ -90,6 +96,7 @@ class AnyReturnMap {
     virtual std::optional<double> landing(double, int, std::span<const double>) const = 0;
     virtual std::optional<double> rest_probability(double, int) const = 0;
     virtual std::optional<std::pair<double, double>> landing_range(double, int) const = 0;
+    virtual bool landing_density(double, int, std::span<const double>, std::span<double>) const = 0;
     virtual std::unique_ptr<NoiseTable> tabulate(int, std::span<const double>) const = 0;
     virtual std::optional<double> duration(double, int) const = 0;
     virtual std::optional<double> advance(int) const = 0;
@@ -141,6 +148,14 @@ class AnyReturnMap {
     std::optional<std::pair<double, double>> landing_range(double state, int phase) const override {
       if constexpr (requires { map.landing_range(state, phase); }) return map.landing_range(state, phase);
       else return std::nullopt;
+    }
+    bool landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const override {
+      if constexpr (requires { map.landing_density(state, phase, next, density); }) {
+        map.landing_density(state, phase, next, density);
+        return true;
+      } else {
+        return false;
+      }
     }
     std::unique_ptr<NoiseTable> tabulate(int phase, std::span<const double> noise) const override {
       if constexpr (requires { map.tabulate(phase, noise); })
