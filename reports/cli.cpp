@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/input_error.h"
 #include "dynamics/contact_law.h"
 #include "markov/chain.h"
 #include "reports/compare_command.h"
@@ -390,6 +391,9 @@ int run(int argc, const char* const* argv) {
     return parse_and_run(argc, argv);
   } catch (const Interrupted& interrupted) {
     return fail(interrupted.what(), interrupted.exit_code());
+  } catch (const analysis::InputError& error) {  // all that is wrong with an input, a line each
+    for (const std::string& line : error.lines()) fail(line, 2);
+    return 2;
   } catch (const std::invalid_argument& error) {
     return fail(error.what(), 2);
   } catch (const markov::ConvergenceError& error) {

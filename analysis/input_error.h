@@ -1,0 +1,50 @@
+#pragma once
+// What is wrong with files that were read: every defect with its place, several at once.
+
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace metastable::analysis {
+
+/// Everything found wrong with an input, one line each: "FILE:LINE:COLUMN: what". A user error: exit code 2.
+class InputError : public std::invalid_argument {
+ public:
+  /// @param lines not empty; what() is the lines joined by line feeds
+  explicit InputError(std::vector<std::string> lines);
+  const std::vector<std::string>& lines() const { return lines_; }
+
+ private:
+  std::vector<std::string> lines_;
+};
+
+/// A place in a text file. Both count from 1; 0: not known or the file as a whole.
+struct Place {
+  std::size_t line = 0;
+  std::size_t column = 0;  ///< in bytes
+};
+
+/// Collects defects so that one run of a program shows them all.
+class Defects {
+ public:
+  static constexpr std::size_t most_shown = 20;
+
+  void add(std::string_view file, Place place, std::string_view what);
+  std::size_t count() const { return count_; }
+  bool empty() const { return count_ == 0; }
+  /// The first `most_shown` in the order they were added; what was left out is counted in a last line.
+  std::vector<std::string> lines() const;
+  /// @throws InputError if there is any
+  void check() const;
+
+ private:
+  std::vector<std::string> lines_;
+  std::size_t count_ = 0;
+};
+
+/// Text from a file for a message: in single quotes, at most 40 bytes, everything but printable ASCII as \xNN.
+std::string shown_text(std::string_view text);
+
+}  // namespace metastable::analysis
