@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "analysis/chain_summary.h"
+#include "analysis/integrated_study.h"
 #include "analysis/rest_reachability.h"
 #include "analysis/t_interval.h"
 #include "markov/chain_pool.h"
@@ -274,7 +275,16 @@ void StudyOptions::validate() const {
 
 Metastability study(const Problem& problem, const StudyOptions& options) {
   options.validate();
+  if (options.method == Method::integrated) return integrated_study(problem, options);
   return Study(problem, options).run();
+}
+
+std::string_view method_name(Method method) { return method == Method::sampled ? "sampled" : "integrated"; }
+
+Method method_from_name(std::string_view name) {
+  for (const Method method : {Method::sampled, Method::integrated})
+    if (name == method_name(method)) return method;
+  throw std::invalid_argument(fmt::format("method: '{}' is neither 'sampled' nor 'integrated'", name));
 }
 
 std::string status_text(Status status) {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "analysis/problem.h"
@@ -20,7 +21,14 @@ struct Estimate {
   double upper = 0;
 };
 
+/// How rows are made.
+enum class Method {
+  sampled,     ///< by draws of the noise in every cell
+  integrated,  ///< from the landing's density on Gauss-Legendre nodes (integrated_study.h)
+};
+
 struct StudyOptions {
+  Method method = Method::sampled;
   std::size_t cells = 0;     ///< per phase, 8 .. 4096; 0: refined until the tolerance is met
   std::size_t samples = 0;   ///< draws per cell and replicate, 16 .. 2^24; 0: raised until the tolerance is met
   double tolerance = 0.01;   ///< wanted relative half-width of the 95 % interval of the expected steps, (0, 1)
@@ -69,6 +77,7 @@ struct Share {
 struct Metastability {
   Status status = Status::converged;
   std::string message;          ///< one sentence when status is not `converged`, empty otherwise
+  Method method = Method::sampled;
   std::size_t cells = 0, samples = 0;
   int replicates = 0, phases = 1, period = 1;
 
@@ -105,10 +114,15 @@ struct Metastability {
 /// Expected steps and the failure rate are extrapolated (Richardson, order 2, in the logarithm) from the two finest cell
 /// sizes of the chain of all replicates' draws; everything else is read off that chain at the finest size.
 /// interval_95: t-interval over replicates plus the difference of the last two extrapolations.
+/// Method::integrated: integrated_study().
 /// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails
 Metastability study(const Problem& problem, const StudyOptions& options);
 
 /// "infinite: rest is unreachable", "converged", ... one phrase per status.
 std::string status_text(Status status);
+/// "sampled", "integrated".
+std::string_view method_name(Method method);
+/// @throws std::invalid_argument naming the two
+Method method_from_name(std::string_view name);
 
 }  // namespace metastable::analysis

@@ -19,7 +19,7 @@ constexpr int score_steps = 17;  // on each side
 constexpr std::size_t pilot_cells = 96;
 constexpr std::size_t pilot_samples = 4096;
 constexpr double least_scaled = 1e-6;  // survivors of a row whose total is worth correcting
-constexpr double spare = 0.02;         // of the range, beyond where the pilot ends
+constexpr double spare = 0.2;           // of the range, beyond where the pilot ends
 
 struct Row {
   std::vector<double> landing;  // on the nodes of the next phase
@@ -177,10 +177,13 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     }
     const StateSpace graded =
         graded_space(space, quasi.distribution, quasi.survival_weight, sampled.launch.after, pilot_cells);
+    // One upper edge for all phases: what the launch leaves high up at one phase comes by at the next.
+    double upper = rest_landing;
+    for (int p = 0; p < graded.phases(); ++p) upper = std::max(upper, graded.grid(p).edges().back());
     std::vector<std::pair<double, double>> ranges;
     for (int p = 0; p < graded.phases(); ++p) {
-      const auto edges = graded.grid(p).edges();
-      ranges.emplace_back(edges.front(), edges.back() + spare * (edges.back() - edges.front()));
+      const double lower = graded.grid(p).edges().front();
+      ranges.emplace_back(lower, upper + spare * (upper - lower));
     }
     return ranges;
   }

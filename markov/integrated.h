@@ -61,7 +61,7 @@ IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const
 /// Where one event from `state` at `phase` leads, as a launch.
 Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase);
 
-/// Ranges per phase that hold all but 1e-13 of the survivors, found on a sampled pilot chain of 96 cells; nothing
+/// Ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings, found on a sampled pilot chain of 96 cells; nothing
 /// if no draw comes to rest. @param threads as in discretize()
 std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads);
 

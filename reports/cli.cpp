@@ -25,6 +25,7 @@
 #include "reports/simulate_command.h"
 #include "reports/steps_command.h"
 #include "reports/sweep_command.h"
+#include "reports/verify_command.h"
 #include "reports/version.h"
 
 namespace metastable::reports {
@@ -106,7 +107,8 @@ void add_course(Options& options) {
 }
 
 void add_study(Options& options) {
-  options.add("method", "sampled", "sampled", "How rows are made: by sampling eta and mu per cell");
+  options.add("method", "sampled|integrated", "sampled",
+              "How rows are made: by sampling eta and mu per cell, or by quadrature of the landing's density");
   options.add("cells", "N", "", "Cells per landing leg, 8..4096 (default: refined until the tolerance is met)");
   options.add("samples", "S", "", "Draws per cell and replicate (default: raised until the tolerance is met)");
   options.add("tolerance", "REL", "0.01", "Half-width of the 95 % interval of the expected steps, relative");
@@ -196,9 +198,10 @@ std::vector<analysis::Setting> several_settings(const Options& options, std::siz
 }
 
 analysis::StudyOptions study_options(const Options& options) {
-  if (options.text("method") != "sampled")
-    throw std::invalid_argument(fmt::format("--method: '{}' is not 'sampled'", options.text("method")));
   analysis::StudyOptions study;
+  if (options.text("method") != "sampled" && options.text("method") != "integrated")
+    throw std::invalid_argument(fmt::format("--method: '{}' is neither 'sampled' nor 'integrated'", options.text("method")));
+  study.method = analysis::method_from_name(options.text("method"));
   if (options.given("cells")) study.cells = options.whole("cells", 8, 4096);
   if (options.given("samples")) study.samples = options.whole("samples", 16, 1u << 24);
   study.tolerance = options.number("tolerance");
@@ -315,6 +318,18 @@ std::vector<Command> commands() {
        [](const Options& o, const std::string& line) {
          run_report({several_settings(o, 1), study_options(o), static_cast<int>(o.whole("energy-trials", 2, 1000000)),
                      o.text("out"), line});
+       }},
+      {"verify", "How accurate the program is: known values, doubling of nodes, three solvers side by side",
+       [](Options& o) {
+         o.add("seeds", "N", "0", "Sampled studies a benchmark, to count how often their interval is right; 0: none");
+         o.add("nodes", "N", "512", "Nodes a landing leg at which doubling stops, 128..4096");
+         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add("out", "DIR", "", "Folder for the tables (CSV, Markdown, LaTeX)");
+         o.add("export", "DIR", "", "Folder for the default wheel's chain (PRISM .tra, .lab, .srew; MatrixMarket)");
+       },
+       [](const Options& o, const std::string& line) {
+         run_verify({static_cast<int>(o.whole("seeds", 0, 1000)), o.whole("nodes", 128, 4096),
+                     static_cast<int>(o.whole("threads", 0, 1024)), o.text("out"), o.text("export"), line});
        }},
   };
 }

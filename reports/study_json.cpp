@@ -40,7 +40,7 @@ Json study_json(const analysis::Setting& setting, const analysis::Metastability&
   Json json;
   json["slope_deg"] = setting.slope_deg;
   json["law"] = dynamics::law_name(setting.law);
-  json["method"] = "sampled";
+  json["method"] = analysis::method_name(study.method);
   json["status"] = analysis::status_text(study.status);
   if (!study.message.empty()) json["message"] = study.message;
   json["expected_steps"] = {{"from_start", number(study.from_start.value)},

@@ -79,8 +79,10 @@ std::string study_text(const analysis::Setting& setting, const analysis::Metasta
                  endless ? fmt::format("{:.3g} %", 100 * share.quasi_stationary)
                          : fmt::format("{:.3g} % in the metastable regime, {:.3g} % until rest",
                                        100 * share.quasi_stationary, 100 * share.until_rest));
-  text += line("resolution", fmt::format("{} cells x {} legs, {} draws a cell, {} replicates", study.cells, study.phases,
-                                         study.samples, study.replicates));
+  text += line("resolution", study.method == analysis::Method::integrated
+                                 ? fmt::format("{} nodes x {} legs, integrated", study.cells, study.phases)
+                                 : fmt::format("{} cells x {} legs, {} draws a cell, {} replicates", study.cells,
+                                               study.phases, study.samples, study.replicates));
   if (!endless) {
     text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)", study.discretization_error,
                                                study.sampling_error));

@@ -35,8 +35,8 @@ std::string head(const SweepRequest& request) {
                       request.setting.wheel.inertia.value_or(0), request.setting.wheel.ramp_stiffness,
                       request.setting.wheel.contact_mass.value_or(0), request.setting.wheel.gravity,
                       request.setting.pairs.size());
-  text += fmt::format("# cells {}, samples {}, tolerance {}, seed {}, replicates {}, sequence {}, draws {}, tail {}\n",
-                      study.cells, study.samples, study.tolerance, study.seed, study.replicates,
+  text += fmt::format("# method {}, cells {}, samples {}, tolerance {}, seed {}, replicates {}, sequence {}, draws {}, tail {}\n",
+                      analysis::method_name(study.method), study.cells, study.samples, study.tolerance, study.seed, study.replicates,
                       study.sequence == markov::Sequence::sobol ? "sobol" : "random",
                       study.weighting == markov::Weighting::weighted ? "weighted" : "plain", study.tail);
   text += fmt::format("# version: {}\n", version());

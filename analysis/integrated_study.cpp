@@ -1,0 +1,175 @@
+#include "analysis/integrated_study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "analysis/chain_summary.h"
+#include "analysis/rest_reachability.h"
+#include "markov/integrated.h"
+#include "markov/solver.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::size_t first_panels = 2;
+constexpr double rounding = 1e-13;  // of the solvers: no error is claimed to be smaller
+
+struct Level {
+  markov::NodeSpace space;
+  markov::IntegratedChain integrated;
+  double from_start = 0, failure_rate = 0, worst_start = 0;
+};
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+// Nothing if the nodes are too few to lead to rest.
+std::optional<Level> solve(const Problem& problem, markov::NodeSpace space, int threads) {
+  Level level{std::move(space), {}};
+  level.integrated = markov::integrate(problem.map, level.space, problem.launch, threads);
+  const markov::SampledChain& sampled = level.integrated.chain;
+  const markov::Reachability reach = markov::classify(sampled.chain);
+  if (std::find(reach.must_rest.begin(), reach.must_rest.end(), 0) != reach.must_rest.end()) return std::nullopt;
+  const markov::ChainSolver solver(sampled.chain);
+  const std::vector<double> mean = markov::mean_first_passage(solver);
+  level.from_start = 1 + dot(sampled.launch.after, mean);
+  level.failure_rate = markov::quasi_stationary(solver).failure_rate;
+  int worst = 0;
+  for (int p = 1; p < level.space.phases(); ++p)
+    if (mean[static_cast<std::size_t>(p) * level.space.nodes()] < mean[static_cast<std::size_t>(worst) * level.space.nodes()])
+      worst = p;
+  const double lowest = problem.map.state_interval(worst).first;
+  level.worst_start = 1 + dot(markov::integrated_row(problem.map, level.space, lowest, worst).after, mean);
+  return level;
+}
+
+double change(double fine, double coarse) { return std::max(rounding, std::abs(std::log(fine) - std::log(coarse))); }
+
+Estimate estimate(double value, double error) { return {value, value * std::exp(-error), value * std::exp(error)}; }
+
+struct MeanSd {
+  double mean = 0, sd = 0;
+};
+
+// Of the observable at the nodes first .. last - 1.
+MeanSd observe(const Problem& problem, const markov::NodeSpace& space, const std::vector<double>& mass, std::size_t first,
+               std::size_t last) {
+  double total = 0, one = 0, two = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    const double value = problem.observable(space.node(i));
+    total += mass[i];
+    one += mass[i] * value;
+    two += mass[i] * value * value;
+  }
+  one /= total;
+  return {one, std::sqrt(std::max(0.0, two / total - one * one))};
+}
+
+// The summary of the chain, with the observable at the nodes in place of the cells' midpoints.
+void describe(const Problem& problem, const Level& level, const StudyOptions& options, Metastability& result) {
+  const markov::SampledChain& sampled = level.integrated.chain;
+  summarize(problem, level.space.cells(), sampled, options, result);
+  const markov::ChainSolver solver(sampled.chain);
+  const std::vector<double> nu = markov::quasi_stationary(solver).distribution;
+  const std::size_t n = level.space.nodes();
+  for (std::size_t p = 0; p < result.quasi_stationary.size(); ++p) {
+    const MeanSd phase = observe(problem, level.space, nu, p * n, (p + 1) * n);
+    result.quasi_stationary[p].mean = phase.mean;
+    result.quasi_stationary[p].sd = phase.sd;
+  }
+  const MeanSd all = observe(problem, level.space, nu, 0, nu.size());
+  result.observable_mean = all.mean;
+  result.observable_sd = all.sd;
+  const std::vector<double> again = markov::stationary_with_restart(solver, sampled.launch.after);
+  const MeanSd restarted = observe(problem, level.space, again, 0, again.size());
+  result.restart_mean = restarted.mean;
+  result.restart_sd = restarted.sd;
+}
+
+Metastability unresolved(const Problem& problem) {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  Metastability result;
+  result.method = Method::integrated;
+  result.status = Status::rest_unresolved;
+  result.phases = problem.map.phases();
+  result.message = "rest is possible, but only by noise beyond probabilities of 1e-300";
+  result.from_start = result.from_quasi_stationary = result.worst_start = {infinite, 1.0, infinite};
+  result.failure_rate = {0, 0, 1};
+  return result;
+}
+
+}  // namespace
+
+Metastability integrated_study(const Problem& problem, const StudyOptions& options) {
+  const auto tell = [&](double done, const std::string& what) {
+    if (options.progress) options.progress(done, what);
+  };
+  const RestReachability reach = rest_reachability(problem);
+  if (!reach.certain) {
+    StudyOptions sampled = options;
+    sampled.method = Method::sampled;
+    return study(problem, sampled);
+  }
+  tell(0, "pilot");
+  // Says at once, and clearly, when there is no density.
+  const double lowest = problem.map.state_interval(problem.launch.phase).first;
+  markov::integrated_row(problem.map, markov::NodeSpace(std::vector(static_cast<std::size_t>(problem.map.phases()),
+                                                                    std::pair(lowest, lowest + 1)), 1),
+                         problem.launch.state(0), problem.launch.phase);
+  const std::vector<std::pair<double, double>> ranges =
+      markov::node_ranges(problem.map, problem.launch, options.threads);
+  if (ranges.empty()) return unresolved(problem);
+
+  const bool free = options.cells == 0;
+  const std::size_t most =
+      (problem.map.phases() > 1 ? options.largest_cells / 2 : options.largest_cells) / markov::NodeSpace::order;
+  const std::size_t given = (options.cells + markov::NodeSpace::order - 1) / markov::NodeSpace::order;
+  std::size_t panels = free ? first_panels : std::max<std::size_t>(1, given / 2);
+  std::optional<Level> coarse, fine;
+  double done = 0.02, error = 0, rate_error = 0;
+  for (;;) {
+    const std::size_t nodes = panels * markov::NodeSpace::order;
+    tell(done, fmt::format("{} nodes", nodes));
+    coarse = std::move(fine);
+    fine = solve(problem, markov::NodeSpace(ranges, panels), options.threads);
+    done += 0.5 * (0.95 - done);
+    bool met = false;
+    if (coarse && fine) {
+      error = change(fine->from_start, coarse->from_start);
+      rate_error = change(fine->failure_rate, coarse->failure_rate);
+      met = std::max(error, rate_error) <= options.tolerance;
+    }
+    const bool last = free ? met || 2 * panels > std::max(most, 2 * first_panels) : panels >= given && (given == 1 || coarse || !fine);
+    if (last) break;
+    panels = free ? 2 * panels : std::max(given, panels + 1);
+  }
+  if (!fine || !coarse)
+    throw markov::ConvergenceError("integrated rows", 1, fmt::format("{} nodes are too few to lead to rest", panels * 16));
+
+  Metastability result;
+  result.method = Method::integrated;
+  result.cells = fine->space.nodes();
+  result.from_start = estimate(fine->from_start, error);
+  result.failure_rate = estimate(fine->failure_rate, rate_error);
+  result.from_quasi_stationary = estimate(1 / fine->failure_rate, rate_error);
+  result.worst_start = estimate(fine->worst_start, change(fine->worst_start, coarse->worst_start));
+  result.discretization_error = std::max(error, rate_error);
+  result.safe_state = reach.safe_state;
+  if (result.discretization_error > options.tolerance) {
+    result.status = free ? Status::tolerance_not_met : Status::fixed_resolution;
+    if (free)
+      result.message = fmt::format("tolerance {} not met: the last doubling of nodes changed the result by {:.2g} at {} nodes",
+                                   options.tolerance, result.discretization_error, result.cells);
+  }
+  tell(0.96, "summary");
+  describe(problem, *fine, options, result);
+  return result;
+}
+
+}  // namespace metastable::analysis

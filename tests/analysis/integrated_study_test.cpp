@@ -1,0 +1,98 @@
+#include "analysis/integrated_study.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "analysis/comparison.h"
+#include "analysis/setting.h"
+#include "dynamics/rough_terrain.h"
+
+namespace metastable::analysis {
+namespace {
+
+Setting equal_legs(double slope_deg, Spread friction) {
+  Setting setting;
+  setting.wheel.leg_length.assign(8, 0.1519);
+  setting.slope_deg = slope_deg;
+  setting.friction = friction;
+  setting.initial_speed = *paper_launch(slope_deg);
+  return setting;
+}
+
+Metastability integrated(const Setting& setting, double tolerance, std::size_t cells = 0) {
+  StudyOptions options;
+  options.method = Method::integrated;
+  options.tolerance = tolerance;
+  options.cells = cells;
+  return study(setting.problem(), options);
+}
+
+TEST(IntegratedStudy, GivesTheKnownAnswersOfThePapersWheel) {
+  // physics.md: 4.26 and 6.17, within 0.1 %; sampled and extrapolated: 4.2585(1), 6.1746(2).
+  const Metastability flat = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-3);
+  EXPECT_EQ(flat.method, Method::integrated);
+  EXPECT_EQ(flat.status, Status::converged);
+  EXPECT_EQ(flat.sampling_error, 0);
+  EXPECT_NEAR(flat.from_start.value, 4.2585, 1e-4);
+  EXPECT_NEAR(flat.steps.mean / flat.from_start.value, 1, 1e-12);
+  EXPECT_NEAR(integrated(equal_legs(9.59, {0.4, 0.1}), 1e-3).from_start.value, 6.1746, 2e-4);
+}
+
+TEST(IntegratedStudy, IsRightWhereFailuresAreRare) {
+  // Sampled and extrapolated: 46577.7(50).
+  EXPECT_NEAR(integrated(equal_legs(9.59, {0.3, 0.05}), 1e-3).from_start.value, 46577.7, 5);
+}
+
+TEST(IntegratedStudy, ErrorCoversFinerNodes) {
+  const Setting setting = equal_legs(7.02, {0.3, 0.05});
+  const Metastability coarse = integrated(setting, 0.5, 48), fine = integrated(setting, 0.5, 96);
+  EXPECT_EQ(coarse.cells, 48u);
+  EXPECT_LT(std::abs(std::log(coarse.from_start.value / fine.from_start.value)), coarse.discretization_error);
+  EXPECT_LT(fine.discretization_error, 0.1 * coarse.discretization_error);
+}
+
+TEST(IntegratedStudy, ReproducesTheSixtyDigitValuesOfRoughTerrain) {
+  constexpr double degree = std::numbers::pi / 180;
+  const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = 1.5 * degree});
+  const double start = wheel.fixed_point();
+  StudyOptions options;
+  options.method = Method::integrated;
+  options.tolerance = 1e-11;
+  const Metastability result = study({wheel, {[start](double) { return start; }, 0}, [](double x) { return x; }, {}}, options);
+  EXPECT_EQ(result.status, Status::converged);
+  EXPECT_NEAR(result.failure_rate.value / 1.5280057867965971e-6, 1, 1e-11);
+  EXPECT_NEAR(result.from_start.value / 654449.43992398285, 1, 1e-11);
+}
+
+TEST(IntegratedStudy, ComparisonsHaveNoSamplingError) {
+  StudyOptions options;
+  options.method = Method::integrated;
+  options.cells = 32;
+  const Comparison comparison = compare({equal_legs(7.02, {0.4, 0.1}), equal_legs(9.59, {0.4, 0.1})}, options);
+  const Estimate ratio = *comparison.contrasts.front().ratio;
+  EXPECT_NEAR(ratio.value, 6.1746 / 4.2585, 0.01);
+  EXPECT_LT(ratio.upper - ratio.lower, 0.1);
+}
+
+TEST(IntegratedStudy, NamesTheReasonWhereThereIsNoDensity) {
+  Setting setting = equal_legs(7.02, {0.4, 0});
+  try {
+    integrated(setting, 0.01);
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("a constant friction; use the sampled method"), std::string::npos);
+  }
+}
+
+TEST(IntegratedStudy, LeavesUnreachableRestToTheSampledStudy) {
+  Setting setting = equal_legs(9.59, {0.4, 0.1});
+  setting.law = dynamics::Law::plastic;
+  const Metastability result = integrated(setting, 0.01, 64);
+  EXPECT_EQ(result.status, Status::rest_unreachable);
+  EXPECT_EQ(result.method, Method::sampled);
+}
+
+}  // namespace
+}  // namespace metastable::analysis
