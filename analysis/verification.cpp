@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -128,7 +129,8 @@ Coverage coverage(const Problem& problem, double from_start, int seeds, int thre
     const Estimate steps = study(problem, options).from_start;
     ++result.seeds;
     if (steps.lower <= from_start && from_start <= steps.upper) ++result.inside;
-    result.widest = std::max(result.widest, 0.5 * (steps.upper - steps.lower) / steps.value);
+    const double half = 0.5 * (steps.upper - steps.lower) / steps.value;
+    result.widest = std::max(result.widest, std::isfinite(half) ? half : std::numeric_limits<double>::infinity());
   }
   return result;
 }

@@ -43,7 +43,7 @@ Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes 
 /// How often the sampled study's 95 % interval holds a value.
 struct Coverage {
   int seeds = 0, inside = 0;
-  double widest = 0;  ///< half-width over value
+  double widest = 0;  ///< half-width over value; infinite where a study does not resolve rest
 };
 /// Default study at seeds 1 .. seeds. Cost: that many studies.
 Coverage coverage(const Problem& problem, double from_start, int seeds, int threads);
