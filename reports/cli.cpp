@@ -16,6 +16,7 @@
 #include "analysis/input_error.h"
 #include "dynamics/contact_law.h"
 #include "markov/chain.h"
+#include "reports/collisions_command.h"
 #include "reports/compare_command.h"
 #include "reports/config_file.h"
 #include "reports/interrupt.h"
@@ -44,6 +45,11 @@ class Options {
       option->default_str(fallback);
       fallback_[name] = fallback;
     }
+  }
+
+  // What the command is about, given by its place on the command line; required.
+  void add_place(const std::string& name, const std::string& help) {
+    command_.add_option(name, texts_[name], help)->required()->expected(1)->type_name("");
   }
 
   // Keys of the file that the command line did not give.
@@ -297,15 +303,55 @@ std::vector<Command> commands() {
          add_wheel(o), add_contact(o), add_course(o);
          o.add("trials", "N", "50", "Trials");
          o.add("collisions", "N", "16", "Most collisions of a trial");
+         o.add("angle-rate", "HZ", "", "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
+         o.add("angle-noise", "RAD", "", "White noise of the angle (default 0.0002; needs --angle-rate)");
          o.add("seed", "SEED", "1", "Seed of the random numbers");
          o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
          o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
        },
        [](const Options& o, const std::string& line) {
          if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
-         run_simulate({one_setting(o), static_cast<int>(o.whole("trials", 1, 1000000)),
-                       static_cast<int>(o.whole("collisions", 1, 100000)), o.whole("seed", 0, UINT64_MAX),
-                       static_cast<int>(o.whole("threads", 0, 1024)), o.text("out"), line});
+         SimulateRequest request{one_setting(o), static_cast<int>(o.whole("trials", 1, 1000000)),
+                                 static_cast<int>(o.whole("collisions", 1, 100000)), o.whole("seed", 0, UINT64_MAX),
+                                 static_cast<int>(o.whole("threads", 0, 1024)), o.text("out"), line};
+         if (o.given("angle-noise") && !o.given("angle-rate"))
+           throw std::invalid_argument("--angle-noise: needs --angle-rate");
+         if (o.given("angle-rate")) {
+           analysis::CameraOptions& camera = request.camera.emplace();
+           camera.rate = o.number("angle-rate");
+           if (o.given("angle-noise")) camera.noise_sd = o.number("angle-noise");
+           camera.seed = request.seed;
+           camera.threads = request.threads;
+           camera.validate();
+         }
+         run_simulate(request);
+       }},
+      {"collisions", "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
+       [](Options& o) {
+         o.add_place("DIR", "Experiment folder with experiment.toml and angle.csv");
+         o.add("window", "N", "", "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples)");
+         o.add("collisions", "N", "16", "Most collisions of a trial");
+         o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides");
+         o.add("omega-minus", "fit|peak", "fit", "Stance motion extrapolated to the collision, or the smoothed speed's peak");
+         o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision");
+         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
+       },
+       [](const Options& o, const std::string&) {
+         CollisionsRequest request;
+         request.folder = o.text("DIR");
+         if (o.given("window")) request.finder.window = static_cast<int>(o.whole("window", 5, 10001));
+         request.finder.collisions = static_cast<int>(o.whole("collisions", 1, 100000));
+         request.finder.rise = o.number("rise");
+         request.finder.fit_span = o.number("fit-span");
+         request.finder.validate();
+         const std::string speed = o.text("omega-minus");
+         if (speed != "fit" && speed != "peak")
+           throw std::invalid_argument(fmt::format("--omega-minus: '{}' is neither 'fit' nor 'peak'", speed));
+         request.peak = speed == "peak";
+         request.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.out = o.text("out");
+         run_collisions(request);
        }},
       {"report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
        [](Options& o) {

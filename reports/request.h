@@ -1,9 +1,12 @@
 #pragma once
 // What the command line asks for, as data: one struct a command.
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "analysis/angle_recording.h"
+#include "analysis/collision_finder.h"
 #include "analysis/metastability.h"
 #include "analysis/setting.h"
 #include "analysis/sweep.h"
@@ -45,6 +48,16 @@ struct SimulateRequest {
   int threads = 0;
   std::string out;  ///< folder
   std::string command;
+  std::optional<analysis::CameraOptions> camera = {};  ///< given: angle.csv too
+};
+
+/// metastable collisions
+struct CollisionsRequest {
+  std::string folder;
+  analysis::FinderOptions finder;
+  bool peak = false;  ///< omega_minus is the peak of the smoothed speed instead of the stance fit
+  std::string out;    ///< file; "": collisions.csv in the folder, or collisions-from-angle.csv if that is there
+  int threads = 0;
 };
 
 /// metastable report

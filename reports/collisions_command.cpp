@@ -1,0 +1,189 @@
+#include "reports/collisions_command.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "analysis/angle_file.h"
+#include "analysis/experiment.h"
+#include "analysis/input_error.h"
+#include "markov/parallel.h"
+#include "reports/output_file.h"
+
+namespace metastable::reports {
+namespace {
+namespace fs = std::filesystem;
+
+using analysis::FoundCollision;
+using analysis::FoundTrial;
+
+// Mean and spread of differences.
+class Differences {
+ public:
+  void add(double difference) {
+    const double step = difference - mean_;
+    mean_ += step / ++count_;
+    squares_ += step * (difference - mean_);
+  }
+  std::string text() const {
+    if (count_ < 2) return "too few to say";
+    const double sd = std::sqrt(squares_ / (count_ - 1));
+    return fmt::format("bias {:+.4f} +- {:.4f} rad/s, spread (sd) {:.4f} rad/s, n = {:.0f}", mean_,
+                       1.96 * sd / std::sqrt(count_), sd, count_);
+  }
+
+ private:
+  double count_ = 0, mean_ = 0, squares_ = 0;
+};
+
+double omega_minus(const FoundCollision& c, bool peak) { return peak || !c.fit ? c.peak : c.fit->omega_minus; }
+double time_of(const FoundCollision& c) { return c.fit ? c.fit->time : c.peak_time; }
+
+std::string csv_text(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + '"';
+}
+
+struct Files {
+  std::string collisions = "condition,trial,collision,leg,time_s,omega_minus_rad_s,omega_plus_rad_s\n";
+  std::string details =
+      "condition,trial,collision,peak_time_s,omega_peak_rad_s,time_fit_s,omega_minus_fit_rad_s,omega_plus_fit_rad_s,"
+      "fit_residual_rad,apex_time_s,omega_apex_rad_s,bounces\n";
+};
+
+Files write_files(const analysis::Experiment& experiment, const std::vector<analysis::MeasuredAngle>& angles,
+                  const std::vector<FoundTrial>& found, bool peak) {
+  Files files;
+  for (std::size_t t = 0; t < angles.size(); ++t) {
+    const analysis::Condition& condition = experiment.conditions[angles[t].condition];
+    for (const FoundCollision& c : found[t].collisions) {
+      const std::string key = fmt::format("{},{},{}", csv_text(condition.id), angles[t].number, c.number);
+      fmt::format_to(std::back_inserter(files.collisions), "{},{},{:.6f},{:.6g},{}\n", key,
+                     (condition.first_landing_leg + c.number - 1) % experiment.legs(), time_of(c), omega_minus(c, peak),
+                     c.fit ? fmt::format("{:.6g}", c.fit->omega_plus) : "");
+      const std::string fit = c.fit ? fmt::format("{:.6f},{:.6g},{:.6g},{:.3g}", c.fit->time, c.fit->omega_minus,
+                                                  c.fit->omega_plus, c.fit->residual_sd)
+                                    : ",,,";
+      fmt::format_to(std::back_inserter(files.details), "{},{:.6f},{:.6g},{},{:.6f},{:.6g},{}\n", key, c.peak_time, c.peak,
+                     fit, c.apex_time, c.apex, c.bounces);
+    }
+  }
+  return files;
+}
+
+// How the found collisions differ from known ones: the same number, and within a tenth of a second if both have a time.
+void print_comparison(const analysis::Experiment& known, const std::vector<analysis::MeasuredAngle>& angles,
+                      const std::vector<FoundTrial>& found, const CollisionsRequest& request) {
+  std::map<int, const analysis::MeasuredTrial*> trials;
+  for (const analysis::MeasuredTrial& trial : known.trials) trials[trial.number] = &trial;
+  std::size_t due = 0, hits = 0, extra = 0;
+  Differences reported, peaks, before, after;
+  for (std::size_t t = 0; t < angles.size(); ++t) {
+    const auto trial = trials.find(angles[t].number);
+    if (trial == trials.end()) continue;
+    const auto& truth = trial->second->collisions;
+    const std::size_t wanted = std::min(truth.size(), static_cast<std::size_t>(request.finder.collisions));
+    due += wanted;
+    for (const FoundCollision& c : found[t].collisions) {
+      const auto i = static_cast<std::size_t>(c.number) - 1;
+      if (i >= wanted || (truth[i].time && std::abs(*truth[i].time - time_of(c)) > 0.1)) {
+        ++extra;
+        continue;
+      }
+      ++hits;
+      reported.add(omega_minus(c, request.peak) - truth[i].omega_minus);
+      peaks.add(c.peak - truth[i].omega_minus);
+      if (!c.fit) continue;
+      before.add(c.fit->omega_minus - truth[i].omega_minus);
+      if (truth[i].omega_plus) after.add(c.fit->omega_plus - *truth[i].omega_plus);
+    }
+  }
+  fmt::print("against the {} collisions of collisions.csv: {} found ({:.2f} %), {} others\n", due, hits,
+             due > 0 ? 100.0 * static_cast<double>(hits) / static_cast<double>(due) : 0.0, extra);
+  fmt::print("  omega_minus as written:  {}\n", reported.text());
+  fmt::print("  omega_minus, peak:       {}\n", peaks.text());
+  fmt::print("  omega_minus, stance fit: {}\n", before.text());
+  fmt::print("  omega_plus, stance fit:  {}\n", after.text());
+}
+
+}  // namespace
+
+void run_collisions(const CollisionsRequest& request) {
+  const fs::path folder = request.folder;
+  const analysis::ExperimentSource source = analysis::read_source(folder);
+  analysis::Experiment experiment = analysis::parse_description(source);
+  if (experiment.system != analysis::System::rimless_wheel)
+    throw std::invalid_argument(fmt::format("{}: a coast-down has no collisions to find", request.folder));
+  const std::vector<analysis::MeasuredAngle> angles = analysis::parse_angles(source, experiment);
+  std::optional<analysis::Experiment> known;
+  if (source.collisions_csv) known = analysis::parse_experiment(source);
+  const fs::path out = !request.out.empty() ? fs::path(request.out)
+                       : known              ? folder / "collisions-from-angle.csv"
+                                            : folder / "collisions.csv";
+  const bool to_terminal = out == "-";
+  OutputFile collisions_file(out);
+  std::optional<OutputFile> details_file;
+  fs::path details;
+  if (!to_terminal) {
+    details = out.parent_path() / (out.stem().string() + "-details.csv");
+    details_file.emplace(details);
+  }
+
+  std::vector<dynamics::WheelMap> maps;
+  for (const analysis::Condition& condition : experiment.conditions) {
+    analysis::Setting setting;
+    setting.wheel = experiment.wheel;
+    setting.slope_deg = condition.slope_deg;
+    setting.law = experiment.contact.law;
+    setting.first_landing_leg = condition.first_landing_leg;
+    maps.push_back(setting.map());
+  }
+  std::vector<FoundTrial> found(angles.size());
+  markov::parallel_for(angles.size(), request.threads, [&](std::size_t t) {
+    const auto& [number, condition, recording] = angles[t];
+    try {
+      found[t] = analysis::find_collisions(recording, maps[condition], experiment.conditions[condition].first_landing_leg,
+                                           request.finder);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: trial {}: {}", (folder / "angle.csv").string(), number, error.what()));
+    }
+  });
+
+  const Files files = write_files(experiment, angles, found, request.peak);
+  collisions_file.stream() << files.collisions;
+  if (details_file) {
+    details_file->stream() << files.details;
+    details_file->commit();
+  }
+  collisions_file.commit();
+  if (to_terminal) return;
+
+  std::size_t count = 0, bounces = 0, unfitted = 0;
+  std::map<std::string, std::size_t> stopped;
+  for (const FoundTrial& trial : found) {
+    count += trial.collisions.size();
+    for (const FoundCollision& c : trial.collisions) {
+      bounces += static_cast<std::size_t>(c.bounces);
+      unfitted += !c.fit;
+    }
+    if (trial.collisions.empty()) ++stopped[trial.stopped];
+  }
+  fmt::print("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}\n", out.string(), count,
+             angles.size(), bounces, details.string());
+  fmt::print("omega_minus is the {}\n", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
+                                                     : "stance motion extrapolated to the collision");
+  if (unfitted > 0)
+    fmt::print("{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left empty\n",
+               unfitted);
+  for (const auto& [why, trials] : stopped) fmt::print("{} trials without a collision: {}\n", trials, why);
+  if (known) print_comparison(*known, angles, found, request);
+}
+
+}  // namespace metastable::reports

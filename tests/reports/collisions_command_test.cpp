@@ -1,0 +1,96 @@
+#include "reports/collisions_command.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include "analysis/experiment.h"
+#include "analysis/input_error.h"
+#include "reports/simulate_command.h"
+
+namespace metastable::reports {
+namespace {
+namespace fs = std::filesystem;
+
+class CollisionsCommandTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("metastable_collisions_" + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void simulate() const {
+    SimulateRequest request;
+    request.trials = 10;
+    request.out = folder_.string();
+    request.camera.emplace();
+    testing::internal::CaptureStdout();
+    run_simulate(request);
+    testing::internal::GetCapturedStdout();
+  }
+  std::string run(bool peak = false) const {
+    CollisionsRequest request;
+    request.folder = folder_.string();
+    request.peak = peak;
+    testing::internal::CaptureStdout();
+    try {
+      run_collisions(request);
+    } catch (...) {
+      testing::internal::GetCapturedStdout();
+      throw;
+    }
+    return testing::internal::GetCapturedStdout();
+  }
+  static std::string read(const fs::path& path) {
+    std::ostringstream text;
+    text << std::ifstream(path).rdbuf();
+    return text.str();
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(CollisionsCommandTest, ComparesWithTheCollisionsThatAreThere) {
+  simulate();
+  const std::string before = read(folder_ / "collisions.csv");
+  const std::string said = run();
+  EXPECT_NE(said.find("found (100.00 %), 0 others"), std::string::npos) << said;
+  EXPECT_NE(said.find("omega_minus as written:  bias"), std::string::npos) << said;
+  EXPECT_EQ(read(folder_ / "collisions.csv"), before);
+  EXPECT_TRUE(fs::exists(folder_ / "collisions-from-angle.csv"));
+  EXPECT_TRUE(fs::exists(folder_ / "collisions-from-angle-details.csv"));
+}
+
+TEST_F(CollisionsCommandTest, MakesAFolderThatCanBeReadInFull) {
+  simulate();
+  const analysis::Experiment known = analysis::read_experiment(folder_);
+  fs::remove(folder_ / "collisions.csv");
+  run(true);
+  const analysis::Experiment found = analysis::read_experiment(folder_);
+  EXPECT_EQ(found.collisions(), known.collisions());
+  EXPECT_EQ(found.columns.leg, analysis::Presence::all);
+  EXPECT_EQ(found.columns.position, analysis::Presence::none);
+  EXPECT_LT(found.trials[0].collisions[0].omega_minus, known.trials[0].collisions[0].omega_minus - 0.1);  // the peak
+}
+
+TEST_F(CollisionsCommandTest, LeavesNothingBehindWhenTheInputIsBad) {
+  simulate();
+  fs::remove(folder_ / "collisions.csv");
+  std::ofstream(folder_ / "angle.csv", std::ios::app) << "7.02,1,zero,0\n";
+  EXPECT_THROW(run(), analysis::InputError);
+  std::ofstream(folder_ / "angle.csv") << "trial,time_s,angle_rad\n1,0,0\n1,1,0\n";
+  fs::remove(folder_ / "trials.csv");
+  EXPECT_THROW(run(), std::invalid_argument);  // 1 Hz
+  EXPECT_FALSE(fs::exists(folder_ / "collisions.csv"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 2);
+}
+
+}  // namespace
+}  // namespace metastable::reports
