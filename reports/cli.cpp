@@ -47,6 +47,19 @@ class Options {
     }
   }
 
+  // An option without a value; `true` or `false` in a file.
+  void add_flag(const std::string& name, const std::string& help) {
+    std::vector<std::string>& texts = texts_[name];
+    command_.add_flag_callback("--" + name, [&texts] { texts = {"true"}; }, help);
+    fallback_[name] = "false";
+  }
+  bool flag(const std::string& name) const {
+    const std::string value = text(name);
+    if (value != "true" && value != "false")
+      throw std::invalid_argument(fmt::format("--{}: '{}' is neither true nor false", name, value));
+    return value == "true";
+  }
+
   // What the command is about, given by its place on the command line; required.
   void add_place(const std::string& name, const std::string& help) {
     command_.add_option(name, texts_[name], help)->required()->expected(1)->type_name("");
@@ -243,10 +256,11 @@ std::vector<Command> commands() {
          o.add("slope", "DEG", "7.02", "Ramp slope [deg], above 0 and below half the angle between legs");
          o.add("initial-speed", "MEAN,SD", "", "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
          add_wheel(o), add_contact(o), add_course(o), add_study(o);
+         o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
          o.add("json", "FILE|-", "", "Write the results as JSON");
        },
        [](const Options& o, const std::string& line) {
-         run_steps({one_setting(o), study_options(o), o.text("json"), line});
+         run_steps({one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")});
        }},
       {"compare", "Expected steps of two or more slopes on common random numbers",
        [](Options& o) {

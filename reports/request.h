@@ -19,6 +19,7 @@ struct StepsRequest {
   analysis::StudyOptions study;
   std::string json;     ///< file, "-" for standard output, "" for none
   std::string command;  ///< the command line, for provenance
+  bool certify = false;  ///< guaranteed bounds as well
 };
 
 /// metastable compare

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+
+#include "analysis/certify.h"
 #include "reports/output_file.h"
 #include "reports/study_json.h"
 #include "reports/study_progress.h"
@@ -20,12 +23,21 @@ void run_steps(const StepsRequest& request) {
     return analysis::study(request.setting.problem(), options);
   }();
   const RestThresholds thresholds = rest_thresholds(request.setting, study);
+  std::optional<analysis::CertifiedSteps> certified;
+  if (request.certify) {
+    Progress progress("certificate", study_units);
+    certified = analysis::certify(request.setting, {.tolerance = request.study.tolerance,
+                                                    .threads = request.study.threads,
+                                                    .progress = study_progress(progress)});
+  }
   if (json) {
     const Provenance provenance{request.command, request.setting.describe(), request.study.seed, version()};
-    json->stream() << steps_json(request.setting, study, thresholds, provenance);
+    json->stream() << steps_json(request.setting, study, thresholds, provenance, certified ? &*certified : nullptr);
     json->commit();
   }
-  if (request.json != "-") fmt::print("{}", study_text(request.setting, study, thresholds));
+  if (request.json == "-") return;
+  fmt::print("{}", study_text(request.setting, study, thresholds));
+  if (certified) fmt::print("  {:<38}{}\n", "certificate", analysis::certificate_text(*certified));
 }
 
 }  // namespace metastable::reports

@@ -29,6 +29,24 @@ Json accumulated(const analysis::Accumulated& total) {
   return json;
 }
 
+Json certificate_json(const analysis::CertifiedSteps& certified) {
+  Json json = {{"exists", certified.exists}};
+  if (!certified.reason.empty()) json["reason"] = certified.reason;
+  if (!certified.exists) return json;
+  json["expected_steps"] = {{"lower", number(certified.lower)}, {"upper", number(certified.upper)}};
+  json["relative_width"] = number(certified.width());
+  json["cells"] = certified.cells;
+  // From any omega^2 just before a collision: linear between states.
+  Json legs = Json::array();
+  const markov::Certificate& all = certified.from_state;
+  for (std::size_t p = 0; p < all.nodes.size(); ++p)
+    legs.push_back({{"state_rad2_s2", all.nodes[p]},
+                    {"lower", all.lower[p]},
+                    {"upper", all.upper.empty() ? Json(nullptr) : Json(all.upper[p])}});
+  json["per_leg"] = legs;
+  return json;
+}
+
 Json provenance_json(const Provenance& provenance) {
   return {{"command", provenance.command}, {"settings", provenance.settings}, {"seed", provenance.seed},
           {"version", provenance.version}};
@@ -89,9 +107,11 @@ RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis:
 }
 
 std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
-                       const RestThresholds& thresholds, const Provenance& provenance) {
+                       const RestThresholds& thresholds, const Provenance& provenance,
+                       const analysis::CertifiedSteps* certified) {
   Json json = {{"schema", 1}};
   json.update(study_json(setting, study, thresholds));
+  if (certified) json["certificate"] = certificate_json(*certified);
   json["provenance"] = provenance_json(provenance);
   return json.dump(2) + "\n";
 }

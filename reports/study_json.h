@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/certify.h"
 #include "analysis/comparison.h"
 #include "analysis/metastability.h"
 #include "analysis/setting.h"
@@ -21,8 +22,10 @@ RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis:
 
 /// The result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as many
 /// digits as a double holds. Keys as in the README ("steps --json").
+/// @param certified  adds "certificate" if not null
 std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
-                       const RestThresholds& thresholds, const Provenance& provenance);
+                       const RestThresholds& thresholds, const Provenance& provenance,
+                       const analysis::CertifiedSteps* certified = nullptr);
 
 /// The result of `compare`: "settings" (each as in steps_json) and "contrasts".
 std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,

@@ -71,6 +71,23 @@ std::vector<std::string> with(std::vector<std::string> words, const std::vector<
   return words;
 }
 
+TEST_F(CommandLine, CertifiedBoundsStandBesideTheEstimate) {
+  const std::vector<std::string> words = with({"steps", "--slope", "9.59", "--certify", "--json"}, {path("c.json")});
+  const Ran ran = metastable(with(words, quick));
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(ran.out.find("certificate"), std::string::npos);
+  EXPECT_NE(ran.out.find("guaranteed"), std::string::npos);
+  const auto certificate = nlohmann::json::parse(content(path("c.json")))["certificate"];
+  EXPECT_TRUE(certificate["exists"]);
+  EXPECT_LT(certificate["expected_steps"]["lower"], 6.1746);
+  EXPECT_GT(certificate["expected_steps"]["upper"], 6.1746);
+  EXPECT_EQ(certificate["per_leg"].size(), 1U);
+
+  const Ran none = metastable(with({"steps", "--slope", "9.59", "--law", "coulomb", "--certify"}, quick));
+  EXPECT_EQ(none.code, 0) << none.err;
+  EXPECT_NE(none.out.find("no certificate: bounds exist for the law published only"), std::string::npos) << none.out;
+}
+
 // A wrong option, key or value: exit code 2 and one line that names it and what is allowed.
 TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
   struct Case {
