@@ -1,10 +1,13 @@
 #include "analysis/chain_summary.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <string>
 
 #include "markov/eigenpairs.h"
 #include "markov/first_passage.h"
@@ -16,6 +19,7 @@ namespace {
 constexpr std::size_t survival_values = 64;
 constexpr std::size_t violation_draws = 64;  // a state
 constexpr std::size_t slowest_draws = 16384;
+constexpr std::size_t most_forward = 100000;  // steps followed where some launches never rest
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -70,14 +74,21 @@ bool noise_free(const Problem& problem) {
   return true;
 }
 
-// Moduli per step of the eigenvalues of a chain watched once a revolution of `period` steps; lambda_1's alone for a map
-// without noise.
+// Moduli per step of the eigenvalues of a chain watched once a revolution of `period` steps. lambda_1 alone for a map
+// without noise, and where Spectra does not converge (its message is then added to `message`).
 std::vector<double> moduli_per_step(const Problem& problem, const markov::Chain& revolution, int period, int count,
-                                    double failure_rate) {
-  if (noise_free(problem)) return {1 - failure_rate};
+                                    double failure_rate, std::string& message) {
+  const std::vector<double> first{1 - failure_rate};
+  if (noise_free(problem)) return first;
+  constexpr double rounding = 1e-13;  // of a revolution's eigenvalue: below it a modulus means nothing
   std::vector<double> moduli;
-  for (const std::complex<double>& value : markov::leading_eigenpairs(revolution, count).values)
-    moduli.push_back(std::pow(std::abs(value), 1.0 / period));
+  try {
+    for (const std::complex<double>& value : markov::leading_eigenpairs(revolution, count).values)
+      if (moduli.empty() || std::abs(value) > rounding) moduli.push_back(std::pow(std::abs(value), 1.0 / period));
+  } catch (const markov::ConvergenceError& error) {
+    message += (message.empty() ? "" : "; ") + std::string("eigenvalues beyond lambda_1: ") + error.what();
+    return first;
+  }
   return moduli;
 }
 
@@ -153,14 +164,17 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
   for (std::size_t n = 0; n < shown; ++n) result.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.reach_end = survival.at(*problem.last_event);
 
-  result.eigenvalue_moduli = moduli_per_step(problem, solver.revolution(), result.period, options.eigenvalues, quasi.failure_rate);
+  result.eigenvalue_moduli = moduli_per_step(problem, solver.revolution(), result.period, options.eigenvalues,
+                                             quasi.failure_rate, result.message);
   result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
   result.total_variation_steps =
       markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   describe_survivors(problem, space, quasi.distribution, result);
-  const MeanSd restarted = observe(problem, space, markov::stationary_with_restart(solver, launch.after));
-  result.restart_mean = restarted.mean;
-  result.restart_sd = restarted.sd;
+  if (dot(launch.after, launch.after) > 0) {  // otherwise no launch survives its first collision
+    const MeanSd restarted = observe(problem, space, markov::stationary_with_restart(solver, launch.after));
+    result.restart_mean = restarted.mean;
+    result.restart_sd = restarted.sd;
+  }
   describe_violations(problem, space, quasi.distribution, solver.solve_left(launch.after), options, result);
 
   const markov::SparseSolver check(solver.revolution());
@@ -188,23 +202,41 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   const markov::Period period = markov::find_period(closed);
   result.period = period.period;
   result.eigenvalue_moduli =
-      moduli_per_step(problem, markov::revolution_chain(closed, period), period.period, options.eigenvalues, 0.0);
+      moduli_per_step(problem, markov::revolution_chain(closed, period), period.period, options.eigenvalues, 0.0, result.message);
   result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
   describe_survivors(problem, space, stationary, result);
   result.restart_mean = result.observable_mean;
   result.restart_sd = result.observable_sd;
 
-  std::vector<double> alive = launch.after;
+  // Forward from the launch: survival, visits on the course, and the share that has come to rest when no more do.
+  std::vector<double> alive = launch.after, visits(space.size(), 0.0);
   result.survival = {1.0};
   const std::size_t shown =
       std::max<std::size_t>(survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
-  while (result.survival.size() < shown) {
-    result.survival.push_back(std::accumulate(alive.begin(), alive.end(), 0.0));
+  for (std::size_t n = 1; n < most_forward; ++n) {
+    const double surviving = std::min(result.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
+    const bool settled = n > 2 * static_cast<std::size_t>(result.period) &&
+                         surviving > result.survival[n - static_cast<std::size_t>(result.period)] * (1 - 1e-12);
+    if (n >= shown && settled) break;
+    result.survival.push_back(surviving);
+    if (n < shown)
+      for (std::size_t i = 0; i < visits.size(); ++i) visits[i] += alive[i];
     alive = markov::apply_left(sampled.chain, alive);
   }
+  const double ever_rests = 1 - result.survival.back();
+  if (ever_rests > 1e-9)
+    result.message = fmt::format("infinite: rest is unreachable for {:.4g} % of the launches, the others rest",
+                                 100 * result.survival.back());
+  for (const double level : Metastability::levels) {
+    const auto reached = std::find_if(result.survival.begin(), result.survival.end(),
+                                      [&](double surviving) { return surviving <= 1 - level; });
+    result.steps.quantile.push_back(reached == result.survival.end()
+                                        ? infinite
+                                        : static_cast<double>(reached - result.survival.begin()));
+  }
+  result.survival.resize(std::min(result.survival.size(), shown));
   if (problem.last_event) result.reach_end = result.survival[static_cast<std::size_t>(*problem.last_event)];
-  describe_violations(problem, space, stationary, std::vector<double>(space.size(), 0.0), options, result);
-  for (Share& share : result.violations) share.until_rest = share.quasi_stationary;
+  describe_violations(problem, space, stationary, visits, options, result);
 }
 
 }  // namespace metastable::analysis

@@ -40,13 +40,10 @@ Contrast contrast(const Comparison& comparison, std::size_t against, std::size_t
   if (!a.survival.empty() && !b.survival.empty())
     result.trials_needed = trials_to_tell_apart(a.survival, b.survival, collisions);
   if (endless(a) || endless(b)) {
-    const auto phrase = [](const Metastability& study) {
-      return study.status == Status::rest_unreachable ? std::string("infinite: rest is unreachable") : study.message;
-    };
     result.sentence = endless(a) && endless(b)
-                          ? fmt::format("{}: {}; {}: {}; no ratio is formed", name_a, phrase(a), name_b, phrase(b))
+                          ? fmt::format("{}: {}; {}: {}; no ratio is formed", name_a, a.message, name_b, b.message)
                           : fmt::format("{}: {}; no ratio is formed", endless(a) ? name_a : name_b,
-                                        phrase(endless(a) ? a : b));
+                                        (endless(a) ? a : b).message);
     return result;
   }
   std::vector<double> log_ratio, difference;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "markov/parallel.h"
@@ -29,6 +30,23 @@ std::string toml_text(const std::string& text) {
 
 std::string toml_spread(const Spread& spread) { return fmt::format("{{ mean = {}, sd = {} }}", spread.mean, spread.sd); }
 
+// The nominal distributions; of a list of pairs, its means and sds.
+struct Nominal {
+  Spread restitution, friction;
+};
+
+Nominal nominal(const Setting& setting) {
+  if (setting.pairs.empty()) return {setting.restitution, setting.friction};
+  const auto spread = [&](double dynamics::Contact::* which) {
+    const auto count = static_cast<double>(setting.pairs.size());
+    double mean = 0, square = 0;
+    for (const dynamics::Contact& pair : setting.pairs) mean += pair.*which / count;
+    for (const dynamics::Contact& pair : setting.pairs) square += (pair.*which - mean) * (pair.*which - mean) / count;
+    return Spread{mean, std::sqrt(square)};
+  };
+  return {spread(&dynamics::Contact::restitution), spread(&dynamics::Contact::friction)};
+}
+
 }  // namespace
 
 std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const SimulationOptions& options) {
@@ -51,6 +69,7 @@ std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const Simul
 ExperimentFiles experiment_files(const Setting& setting, const std::vector<dynamics::Trial>& trials,
                                  const std::string& title, const std::vector<std::string>& comment) {
   const std::string condition = fmt::format("{}", setting.slope_deg);
+  const Nominal contact = nominal(setting);
   ExperimentFiles files;
   std::string& toml = files.experiment_toml;
   for (const std::string& line : comment) toml += "# " + line + "\n";
@@ -64,7 +83,8 @@ ExperimentFiles experiment_files(const Setting& setting, const std::vector<dynam
     toml += fmt::format("radius_of_gyration_m = {}\n",
                         dynamics::contact_model(setting.wheel, setting.law).radius_of_gyration);
   toml += fmt::format("\n[contact]\nlaw = \"{}\"\nrestitution = {}\nfriction = {}\n", dynamics::law_name(setting.law),
-                      toml_spread(setting.restitution), toml_spread(setting.friction));
+                      toml_spread(contact.restitution), toml_spread(contact.friction));
+  if (!setting.pairs.empty()) toml += "# drawn from a list of pairs; these are its means and sds\n";
   toml += fmt::format(
       "\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\ninitial_speed_rad_s = {}\nfirst_landing_leg = {}\n",
       condition, setting.slope_deg, setting.ramp_length, toml_spread(setting.initial_speed), setting.first_landing_leg);

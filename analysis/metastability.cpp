@@ -68,15 +68,17 @@ class Study {
         std::optional<Metastability> result = refine(*pilot);
         if (result) return *std::move(result);
       }
-      // Rest is possible, but no draw came to it: look deeper into the tails, as far as doubles go.
-      if (options_.weighting == markov::Weighting::plain || options_.tail <= 1e-300) return unresolved();
+      // Rest is possible, but no draw came to it, or hardly: look deeper into the tails, as far as doubles go.
+      if (!can_look_deeper()) return unresolved();
       options_.tail = std::max(1e-300, options_.tail * options_.tail * options_.tail);
     }
   }
 
+  bool can_look_deeper() const { return options_.weighting == markov::Weighting::weighted && options_.tail > 1e-300; }
+
   struct Pilot {
     markov::StateSpace space;
-    std::vector<double> nu, h, after;
+    std::vector<double> nu, h, visits;
   };
 
   std::optional<Pilot> solve_pilot() {
@@ -90,8 +92,19 @@ class Study {
       const markov::ChainSolver solver(sampled.chain);
       const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
       if (markov::top_share(space, quasi.distribution) < 1e-10 || reach > 1e6)
-        return Pilot{std::move(space), quasi.distribution, quasi.survival_weight, sampled.launch.after};
+        return Pilot{std::move(space), quasi.distribution, quasi.survival_weight, early_visits(sampled)};
     }
+  }
+
+  // Expected visits to each state in the steps after the launch: the transient that the cells must hold in every phase.
+  static std::vector<double> early_visits(const markov::SampledChain& sampled) {
+    constexpr int steps = 64;
+    std::vector<double> now = sampled.launch.after, visits = now;
+    for (int step = 1; step < steps; ++step) {
+      now = markov::apply_left(sampled.chain, now);
+      for (std::size_t i = 0; i < visits.size(); ++i) visits[i] += now[i];
+    }
+    return visits;
   }
 
   static bool rests(const markov::SampledChain& sampled) {
@@ -101,7 +114,7 @@ class Study {
 
   // All replicates at one resolution, in batches of as many as there are threads; sums run in replicate order.
   Ladder climb(const Pilot& pilot, std::size_t cells, std::size_t samples, double work_before, double work_after) {
-    Ladder ladder{nested(markov::graded_space(pilot.space, pilot.nu, pilot.h, pilot.after, cells >> (sizes - 1))), {}, {}};
+    Ladder ladder{nested(markov::graded_space(pilot.space, pilot.nu, pilot.h, pilot.visits, cells >> (sizes - 1))), {}, {}};
     std::vector<markov::ChainPool> pools(sizes);
     const auto replicates = static_cast<std::size_t>(options_.replicates);
     const auto threads = static_cast<std::size_t>(markov::thread_count(options_.threads));
@@ -146,9 +159,14 @@ class Study {
       done = next;
       if (!ladder.rest_resolved) return std::nullopt;
       Metastability result = assess(ladder, cells, samples);
-      const bool met = result.discretization_error + result.sampling_error <= options_.tolerance;
+      // A failure this rare may hang on noise rarer than the draws reach.
+      if (can_look_deeper() && std::log(result.failure_rate.value) < 0.6 * std::log(options_.tail)) return std::nullopt;
+      // What is read off the finest chain as it is must be within the tolerance too.
+      const double unextrapolated = std::abs(std::log(result.from_start.value / result.steps.mean));
+      const bool met = std::max(result.discretization_error + result.sampling_error, unextrapolated) <= options_.tolerance;
       bool refined = false;
-      if (!met && free_cells && result.discretization_error > options_.tolerance / 3 && cells < most_cells) {
+      if (!met && free_cells &&
+          (result.discretization_error > options_.tolerance / 3 || unextrapolated > options_.tolerance) && cells < most_cells) {
         cells *= 2;
         refined = true;
       }
@@ -198,6 +216,7 @@ class Study {
       const double half = discretization + sampling;
       return Estimate{std::exp(extrapolated), std::exp(extrapolated - half), std::exp(extrapolated + half)};
     };
+    result.steps.mean = pooled.back().from_start;
     double unused_d = 0, unused_s = 0;
     result.from_start = estimate(&ExpectedSteps::from_start, result.discretization_error, result.sampling_error);
     result.from_quasi_stationary = estimate(&ExpectedSteps::from_quasi_stationary, unused_d, unused_s);
@@ -212,7 +231,7 @@ class Study {
   Metastability infinite_case() {
     Metastability result;
     result.status = Status::rest_unreachable;
-    result.message = status_text(Status::rest_unreachable);
+    result.message = "infinite: rest is unreachable";
     result.cells = options_.cells == 0 ? 4 * first_cells : options_.cells;
     result.samples = options_.samples == 0 ? 4 * first_samples : options_.samples;
     result.replicates = 1;
@@ -290,10 +309,11 @@ Method method_from_name(std::string_view name) {
 std::string status_text(Status status) {
   switch (status) {
     case Status::converged: return "converged";
-    case Status::tolerance_not_met: return "tolerance not met";
-    case Status::fixed_resolution: return "fixed resolution";
-    case Status::rest_unreachable: return "infinite: rest is unreachable";
-    case Status::rest_unresolved: return "rest not resolved";
+    case Status::tolerance_not_met: return "tolerance_not_met";
+    case Status::fixed_resolution: return "fixed_resolution";
+    case Status::rest_unreachable: return "rest_unreachable";
+    case Status::solver_failed: return "solver_failed";
+    case Status::rest_unresolved: return "rest_unresolved";
   }
   throw std::logic_error("unknown status");
 }

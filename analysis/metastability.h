@@ -37,7 +37,7 @@ struct StudyOptions {
   int replicates = 8;        ///< independent randomisations behind the interval, 2 .. 64
   markov::Sequence sequence = markov::Sequence::sobol;
   markov::Weighting weighting = markov::Weighting::weighted;
-  double tail = 1e-30;       ///< tail probability the weighted draws reach
+  double tail = 1e-30;       ///< tail probability the weighted draws reach; deepened by itself where failures are that rare
   double mixing_distance = 0.05;  ///< total variation distance that counts as mixed
   int eigenvalues = 6;       ///< how many moduli to report
   std::size_t largest_cells = 1024;        ///< refinement stops here
@@ -52,6 +52,7 @@ enum class Status {
   tolerance_not_met,    ///< refinement stopped at its largest size; the interval says how far it got
   fixed_resolution,     ///< tolerance not met, but cells and samples were both given: nothing was refined
   rest_unreachable,     ///< expected steps are infinite
+  solver_failed,        ///< only in sweeps: a solver did not converge at this point, see the message
   rest_unresolved,      ///< rest is possible, but beyond the draws: expected steps exceed from_start.lower
 };
 
@@ -71,12 +72,12 @@ struct PhaseDistribution {
 struct Share {
   std::string name;
   double quasi_stationary = 0;  ///< of collisions in the metastable regime
-  double until_rest = 0;        ///< of all collisions from the launch to rest
+  double until_rest = 0;        ///< of all collisions from the launch to rest (to the end of `survival` where some never rest)
 };
 
 struct Metastability {
   Status status = Status::converged;
-  std::string message;          ///< one sentence when status is not `converged`, empty otherwise
+  std::string message;          ///< one sentence when there is something to say beside the numbers, empty otherwise
   Method method = Method::sampled;
   std::size_t cells = 0, samples = 0;
   int replicates = 0, phases = 1, period = 1;
@@ -118,7 +119,7 @@ struct Metastability {
 /// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails
 Metastability study(const Problem& problem, const StudyOptions& options);
 
-/// "infinite: rest is unreachable", "converged", ... one phrase per status.
+/// "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.
 std::string status_text(Status status);
 /// "sampled", "integrated".
 std::string_view method_name(Method method);

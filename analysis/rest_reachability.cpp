@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace metastable::analysis {
@@ -57,7 +58,7 @@ RestReachability rest_reachability(const Problem& problem) {
 }
 
 std::optional<double> safe_slope_deg(const Setting& setting) {
-  const double steepest = dynamics::steepest_slope(setting.wheel.legs()) * 180.0 / 3.14159265358979323846;
+  const double steepest = dynamics::steepest_slope(setting.wheel.legs()) * 180.0 / std::numbers::pi;
   const auto has_safe_states = [&](double slope_deg) {
     Setting tilted = setting;
     tilted.slope_deg = slope_deg;

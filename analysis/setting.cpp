@@ -63,8 +63,18 @@ std::string Setting::describe() const {
   std::string law_text = fmt::format("law {}", dynamics::law_name(law));
   if (law != dynamics::Law::published) law_text += fmt::format(" (r_g = {} m)", model.radius_of_gyration);
   if (law == dynamics::Law::coulomb && rebound_lost != 0) law_text += fmt::format(", rebound lost {}", rebound_lost);
-  return fmt::format("{} deg, {}, {}, {}, omega_0 ~ N({}, {}^2) rad/s", slope_deg, legs, law_text, contact,
-                     initial_speed.mean, initial_speed.sd);
+  std::string text = fmt::format("{} deg, {}, {}, {}, omega_0 ~ N({}, {}^2) rad/s", slope_deg, legs, law_text, contact,
+                                 initial_speed.mean, initial_speed.sd);
+  // The rest where it is not the paper's.
+  const Setting paper;
+  if (wheel.hub_mass != paper.wheel.hub_mass) text += fmt::format(", M = {} kg", wheel.hub_mass);
+  if (wheel.inertia) text += fmt::format(", I = {} kg m^2", *wheel.inertia);
+  if (wheel.ramp_stiffness != paper.wheel.ramp_stiffness) text += fmt::format(", K_r = {} N/m", wheel.ramp_stiffness);
+  if (wheel.contact_mass) text += fmt::format(", m_c = {} kg", *wheel.contact_mass);
+  if (wheel.gravity != paper.wheel.gravity) text += fmt::format(", g = {} m/s^2", wheel.gravity);
+  if (ramp_length != paper.ramp_length) text += fmt::format(", ramp {} m", ramp_length);
+  if (first_landing_leg != 0) text += fmt::format(", leg {} lands first", first_landing_leg);
+  return text;
 }
 
 std::optional<Spread> paper_launch(double slope_deg) {

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "markov/chain.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -100,7 +101,13 @@ void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin
   markov::parallel_for(size - begin, options.threads, [&](std::size_t k) {
     SweepPoint point;
     const Setting setting = sweep_setting(base, axes, begin + k, &point.at);
-    point.study = study(setting.problem(), single);
+    try {
+      point.study = study(setting.problem(), single);
+    } catch (const markov::ConvergenceError& error) {  // the other points are worth having
+      point.study.status = Status::solver_failed;
+      point.study.message = error.what();
+      point.failure = std::current_exception();
+    }
     const std::scoped_lock lock(mutex);
     waiting.emplace(begin + k, std::move(point));
     while (!stopped && !waiting.empty() && waiting.begin()->first == next) {

@@ -2,6 +2,7 @@
 // Expected steps over a grid of settings.
 
 #include <cstddef>
+#include <exception>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -34,6 +35,7 @@ std::vector<double> axis_values(double first, double last, double step);
 struct SweepPoint {
   std::vector<double> at;  ///< one value per axis
   Metastability study;
+  std::exception_ptr failure = {};  ///< set when a solver did not converge here (study.status is then solver_failed)
 };
 
 /// Number of points of the product of the axes.
@@ -44,7 +46,8 @@ std::size_t sweep_size(const std::vector<Axis>& axes);
 Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::size_t index, std::vector<double>* at = nullptr);
 
 /// Studies points begin .. end-1, calling done(index, point) for each in this order, one call at a time (from whichever
-/// thread finished it); done may throw to stop. Points run side by side on the options' threads, each single-threaded: the
+/// thread finished it); done may throw to stop. A point whose solver does not converge has the status solver_failed and its
+/// message, and no numbers. Points run side by side on the options' threads, each single-threaded: the
 /// numbers do not depend on that.
 void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
            const std::function<void(std::size_t, const SweepPoint&)>& done);

@@ -96,6 +96,8 @@ Moments reward_from_launch(const ChainSolver& solver, const Launch& launch, std:
   return moments(dot(launch.after, reward) + dot(launch.after, g), dot(launch.after, square) + dot(launch.after, h));
 }
 
+constexpr double kLogNobody = -690.0;  // 1e-300
+
 Survival::Survival(const ChainSolver& solver, const QuasiStationary& quasi, const Launch& launch, int limit)
     : log_factor_(std::log1p(-quasi.revolution_failure_rate)), period_(solver.period().period) {
   const Chain& chain = solver.chain();
@@ -112,6 +114,10 @@ Survival::Survival(const ChainSolver& solver, const QuasiStationary& quasi, cons
     log_step.push_back(log_survival(surviving, failing));
     log_head_.push_back(log_head_.back() + log_step.back());
     if (surviving == 0) return;
+    if (log_head_.back() < kLogNobody) {  // nobody is left to settle
+      log_factor_ = -std::numeric_limits<double>::infinity();
+      return;
+    }
     if (log_step.size() > 2 * period) {
       const double* end = log_step.data() + log_step.size();
       const double now = std::accumulate(end - period, end, 0.0);

@@ -95,17 +95,17 @@ double top_share(const StateSpace& space, std::span<const double> nu) {
 }
 
 StateSpace graded_space(const StateSpace& pilot, std::span<const double> nu, std::span<const double> h,
-                        std::span<const double> after, std::size_t cells) {
+                        std::span<const double> visits, std::size_t cells) {
   std::vector<Grid> grids;
   const std::size_t n = pilot.cells();
   for (int p = 0; p < pilot.phases(); ++p) {
     const Grid& grid = pilot.grid(p);
     const auto at = [&](std::span<const double> v, std::size_t c) { return v[pilot.index(p, c)]; };
     std::size_t used = n;
-    for (double nu_above = 0, after_above = 0; used > 2; --used) {
+    for (double nu_above = 0, visits_above = 0; used > 2; --used) {
       nu_above += at(nu, used - 1);
-      after_above += at(after, used - 1);
-      if (nu_above > 1e-13 || after_above > 1e-9) break;
+      visits_above += at(visits, used - 1);
+      if (nu_above > 1e-13 || visits_above > 1e-9) break;
     }
     // Monitor per pilot cell, centred differences of the density and of h, smoothed over neighbours.
     std::vector<double> monitor(used, 0.0);

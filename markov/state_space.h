@@ -48,10 +48,11 @@ StateSpace covering_space(const AnyReturnMap& map, const LaunchState& launch, st
 /// rate is the sum over cells of width^3 nu'(x) h'(x) / 12 (nu quasi-stationary density, h relative survival), so widths
 /// follow |nu' h'|^(-1/3), taken from a solve on `pilot`, and no cell is wider than four times the narrowest in units of
 /// the pilot's cells there. Measured at 64 cells, error of ln(expected steps) with equal cells -> graded: the paper's wheel
-/// at 1.5e7 steps 0.043 -> 0.004, the rough-terrain wheel at 8e11 steps 0.035 -> 0.012. The upper edge is lowered to where less than 1e-13 of nu and 1e-9 of the launch landings lie above.
-/// @param nu, h, after  quasi-stationary distribution, survival weight and launch landings on the pilot's states
+/// at 1.5e7 steps 0.043 -> 0.004, the rough-terrain wheel at 8e11 steps 0.035 -> 0.012. The upper edge is lowered to where less than 1e-13 of nu and 1e-9 of the early visits lie above.
+/// @param nu, h, visits  quasi-stationary distribution, survival weight and expected visits in the transient after the launch
+///        (all phases: a fast launch is still fast some legs later), on the pilot's states
 StateSpace graded_space(const StateSpace& pilot, std::span<const double> nu, std::span<const double> h,
-                        std::span<const double> after, std::size_t cells);
+                        std::span<const double> visits, std::size_t cells);
 
 /// Largest share of nu in the top cell of any phase: how much the upper edge cuts off.
 double top_share(const StateSpace& space, std::span<const double> nu);

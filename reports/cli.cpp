@@ -8,6 +8,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -104,7 +105,7 @@ void add_wheel(Options& options) {
   options.add("legs", "paper|L|L1,L2,...", "paper", "Leg lengths [m]: the paper's, one for all, or a list in landing order");
   options.add("leg-count", "N", "8", "Number of legs when --legs is one length (3 or more)");
   options.add("mass", "KG", "1.39", "Hub mass M [kg]");
-  options.add("inertia", "KGM2", "", "Inertia about the stance foot [kg m^2] (default: point mass, see the README)");
+  options.add("inertia", "KGM2", "", "About the stance foot [kg m^2] (default: M (mean L)^2; under coulomb and plastic plus M r_g^2)");
   options.add("radius-of-gyration", "M", "", "About the hub [m] (default: 0.05 under coulomb, 0 under plastic)");
   options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m]");
   options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (default: the hub mass)");
@@ -160,6 +161,8 @@ analysis::Setting common_setting(const Options& options) {
   setting.wheel = wheel(options);
   setting.law = dynamics::law_from_name(options.text("law"));
   setting.rebound_lost = options.number("rebound-lost");
+  if (options.given("rebound-lost") && setting.law != dynamics::Law::coulomb)
+    throw std::invalid_argument("--rebound-lost: has a meaning under --law coulomb only");
   setting.restitution = options.spread("restitution");
   setting.friction = options.spread("friction");
   setting.correlation = options.number("correlation");
@@ -183,6 +186,14 @@ analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& 
   return *paper;
 }
 
+// Before the launch is asked for: a slope that no launch can save is named as such.
+void check_slope(const analysis::Setting& setting) {
+  const double steepest = dynamics::steepest_slope(setting.wheel.legs()) * 180 / std::numbers::pi;
+  if (!(setting.slope_deg > 0 && setting.slope_deg < steepest))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside (0, {:.6g}) deg (half the angle between legs)",
+                                            setting.slope_deg, steepest));
+}
+
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
 analysis::Setting checked(analysis::Setting setting) {
   setting.problem();
@@ -192,6 +203,7 @@ analysis::Setting checked(analysis::Setting setting) {
 analysis::Setting one_setting(const Options& options) {
   analysis::Setting setting = common_setting(options);
   setting.slope_deg = options.number("slope");
+  check_slope(setting);
   std::optional<std::string> launch;
   if (options.given("initial-speed")) launch = options.text("initial-speed");
   setting.initial_speed = launch_for(setting.slope_deg, launch);
@@ -204,12 +216,13 @@ std::vector<analysis::Setting> several_settings(const Options& options, std::siz
     throw std::invalid_argument(fmt::format("--slopes: {} given where at least {} are needed", slopes.size(), least));
   const std::vector<std::string>& launches = options.all("initial-speed");
   if (!launches.empty() && launches.size() != slopes.size())
-    throw std::invalid_argument(fmt::format("--initial-speed: given {} times for {} slopes (once a slope, in order)",
+    throw std::invalid_argument(fmt::format("--initial-speed: {} values for {} slopes (give it once a slope, in order)",
                                             launches.size(), slopes.size()));
   std::vector<analysis::Setting> settings;
   for (std::size_t i = 0; i < slopes.size(); ++i) {
     analysis::Setting setting = common_setting(options);
     setting.slope_deg = slopes[i];
+    check_slope(setting);
     setting.initial_speed = launch_for(slopes[i], launches.empty() ? std::nullopt : std::optional(launches[i]));
     settings.push_back(checked(std::move(setting)));
   }
@@ -299,6 +312,10 @@ std::vector<Command> commands() {
          if (request.axes.empty())
            throw std::invalid_argument("sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
                                        "--friction-mean or --friction-sd as first:last:step)");
+         for (const analysis::Axis& axis : request.axes)
+           if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
+             throw std::invalid_argument(fmt::format("--{}: cannot vary with --contact-list",
+                                                     analysis::parameter_name(axis.parameter)));
          const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
          std::optional<std::string> launch;
          if (o.given("initial-speed")) launch = o.text("initial-speed");

@@ -10,6 +10,7 @@ namespace metastable::reports {
 namespace {
 
 std::string place(const std::filesystem::path& file, const toml::source_region& source) {
+  if (source.begin.line == 0) return file.string();
   return fmt::format("{}:{}", file.string(), source.begin.line);
 }
 

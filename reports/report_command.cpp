@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <filesystem>
 
 #include "analysis/energy_losses.h"
@@ -18,7 +19,7 @@
 namespace metastable::reports {
 namespace {
 
-constexpr int energy_levels = 4;       // spreads 0.05 k of Fig. 8, k = 1 .. 4
+constexpr std::array<double, 4> energy_spreads = {0.05, 0.1, 0.15, 0.2};  // Fig. 8
 constexpr int energy_collisions = 16;  // of a trial
 
 // The report as it grows: files in the folder, sections of the page.
@@ -50,7 +51,7 @@ class Report {
  private:
   std::size_t work() const {
     const std::size_t ramps = request_.settings.size();
-    return study_units * (2 * ramps + ramps * (16 + 12) + energy_levels);
+    return study_units * (2 * ramps + ramps * (16 + 12) + energy_spreads.size());
   }
 
   Provenance provenance_for(const std::vector<analysis::Setting>& settings) const {
@@ -77,8 +78,8 @@ class Report {
     }
     const Provenance provenance = provenance_for(settings);
     section("ramps", "The ramps side by side",
-            "Read down a column for one ramp under one contact law; “infinite” means that no sequence of contacts can stop "
-            "a wheel that rolls.",
+            "Read down a column for one ramp under one contact law; “infinite” means that launches this fast never come "
+            "to rest, whatever the contacts do.",
             {}, {ramps_table(studied, provenance)});
     section("regime", "What survivors look like",
             "Left: speeds just before a collision once the start is forgotten; right: how fast the chance of still rolling "
@@ -98,10 +99,13 @@ class Report {
             const analysis::Setting& base, const analysis::Axis& down, const analysis::Axis& across) {
     std::vector<analysis::Metastability> studies;
     analysis::sweep(base, {down, across}, 0, request_.study, [&](std::size_t, const analysis::SweepPoint& point) {
+      if (point.failure) std::rethrow_exception(point.failure);
       studies.push_back(point.study);
       progress_.advance(study_units);
     });
-    const Provenance provenance = provenance_for({base});
+    Provenance provenance = provenance_for({base});
+    provenance.settings += fmt::format("; varied here: {} and {}", analysis::parameter_label(down.parameter),
+                                       analysis::parameter_label(across.parameter));
     section(id, heading, reading, {grid_figure(id, title, down, across, studies, provenance)},
             {grid_table(id, title, down, across, studies, provenance)});
   }
@@ -134,9 +138,9 @@ class Report {
   void energies() {
     std::vector<analysis::EnergyLosses> losses;
     std::vector<analysis::Setting> settings;
-    for (int k = 1; k <= energy_levels; ++k) {
+    for (std::size_t k = 0; k < energy_spreads.size(); ++k) {
       analysis::Setting setting = request_.settings.front();
-      setting.restitution.sd = setting.friction.sd = 0.05 * k;
+      setting.restitution.sd = setting.friction.sd = energy_spreads[k];
       losses.push_back(analysis::energy_losses(setting, {.trials = request_.energy_trials,
                                                          .collisions = energy_collisions,
                                                          .seed = request_.study.seed,

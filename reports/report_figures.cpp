@@ -58,9 +58,9 @@ Series density(const analysis::Metastability& study, int colour) {
 Figure density_figure(const std::vector<Studied>& settings, const Provenance& provenance) {
   Figure figure;
   figure.id = "quasi-stationary";
-  figure.title = "Speed of survivors before a collision";
+  figure.title = "Speed of rolling wheels before a collision, long run";
   figure.x = {"ω before a collision", "rad/s"};
-  figure.y = {"quasi-stationary density", "s/rad"};
+  figure.y = {"density", "s/rad"};
   figure.legend = Legend::below;
   figure.provenance = provenance;
   for (std::size_t i = 0; i < settings.size(); ++i) {

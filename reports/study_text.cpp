@@ -35,13 +35,11 @@ std::string estimate_text(const analysis::Estimate& estimate) {
 
 std::string thresholds_text(const RestThresholds& thresholds) {
   std::string text = thresholds.safe_speed
-                         ? fmt::format("rest is unreachable for launches of {:.4g} rad/s and faster",
-                                       *thresholds.safe_speed)
-                         : std::string("rest is reachable from every speed");
+                         ? fmt::format("out of reach for launches of {:.4g} rad/s and faster", *thresholds.safe_speed)
+                         : std::string("within reach at every speed");
   text += thresholds.safe_slope_deg
-              ? fmt::format("; with this contact, rest is reachable from every speed only up to {:.3f} deg",
-                            *thresholds.safe_slope_deg)
-              : std::string("; so it is, with this contact, at every slope");
+              ? fmt::format("; on slopes above {:.3f} deg fast enough launches never rest", *thresholds.safe_slope_deg)
+              : std::string("; no slope puts it out of reach");
   return text;
 }
 
@@ -57,7 +55,9 @@ std::string study_text(const analysis::Setting& setting, const analysis::Metasta
     text += line("  from the metastable regime", estimate_text(study.from_quasi_stationary));
     text += line("  from the worst start", estimate_text(study.worst_start));
     text += line("failure rate per step", fmt::format("{:.6g}", study.failure_rate.value));
-    text += total_line("steps", study.steps);
+    text += line("steps", fmt::format("sd {}, median {}, 5 to 95 %: {} to {}", show(study.steps.sd),
+                                      show(study.steps.quantile[2]), show(study.steps.quantile.front()),
+                                      show(study.steps.quantile.back())));
     if (study.seconds) text += total_line("seconds", *study.seconds);
     if (study.metres) text += total_line("metres", *study.metres);
   }
@@ -76,13 +76,15 @@ std::string study_text(const analysis::Setting& setting, const analysis::Metasta
   text += line("rest", thresholds_text(thresholds));
   for (const analysis::Share& share : study.violations)
     text += line(fmt::format("collisions with '{}'", share.name),
-                 endless ? fmt::format("{:.3g} %", 100 * share.quasi_stationary)
-                         : fmt::format("{:.3g} % in the metastable regime, {:.3g} % until rest",
-                                       100 * share.quasi_stationary, 100 * share.until_rest));
+                 fmt::format("{:.3f} % in the {} regime, {:.3f} % {}", 100 * share.quasi_stationary,
+                             endless ? "stationary" : "metastable", 100 * share.until_rest,
+                             endless ? "on the ramp" : "until rest"));
+  const std::string legs = study.phases > 1 ? fmt::format(" for each of {} legs", study.phases) : "";
   text += line("resolution", study.method == analysis::Method::integrated
-                                 ? fmt::format("{} nodes x {} legs, integrated", study.cells, study.phases)
-                                 : fmt::format("{} cells x {} legs, {} draws a cell, {} replicates", study.cells,
-                                               study.phases, study.samples, study.replicates));
+                                 ? fmt::format("{} nodes{}, integrated", study.cells, legs)
+                                 : fmt::format("{} cells{}, {} draws a cell, {}", study.cells, legs, study.samples,
+                                               study.replicates > 1 ? fmt::format("{} replicates", study.replicates)
+                                                                    : std::string("one randomisation")));
   if (!endless) {
     text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)", study.discretization_error,
                                                study.sampling_error));

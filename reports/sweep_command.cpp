@@ -24,19 +24,18 @@ constexpr std::size_t most_map_rows = 16;
 // Everything the numbers depend on; a partial file with another head belongs to another sweep.
 std::string head(const SweepRequest& request) {
   const analysis::StudyOptions& study = request.study;
-  std::string text = fmt::format("# sweep: {}\n# axes:", request.setting.describe());
+  std::string text = fmt::format("# sweep: {}; the axes vary\n# axes:", request.setting.describe());
   for (const analysis::Axis& axis : request.axes) {
     text += fmt::format(" {} =", analysis::parameter_name(axis.parameter));
     for (const double value : axis.values) text += fmt::format(" {}", value);
     text += ';';
   }
-  text += fmt::format("\n# ramp: {} m, first landing leg {}, wheel: M {} kg, I {}, K_r {} N/m, m_c {}, g {} m/s^2, pairs {}\n",
-                      request.setting.ramp_length, request.setting.first_landing_leg, request.setting.wheel.hub_mass,
-                      request.setting.wheel.inertia.value_or(0), request.setting.wheel.ramp_stiffness,
-                      request.setting.wheel.contact_mass.value_or(0), request.setting.wheel.gravity,
-                      request.setting.pairs.size());
+  text += "\n";
+  for (const dynamics::Contact& pair : request.setting.pairs)
+    text += fmt::format("# pair: restitution {}, friction {}\n", pair.restitution, pair.friction);
+  const auto size = [](std::size_t given) { return given == 0 ? std::string("as the tolerance needs") : std::to_string(given); };
   text += fmt::format("# method {}, cells {}, samples {}, tolerance {}, seed {}, replicates {}, sequence {}, draws {}, tail {}\n",
-                      analysis::method_name(study.method), study.cells, study.samples, study.tolerance, study.seed, study.replicates,
+                      analysis::method_name(study.method), size(study.cells), size(study.samples), study.tolerance, study.seed, study.replicates,
                       study.sequence == markov::Sequence::sobol ? "sobol" : "random",
                       study.weighting == markov::Weighting::weighted ? "weighted" : "plain", study.tail);
   text += fmt::format("# version: {}\n", version());
@@ -53,6 +52,8 @@ std::string row(const analysis::SweepPoint& point) {
   const analysis::Metastability& study = point.study;
   std::string text;
   for (const double value : point.at) text += fmt::format("{},", value);
+  if (study.status == analysis::Status::solver_failed)
+    return text + fmt::format(",,,,,,,,{}\n", analysis::status_text(study.status));
   return text + fmt::format("{},{},{},{},{},{},{},{},{}\n", number(study.from_start.value), number(study.from_start.lower),
                             number(study.from_start.upper), number(study.from_quasi_stationary.value),
                             number(study.failure_rate.value), study.observable_mean, study.observable_sd,
@@ -81,6 +82,7 @@ double value_of(const std::string& row, std::size_t index) {
   std::size_t at = 0;
   for (std::size_t i = 0; i < index; ++i) at = row.find(',', at) + 1;
   const std::string text = row.substr(at, row.find(',', at) - at);
+  if (text.empty()) return std::numeric_limits<double>::quiet_NaN();  // a point whose solver failed
   return text == "infinite" ? std::numeric_limits<double>::infinity() : std::stod(text);
 }
 

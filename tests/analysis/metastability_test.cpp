@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/experiment_folder.h"
+#include "dynamics/rough_terrain.h"
 #include "dynamics/trials.h"
 #include "markov/discretization.h"
 #include "markov/elimination.h"
@@ -201,6 +202,56 @@ TEST(Metastability, RandomAndPlainDrawsGiveWiderIntervalsAroundTheSameAnswer) {
     EXPECT_LE(other->from_start.lower, best.from_start.upper);
     EXPECT_GE(other->from_start.upper, best.from_start.lower);
   }
+}
+
+// Each was once answered wrongly with a narrow interval, or not at all.
+TEST(Metastability, FastLaunchesStayOnTheGridOnEveryLeg) {
+  Setting plastic = paper_setting(7.02, false);  // rolls 15 steps, fast at first, on legs the first landing does not see
+  plastic.law = dynamics::Law::plastic;
+  plastic.slope_deg = 4.2;
+  plastic.initial_speed = {5, 0.2};
+  EXPECT_DOUBLE_EQ(study(plastic.problem(), {}).from_start.value, 15.0);
+  Setting list = paper_setting(7.02, false);
+  list.pairs = {{0.4, 0.4}, {0.3, 0.5}, {0.5, 0.2}, {0.45, 0.6}};
+  const Metastability result = study(list.problem(), {});
+  EXPECT_NEAR(result.from_start.value, 2.66323, 4 * 0.0016);  // a million trials
+}
+
+TEST(Metastability, SettingsThatSoonRestAreAnswered) {
+  const auto steps = [](dynamics::Law law, double slope_deg, Spread launch, Spread restitution, Spread friction) {
+    Setting setting = paper_setting(7.02, true);
+    setting.law = law;
+    setting.slope_deg = slope_deg;
+    setting.initial_speed = launch;
+    setting.restitution = restitution;
+    setting.friction = friction;
+    return study(setting.problem(), {}).from_start.value;
+  };
+  using dynamics::Law;
+  // Without noise: the launch's distribution decides. By trials: 3.852.
+  EXPECT_NEAR(steps(Law::coulomb, 2, {4.5, 0.2}, {0.4, 0}, {0.4, 0}), 3.852, 0.01);
+  // Hardly any noise; by trials 3.274.
+  EXPECT_NEAR(steps(Law::published, 6, {5, 0.2}, {0.4, 0.002}, {0.4, 0.002}), 3.274, 0.01);
+  // Too slow to survive even once, or nearly so.
+  EXPECT_NEAR(steps(Law::published, 0.5, {3, 0.1}, {0.4, 0.1}, {0.4, 0.1}), 1.0, 1e-6);
+  EXPECT_NEAR(steps(Law::published, 0.5, {5, 0.1}, {0.4, 0.1}, {0.4, 0.1}), 1.391, 0.01);
+  EXPECT_DOUBLE_EQ(steps(Law::published, 7.02, {0, 0}, {0.4, 0.1}, {0.4, 0.1}), 1.0);
+}
+
+TEST(Metastability, FailuresRarerThanTheDrawsReachDeepenTheTail) {
+  // Rough terrain at a spread of 0.6 deg: 1.4e31 steps, beyond tails of 1e-30.
+  constexpr double degree = M_PI / 180;
+  const auto rough = [&](double sd_deg) {
+    const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = sd_deg * degree});
+    const double start = wheel.fixed_point();
+    return Problem{wheel, {[start](double) { return start; }, 0}, [](double x) { return std::sqrt(x); }, {}};
+  };
+  StudyOptions deep;
+  deep.tail = 1e-120;
+  const Metastability by_itself = study(rough(0.6), {}), told = study(rough(0.6), deep);
+  EXPECT_GT(by_itself.from_start.value, 1e31);
+  EXPECT_LE(by_itself.from_start.lower, told.from_start.upper);
+  EXPECT_GE(by_itself.from_start.upper, told.from_start.lower);
 }
 
 TEST(Metastability, PlainDrawsThatSeeNoRestSaySo) {

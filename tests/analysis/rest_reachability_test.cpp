@@ -62,5 +62,19 @@ TEST(RestReachability, AStudyOfAnEndlessWheelIsInfiniteNotLarge) {
   EXPECT_NEAR(*result.reach_end, 1.0, 1e-9);
 }
 
+// Some launches rest, the others never do: both are said.
+TEST(RestReachability, SlowLaunchesOfAnEndlessWheelRest) {
+  Setting setting = paper_setting(7.02, true);
+  setting.law = dynamics::Law::plastic;
+  setting.initial_speed = {3, 0.1};
+  const Metastability result = study(setting.problem(), {});
+  EXPECT_TRUE(std::isinf(result.from_start.value));
+  EXPECT_NE(result.message.find("the others rest"), std::string::npos);
+  // Rest at once below the threshold speed of the barrier: P(omega_0 < 3.061) for N(3, 0.1^2).
+  const double threshold = std::sqrt(*result.safe_state);
+  EXPECT_NEAR(*result.reach_end, 0.5 * std::erfc((threshold - 3) / 0.1 / std::sqrt(2.0)), 2e-3);
+  EXPECT_EQ(result.steps.quantile[2], 1.0);
+}
+
 }  // namespace
 }  // namespace metastable::analysis
