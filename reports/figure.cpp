@@ -231,7 +231,9 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
   script += "unset grid\nset key off\nset style fill solid 1 border rgb 'white'\n";
   script += "set palette defined (0 '#440154', 0.25 '#3b528b', 0.5 '#21918c', 0.75 '#5ec962', 1 '#fde725')\n";
   script += fmt::format("set cblabel {} noenhanced\nset cbrange [{}:{}]\n", quote(map.label), low, high);
-  if (map.logarithmic) {
+  if (map.logarithmic && high / low >= 100) {
+    script += "set logscale cb\nset format cb '10^{%T}'\n";
+  } else if (map.logarithmic) {  // too few powers of ten to read a scale by
     script += "set logscale cb\nset cbtics (";
     constexpr int ticks = 5;  // evenly on the logarithmic scale, its ends included
     for (int t = 0; t < ticks; ++t) {

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <optional>
 
 #include "reports/figure.h"
 #include "reports/output_file.h"
@@ -90,7 +91,8 @@ std::string axis_label(analysis::Parameter parameter) { return std::string(analy
 
 std::string axis_unit(analysis::Parameter parameter) { return parameter == analysis::Parameter::slope ? "deg" : ""; }
 
-Figure figure(const SweepRequest& request, const std::vector<std::string>& rows) {
+// Nothing if no point has a finite number of steps.
+std::optional<Figure> figure(const SweepRequest& request, const std::vector<std::string>& rows) {
   const std::vector<analysis::Axis>& axes = request.axes;
   Figure figure;
   figure.id = "sweep";
@@ -116,6 +118,10 @@ Figure figure(const SweepRequest& request, const std::vector<std::string>& rows)
       for (std::size_t i = 0; i < across.values.size(); ++i)
         map.value.back().push_back(value_of(row_at(i, k), axes.size()));
     }
+    const auto finite = [](const std::vector<double>& row) {
+      return std::any_of(row.begin(), row.end(), [](double value) { return std::isfinite(value); });
+    };
+    if (std::none_of(map.value.begin(), map.value.end(), finite)) return std::nullopt;
     figure.heat_map = std::move(map);
     figure.width = 960;
     return figure;
@@ -132,9 +138,11 @@ Figure figure(const SweepRequest& request, const std::vector<std::string>& rows)
       band.lower.push_back(value_of(row_at(i, k), axes.size() + 1));
       band.upper.push_back(value_of(row_at(i, k), axes.size() + 2));
     }
+    if (std::none_of(line.y.begin(), line.y.end(), [](double value) { return std::isfinite(value); })) continue;
     figure.series.push_back(std::move(band));
     figure.series.push_back(std::move(line));
   }
+  if (figure.series.empty()) return std::nullopt;
   figure.legend = Legend::below;
   return figure;
 }
@@ -182,8 +190,10 @@ void run_sweep(const SweepRequest& request) {
   }
   std::filesystem::path picture = out;
   picture.replace_extension(".svg");
-  write_file(picture, render_svg(figure(request, rows)));
-  fmt::print("{}: {} points ({} taken over); {}\n", out.string(), size, had, picture.string());
+  const std::optional<Figure> drawn = figure(request, rows);
+  if (drawn) write_file(picture, render_svg(*drawn));
+  fmt::print("{}: {} points ({} taken over); {}\n", out.string(), size, had,
+             drawn ? picture.string() : "no figure: no point has a finite number of steps");
 }
 
 }  // namespace metastable::reports
