@@ -19,7 +19,8 @@ constexpr CsvColumn angle_columns[] = {{"condition"}, {"trial", true}, {"time_s"
 constexpr CsvColumn trial_columns[] = {{"condition"}, {"trial", true}, {"outcome", true}};
 
 // Frames that are missing or doubled would bend the derivative where nothing happened.
-void check_frames(const MeasuredAngle& angle, const std::vector<std::size_t>& lines, const std::string& file, Defects& defects) {
+void check_frames(const MeasuredAngle& angle, const std::vector<std::size_t>& lines, const std::string& file,
+                  Defects& defects) {
   const std::vector<double>& time = angle.recording.time;
   if (time.size() < 2) {
     defects.add(file, {lines.front(), 1}, fmt::format("trial {} has one frame only", angle.number));
@@ -32,11 +33,13 @@ void check_frames(const MeasuredAngle& angle, const std::vector<std::size_t>& li
   const double frame = sorted[sorted.size() / 2];
   for (std::size_t i = 0; i < interval.size(); ++i) {
     if (interval[i] <= 0)
-      defects.add(file, {lines[i + 1], 1}, fmt::format("time_s: {} s is not after the frame before ({} s)", time[i + 1], time[i]));
-    else if (frame > 0 && std::abs(interval[i] - frame) > frame / 4)
       defects.add(file, {lines[i + 1], 1},
-                  fmt::format("time_s: {:.6g} s after the frame before where trial {} has {:.6g} s; frames must follow evenly",
-                              interval[i], angle.number, frame));
+                  fmt::format("time_s: {} s is not after the frame before ({} s)", time[i + 1], time[i]));
+    else if (frame > 0 && std::abs(interval[i] - frame) > frame / 4)
+      defects.add(
+          file, {lines[i + 1], 1},
+          fmt::format("time_s: {:.6g} s after the frame before where trial {} has {:.6g} s; frames must follow evenly",
+                      interval[i], angle.number, frame));
   }
 }
 

@@ -34,12 +34,15 @@ struct Piece {
   double from = 0;            // time of `state` [s]
   StanceState state;
   double pendulum = 0;
-  double at(double time) const { return angle + dynamics::stance_motion(pendulum, state, time - from).angle - state.angle; }
+  double at(double time) const {
+    return angle + dynamics::stance_motion(pendulum, state, time - from).angle - state.angle;
+  }
 };
 
 // The stance before collision 1, from its end backwards.
 Piece before_first(const Stance& stance, double omega) {
-  Piece piece{.begin = -lead, .end = 0, .angle = 0, .from = 0, .state = {stance.end_angle, omega}, .pendulum = stance.pendulum};
+  Piece piece{
+      .begin = -lead, .end = 0, .angle = 0, .from = 0, .state = {stance.end_angle, omega}, .pendulum = stance.pendulum};
   constexpr double step = 1e-4;
   StanceState now = piece.state;
   for (double time = 0; time > -lead; time -= step) {
@@ -55,7 +58,8 @@ Piece before_first(const Stance& stance, double omega) {
 }  // namespace
 
 void CameraOptions::validate() const {
-  if (!(rate >= 10 && rate <= 100000)) throw std::invalid_argument(fmt::format("angle rate: {} Hz is outside [10, 100000]", rate));
+  if (!(rate >= 10 && rate <= 100000))
+    throw std::invalid_argument(fmt::format("angle rate: {} Hz is outside [10, 100000]", rate));
   if (!(noise_sd >= 0) || !std::isfinite(noise_sd))
     throw std::invalid_argument(fmt::format("angle noise: {} rad is outside [0, inf)", noise_sd));
 }
@@ -69,20 +73,26 @@ AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial
   const int legs = map.wheel().legs();
   const Stance& previous = map.stance(phase((first.leg + legs - 1) % legs));
   pieces.push_back(before_first(previous, first.omega_minus));
-  const bool held = pieces.front().begin > -lead && dynamics::stance_motion(previous.pendulum, pieces.front().state,
-                                                                            pieces.front().begin).angle > std::numbers::pi / 2;
+  const bool held = pieces.front().begin > -lead &&
+                    dynamics::stance_motion(previous.pendulum, pieces.front().state, pieces.front().begin).angle >
+                        std::numbers::pi / 2;
   double angle = 0;
   for (std::size_t i = 0; i < trial.collisions.size(); ++i) {
     const dynamics::TrialCollision& c = trial.collisions[i];
     const Stance& stance = map.stance(phase(c.leg));
-    Piece piece{.begin = c.time, .end = 0, .angle = angle, .from = c.time, .state = {stance.start_angle, c.omega_plus},
+    Piece piece{.begin = c.time,
+                .end = 0,
+                .angle = angle,
+                .from = c.time,
+                .state = {stance.start_angle, c.omega_plus},
                 .pendulum = stance.pendulum};
     if (i + 1 < trial.collisions.size()) {
       piece.end = trial.collisions[i + 1].time;
     } else if (trial.outcome == dynamics::Outcome::rest) {
       // Up to where it turns and back again, as long as up.
       double up = 0;
-      for (StanceState now = piece.state; now.speed > 0; up += 1e-4) now = dynamics::stance_motion(piece.pendulum, now, 1e-4);
+      for (StanceState now = piece.state; now.speed > 0; up += 1e-4)
+        now = dynamics::stance_motion(piece.pendulum, now, 1e-4);
       piece.end = c.time + 2 * up;
     } else {
       piece.end = c.time + dynamics::stance_passage(piece.pendulum, piece.state, stance.end_angle).first;
@@ -108,7 +118,8 @@ AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial
   }
 }
 
-std::string angle_csv(const Setting& setting, const std::vector<dynamics::Trial>& trials, const CameraOptions& options) {
+std::string angle_csv(const Setting& setting, const std::vector<dynamics::Trial>& trials,
+                      const CameraOptions& options) {
   options.validate();
   const dynamics::WheelMap map = setting.map();
   std::vector<std::string> rows(trials.size());

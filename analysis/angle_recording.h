@@ -19,15 +19,15 @@ struct CameraOptions {
   double rate = 120;         ///< frames per second [Hz], [10, 100000]
   double noise_sd = 0.0002;  ///< white noise of the angle [rad], >= 0
   std::uint64_t seed = 1;
-  int threads = 0;           ///< the same bits on any number
+  int threads = 0;  ///< the same bits on any number
   /// @throws std::invalid_argument naming the option and its range
   void validate() const;
 };
 
-/// Trial `index` as recorded: the angle is 0 and the time 0 at collision 1. It begins in the stance before collision 1 (at
-/// most 0.3 s before; a wheel too slow to have come over its foot was held until its release) and ends before the
-/// collision after the last one; a wheel that came to rest falls back onto both feet and lies still for 0.3 s. The first
-/// frame falls at random between two ticks of the trial's clock.
+/// Trial `index` as recorded: the angle is 0 and the time 0 at collision 1. It begins in the stance before collision 1
+/// (at most 0.3 s before; a wheel too slow to have come over its foot was held until its release) and ends before the
+/// collision after the last one; a wheel that came to rest falls back onto both feet and lies still for 0.3 s. The
+/// first frame falls at random between two ticks of the trial's clock.
 AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial& trial, const CameraOptions& options,
                             std::uint64_t index);
 

@@ -159,16 +159,15 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
   };
   if (!sampled.duration.empty()) result.seconds = reward(sampled.duration);
   if (!sampled.advance.empty()) result.metres = reward(sampled.advance);
-  const std::size_t shown =
-      std::max<std::size_t>(survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
+  const std::size_t shown = std::max<std::size_t>(
+      survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
   for (std::size_t n = 0; n < shown; ++n) result.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.reach_end = survival.at(*problem.last_event);
 
   result.eigenvalue_moduli = moduli_per_step(problem, solver.revolution(), result.period, options.eigenvalues,
                                              quasi.failure_rate, result.message);
   result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
-  result.total_variation_steps =
-      markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
+  result.total_variation_steps = markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   describe_survivors(problem, space, quasi.distribution, result);
   if (dot(launch.after, launch.after) > 0) {  // otherwise no launch survives its first collision
     const MeanSd restarted = observe(problem, space, markov::stationary_with_restart(solver, launch.after));
@@ -201,8 +200,8 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   const markov::Chain closed = sampled.chain.restricted_to(recurrent);
   const markov::Period period = markov::find_period(closed);
   result.period = period.period;
-  result.eigenvalue_moduli =
-      moduli_per_step(problem, markov::revolution_chain(closed, period), period.period, options.eigenvalues, 0.0, result.message);
+  result.eigenvalue_moduli = moduli_per_step(problem, markov::revolution_chain(closed, period), period.period,
+                                             options.eigenvalues, 0.0, result.message);
   result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
   describe_survivors(problem, space, stationary, result);
   result.restart_mean = result.observable_mean;
@@ -211,8 +210,8 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   // Forward from the launch: survival, visits on the course, and the share that has come to rest when no more do.
   std::vector<double> alive = launch.after, visits(space.size(), 0.0);
   result.survival = {1.0};
-  const std::size_t shown =
-      std::max<std::size_t>(survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
+  const std::size_t shown = std::max<std::size_t>(
+      survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
   for (std::size_t n = 1; n < most_forward; ++n) {
     const double surviving = std::min(result.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
     const bool settled = n > 2 * static_cast<std::size_t>(result.period) &&
@@ -230,9 +229,8 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   for (const double level : Metastability::levels) {
     const auto reached = std::find_if(result.survival.begin(), result.survival.end(),
                                       [&](double surviving) { return surviving <= 1 - level; });
-    result.steps.quantile.push_back(reached == result.survival.end()
-                                        ? infinite
-                                        : static_cast<double>(reached - result.survival.begin()));
+    result.steps.quantile.push_back(
+        reached == result.survival.end() ? infinite : static_cast<double>(reached - result.survival.begin()));
   }
   result.survival.resize(std::min(result.survival.size(), shown));
   if (problem.last_event) result.reach_end = result.survival[static_cast<std::size_t>(*problem.last_event)];

@@ -16,8 +16,8 @@ struct ExpectedSteps {
   double worst_start = 0;
 };
 
-/// Expected steps of a chain whose every state reaches rest. The worst start is the lowest state a survivor can have, at
-/// the phase where that is worst; its landings are drawn with `draws` (each at most 16384, the first four).
+/// Expected steps of a chain whose every state reaches rest. The worst start is the lowest state a survivor can have,
+/// at the phase where that is worst; its landings are drawn with `draws` (each at most 16384, the first four).
 ExpectedSteps expected_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
                              const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws);
 

@@ -45,12 +45,14 @@ std::vector<Peak> peaks(std::span<const double> speed, double rise) {
 
 class Search {
  public:
-  Search(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg, const FinderOptions& options)
+  Search(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg,
+         const FinderOptions& options)
       : recording_(recording), map_(map), first_leg_(first_landing_leg), options_(options) {
     const std::vector<double>& time = recording.time;
     const double rate = time.size() < 2 ? 0 : static_cast<double>(time.size() - 1) / (time.back() - time.front());
     if (!(rate >= slowest_rate * 0.99 && rate <= fastest_rate * 1.01))
-      throw std::invalid_argument(fmt::format("the rate of {:.6g} Hz is outside {}..{} Hz", rate, slowest_rate, fastest_rate));
+      throw std::invalid_argument(
+          fmt::format("the rate of {:.6g} Hz is outside {}..{} Hz", rate, slowest_rate, fastest_rate));
     const SavitzkyGolay smooth(smoothing_window(options, rate), 3, 0), slope(smooth.window(), 3, 1);
     angle_ = smooth.apply(recording.angle, 1 / rate);
     speed_ = slope.apply(recording.angle, 1 / rate);
@@ -79,8 +81,7 @@ class Search {
       }
       chosen.push_back(best);
     }
-    for (std::size_t n = 0; n < chosen.size(); ++n)
-      found.collisions.push_back(collision(all, chosen, n));
+    for (std::size_t n = 0; n < chosen.size(); ++n) found.collisions.push_back(collision(all, chosen, n));
     return found;
   }
 
@@ -102,11 +103,13 @@ class Search {
     // The apex lies within one leg angle of the collision: behind the last one the recording may go on with others.
     std::size_t behind = last ? all.size() : chosen[n + 1];
     if (last)
-      while (behind > chosen[n] + 1 && angle_[all[behind - 1].at] > c.peak_angle + 0.5 * map_.wheel().leg_angle()) --behind;
+      while (behind > chosen[n] + 1 && angle_[all[behind - 1].at] > c.peak_angle + 0.5 * map_.wheel().leg_angle())
+        --behind;
     c.bounces = static_cast<int>(behind - chosen[n]) - 1;
     const std::size_t end = behind < all.size() ? all[behind].at : speed_.size();
     const auto apex = std::min_element(speed_.begin() + static_cast<std::ptrdiff_t>(peak.at),
-                                       speed_.begin() + static_cast<std::ptrdiff_t>(end)) - speed_.begin();
+                                       speed_.begin() + static_cast<std::ptrdiff_t>(end)) -
+                      speed_.begin();
     c.apex_time = recording_.time[static_cast<std::size_t>(apex)];
     c.apex = speed_[static_cast<std::size_t>(apex)];
     c.fit = fit(all, chosen[n], n);
@@ -132,8 +135,8 @@ class Search {
                           .omega_minus = speed_[peak.at],
                           .omega_plus = speed_[std::min(peak.trough, fall + (fall - peak.at) + 1)],
                           .residual_sd = 0};
-    return fit_collision(std::span(time).subspan(first, end - first), std::span(recording_.angle).subspan(first, end - first),
-                         stance(n), stance(n + 1), guess);
+    return fit_collision(std::span(time).subspan(first, end - first),
+                         std::span(recording_.angle).subspan(first, end - first), stance(n), stance(n + 1), guess);
   }
 
   const AngleRecording& recording_;
@@ -148,7 +151,8 @@ class Search {
 void FinderOptions::validate() const {
   if (window != 0 && (window < 5 || window > 10001 || window % 2 == 0))
     throw std::invalid_argument(fmt::format("window: {} is not an odd number of samples in 5..10001", window));
-  if (!(rise > 0) || !std::isfinite(rise)) throw std::invalid_argument(fmt::format("rise: {} rad/s is outside (0, inf)", rise));
+  if (!(rise > 0) || !std::isfinite(rise))
+    throw std::invalid_argument(fmt::format("rise: {} rad/s is outside (0, inf)", rise));
   if (collisions < 1) throw std::invalid_argument(fmt::format("collisions: {} is outside 1..", collisions));
   if (!(fit_span > 0) || !std::isfinite(fit_span))
     throw std::invalid_argument(fmt::format("fit span: {} s is outside (0, inf)", fit_span));

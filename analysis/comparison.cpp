@@ -40,10 +40,10 @@ Contrast contrast(const Comparison& comparison, std::size_t against, std::size_t
   if (!a.survival.empty() && !b.survival.empty())
     result.trials_needed = trials_to_tell_apart(a.survival, b.survival, collisions);
   if (endless(a) || endless(b)) {
-    result.sentence = endless(a) && endless(b)
-                          ? fmt::format("{}: {}; {}: {}; no ratio is formed", name_a, a.message, name_b, b.message)
-                          : fmt::format("{}: {}; no ratio is formed", endless(a) ? name_a : name_b,
-                                        (endless(a) ? a : b).message);
+    result.sentence =
+        endless(a) && endless(b)
+            ? fmt::format("{}: {}; {}: {}; no ratio is formed", name_a, a.message, name_b, b.message)
+            : fmt::format("{}: {}; no ratio is formed", endless(a) ? name_a : name_b, (endless(a) ? a : b).message);
     return result;
   }
   std::vector<double> log_ratio, difference;
@@ -53,16 +53,19 @@ Contrast contrast(const Comparison& comparison, std::size_t against, std::size_t
   }
   const double ratio = b.from_start.value / a.from_start.value;
   // Integrated studies have no replicates, and no sampling error.
-  const auto sampling = [](const std::vector<double>& sample) { return sample.empty() ? 0 : t_interval(sample).half_width; };
+  const auto sampling = [](const std::vector<double>& sample) {
+    return sample.empty() ? 0 : t_interval(sample).half_width;
+  };
   const double ratio_half = sampling(log_ratio) + a.discretization_error + b.discretization_error;
   result.ratio = Estimate{ratio, ratio * std::exp(-ratio_half), ratio * std::exp(ratio_half)};
   const double apart = b.from_start.value - a.from_start.value;
-  const double apart_half = sampling(difference) + a.discretization_error * a.from_start.value +
-                            b.discretization_error * b.from_start.value;
+  const double apart_half =
+      sampling(difference) + a.discretization_error * a.from_start.value + b.discretization_error * b.from_start.value;
   result.difference = Estimate{apart, apart - apart_half, apart + apart_half};
-  result.sentence = fmt::format("{} takes {:.4g} times the steps of {} (95 % interval {:.4g} to {:.4g}), {:.4g} more ({:.4g} to {:.4g})",
-                                name_b, ratio, name_a, result.ratio->lower, result.ratio->upper, apart,
-                                result.difference->lower, result.difference->upper);
+  result.sentence = fmt::format(
+      "{} takes {:.4g} times the steps of {} (95 % interval {:.4g} to {:.4g}), {:.4g} more ({:.4g} to {:.4g})", name_b,
+      ratio, name_a, result.ratio->lower, result.ratio->upper, apart, result.difference->lower,
+      result.difference->upper);
   return result;
 }
 
@@ -72,8 +75,8 @@ std::optional<double> trials_to_tell_apart(const std::vector<double>& survival_a
                                            int collisions) {
   const auto wanted = static_cast<std::size_t>(collisions) + 1;
   if (collisions < 1 || survival_a.size() < wanted || survival_b.size() < wanted)
-    throw std::invalid_argument(fmt::format("collisions: {} is outside 1..{}", collisions,
-                                            std::min(survival_a.size(), survival_b.size()) - 1));
+    throw std::invalid_argument(
+        fmt::format("collisions: {} is outside 1..{}", collisions, std::min(survival_a.size(), survival_b.size()) - 1));
   const MeanVariance a = limited_steps(survival_a, collisions), b = limited_steps(survival_b, collisions);
   const double apart = a.mean - b.mean;
   if (std::abs(apart) < 1e-12 * std::max(a.mean, b.mean)) return std::nullopt;
@@ -107,7 +110,8 @@ Comparison compare(const std::vector<Setting>& settings, const StudyOptions& opt
   for (std::size_t i = 0; i < settings.size(); ++i) {
     Metastability& one = comparison.studies[i];
     if (endless(one) || (one.cells == cells && one.samples == samples)) continue;
-    StudyOptions own = part(i, 0.6 + 0.4 * static_cast<double>(i) / count, 0.6 + 0.4 * static_cast<double>(i + 1) / count);
+    StudyOptions own =
+        part(i, 0.6 + 0.4 * static_cast<double>(i) / count, 0.6 + 0.4 * static_cast<double>(i + 1) / count);
     own.cells = cells;
     own.samples = samples;
     const Status status = one.status;

@@ -12,13 +12,14 @@ namespace metastable::analysis {
 
 /// One setting against the first of the list.
 struct Contrast {
-  std::size_t against = 0, of = 0;    ///< indices: `of` compared with `against`
-  std::optional<Estimate> ratio;      ///< expected steps of `of` over those of `against`; nothing if a side is infinite
-  std::optional<Estimate> difference; ///< expected steps of `of` minus those of `against`
-  /// Measured trials per setting, each of `collisions` collisions, after which a two-sided 5 % Welch test on the mean number
-  /// of steps within those collisions tells the two apart with 80 % power; nothing if they do not differ within them.
+  std::size_t against = 0, of = 0;  ///< indices: `of` compared with `against`
+  std::optional<Estimate> ratio;    ///< expected steps of `of` over those of `against`; nothing if a side is infinite
+  std::optional<Estimate> difference;  ///< expected steps of `of` minus those of `against`
+  /// Measured trials per setting, each of `collisions` collisions, after which a two-sided 5 % Welch test on the mean
+  /// number of steps within those collisions tells the two apart with 80 % power; nothing if they do not differ within
+  /// them.
   std::optional<double> trials_needed;
-  std::string sentence;               ///< the contrast in words
+  std::string sentence;  ///< the contrast in words
 };
 
 struct Comparison {
@@ -27,8 +28,8 @@ struct Comparison {
   std::vector<Contrast> contrasts;  ///< each later setting against the first
 };
 
-/// Studies all settings with the same seed and the same resolution (the finest any of them needed), so that replicate r of
-/// all sides shares its noise, and forms differences and ratios replicate by replicate.
+/// Studies all settings with the same seed and the same resolution (the finest any of them needed), so that replicate r
+/// of all sides shares its noise, and forms differences and ratios replicate by replicate.
 /// @param collisions length of a measured trial, >= 1
 Comparison compare(const std::vector<Setting>& settings, const StudyOptions& options, int collisions = 16);
 

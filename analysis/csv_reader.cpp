@@ -58,8 +58,8 @@ bool CsvReader::next() {
     if (fields_.size() == 1 && fields_.front().text.empty())
       report(begin_, "empty line");
     else
-      report(begin_, fmt::format("{} field{} where the header has {}", fields_.size(), fields_.size() == 1 ? "" : "s",
-                                 width_));
+      report(begin_,
+             fmt::format("{} field{} where the header has {}", fields_.size(), fields_.size() == 1 ? "" : "s", width_));
   }
   return false;
 }
@@ -83,7 +83,8 @@ bool CsvReader::record() {
       if (at_ < text_.size() && text_[at_] != ',' && text_[at_] != '\n' && text_[at_] != '\r')
         return give_up(at_, "text after a closing quote");
     } else {
-      while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) >= ' ' && text_[at_] != ',' && text_[at_] != '"')
+      while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) >= ' ' && text_[at_] != ',' &&
+             text_[at_] != '"')
         ++at_;
       field.text = text_.substr(field.offset, at_ - field.offset);
     }
@@ -95,9 +96,12 @@ bool CsvReader::record() {
       continue;
     }
     if (stop == '"') return give_up(at_, "quote inside an unquoted field");
-    if (stop == '\r' && text_.substr(at_, 2) == "\r\n") ++at_;
-    else if (stop == '\r') return give_up(at_, "carriage return without a line feed");
-    else if (stop != '\n') return give_up(at_, fmt::format("control character {}", shown_text(text_.substr(at_, 1))));
+    if (stop == '\r' && text_.substr(at_, 2) == "\r\n")
+      ++at_;
+    else if (stop == '\r')
+      return give_up(at_, "carriage return without a line feed");
+    else if (stop != '\n')
+      return give_up(at_, fmt::format("control character {}", shown_text(text_.substr(at_, 1))));
     ++at_;
     ++next_line_;
     return true;

@@ -20,10 +20,10 @@ struct CsvColumn {
   bool required = false;  ///< must be in the header, and filled in every row
 };
 
-/// Walks through the records of a CSV text once, in order. Line ends LF or CRLF, an optional byte order mark, an optional
-/// line end after the last record; fields in double quotes may hold commas, line ends and doubled quotes. Defects: a
-/// quote inside an unquoted field, text after a closing quote, an unclosed quote, control characters, a carriage return
-/// alone, an empty line, too few or too many fields, a column that is missing, unknown or named twice.
+/// Walks through the records of a CSV text once, in order. Line ends LF or CRLF, an optional byte order mark, an
+/// optional line end after the last record; fields in double quotes may hold commas, line ends and doubled quotes.
+/// Defects: a quote inside an unquoted field, text after a closing quote, an unclosed quote, control characters, a
+/// carriage return alone, an empty line, too few or too many fields, a column that is missing, unknown or named twice.
 /// One pass, O(bytes); only quoted fields with doubled quotes are copied.
 class CsvReader {
  public:
@@ -32,8 +32,8 @@ class CsvReader {
   CsvReader(std::string file, std::string_view text, std::span<const CsvColumn> columns, Defects& defects);
 
   bool has(std::size_t column) const { return position_[column].has_value(); }
-  /// Goes to the next record that has as many fields as the header; defective ones are reported and skipped. False at the
-  /// end of the text, and at once if a required column is missing.
+  /// Goes to the next record that has as many fields as the header; defective ones are reported and skipped. False at
+  /// the end of the text, and at once if a required column is missing.
   bool next();
   /// Whether every record so far had as many fields as the header, and no required column is missing.
   bool complete() const { return complete_; }
@@ -69,8 +69,8 @@ class CsvReader {
   bool usable_ = false, complete_ = true;
   std::vector<Field> fields_;
   std::deque<std::string> unescaped_;
-  std::size_t at_ = 0, begin_ = 0;           // offsets: next byte, this record
-  std::size_t line_ = 0, next_line_ = 1;     // numbers: this record's, the next one's
+  std::size_t at_ = 0, begin_ = 0;        // offsets: next byte, this record
+  std::size_t line_ = 0, next_line_ = 1;  // numbers: this record's, the next one's
 };
 
 }  // namespace metastable::analysis

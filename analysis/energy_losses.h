@@ -20,14 +20,15 @@ struct EnergyLosses {
 };
 
 struct EnergyLossOptions {
-  int trials = 1000;      ///< >= 2
-  int collisions = 16;    ///< per trial, >= 1
-  bool rest_rule = false; ///< false: as in Fig. 8, the wheel goes on whatever happens and x' < 0 is set to 0
+  int trials = 1000;       ///< >= 2
+  int collisions = 16;     ///< per trial, >= 1
+  bool rest_rule = false;  ///< false: as in Fig. 8, the wheel goes on whatever happens and x' < 0 is set to 0
   std::uint64_t seed = 1;
   int threads = 0;
 };
 
-/// Losses of all collisions of all trials under `setting`. O(trials x collisions); the same bits on any number of threads.
+/// Losses of all collisions of all trials under `setting`. O(trials x collisions); the same bits on any number of
+/// threads.
 EnergyLosses energy_losses(const Setting& setting, const EnergyLossOptions& options);
 
 }  // namespace metastable::analysis

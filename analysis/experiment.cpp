@@ -36,9 +36,9 @@ std::optional<std::string> read_text(const fs::path& path, Defects& defects) {
 }
 
 enum Column { condition, trial, collision, leg, time_s, position_m, omega_minus, omega_plus };
-constexpr CsvColumn collision_columns[] = {{"condition"},   {"trial", true}, {"collision", true},
-                                           {"leg"},         {"time_s"},      {"position_m"},
-                                           {"omega_minus_rad_s", true},      {"omega_plus_rad_s"}};
+constexpr CsvColumn collision_columns[] = {
+    {"condition"}, {"trial", true}, {"collision", true},         {"leg"},
+    {"time_s"},    {"position_m"},  {"omega_minus_rad_s", true}, {"omega_plus_rad_s"}};
 
 // Reads collisions.csv row by row into the trials of an experiment.
 class CollisionRows {
@@ -88,8 +88,8 @@ class CollisionRows {
     if (landing) c.leg = static_cast<int>(*landing);
     if (before) c.omega_minus = *before;
     if (c.number < due)
-      return csv_.refuse(collision, fmt::format("{} repeats or goes back: collision {} of trial {} is due", c.number, due,
-                                                roll.number));
+      return csv_.refuse(collision, fmt::format("{} repeats or goes back: collision {} of trial {} is due", c.number,
+                                                due, roll.number));
     if (c.number > due)
       csv_.refuse(collision, fmt::format("{} skips: collision {} of trial {} is due", c.number, due, roll.number));
     else if (due > 1)
@@ -103,7 +103,8 @@ class CollisionRows {
     if (last.time && next.time && !(*next.time > *last.time))
       csv_.refuse(time_s, fmt::format("{} s is not after the collision before ({} s)", *next.time, *last.time));
     if (last.position && next.position && !(*next.position > *last.position))
-      csv_.refuse(position_m, fmt::format("{} m is not below the collision before ({} m)", *next.position, *last.position));
+      csv_.refuse(position_m,
+                  fmt::format("{} m is not below the collision before ({} m)", *next.position, *last.position));
   }
 
   Experiment& experiment_;
@@ -139,13 +140,15 @@ void read_outcomes(Experiment& experiment, TrialIndex& index, const TrialIndex& 
 void add_notes(Experiment& experiment) {
   const auto missing = [&](Presence presence, std::string_view column) {
     if (presence == Presence::none) experiment.notes.push_back(fmt::format("{} is not given.", column));
-    if (presence == Presence::some) experiment.notes.push_back(fmt::format("{} is given for some collisions only.", column));
+    if (presence == Presence::some)
+      experiment.notes.push_back(fmt::format("{} is given for some collisions only.", column));
   };
   if (experiment.system == System::rimless_wheel) missing(experiment.columns.leg, "leg");
   missing(experiment.columns.time, "time_s");
   if (experiment.system == System::rimless_wheel) missing(experiment.columns.position, "position_m");
   missing(experiment.columns.omega_plus, "omega_plus_rad_s");
-  if (!experiment.columns.outcomes) experiment.notes.push_back("There is no trials.csv: how the trials ended is not known.");
+  if (!experiment.columns.outcomes)
+    experiment.notes.push_back("There is no trials.csv: how the trials ended is not known.");
   for (std::size_t c = 0; c < experiment.conditions.size(); ++c) {
     const Condition& condition = experiment.conditions[c];
     std::size_t trials = 0, others = 0;
@@ -156,9 +159,10 @@ void add_notes(Experiment& experiment) {
     }
     if (trials == 0) experiment.notes.push_back(fmt::format("Condition '{}' has no trial.", condition.id));
     if (others > 0)
-      experiment.notes.push_back(fmt::format("Condition '{}': {} of {} trials do not begin with first_landing_leg = {}; the "
-                                             "column leg counts.",
-                                             condition.id, others, trials, condition.first_landing_leg));
+      experiment.notes.push_back(
+          fmt::format("Condition '{}': {} of {} trials do not begin with first_landing_leg = {}; the "
+                      "column leg counts.",
+                      condition.id, others, trials, condition.first_landing_leg));
   }
 }
 
@@ -171,8 +175,7 @@ std::size_t Experiment::collisions() const {
 }
 
 Setting nominal_setting(const Experiment& experiment, std::size_t condition_index) {
-  if (experiment.system != System::rimless_wheel)
-    throw std::invalid_argument("a coast-down has no wheel and no ramp");
+  if (experiment.system != System::rimless_wheel) throw std::invalid_argument("a coast-down has no wheel and no ramp");
   if (condition_index >= experiment.conditions.size())
     throw std::invalid_argument(
         fmt::format("condition: {} is outside [0, {}]", condition_index, experiment.conditions.size() - 1));
@@ -204,7 +207,8 @@ Setting nominal_setting(const Experiment& experiment, std::size_t condition_inde
 
 ExperimentSource read_source(const fs::path& folder) {
   Defects defects;
-  ExperimentSource source{.folder = folder.string(), .experiment_toml = {}, .collisions_csv = {}, .trials_csv = {}, .angle_csv = {}};
+  ExperimentSource source{
+      .folder = folder.string(), .experiment_toml = {}, .collisions_csv = {}, .trials_csv = {}, .angle_csv = {}};
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
     defects.add(source.folder.empty() ? "''" : source.folder, {}, "there is no such folder");
@@ -232,7 +236,8 @@ Experiment parse_experiment(const ExperimentSource& source) {
   Experiment experiment;
   Defects defects;
   parse_experiment_toml(file_name(source, "experiment.toml"), source.experiment_toml, experiment, defects);
-  const std::string collisions_file = file_name(source, "collisions.csv"), trials_file = file_name(source, "trials.csv");
+  const std::string collisions_file = file_name(source, "collisions.csv"),
+                    trials_file = file_name(source, "trials.csv");
   const bool described = defects.empty();
   if (!source.collisions_csv) {
     defects.add(collisions_file, {},

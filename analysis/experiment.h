@@ -54,8 +54,8 @@ struct MeasuredCollision {
 };
 
 struct MeasuredTrial {
-  int number = 0;             ///< in the order the trials were run
-  std::size_t condition = 0;  ///< index
+  int number = 0;                             ///< in the order the trials were run
+  std::size_t condition = 0;                  ///< index
   std::vector<MeasuredCollision> collisions;  ///< at least one
   std::optional<dynamics::Outcome> outcome;   ///< nothing: unknown. A trial that rests does so after its last collision
 };
@@ -71,17 +71,17 @@ struct Columns {
 struct Experiment {
   std::string title;
   System system = System::rimless_wheel;
-  dynamics::Wheel wheel;               ///< of a rimless wheel
-  NominalContact contact;              ///< of a rimless wheel
-  std::optional<double> rotor_inertia; ///< of a coast-down [kg m^2]
-  RevolutionLoss loss;                 ///< of a coast-down
-  std::vector<Condition> conditions;   ///< at least one
+  dynamics::Wheel wheel;                ///< of a rimless wheel
+  NominalContact contact;               ///< of a rimless wheel
+  std::optional<double> rotor_inertia;  ///< of a coast-down [kg m^2]
+  RevolutionLoss loss;                  ///< of a coast-down
+  std::vector<Condition> conditions;    ///< at least one
   Sensor sensor;
-  std::vector<MeasuredTrial> trials;   ///< by rising number
+  std::vector<MeasuredTrial> trials;  ///< by rising number
   Columns columns;
-  std::vector<std::string> notes;      ///< what is not known or looks odd, a sentence each; for the user to see
+  std::vector<std::string> notes;  ///< what is not known or looks odd, a sentence each; for the user to see
 
-  std::size_t collisions() const;      ///< of all trials
+  std::size_t collisions() const;  ///< of all trials
   int legs() const { return system == System::rimless_wheel ? wheel.legs() : 1; }
 };
 

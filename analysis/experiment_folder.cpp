@@ -12,9 +12,12 @@ namespace {
 
 std::string_view outcome_name(dynamics::Outcome outcome) {
   switch (outcome) {
-    case dynamics::Outcome::rest: return "rest";
-    case dynamics::Outcome::end_of_ramp: return "end_of_ramp";
-    case dynamics::Outcome::max_collisions: return "max_collisions";
+    case dynamics::Outcome::rest:
+      return "rest";
+    case dynamics::Outcome::end_of_ramp:
+      return "end_of_ramp";
+    case dynamics::Outcome::max_collisions:
+      return "max_collisions";
   }
   throw std::logic_error("unknown outcome");
 }
@@ -28,7 +31,9 @@ std::string toml_text(const std::string& text) {
   return quoted + '"';
 }
 
-std::string toml_spread(const Spread& spread) { return fmt::format("{{ mean = {}, sd = {} }}", spread.mean, spread.sd); }
+std::string toml_spread(const Spread& spread) {
+  return fmt::format("{{ mean = {}, sd = {} }}", spread.mean, spread.sd);
+}
 
 // The nominal distributions; of a list of pairs, its means and sds.
 struct Nominal {
@@ -37,7 +42,7 @@ struct Nominal {
 
 Nominal nominal(const Setting& setting) {
   if (setting.pairs.empty()) return {setting.restitution, setting.friction};
-  const auto spread = [&](double dynamics::Contact::* which) {
+  const auto spread = [&](double dynamics::Contact::*which) {
     const auto count = static_cast<double>(setting.pairs.size());
     double mean = 0, square = 0;
     for (const dynamics::Contact& pair : setting.pairs) mean += pair.*which / count;
@@ -86,15 +91,16 @@ ExperimentFiles experiment_files(const Setting& setting, const std::vector<dynam
                       toml_spread(contact.restitution), toml_spread(contact.friction));
   if (!setting.pairs.empty()) toml += "# drawn from a list of pairs; these are its means and sds\n";
   toml += fmt::format(
-      "\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\ninitial_speed_rad_s = {}\nfirst_landing_leg = {}\n",
+      "\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\ninitial_speed_rad_s = {}\nfirst_landing_leg = "
+      "{}\n",
       condition, setting.slope_deg, setting.ramp_length, toml_spread(setting.initial_speed), setting.first_landing_leg);
 
   files.collisions_csv = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
   files.trials_csv = "condition,trial,outcome\n";
   for (std::size_t t = 0; t < trials.size(); ++t) {
     for (const dynamics::TrialCollision& c : trials[t].collisions)
-      files.collisions_csv += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", condition, t + 1, c.number, c.leg,
-                                          c.time, c.position, c.omega_minus, c.omega_plus);
+      files.collisions_csv += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", condition, t + 1, c.number,
+                                          c.leg, c.time, c.position, c.omega_minus, c.omega_plus);
     files.trials_csv += fmt::format("{},{},{}\n", condition, t + 1, outcome_name(trials[t].outcome));
   }
   return files;

@@ -11,10 +11,10 @@
 namespace metastable::analysis {
 
 struct SimulationOptions {
-  int trials = 50;       ///< 1 .. 1000000
-  int collisions = 16;   ///< most collisions of a trial, 1 .. 100000
+  int trials = 50;      ///< 1 .. 1000000
+  int collisions = 16;  ///< most collisions of a trial, 1 .. 100000
   std::uint64_t seed = 1;
-  int threads = 0;       ///< the same bits on any number
+  int threads = 0;  ///< the same bits on any number
 };
 
 /// Trials 0 .. trials-1 under `setting`. @throws std::invalid_argument naming the option and its range

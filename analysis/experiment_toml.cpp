@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
-// toml++ 3.3 takes some things for granted that a text can break ("[!" or "[1,}"), and asserts them. Here they are exceptions,
-// whatever the build type; that wants the library's code in this file.
+// toml++ 3.3 takes some things for granted that a text can break ("[!" or "[1,}"), and asserts them. Here they are
+// exceptions, whatever the build type; that wants the library's code in this file.
 namespace metastable::analysis {
 constexpr void toml_must_hold(bool truth) {
   if (!truth) throw std::logic_error("toml++ assertion");
@@ -43,7 +43,8 @@ struct Range {
                        high_open || std::isinf(high) ? ')' : ']');
   }
   bool holds(double value) const {
-    return std::isfinite(value) && (low_open ? value > low : value >= low) && (high_open ? value < high : value <= high);
+    return std::isfinite(value) && (low_open ? value > low : value >= low) &&
+           (high_open ? value < high : value <= high);
   }
 };
 constexpr Range any{};
@@ -114,7 +115,8 @@ class Keys {
       return std::nullopt;
     }
     Keys keys(file_, *node->as_table(), path(key), defects_);
-    const std::optional<double> mean = keys.number("mean", true, mean_range), sd = keys.number("sd", true, not_negative);
+    const std::optional<double> mean = keys.number("mean", true, mean_range),
+                                sd = keys.number("sd", true, not_negative);
     keys.finish();
     if (!mean || !sd) return std::nullopt;
     return Spread{*mean, *sd};
@@ -132,7 +134,9 @@ class Keys {
   }
 
   void report(const toml::node& node, std::string_view what) { defects_.add(file_, place(node.source()), what); }
-  std::string path(std::string_view key) const { return name_.empty() ? std::string(key) : fmt::format("{}.{}", name_, key); }
+  std::string path(std::string_view key) const {
+    return name_.empty() ? std::string(key) : fmt::format("{}.{}", name_, key);
+  }
 
  private:
   static Place place(const toml::source_region& source) {

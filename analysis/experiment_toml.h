@@ -9,8 +9,8 @@
 
 namespace metastable::analysis {
 
-/// Fills everything of `experiment` that experiment.toml says; all of its defects go to `defects`: not TOML, a key that is
-/// missing, unknown, of the wrong type or out of range.
+/// Fills everything of `experiment` that experiment.toml says; all of its defects go to `defects`: not TOML, a key that
+/// is missing, unknown, of the wrong type or out of range.
 /// @param file name for messages
 void parse_experiment_toml(const std::string& file, std::string_view text, Experiment& experiment, Defects& defects);
 

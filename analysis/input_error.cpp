@@ -13,7 +13,8 @@ std::string joined(const std::vector<std::string>& lines) {
 
 }  // namespace
 
-InputError::InputError(std::vector<std::string> lines) : std::invalid_argument(joined(lines)), lines_(std::move(lines)) {}
+InputError::InputError(std::vector<std::string> lines)
+    : std::invalid_argument(joined(lines)), lines_(std::move(lines)) {}
 
 void Defects::add(std::string_view file, Place place, std::string_view what) {
   if (++count_ > most_shown) return;

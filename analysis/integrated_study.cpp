@@ -42,7 +42,8 @@ std::optional<Level> solve(const Problem& problem, markov::NodeSpace space, int 
   level.failure_rate = markov::quasi_stationary(solver).failure_rate;
   int worst = 0;
   for (int p = 1; p < level.space.phases(); ++p)
-    if (mean[static_cast<std::size_t>(p) * level.space.nodes()] < mean[static_cast<std::size_t>(worst) * level.space.nodes()])
+    if (mean[static_cast<std::size_t>(p) * level.space.nodes()] <
+        mean[static_cast<std::size_t>(worst) * level.space.nodes()])
       worst = p;
   const double lowest = problem.map.state_interval(worst).first;
   level.worst_start = 1 + dot(markov::integrated_row(problem.map, level.space, lowest, worst).after, mean);
@@ -58,8 +59,8 @@ struct MeanSd {
 };
 
 // Of the observable at the nodes first .. last - 1.
-MeanSd observe(const Problem& problem, const markov::NodeSpace& space, const std::vector<double>& mass, std::size_t first,
-               std::size_t last) {
+MeanSd observe(const Problem& problem, const markov::NodeSpace& space, const std::vector<double>& mass,
+               std::size_t first, std::size_t last) {
   double total = 0, one = 0, two = 0;
   for (std::size_t i = first; i < last; ++i) {
     const double value = problem.observable(space.node(i));
@@ -119,9 +120,10 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   tell(0, "pilot");
   // Says at once, and clearly, when there is no density.
   const double lowest = problem.map.state_interval(problem.launch.phase).first;
-  markov::integrated_row(problem.map, markov::NodeSpace(std::vector(static_cast<std::size_t>(problem.map.phases()),
-                                                                    std::pair(lowest, lowest + 1)), 1),
-                         problem.launch.state(0), problem.launch.phase);
+  markov::integrated_row(
+      problem.map,
+      markov::NodeSpace(std::vector(static_cast<std::size_t>(problem.map.phases()), std::pair(lowest, lowest + 1)), 1),
+      problem.launch.state(0), problem.launch.phase);
   const std::vector<std::pair<double, double>> ranges =
       markov::node_ranges(problem.map, problem.launch, options.threads);
   if (ranges.empty()) return unresolved(problem);
@@ -145,12 +147,14 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
       rate_error = change(fine->failure_rate, coarse->failure_rate);
       met = std::max(error, rate_error) <= options.tolerance;
     }
-    const bool last = free ? met || 2 * panels > std::max(most, 2 * first_panels) : panels >= given && (given == 1 || coarse || !fine);
+    const bool last = free ? met || 2 * panels > std::max(most, 2 * first_panels)
+                           : panels >= given && (given == 1 || coarse || !fine);
     if (last) break;
     panels = free ? 2 * panels : std::max(given, panels + 1);
   }
   if (!fine || !coarse)
-    throw markov::ConvergenceError("integrated rows", 1, fmt::format("{} nodes are too few to lead to rest", panels * 16));
+    throw markov::ConvergenceError("integrated rows", 1,
+                                   fmt::format("{} nodes are too few to lead to rest", panels * 16));
 
   Metastability result;
   result.method = Method::integrated;
@@ -164,8 +168,9 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   if (result.discretization_error > options.tolerance) {
     result.status = free ? Status::tolerance_not_met : Status::fixed_resolution;
     if (free)
-      result.message = fmt::format("tolerance {} not met: the last doubling of nodes changed the result by {:.2g} at {} nodes",
-                                   options.tolerance, result.discretization_error, result.cells);
+      result.message =
+          fmt::format("tolerance {} not met: the last doubling of nodes changed the result by {:.2g} at {} nodes",
+                      options.tolerance, result.discretization_error, result.cells);
   }
   tell(0.96, "summary");
   describe(problem, *fine, options, result);

@@ -86,8 +86,9 @@ class Study {
     for (double reach = 1.2;; reach *= reach > 3 ? 10 : 1.5) {
       markov::StateSpace space =
           markov::covering_space(problem_.map, problem_.launch, pilot_cells, options_.seed, reach);
-      const markov::SampledChain sampled = markov::discretize(
-          problem_.map, space, problem_.launch, {.draws = draw_options(options_, pilot_samples, 0), .threads = options_.threads});
+      const markov::SampledChain sampled =
+          markov::discretize(problem_.map, space, problem_.launch,
+                             {.draws = draw_options(options_, pilot_samples, 0), .threads = options_.threads});
       if (!rests(sampled)) return std::nullopt;
       const markov::ChainSolver solver(sampled.chain);
       const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
@@ -114,7 +115,8 @@ class Study {
 
   // All replicates at one resolution, in batches of as many as there are threads; sums run in replicate order.
   Ladder climb(const Pilot& pilot, std::size_t cells, std::size_t samples, double work_before, double work_after) {
-    Ladder ladder{nested(markov::graded_space(pilot.space, pilot.nu, pilot.h, pilot.visits, cells >> (sizes - 1))), {}, {}};
+    Ladder ladder{
+        nested(markov::graded_space(pilot.space, pilot.nu, pilot.h, pilot.visits, cells >> (sizes - 1))), {}, {}};
     std::vector<markov::ChainPool> pools(sizes);
     const auto replicates = static_cast<std::size_t>(options_.replicates);
     const auto threads = static_cast<std::size_t>(markov::thread_count(options_.threads));
@@ -129,7 +131,8 @@ class Study {
       parallel(count, [&](std::size_t k) {
         const auto draws = draw_options(options_, samples, static_cast<int>(first + k));
         for (const markov::StateSpace& space : ladder.spaces)
-          chains[k].push_back(markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = inner}));
+          chains[k].push_back(
+              markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = inner}));
         if (rests(chains[k].back())) {
           steps[first + k] = expected_steps(problem_.map, ladder.spaces.back(), chains[k].back(), {draws});
         } else {
@@ -163,14 +166,17 @@ class Study {
       if (can_look_deeper() && std::log(result.failure_rate.value) < 0.6 * std::log(options_.tail)) return std::nullopt;
       // What is read off the finest chain as it is must be within the tolerance too.
       const double unextrapolated = std::abs(std::log(result.from_start.value / result.steps.mean));
-      const bool met = std::max(result.discretization_error + result.sampling_error, unextrapolated) <= options_.tolerance;
+      const bool met =
+          std::max(result.discretization_error + result.sampling_error, unextrapolated) <= options_.tolerance;
       bool refined = false;
       if (!met && free_cells &&
-          (result.discretization_error > options_.tolerance / 3 || unextrapolated > options_.tolerance) && cells < most_cells) {
+          (result.discretization_error > options_.tolerance / 3 || unextrapolated > options_.tolerance) &&
+          cells < most_cells) {
         cells *= 2;
         refined = true;
       }
-      if (!met && free_samples && result.sampling_error > options_.tolerance / 2 && samples < options_.largest_samples) {
+      if (!met && free_samples && result.sampling_error > options_.tolerance / 2 &&
+          samples < options_.largest_samples) {
         samples *= 4;
         refined = true;
       }
@@ -205,7 +211,7 @@ class Study {
     result.cells = cells;
     result.samples = samples;
     result.replicates = options_.replicates;
-    const auto estimate = [&](double ExpectedSteps::* which, double& discretization, double& sampling) {
+    const auto estimate = [&](double ExpectedSteps::*which, double& discretization, double& sampling) {
       std::vector<double> log_replicate;
       for (const ExpectedSteps& one : ladder.replicate) log_replicate.push_back(std::log(one.*which));
       const double fine = std::log(pooled[2].*which), middle = std::log(pooled[1].*which),
@@ -236,8 +242,7 @@ class Study {
     result.samples = options_.samples == 0 ? 4 * first_samples : options_.samples;
     result.replicates = 1;
     tell(0.1, "stationary distribution");
-    const markov::StateSpace space =
-        markov::covering_space(problem_.map, problem_.launch, result.cells, options_.seed);
+    const markov::StateSpace space = markov::covering_space(problem_.map, problem_.launch, result.cells, options_.seed);
     const markov::SampledChain sampled =
         markov::discretize(problem_.map, space, problem_.launch,
                            {.draws = draw_options(options_, result.samples, 0), .threads = options_.threads});
@@ -282,10 +287,12 @@ void StudyOptions::validate() const {
     throw std::invalid_argument(fmt::format("samples: {} is outside 16..{}", samples, 1u << 24));
   if (!(tolerance > 0 && tolerance < 1))
     throw std::invalid_argument(fmt::format("tolerance: {} is outside (0, 1)", tolerance));
-  if (threads < 0 || threads > 1024) throw std::invalid_argument(fmt::format("threads: {} is outside 0..1024", threads));
+  if (threads < 0 || threads > 1024)
+    throw std::invalid_argument(fmt::format("threads: {} is outside 0..1024", threads));
   if (replicates < 2 || replicates > 64)
     throw std::invalid_argument(fmt::format("replicates: {} is outside 2..64", replicates));
-  if (!(tail >= 1e-300 && tail <= 1e-3)) throw std::invalid_argument(fmt::format("tail: {} is outside [1e-300, 1e-3]", tail));
+  if (!(tail >= 1e-300 && tail <= 1e-3))
+    throw std::invalid_argument(fmt::format("tail: {} is outside [1e-300, 1e-3]", tail));
   if (!(mixing_distance > 0 && mixing_distance < 1))
     throw std::invalid_argument(fmt::format("mixing distance: {} is outside (0, 1)", mixing_distance));
   if (eigenvalues < 1 || eigenvalues > 64)
@@ -308,12 +315,18 @@ Method method_from_name(std::string_view name) {
 
 std::string status_text(Status status) {
   switch (status) {
-    case Status::converged: return "converged";
-    case Status::tolerance_not_met: return "tolerance_not_met";
-    case Status::fixed_resolution: return "fixed_resolution";
-    case Status::rest_unreachable: return "rest_unreachable";
-    case Status::solver_failed: return "solver_failed";
-    case Status::rest_unresolved: return "rest_unresolved";
+    case Status::converged:
+      return "converged";
+    case Status::tolerance_not_met:
+      return "tolerance_not_met";
+    case Status::fixed_resolution:
+      return "fixed_resolution";
+    case Status::rest_unreachable:
+      return "rest_unreachable";
+    case Status::solver_failed:
+      return "solver_failed";
+    case Status::rest_unresolved:
+      return "rest_unresolved";
   }
   throw std::logic_error("unknown status");
 }

@@ -22,7 +22,8 @@ struct RestReachability {
 RestReachability rest_reachability(const Problem& problem);
 
 /// Slope [deg] above which the setting's wheel has safe states (rest becomes unreachable from fast enough launches), by
-/// bisection to 1e-6 deg; nothing if there are none at any slope below alpha/2. The ramp's slope in `setting` is ignored.
+/// bisection to 1e-6 deg; nothing if there are none at any slope below alpha/2. The ramp's slope in `setting` is
+/// ignored.
 std::optional<double> safe_slope_deg(const Setting& setting);
 
 }  // namespace metastable::analysis

@@ -12,7 +12,8 @@ namespace metastable::analysis {
 SavitzkyGolay::SavitzkyGolay(int window, int degree, int derivative) : window_(window), derivative_(derivative) {
   if (degree < 0 || degree > 6) throw std::invalid_argument(fmt::format("degree: {} is outside 0..6", degree));
   if (window % 2 == 0 || window <= degree || window > 10001)
-    throw std::invalid_argument(fmt::format("window: {} is not an odd number of samples in {}..10001", window, degree + 1));
+    throw std::invalid_argument(
+        fmt::format("window: {} is not an odd number of samples in {}..10001", window, degree + 1));
   if (derivative < 0 || derivative > degree)
     throw std::invalid_argument(fmt::format("derivative: {} is outside 0..{}", derivative, degree));
   // Positions scaled to [-1, 1], so that the powers stay of one size.
@@ -22,7 +23,8 @@ SavitzkyGolay::SavitzkyGolay(int window, int degree, int derivative) : window_(w
   for (int i = 0; i < window; ++i)
     for (int p = 0; p <= degree; ++p) powers(i, p) = std::pow(position(i), p);
   // Normal equations: at these degrees and on [-1, 1] they lose no more than a few digits.
-  const Eigen::MatrixXd fit = (powers.transpose() * powers).ldlt().solve(powers.transpose());  // samples to coefficients
+  const Eigen::MatrixXd fit =
+      (powers.transpose() * powers).ldlt().solve(powers.transpose());  // samples to coefficients
   weights_.resize(static_cast<std::size_t>(window) * static_cast<std::size_t>(window));
   for (int at = 0; at < window; ++at) {
     Eigen::RowVectorXd value = Eigen::RowVectorXd::Zero(degree + 1);

@@ -6,8 +6,9 @@
 
 namespace metastable::analysis {
 
-/// A. Savitzky, M. J. E. Golay, Anal. Chem. 36 (1964): the polynomial that fits a window of samples best, evaluated at a
-/// sample. In the first and last half window the polynomial of the outermost whole window is evaluated off its centre.
+/// A. Savitzky, M. J. E. Golay, Anal. Chem. 36 (1964): the polynomial that fits a window of samples best, evaluated at
+/// a sample. In the first and last half window the polynomial of the outermost whole window is evaluated off its
+/// centre.
 class SavitzkyGolay {
  public:
   /// @param window      samples, odd, > degree, at most 10001

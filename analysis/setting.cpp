@@ -40,7 +40,8 @@ Problem Setting::problem() const {
     const double omega = speed.at_score(score);
     return omega * omega;
   };
-  Problem problem{wheel_map, {state, first_landing_leg % wheel_map.phases()}, [](double x) { return std::sqrt(x); }, {}};
+  Problem problem{
+      wheel_map, {state, first_landing_leg % wheel_map.phases()}, [](double x) { return std::sqrt(x); }, {}};
   if (std::isfinite(ramp_length))
     problem.last_event = dynamics::last_collision_on_ramp(wheel_map, first_landing_leg, ramp_length);
   return problem;
@@ -54,10 +55,9 @@ std::string Setting::describe() const {
     for (const double length : wheel.leg_length) legs += fmt::format("{}{}", legs.empty() ? "" : ", ", length);
     legs = "legs " + legs + " m";
   }
-  std::string contact =
-      pairs.empty() ? fmt::format("eta ~ N({}, {}^2), mu ~ N({}, {}^2)", restitution.mean, restitution.sd, friction.mean,
-                                  friction.sd)
-                    : fmt::format("(eta, mu) from a list of {} pairs", pairs.size());
+  std::string contact = pairs.empty() ? fmt::format("eta ~ N({}, {}^2), mu ~ N({}, {}^2)", restitution.mean,
+                                                    restitution.sd, friction.mean, friction.sd)
+                                      : fmt::format("(eta, mu) from a list of {} pairs", pairs.size());
   if (pairs.empty() && correlation != 0) contact += fmt::format(", correlation {}", correlation);
   const dynamics::ContactModel model = dynamics::contact_model(wheel, law, rebound_lost);
   std::string law_text = fmt::format("law {}", dynamics::law_name(law));

@@ -22,7 +22,8 @@ class Residuals {
   Eigen::VectorXd operator()(const Parameters& p) const {
     Eigen::VectorXd residual(static_cast<Eigen::Index>(time_.size()));
     // Outwards from the collision, each sample from its neighbour, so that every stretch is integrated once.
-    const auto first_after = static_cast<std::size_t>(std::upper_bound(time_.begin(), time_.end(), p(0)) - time_.begin());
+    const auto first_after =
+        static_cast<std::size_t>(std::upper_bound(time_.begin(), time_.end(), p(0)) - time_.begin());
     dynamics::StanceState state{before_.end_angle, p(2)};
     double now = p(0);
     for (std::size_t i = first_after; i-- > 0; now = time_[i]) {
@@ -79,7 +80,8 @@ std::optional<std::pair<StanceFit, double>> descend(const Residuals& residuals, 
     if (better && !settled) continue;
     if (!better && !(gradient.norm() <= 1e-6 * (1 + normal.diagonal().norm()))) return std::nullopt;
     const double freedom = std::max<double>(1, static_cast<double>(r.size()) - 4);
-    return std::pair(StanceFit{p(0), p(1), p(2), std::max(0.0, p(3)), std::sqrt(r.squaredNorm() / freedom)}, r.squaredNorm());
+    return std::pair(StanceFit{p(0), p(1), p(2), std::max(0.0, p(3)), std::sqrt(r.squaredNorm() / freedom)},
+                     r.squaredNorm());
   }
   return std::nullopt;
 }

@@ -17,11 +17,11 @@ struct StanceFit {
   double residual_sd = 0;  ///< of the samples [rad]
 };
 
-/// Least squares of time, angle, omega_minus and omega_plus: before the collision the stance motion of `before` backwards
-/// from its end, after it that of `after` onwards from its start; a wheel that falls back lies still
-/// on both feet (omega_plus is 0 where it never left them). Levenberg-Marquardt from `guess` and from small omega_plus, the best
-/// of them; nothing if fewer than
-/// three samples lie on either side, the time leaves the samples, or it does not settle within 50 steps.
+/// Least squares of time, angle, omega_minus and omega_plus: before the collision the stance motion of `before`
+/// backwards from its end, after it that of `after` onwards from its start; a wheel that falls back lies still on both
+/// feet (omega_plus is 0 where it never left them). Levenberg-Marquardt from `guess` and from small omega_plus, the
+/// best of them; nothing if fewer than three samples lie on either side, the time leaves the samples, or it does not
+/// settle within 50 steps.
 /// @param time, angle  samples around one collision and no other [s], [rad]
 std::optional<StanceFit> fit_collision(std::span<const double> time, std::span<const double> angle,
                                        const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess);

@@ -35,11 +35,21 @@ const Known& entry(Parameter parameter) {
 
 void set(Setting& setting, Parameter parameter, double value) {
   switch (parameter) {
-    case Parameter::slope: setting.slope_deg = value; return;
-    case Parameter::restitution_mean: setting.restitution.mean = value; return;
-    case Parameter::restitution_sd: setting.restitution.sd = value; return;
-    case Parameter::friction_mean: setting.friction.mean = value; return;
-    case Parameter::friction_sd: setting.friction.sd = value; return;
+    case Parameter::slope:
+      setting.slope_deg = value;
+      return;
+    case Parameter::restitution_mean:
+      setting.restitution.mean = value;
+      return;
+    case Parameter::restitution_sd:
+      setting.restitution.sd = value;
+      return;
+    case Parameter::friction_mean:
+      setting.friction.mean = value;
+      return;
+    case Parameter::friction_sd:
+      setting.friction.sd = value;
+      return;
   }
 }
 
@@ -62,7 +72,8 @@ std::vector<double> axis_values(double first, double last, double step) {
   if (!(step > 0) || !(last >= first) || !std::isfinite(first) || !std::isfinite(last))
     throw std::invalid_argument(fmt::format("range {}:{}:{}: needs first <= last and step > 0", first, last, step));
   const double count = std::floor((last - first) / step + 1e-3);
-  if (count >= 100000) throw std::invalid_argument(fmt::format("range {}:{}:{}: more than 100000 values", first, last, step));
+  if (count >= 100000)
+    throw std::invalid_argument(fmt::format("range {}:{}:{}: more than 100000 values", first, last, step));
   std::vector<double> values;
   // Rounded to the decimals a reader typed, so that 5:12:0.25 gives 5.25 and not 5.2500000000000004.
   for (double i = 0; i <= count; ++i) values.push_back(std::stod(fmt::format("{:.12g}", first + i * step)));

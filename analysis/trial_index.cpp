@@ -21,8 +21,8 @@ std::optional<std::size_t> TrialIndex::condition(CsvReader& csv, std::size_t col
     if (open_ && known.empty()) known.emplace_back();
     if (known.size() == 1) return 0;
     if (!told_)
-      csv.refuse(trial_column, fmt::format("the column 'condition' is missing and experiment.toml has {} conditions",
-                                           known.size()));
+      csv.refuse(trial_column,
+                 fmt::format("the column 'condition' is missing and experiment.toml has {} conditions", known.size()));
     told_ = true;
     return std::nullopt;
   }

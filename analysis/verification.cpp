@@ -26,8 +26,12 @@ constexpr std::size_t first_panels = 4;
 Benchmark rough_terrain(double sd_deg) {
   const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = sd_deg * degree});
   const double start = wheel.fixed_point();
-  return {fmt::format("rough terrain, sd {} deg", sd_deg), 
-          {wheel, {[start](double) { return start; }, 0}, [](double state) { return state; }, {}}, 1e-10, {}, {}, {}};
+  return {fmt::format("rough terrain, sd {} deg", sd_deg),
+          {wheel, {[start](double) { return start; }, 0}, [](double state) { return state; }, {}},
+          1e-10,
+          {},
+          {},
+          {}};
 }
 
 Benchmark wheel(double slope_deg, Spread friction, bool equal_legs) {
@@ -38,7 +42,11 @@ Benchmark wheel(double slope_deg, Spread friction, bool equal_legs) {
   setting.initial_speed = *paper_launch(slope_deg);
   return {fmt::format("{} deg, mu ~ N({}, {}^2), {}", slope_deg, friction.mean, friction.sd,
                       equal_legs ? "equal legs" : "the paper's legs"),
-          setting.problem(), 1e-8, {}, {}, {}};
+          setting.problem(),
+          1e-8,
+          {},
+          {},
+          {}};
 }
 
 double by_launch(const markov::Launch& launch, const std::vector<double>& mean) {
@@ -88,8 +96,8 @@ std::vector<Benchmark> rough_terrain_benchmarks() {
 }
 
 std::vector<Benchmark> wheel_benchmarks() {
-  return {wheel(7.02, {0.45, 0.1}, true),  wheel(7.02, {0.4, 0.1}, true),   wheel(7.02, {0.4, 0.1}, false),
-          wheel(7.02, {0.3, 0.05}, true),  wheel(9.59, {0.3, 0.05}, true),  wheel(7.02, {0.3, 0.03}, true),
+  return {wheel(7.02, {0.45, 0.1}, true), wheel(7.02, {0.4, 0.1}, true),  wheel(7.02, {0.4, 0.1}, false),
+          wheel(7.02, {0.3, 0.05}, true), wheel(9.59, {0.3, 0.05}, true), wheel(7.02, {0.3, 0.03}, true),
           wheel(7.02, {0.3, 0.02}, true), wheel(9.59, {0.3, 0.024}, true)};
 }
 

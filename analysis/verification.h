@@ -28,14 +28,14 @@ std::vector<Benchmark> wheel_benchmarks();
 
 /// Answers of one benchmark on Gauss-Legendre nodes doubled until the tolerance is met.
 struct Verified {
-  std::size_t nodes = 0;         ///< per phase, of the finest
+  std::size_t nodes = 0;  ///< per phase, of the finest
   double from_start = 0, from_quasi_stationary = 0, failure_rate = 0;
-  double change = 0;             ///< largest relative change of the three at the last doubling
-  std::optional<double> error;   ///< largest relative distance from the known values
-  /// The same chain by other solvers: expected steps from the launch by sparse LU, from the quasi-stationary distribution
-  /// as 1 / (1 - lambda_1) by Arnoldi; nothing where they give up. Neither has to be positive.
+  double change = 0;            ///< largest relative change of the three at the last doubling
+  std::optional<double> error;  ///< largest relative distance from the known values
+  /// The same chain by other solvers: expected steps from the launch by sparse LU, from the quasi-stationary
+  /// distribution as 1 / (1 - lambda_1) by Arnoldi; nothing where they give up. Neither has to be positive.
   std::optional<double> lu_from_start, arnoldi_from_quasi_stationary;
-  markov::SampledChain chain;    ///< of the finest nodes
+  markov::SampledChain chain;  ///< of the finest nodes
 };
 /// @param most_nodes per phase, where doubling stops whatever the change
 Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes = 512);

@@ -1,11 +1,11 @@
 #include "dynamics/contact_law.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "dynamics/coulomb_law.h"
 #include "dynamics/plastic_law.h"
@@ -26,8 +26,9 @@ double radius_of_gyration(const Wheel& wheel, Law law) {
     const double about_foot = wheel.hub_mass * wheel.mean_leg_length() * wheel.mean_leg_length();
     // A point mass written with rounded digits is still a point mass.
     if (*wheel.inertia < about_foot * (1 - 1e-6))
-      throw std::invalid_argument(fmt::format("inertia: {} kg m^2 is outside [{}, inf) (hub mass times mean leg length squared)",
-                                              *wheel.inertia, about_foot));
+      throw std::invalid_argument(
+          fmt::format("inertia: {} kg m^2 is outside [{}, inf) (hub mass times mean leg length squared)",
+                      *wheel.inertia, about_foot));
     return std::sqrt(std::max(0.0, (*wheel.inertia - about_foot) / wheel.hub_mass));
   }
   return law == Law::coulomb ? coulomb_gyration : 0;
@@ -65,18 +66,24 @@ ContactModel contact_model(const Wheel& wheel, Law law, double rebound_lost) {
 
 Loss collide(const ContactModel& model, const Collision& collision, const Contact& contact) {
   switch (model.law) {
-    case Law::published: return published_loss(model, collision, contact);
-    case Law::coulomb: return coulomb_loss(model, collision, contact);
-    case Law::plastic: return plastic_loss(model, collision);
+    case Law::published:
+      return published_loss(model, collision, contact);
+    case Law::coulomb:
+      return coulomb_loss(model, collision, contact);
+    case Law::plastic:
+      return plastic_loss(model, collision);
   }
   throw std::logic_error("collide: unknown law");
 }
 
 std::vector<double> friction_breaks(const ContactModel& model, const Collision& collision) {
   switch (model.law) {
-    case Law::published: return published_friction_breaks(collision);
-    case Law::coulomb: return {coulomb_sticking_friction(model, collision)};
-    case Law::plastic: return {};
+    case Law::published:
+      return published_friction_breaks(collision);
+    case Law::coulomb:
+      return {coulomb_sticking_friction(model, collision)};
+    case Law::plastic:
+      return {};
   }
   throw std::logic_error("friction_breaks: unknown law");
 }

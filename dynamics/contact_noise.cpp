@@ -1,12 +1,12 @@
 #include "dynamics/contact_noise.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <utility>
-
-#include <fmt/format.h>
 
 namespace metastable::dynamics {
 namespace {
@@ -32,7 +32,9 @@ ContactNoise ContactNoise::normal(double restitution_mean, double restitution_sd
   if (!(correlation > -1 && correlation < 1))
     throw std::invalid_argument(fmt::format("correlation: {} is outside (-1, 1)", correlation));
   return {named("restitution", restitution_mean, restitution_sd, 0, 1),
-          named("friction", friction_mean, friction_sd, 0, infinity), correlation, {}};
+          named("friction", friction_mean, friction_sd, 0, infinity),
+          correlation,
+          {}};
 }
 
 ContactNoise ContactNoise::empirical(std::vector<Contact> pairs) {

@@ -17,8 +17,8 @@ struct Contact {
 
 /// Distribution of (eta, mu), drawn afresh and independently at every collision.
 ///
-/// Either truncated normals (eta on [0, 1], mu on [0, inf)), joined by a Gaussian copula of the given correlation, or an
-/// empirical list of pairs, each equally likely.
+/// Either truncated normals (eta on [0, 1], mu on [0, inf)), joined by a Gaussian copula of the given correlation, or
+/// an empirical list of pairs, each equally likely.
 class ContactNoise {
  public:
   /// @param correlation of the normal scores of eta and mu, in (-1, 1)

@@ -47,10 +47,10 @@ Loss coulomb_loss(const ContactModel& model, const Collision& c, const Contact& 
   const Contactor contactor(model, c, mu);
   Loss loss;
 
-  double impulse = 0;    // P so far
-  double normal = -v0;   // v_n now
-  double absorbed = 0;   // normal work taken up in compression
-  double released = 0;   // and given back so far
+  double impulse = 0;   // P so far
+  double normal = -v0;  // v_n now
+  double absorbed = 0;  // normal work taken up in compression
+  double released = 0;  // and given back so far
   bool finished = false;
   if (slip0 != 0) {
     const double direction = slip0 > 0 ? 1 : -1;

@@ -1,15 +1,14 @@
 #include "dynamics/landing_density.h"
 
 #include <algorithm>
+#include <boost/math/quadrature/gauss_kronrod.hpp>
+#include <boost/math/tools/minima.hpp>
+#include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
-
-#include <boost/math/quadrature/gauss_kronrod.hpp>
-#include <boost/math/tools/minima.hpp>
-#include <boost/math/tools/roots.hpp>
 
 namespace metastable::dynamics {
 namespace {
@@ -40,17 +39,21 @@ Place place(double lower, double upper, bool fold_below, bool fold_above, double
 
 void LandingDensity::check(const WheelMap& map) {
   const char* reason = nullptr;
-  if (map.noise().is_empirical()) reason = "a list of contacts";
-  else if (map.law() == Law::plastic) reason = "the plastic law (nothing is random)";
-  else if (map.noise().friction().constant()) reason = "a constant friction";
-  else if (map.noise().correlation() != 0) reason = "correlated restitution and friction";
+  if (map.noise().is_empirical())
+    reason = "a list of contacts";
+  else if (map.law() == Law::plastic)
+    reason = "the plastic law (nothing is random)";
+  else if (map.noise().friction().constant())
+    reason = "a constant friction";
+  else if (map.noise().correlation() != 0)
+    reason = "correlated restitution and friction";
   else if (map.law() == Law::coulomb && map.contact_model().rebound_lost == 1)
     reason = "rebound_lost = 1 under coulomb (sticking collisions all land alike)";
   else if (map.law() == Law::coulomb && map.noise().restitution().constant())
     reason = "a constant restitution under coulomb (sticking collisions all land alike)";
   if (reason != nullptr)
-    throw std::invalid_argument(std::string("method integrated: the landing has no density in closed form for ") + reason +
-                                "; use the sampled method");
+    throw std::invalid_argument(std::string("method integrated: the landing has no density in closed form for ") +
+                                reason + "; use the sampled method");
 }
 
 LandingDensity::LandingDensity(const WheelMap& map, double state, int phase)
@@ -80,8 +83,10 @@ LandingDensity::LandingDensity(const WheelMap& map, double state, int phase)
     stretch_ = std::sqrt(model.contact_mass / model.ramp_stiffness);
   }
   end_ = std::max(friction_.lower(), friction_.mean()) + far_tail * friction_.sd();
-  if (coulomb_) end_ = tangential_0_ / tangential_1_;
-  else if (normal_1_ > 0) end_ = std::min(end_, normal_0_ / normal_1_);
+  if (coulomb_)
+    end_ = tangential_0_ / tangential_1_;
+  else if (normal_1_ > 0)
+    end_ = std::min(end_, normal_0_ / normal_1_);
 
   if (restitution_.constant()) {
     lower_ = upper_ = restitution_.mean();
@@ -110,11 +115,13 @@ LandingDensity::LandingDensity(const WheelMap& map, double state, int phase)
     if (before * after >= 0) continue;
     const double sign = before > 0 ? -1 : 1;
     std::uintmax_t iterations = 60;
-    const auto best = boost::math::tools::brent_find_minima([&](double eta) { return sign * extreme_loss(eta); },
-                                                            plain[i - 1].restitution, plain[i + 1].restitution, 26, iterations);
+    const auto best =
+        boost::math::tools::brent_find_minima([&](double eta) { return sign * extreme_loss(eta); },
+                                              plain[i - 1].restitution, plain[i + 1].restitution, 26, iterations);
     extremes_.push_back({best.first, sign * best.second});
   }
-  std::sort(extremes_.begin(), extremes_.end(), [](const Point& p, const Point& q) { return p.restitution < q.restitution; });
+  std::sort(extremes_.begin(), extremes_.end(),
+            [](const Point& p, const Point& q) { return p.restitution < q.restitution; });
 }
 
 LandingDensity::Coefficients LandingDensity::at(double restitution) const {
@@ -158,8 +165,8 @@ LandingDensity::Extreme LandingDensity::extreme(const Coefficients& k, double gu
     const double normal = normal_0_ - normal_1_ * mu, product = mu * (tangential_1_ * mu - tangential_0_),
                  rise = 2 * tangential_1_ * mu - tangential_0_, both = rise * normal + product * normal_1_;
     const double value = k.a * normal_1_ * normal + k.b * (both + product * normal_1_) + k.c * normal * both;
-    const double derivative = normal_1_ * (k.b * rise - k.a * normal_1_ - k.c * both) +
-                              2 * tangential_1_ * normal * (k.b + k.c * normal);
+    const double derivative =
+        normal_1_ * (k.b * rise - k.a * normal_1_ - k.c * both) + 2 * tangential_1_ * normal * (k.b + k.c * normal);
     if (value == 0) break;
     (sign * value < 0 ? low : high) = mu;
     double next = mu - value / derivative;
@@ -171,8 +178,10 @@ LandingDensity::Extreme LandingDensity::extreme(const Coefficients& k, double gu
   return {mu, loss(k, mu)};
 }
 
-// The one mu in [from, to] with loss = level: Newton's method on (loss - level) A^2 within a bracket, from near `guess`.
-double LandingDensity::root(const Coefficients& k, double level, double from, double to, bool rising, double guess) const {
+// The one mu in [from, to] with loss = level: Newton's method on (loss - level) A^2 within a bracket, from near
+// `guess`.
+double LandingDensity::root(const Coefficients& k, double level, double from, double to, bool rising,
+                            double guess) const {
   const double sign = rising ? 1 : -1;
   double low = from, high = to, mu = guess > low && guess < high ? guess : 0.5 * (low + high);
   for (int i = 0; i < 100; ++i) {
@@ -208,7 +217,8 @@ double LandingDensity::given_restitution(double restitution, double level, Guess
   if (beyond <= 0) return 0;
   if (turn.friction > 0 && sign * (first - level) > 0) add(0, turn.friction, coulomb_, guess.first);
   const bool jams = !coulomb_ && normal_0_ - normal_1_ * end_ <= 1e-15 * normal_0_;
-  if (turn.friction < end_ && (jams || sign * (loss(k, end_) - level) > 0)) add(turn.friction, end_, !coulomb_, guess.second);
+  if (turn.friction < end_ && (jams || sign * (loss(k, end_) - level) > 0))
+    add(turn.friction, end_, !coulomb_, guess.second);
   return sum;
 }
 
@@ -239,8 +249,7 @@ std::vector<LandingDensity::Piece> LandingDensity::pieces(double level) const {
     const double before = p.loss - level, after = q.loss - level;
     if (!(before * after < 0)) continue;
     std::uintmax_t iterations = 100;
-    const auto [l, r] = boost::math::tools::toms748_solve(fold,
-                                                          p.restitution, q.restitution, before, after,
+    const auto [l, r] = boost::math::tools::toms748_solve(fold, p.restitution, q.restitution, before, after,
                                                           boost::math::tools::eps_tolerance<double>(52), iterations);
     breaks.push_back({0.5 * (l + r), true});
   }
@@ -288,7 +297,8 @@ double LandingDensity::integrate(const std::vector<Piece>& all, double level) co
     if (p.fold_below) left = 0;
     for (int i = 0; i < count; ++i) {
       const double from = static_cast<double>(i) / count, to = static_cast<double>(i + 1) / count;
-      const double middle = integrand(p, 0.5 * (from + to)), right = i + 1 == count && p.fold_above ? 0 : integrand(p, to);
+      const double middle = integrand(p, 0.5 * (from + to)),
+                   right = i + 1 == count && p.fold_above ? 0 : integrand(p, to);
       panels.push_back({&p, from, to, 0, 0});
       size.push_back(std::max({left, middle, right}) * (to - from));
       largest = std::max(largest, size.back());

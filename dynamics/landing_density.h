@@ -9,15 +9,15 @@ namespace metastable::dynamics {
 
 /// Density of the landing x' of a wheel that meets the collision at `phase` with x = omega^2 [rad^2/s^2] = state, > 0.
 ///
-/// Given eta, the loss rises and falls once in mu, g(mu) = a/A + b mu B/A^2 + c mu B/A with A and B linear in mu, so x' is
-/// reached by at most two mu, the roots of a cubic; the density is the integral over eta of
-/// f(eta) sum f(mu) / |dx'/dmu|. It is broken where a pair of roots appears (the inverse square root there is
-/// removed by substitution) and where a root leaves [0, inf). `coulomb`: the foot sticks for every mu >= mu_c, and that
-/// share of the mass has x' from eta alone; its density is added in closed form.
+/// Given eta, the loss rises and falls once in mu, g(mu) = a/A + b mu B/A^2 + c mu B/A with A and B linear in mu, so x'
+/// is reached by at most two mu, the roots of a cubic; the density is the integral over eta of f(eta) sum f(mu) /
+/// |dx'/dmu|. It is broken where a pair of roots appears (the inverse square root there is removed by substitution) and
+/// where a root leaves [0, inf). `coulomb`: the foot sticks for every mu >= mu_c, and that share of the mass has x'
+/// from eta alone; its density is added in closed form.
 ///
 /// Relative accuracy about 1e-11, tails included. The density is smooth in x' but for a few points that move with the
-/// state: `published`: about f(eta) at 0 times f(mu) at its own least loss in size. `coulomb`: jumps and inverse square roots in the
-/// bulk of x'.
+/// state: `published`: about f(eta) at 0 times f(mu) at its own least loss in size. `coulomb`: jumps and inverse square
+/// roots in the bulk of x'.
 class LandingDensity {
  public:
   /// Cost: about 30 us. @throws std::invalid_argument where the landing has no density (a list of contacts,
@@ -64,15 +64,15 @@ class LandingDensity {
   const TruncatedNormal restitution_, friction_;
   bool coulomb_ = false;
   double lowest_ = 0, gain_ = 0, inertia_ = 0, available_ = 0;  // I2, I1 x
-  double normal_0_ = 0, normal_1_ = 0;          // A = normal_0 - normal_1 mu
-  double tangential_0_ = 0, tangential_1_ = 0;  // B = tangential_1 mu - tangential_0
-  double energy_ = 0;     // c^2 x / 2
-  double pull_ = 0;       // M g sin(gamma) c omega / 2
-  double stretch_ = 0;    // sqrt(m_c / K_r)
-  double kept_ = 1;       // 1 - rebound_lost
-  double end_ = 0;        // mu beyond which nothing lands, or the foot sticks
-  double lower_ = 0, upper_ = 1;  // eta
-  std::vector<Point> extremes_;   // over eta, its own extremes included
+  double normal_0_ = 0, normal_1_ = 0;                          // A = normal_0 - normal_1 mu
+  double tangential_0_ = 0, tangential_1_ = 0;                  // B = tangential_1 mu - tangential_0
+  double energy_ = 0;                                           // c^2 x / 2
+  double pull_ = 0;                                             // M g sin(gamma) c omega / 2
+  double stretch_ = 0;                                          // sqrt(m_c / K_r)
+  double kept_ = 1;                                             // 1 - rebound_lost
+  double end_ = 0;                                              // mu beyond which nothing lands, or the foot sticks
+  double lower_ = 0, upper_ = 1;                                // eta
+  std::vector<Point> extremes_;                                 // over eta, its own extremes included
 };
 
 }  // namespace metastable::dynamics

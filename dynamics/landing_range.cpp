@@ -1,18 +1,17 @@
 #include "dynamics/landing_range.h"
 
 #include <algorithm>
+#include <boost/math/tools/minima.hpp>
 #include <cstdint>
 #include <limits>
 #include <vector>
-
-#include <boost/math/tools/minima.hpp>
 
 namespace metastable::dynamics {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr int steps = 16;     // of the grid between two edges
-constexpr int bits = 40;      // of Brent's method
+constexpr int steps = 16;       // of the grid between two edges
+constexpr int bits = 40;        // of Brent's method
 constexpr double widest = 100;  // friction that stands for "no upper end" where the law has no break
 
 std::vector<double> refined(const std::vector<double>& edges) {
@@ -48,7 +47,8 @@ class Extremes {
         state_(state),
         phase_(phase),
         restitution_(restitution_grid(map.noise().support())),
-        friction_(friction_grid(map.noise().support(), friction_breaks(map.contact_model(), map.collision(phase, 1)))) {}
+        friction_(friction_grid(map.noise().support(), friction_breaks(map.contact_model(), map.collision(phase, 1)))) {
+  }
 
   // Smallest sign * omega+^2.
   double least(double sign) const {

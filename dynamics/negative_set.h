@@ -1,13 +1,12 @@
 #pragma once
 // Where a function of one variable is negative.
 
+#include <boost/math/tools/minima.hpp>
+#include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include <boost/math/tools/minima.hpp>
-#include <boost/math/tools/roots.hpp>
 
 namespace metastable::dynamics {
 
@@ -18,9 +17,9 @@ struct Interval {
 /// Intervals of [edges.front(), edges.back()] on which f < 0, ascending and disjoint; bounds to double precision.
 ///
 /// f is continuous and smooth between consecutive edges, and finite; it need not be monotone. Each piece is scanned at
-/// `samples` (2 or more) equal steps; where the samples show a dip towards zero, beside an edge too, it is followed to its bottom, so
-/// that a pair of roots between two samples is found. Finer structure than a step is missed.
-/// Cost: samples + 2 calls a piece, about ten a root, about 30 a dip.
+/// `samples` (2 or more) equal steps; where the samples show a dip towards zero, beside an edge too, it is followed to
+/// its bottom, so that a pair of roots between two samples is found. Finer structure than a step is missed. Cost:
+/// samples + 2 calls a piece, about ten a root, about 30 a dip.
 template <class F>
 std::vector<Interval> negative_set(const F& f, std::span<const double> edges, int samples) {
   const auto negative = [](double v) { return v < 0; };
@@ -49,7 +48,9 @@ std::vector<Interval> negative_set(const F& f, std::span<const double> edges, in
   const auto count = static_cast<std::size_t>(samples);
   std::vector<double> at(count + 1), value(count + 1);
   const auto same_sign = [&](std::size_t a, std::size_t b) { return negative(value[a]) == negative(value[b]); };
-  const auto closer = [&](std::size_t a, std::size_t b) { return same_sign(a, b) && std::abs(value[a]) < std::abs(value[b]); };
+  const auto closer = [&](std::size_t a, std::size_t b) {
+    return same_sign(a, b) && std::abs(value[a]) < std::abs(value[b]);
+  };
   // Whether |f| falls on leaving the sample at an edge towards its neighbour.
   const auto falls = [&](std::size_t edge, std::size_t neighbour) {
     return same_sign(edge, neighbour) &&

@@ -51,7 +51,7 @@ Loss published_loss(const ContactModel& model, const Collision& c, const Contact
       loss.jammed = true;
       return loss;
     }
-    const double impulse = v0 / before.normal;  // P_+
+    const double impulse = v0 / before.normal;            // P_+
     const double stopping = impulse * before.tangential;  // speed that the impulse P_+ takes off
     loss.zeta = stopping > 0 ? u0 / stopping : std::numeric_limits<double>::infinity();
     if (loss.zeta >= 1 + eta) {  // slip never stops

@@ -1,12 +1,11 @@
 #include "dynamics/rest_probability.h"
 
 #include <algorithm>
+#include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <vector>
-
-#include <boost/math/quadrature/gauss_kronrod.hpp>
 
 #include "dynamics/negative_set.h"
 
@@ -14,8 +13,8 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double far_tail = 39;        // [sd]: beyond it probabilities underflow
-constexpr double tolerance = 1e-11;    // of the result
+constexpr double far_tail = 39;      // [sd]: beyond it probabilities underflow
+constexpr double tolerance = 1e-11;  // of the result
 constexpr std::size_t most_panels = 4000;
 
 class RestProbability {
@@ -110,9 +109,10 @@ class RestProbability {
   Panel panel(double lower, double upper) const {
     Panel p{lower, upper, 0, 0};
     p.value = boost::math::quadrature::gauss_kronrod<double, 21>::integrate(
-        [this](double eta) { return restitution_.density(eta) * given_restitution(eta); }, lower, upper, 0, 0.0, &p.error);
-    // Boost's estimate is the difference to the Gauss rule, of the integral mapped to [-1, 1]; the Kronrod rule itself is
-    // far better, by QUADPACK's experience as good as this:
+        [this](double eta) { return restitution_.density(eta) * given_restitution(eta); }, lower, upper, 0, 0.0,
+        &p.error);
+    // Boost's estimate is the difference to the Gauss rule, of the integral mapped to [-1, 1]; the Kronrod rule itself
+    // is far better, by QUADPACK's experience as good as this:
     const double difference = p.error * (upper - lower) / 2;
     if (p.value > 0) p.error = p.value * std::min(1.0, std::pow(200 * difference / p.value, 1.5));
     return p;
@@ -167,7 +167,8 @@ class RestProbability {
 double rest_probability(const WheelMap& map, double state, int phase) {
   const RestProbability probability(map, state, phase);
   if (map.noise().is_empirical()) return probability.over_list();
-  if (map.noise().correlation() != 0) throw std::logic_error("rest_probability: restitution and friction are correlated");
+  if (map.noise().correlation() != 0)
+    throw std::logic_error("rest_probability: restitution and friction are correlated");
   return probability.over_normals();
 }
 

@@ -1,11 +1,11 @@
 #include "dynamics/rough_terrain.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
-
-#include <fmt/format.h>
 
 #include "dynamics/truncated_normal.h"
 
@@ -42,7 +42,8 @@ RoughTerrainWheel::RoughTerrainWheel(Options options) : options_(options) {
   const Options& o = options_;
   require(std::abs(o.mean_slope) < 45 * degree, "mean_slope [deg]", o.mean_slope / degree, "(-45, 45)");
   require(o.sd_slope >= 0 && o.sd_slope <= widest_sd, "sd_slope [deg]", o.sd_slope / degree, "[0, 10]");
-  require(o.half_leg_angle > 0 && o.half_leg_angle < 45 * degree, "half_leg_angle [deg]", o.half_leg_angle / degree, "(0, 45)");
+  require(o.half_leg_angle > 0 && o.half_leg_angle < 45 * degree, "half_leg_angle [deg]", o.half_leg_angle / degree,
+          "(0, 45)");
   require(o.gravity > 0 && std::isfinite(o.gravity), "gravity [m/s^2]", o.gravity, "(0, inf)");
   require(o.leg_length > 0 && std::isfinite(o.leg_length), "leg_length [m]", o.leg_length, "(0, inf)");
 }
@@ -56,7 +57,8 @@ double RoughTerrainWheel::fixed_point() const {
   const double cosine = std::cos(2 * options_.half_leg_angle);
   const double fixed = next(0, options_.mean_slope) / (1 - cosine * cosine);
   if (!(fixed > 0))
-    throw std::domain_error(fmt::format("fixed point: the wheel rests on a slope of {:.6g} deg", options_.mean_slope / degree));
+    throw std::domain_error(
+        fmt::format("fixed point: the wheel rests on a slope of {:.6g} deg", options_.mean_slope / degree));
   return fixed;
 }
 
@@ -83,7 +85,8 @@ std::optional<double> RoughTerrainWheel::rest_probability(double state, int) con
          normal_cdf((options_.mean_slope - joined.best - reach) / options_.sd_slope);
 }
 
-void RoughTerrainWheel::landing_density(double state, int, std::span<const double> next, std::span<double> density) const {
+void RoughTerrainWheel::landing_density(double state, int, std::span<const double> next,
+                                        std::span<double> density) const {
   const double sd = options_.sd_slope;
   if (sd == 0)
     throw std::invalid_argument("method integrated: a constant slope leaves no density; use the sampled method");

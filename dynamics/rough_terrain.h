@@ -13,11 +13,11 @@ namespace metastable::dynamics {
 class RoughTerrainWheel {
  public:
   struct Options {
-    double mean_slope = 0;         ///< [rad]
-    double sd_slope = 0;           ///< [rad], >= 0
+    double mean_slope = 0;                        ///< [rad]
+    double sd_slope = 0;                          ///< [rad], >= 0
     double half_leg_angle = 0.39269908169872414;  ///< a [rad], pi/8: eight legs
-    double gravity = 9.8;          ///< g [m/s^2]
-    double leg_length = 1.0;       ///< l [m]
+    double gravity = 9.8;                         ///< g [m/s^2]
+    double leg_length = 1.0;                      ///< l [m]
   };
   /// @throws std::invalid_argument naming the quantity and its range
   explicit RoughTerrainWheel(Options options);

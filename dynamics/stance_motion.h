@@ -7,7 +7,8 @@ namespace metastable::dynamics {
 
 /// Where the stance leg is and how fast it turns.
 struct StanceState {
-  double angle = 0;  ///< of the stance leg to the horizontal, theta [rad]; rises as the wheel rolls down, pi/2 at the apex
+  double angle =
+      0;  ///< of the stance leg to the horizontal, theta [rad]; rises as the wheel rolls down, pi/2 at the apex
   double speed = 0;  ///< omega = dtheta/dt [rad/s]; negative: falling back
 };
 
@@ -17,8 +18,8 @@ struct StanceState {
 /// @param pendulum  2 M g L / I [rad^2/s^2], > 0 (Stance::pendulum)
 StanceState stance_motion(double pendulum, StanceState start, double time);
 
-/// Time from `start` (speed > 0) to the first passage of `angle` > start.angle and the speed there; infinite time if the
-/// wheel turns back before. Bisection on stance_motion() inside the step that passes it, to 1e-12 s.
+/// Time from `start` (speed > 0) to the first passage of `angle` > start.angle and the speed there; infinite time if
+/// the wheel turns back before. Bisection on stance_motion() inside the step that passes it, to 1e-12 s.
 std::pair<double, double> stance_passage(double pendulum, StanceState start, double angle);
 
 }  // namespace metastable::dynamics

@@ -1,13 +1,13 @@
 #include "dynamics/trials.h"
 
+#include <Random123/philox.h>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-
-#include <Random123/philox.h>
-#include <fmt/format.h>
 
 namespace metastable::dynamics {
 namespace {
@@ -27,7 +27,8 @@ std::array<double, 2> scores(std::uint64_t seed, std::uint64_t index, std::uint6
 // One trial as it unfolds. Event 0 of a trial is the launch, event n its collision n.
 class Roll {
  public:
-  Roll(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg, std::uint64_t seed, std::uint64_t index)
+  Roll(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg, std::uint64_t seed,
+       std::uint64_t index)
       : map_(map), first_(first_landing_leg), seed_(seed), index_(index) {
     const double omega = launch.at_score(scores(seed, index, 0)[0]);
     state_ = omega * omega;
@@ -69,7 +70,8 @@ void check_leg(const WheelMap& map, int leg) {
 
 int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ramp_length) {
   check_leg(map, first_landing_leg);
-  if (!(ramp_length >= 0)) throw std::invalid_argument(fmt::format("ramp_length: {} m is outside [0, inf]", ramp_length));
+  if (!(ramp_length >= 0))
+    throw std::invalid_argument(fmt::format("ramp_length: {} m is outside [0, inf]", ramp_length));
   double revolution = 0;
   for (int p = 0; p < map.phases(); ++p) revolution += map.advance(p);
   const double whole = std::floor(ramp_length / revolution);
@@ -83,7 +85,8 @@ int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ra
   return number;
 }
 
-Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options, std::uint64_t index) {
+Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
+                     std::uint64_t index) {
   if (options.max_collisions < 1)
     throw std::invalid_argument(fmt::format("max_collisions: {} is outside [1, inf)", options.max_collisions));
   const int last = last_collision_on_ramp(map, options.first_landing_leg, options.ramp_length);
@@ -123,8 +126,8 @@ Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const T
   }
 }
 
-std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg, std::uint64_t seed,
-                            std::uint64_t index, std::uint64_t limit) {
+std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,
+                            std::uint64_t seed, std::uint64_t index, std::uint64_t limit) {
   check_leg(map, first_landing_leg);
   for (Roll roll(map, forwards(launch), first_landing_leg, seed, index);;) {
     const Stance& stance = map.stance(roll.phase());

@@ -13,14 +13,14 @@ enum class Outcome { rest, end_of_ramp, max_collisions };
 
 /// One collision of a trial.
 struct TrialCollision {
-  int number = 0;            ///< from 1
-  int leg = 0;               ///< that lands
-  double time = 0;           ///< [s] since collision 1
-  double position = 0;       ///< of the landing foot, down the ramp from the first [m]
-  double omega_minus = 0;    ///< [rad/s]
-  double omega_plus = 0;     ///< [rad/s]; 0 if the collision left no energy
-  Contact contact;           ///< drawn
-  Loss loss;                 ///< [J]
+  int number = 0;          ///< from 1
+  int leg = 0;             ///< that lands
+  double time = 0;         ///< [s] since collision 1
+  double position = 0;     ///< of the landing foot, down the ramp from the first [m]
+  double omega_minus = 0;  ///< [rad/s]
+  double omega_plus = 0;   ///< [rad/s]; 0 if the collision left no energy
+  Contact contact;         ///< drawn
+  Loss loss;               ///< [J]
 };
 
 struct Trial {
@@ -30,17 +30,18 @@ struct Trial {
 
 struct TrialOptions {
   int first_landing_leg = 0;
-  int max_collisions = 16;          ///< >= 1
-  double ramp_length = 3.66;        ///< [m]; infinity: no end. Reached when the last collision on the ramp is survived:
-                                    ///< the next foot would land beyond it (the 32nd with the paper's legs)
-  bool rest_rule = true;            ///< false: never rest, x' < 0 is set to 0 (the reading of Fig. 8)
+  int max_collisions = 16;    ///< >= 1
+  double ramp_length = 3.66;  ///< [m]; infinity: no end. Reached when the last collision on the ramp is survived:
+                              ///< the next foot would land beyond it (the 32nd with the paper's legs)
+  bool rest_rule = true;      ///< false: never rest, x' < 0 is set to 0 (the reading of Fig. 8)
   std::uint64_t seed = 1;
 };
 
 /// Trial number `index` of a run: launch speed omega_0 ~ launch (truncated at 0) and (eta, mu) of each collision from
 /// Philox at counter (index, collision): the same bits whatever ran before and on however many threads.
 /// @throws std::invalid_argument for options out of range
-Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options, std::uint64_t index);
+Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
+                     std::uint64_t index);
 
 /// Number of steps before failure of trial `index` without storing it, at most `limit` (returned when reached).
 std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,

@@ -1,14 +1,14 @@
 #include "dynamics/truncated_normal.h"
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <stdexcept>
+#include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/math/policies/policy.hpp>
 #include <boost/math/quadrature/gauss.hpp>
 #include <boost/math/special_functions/erf.hpp>
-#include <fmt/format.h>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
 
 namespace metastable::dynamics {
 namespace {
@@ -56,8 +56,8 @@ TruncatedNormal::TruncatedNormal(double mean, double sd, double lower, double up
   above_upper_ = normal_cdf(-b);
   mass_ = untruncated(lower, upper);
   if (!(mass_ >= 1e-290))
-    throw std::invalid_argument(
-        fmt::format("empty truncation: N({}, {}^2) has less than 1e-290 of its mass in [{}, {}]", mean, sd, lower, upper));
+    throw std::invalid_argument(fmt::format(
+        "empty truncation: N({}, {}^2) has less than 1e-290 of its mass in [{}, {}]", mean, sd, lower, upper));
 }
 
 // Mass of the untruncated normal between two points of [lower, upper]; short intervals are integrated, because the

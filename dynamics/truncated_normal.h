@@ -21,8 +21,8 @@ class TruncatedNormal {
   TruncatedNormal(double mean, double sd, double lower = -std::numeric_limits<double>::infinity(),
                   double upper = std::numeric_limits<double>::infinity());
 
-  double mean() const { return mean_; }      ///< of the untruncated normal
-  double sd() const { return sd_; }          ///< of the untruncated normal
+  double mean() const { return mean_; }  ///< of the untruncated normal
+  double sd() const { return sd_; }      ///< of the untruncated normal
   double lower() const { return lower_; }
   double upper() const { return upper_; }
   bool constant() const { return sd_ == 0; }

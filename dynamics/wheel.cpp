@@ -1,12 +1,12 @@
 #include "dynamics/wheel.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 #include <stdexcept>
-
-#include <fmt/format.h>
 
 namespace metastable::dynamics {
 namespace {

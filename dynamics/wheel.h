@@ -19,9 +19,9 @@ struct Wheel {
   std::optional<double> inertia;
   /// Radius of gyration about the hub, r_g [m], >= 0. Not given: each law has its own default.
   std::optional<double> radius_of_gyration;
-  std::optional<double> contact_mass;                    ///< m_c [kg] of the Kelvin-Voigt contact (25); default M
-  double ramp_stiffness = 9000.0;                        ///< K_r [N/m], > 0
-  double gravity = 9.81;                                 ///< g [m/s^2], > 0
+  std::optional<double> contact_mass;  ///< m_c [kg] of the Kelvin-Voigt contact (25); default M
+  double ramp_stiffness = 9000.0;      ///< K_r [N/m], > 0
+  double gravity = 9.81;               ///< g [m/s^2], > 0
 
   int legs() const { return static_cast<int>(leg_length.size()); }
   /// Angle between neighbouring legs, alpha = 2 pi / legs [rad].
@@ -38,7 +38,8 @@ struct Triangle {
   double hub_height = 0;   ///< h [m], of the hub over the ramp = y_cp
   double beta_first = 0;   ///< angle of the stance leg to the ramp [rad]
   double beta_second = 0;  ///< angle of the landing leg to the ramp [rad]
-  double contact_x = 0;    ///< x_cp [m] = second leg * cos(beta_second), a distance; negative only if the foot lies uphill of the hub
+  double contact_x =
+      0;  ///< x_cp [m] = second leg * cos(beta_second), a distance; negative only if the foot lies uphill of the hub
 };
 /// @param first, second leg lengths [m]; @param leg_angle alpha [rad]
 Triangle triangle(double first, double second, double leg_angle);

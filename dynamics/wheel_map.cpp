@@ -1,14 +1,14 @@
 #include "dynamics/wheel_map.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <boost/math/special_functions/ellint_rf.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
-
-#include <boost/math/special_functions/ellint_rf.hpp>
-#include <fmt/format.h>
 
 #include "dynamics/landing_density.h"
 #include "dynamics/landing_range.h"
@@ -20,12 +20,14 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double degree = std::numbers::pi / 180;
 
-Stance make_stance(const Wheel& wheel, Law law, double length, const Triangle& landed, const Triangle& next, double slope) {
+Stance make_stance(const Wheel& wheel, Law law, double length, const Triangle& landed, const Triangle& next,
+                   double slope) {
   Stance s;
   s.length = length;
   s.inertia = stance_inertia(wheel, law, length);
   if (!(s.inertia > 0))
-    throw std::invalid_argument(fmt::format("inertia: {} kg m^2 about a foot at {} m is outside (0, inf)", s.inertia, length));
+    throw std::invalid_argument(
+        fmt::format("inertia: {} kg m^2 about a foot at {} m is outside (0, inf)", s.inertia, length));
   s.start_angle = landed.beta_second + slope;
   s.end_angle = std::numbers::pi - (next.beta_first - slope);
   s.pendulum = 2 * wheel.hub_mass * wheel.gravity * length / s.inertia;
@@ -51,8 +53,9 @@ WheelMap::WheelMap(Wheel wheel, double slope, Law law, ContactNoise noise, doubl
   wheel_.validate();
   const double steepest = steepest_slope(wheel_.legs());
   if (!(slope > 0 && slope < steepest))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside (0, {:.6g}) deg (half the angle between legs)",
-                                            slope / degree, steepest / degree));
+    throw std::invalid_argument(
+        fmt::format("slope: {:.6g} deg is outside (0, {:.6g}) deg (half the angle between legs)", slope / degree,
+                    steepest / degree));
   model_ = dynamics::contact_model(wheel_, law, rebound_lost);
   const auto count = wheel_.equal_legs() ? std::size_t{1} : wheel_.leg_length.size();
   const auto leg = [this, count](std::size_t p) { return wheel_.leg_length[p % count]; };
@@ -80,8 +83,8 @@ Loss WheelMap::loss(int phase, double omega, const Contact& contact) const {
 }
 
 StepCoefficients WheelMap::coefficients(int phase, const Contact& contact) const {
-  // A rolling wheel (u0 = 0) loses energies proportional to omega^2, and gains a potential energy proportional to omega:
-  // the losses at 1 rad/s are the coefficients.
+  // A rolling wheel (u0 = 0) loses energies proportional to omega^2, and gains a potential energy proportional to
+  // omega: the losses at 1 rad/s are the coefficients.
   const Loss unit = loss(phase, 1, contact);
   if (unit.jammed) return {-infinity, 0};
   const double landing = stance(phase).inertia;

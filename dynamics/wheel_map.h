@@ -15,9 +15,11 @@ namespace metastable::dynamics {
 
 /// The stance on one leg, from the collision in which it lands to the next.
 struct Stance {
-  double inertia = 0;      ///< I about this foot [kg m^2]
-  double barrier = 0;      ///< omega+^2 needed to carry the hub over the foot [rad^2/s^2]: 2/I M g L (1 - sin(beta2 + gamma))
-  double gain = 0;         ///< omega^2 gained until the next collision [rad^2/s^2]: 2/I M g L (sin(beta2+gamma) - sin(beta1'-gamma))
+  double inertia = 0;  ///< I about this foot [kg m^2]
+  double barrier =
+      0;  ///< omega+^2 needed to carry the hub over the foot [rad^2/s^2]: 2/I M g L (1 - sin(beta2 + gamma))
+  double gain =
+      0;  ///< omega^2 gained until the next collision [rad^2/s^2]: 2/I M g L (sin(beta2+gamma) - sin(beta1'-gamma))
   double start_angle = 0;  ///< beta2 + gamma [rad], leg to the horizontal at landing
   double end_angle = 0;    ///< pi - (beta1' - gamma) [rad], at the next collision
   double pendulum = 0;     ///< 2 M g L / I [rad^2/s^2]
@@ -82,7 +84,8 @@ class WheelMap {
   /// Many draws of one phase as arrays of coefficients.
   class Table {
    public:
-    void land(double origin, double width, std::span<const double> offset, std::size_t first, std::span<double> next) const;
+    void land(double origin, double width, std::span<const double> offset, std::size_t first,
+              std::span<double> next) const;
 
    private:
     friend class WheelMap;
@@ -100,7 +103,8 @@ class WheelMap {
   std::vector<Stance> stance_;      // on leg p after it
 };
 
-/// Angular speed above which the foot lifts just before the collision at `phase` [rad/s]: omega^2 L1 = g sin(beta1 - gamma).
+/// Angular speed above which the foot lifts just before the collision at `phase` [rad/s]: omega^2 L1 = g sin(beta1 -
+/// gamma).
 double lift_speed(const WheelMap& map, int phase);
 
 }  // namespace metastable::dynamics

@@ -53,13 +53,14 @@ std::string line(std::size_t first, const Entry& e) {
 }  // namespace
 
 ChainFiles chain_files(const Chain& chain, const Launch& launch) {
-  if (launch.after.size() != chain.size()) throw std::invalid_argument("chain files: the launch is not of the chain's size");
+  if (launch.after.size() != chain.size())
+    throw std::invalid_argument("chain files: the launch is not of the chain's size");
   const std::vector<Entry> all = entries(chain, launch);
   const std::string states = std::to_string(chain.size() + 2), count = std::to_string(all.size());
   ChainFiles files;
   files.transitions = states + ' ' + count + '\n';
-  files.matrix_market = "%%MatrixMarket matrix coordinate real general\n% state 1: launch, last state: rest\n" + states + ' ' +
-                        states + ' ' + count + '\n';
+  files.matrix_market = "%%MatrixMarket matrix coordinate real general\n% state 1: launch, last state: rest\n" +
+                        states + ' ' + states + ' ' + count + '\n';
   for (const Entry& e : all) {
     files.transitions += line(0, e);
     files.matrix_market += line(1, e);

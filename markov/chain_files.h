@@ -9,8 +9,8 @@
 namespace metastable::markov {
 
 /// The whole chain as one stochastic matrix of size() + 2 states: 0 is the launch, 1 .. size() are the chain's states,
-/// size() + 1 is rest (absorbing). Probabilities have 17 digits. The diagonal is 1 minus the rest of its row, so a reader
-/// who wants rare failures right computes it anew from the off-diagonal entries.
+/// size() + 1 is rest (absorbing). Probabilities have 17 digits. The diagonal is 1 minus the rest of its row, so a
+/// reader who wants rare failures right computes it anew from the off-diagonal entries.
 struct ChainFiles {
   std::string transitions;    ///< PRISM explicit .tra: "states transitions", then "from to probability"
   std::string labels;         ///< PRISM .lab: "init" (the launch) and "rest"

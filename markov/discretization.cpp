@@ -32,8 +32,10 @@ class RowSampler {
     double rest = 0;
     for (std::size_t k = 0; k < count; ++k) {
       const double weight = draws_.weight[first + k];
-      if (next[k] == rest_landing) rest += weight;
-      else row[target_.cell(next[k])] += weight;
+      if (next[k] == rest_landing)
+        rest += weight;
+      else
+        row[target_.cell(next[k])] += weight;
     }
     return rest;
   }
@@ -132,8 +134,10 @@ Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const Launch
   Launch row;
   row.after.assign(space.size(), 0.0);
   for (std::size_t k = 0; k < draws.count(); ++k) {
-    if (landing[k] == rest_landing) row.rest += draws.weight[k];
-    else row.after[space.index(next_phase, space.grid(next_phase).cell(landing[k]))] += draws.weight[k];
+    if (landing[k] == rest_landing)
+      row.rest += draws.weight[k];
+    else
+      row.after[space.index(next_phase, space.grid(next_phase).cell(landing[k]))] += draws.weight[k];
   }
   return row;
 }
@@ -151,9 +155,9 @@ std::vector<std::vector<double>> violation_rates(const AnyReturnMap& map, const 
     const Draws draws = make_draws(map.noise_dimension(), options);
     const int phase = at_launch ? launch.phase : space.phase(i);
     for (std::size_t k = 0; k < draws.count(); ++k) {
-      const double state = at_launch ? launch.state(normal_score(draws.offset[k]))
-                                     : space.grid(phase).lower(space.cell(i)) +
-                                           space.grid(phase).width(space.cell(i)) * draws.offset[k];
+      const double state =
+          at_launch ? launch.state(normal_score(draws.offset[k]))
+                    : space.grid(phase).lower(space.cell(i)) + space.grid(phase).width(space.cell(i)) * draws.offset[k];
       const auto score = std::span(draws.score).subspan(k * dimension, dimension);
       for (std::size_t a = 0; a < rate.size(); ++a)
         if (map.violates(static_cast<int>(a), state, phase, score)) rate[a][i] += draws.weight[k];

@@ -28,9 +28,7 @@ std::uint64_t philox_word(const DrawOptions& options, std::uint64_t stream, std:
 // The centre of one of 2^52 equal cells: strictly inside (0, 1) and symmetric.
 double unit_interval(std::uint64_t word) { return (static_cast<double>(word >> 12) + 0.5) * 0x1p-52; }
 
-double upper_tail_score(double probability) {
-  return std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * probability);
-}
+double upper_tail_score(double probability) { return std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * probability); }
 
 struct WeightedScore {
   double score, weight;
@@ -61,8 +59,7 @@ Draws make_draws(int noise_dimension, const DrawOptions& options) {
   boost::random::sobol_engine<std::uint64_t, 64, boost::random::default_sobol_table> sobol(
       static_cast<std::size_t>(dimensions));
   std::vector<std::uint64_t> shift(static_cast<std::size_t>(dimensions));
-  for (int d = 0; d < dimensions; ++d)
-    shift[static_cast<std::size_t>(d)] = philox_word(options, shift_stream, 0, d);
+  for (int d = 0; d < dimensions; ++d) shift[static_cast<std::size_t>(d)] = philox_word(options, shift_stream, 0, d);
 
   Draws draws;
   draws.dimension = noise_dimension;

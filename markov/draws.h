@@ -22,10 +22,10 @@ struct DrawOptions {
 
 /// A weighted sample of the noise. Sum over draws of weight * f(scores) estimates E f.
 struct Draws {
-  int dimension = 0;            ///< scores a draw
-  std::vector<double> offset;   ///< size count, uniform in (0,1): where in its cell a start lies
-  std::vector<double> score;    ///< count x dimension, row-major, standard normal scores
-  std::vector<double> weight;   ///< size count, > 0, sums to one (self-normalised)
+  int dimension = 0;           ///< scores a draw
+  std::vector<double> offset;  ///< size count, uniform in (0,1): where in its cell a start lies
+  std::vector<double> score;   ///< count x dimension, row-major, standard normal scores
+  std::vector<double> weight;  ///< size count, > 0, sums to one (self-normalised)
   std::size_t count() const { return weight.size(); }
 };
 

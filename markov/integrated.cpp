@@ -19,7 +19,7 @@ constexpr int score_steps = 17;  // on each side
 constexpr std::size_t pilot_cells = 96;
 constexpr std::size_t pilot_samples = 4096;
 constexpr double least_scaled = 1e-6;  // survivors of a row whose total is worth correcting
-constexpr double spare = 0.2;           // of the range, beyond where the pilot ends
+constexpr double spare = 0.2;          // of the range, beyond where the pilot ends
 
 struct Row {
   std::vector<double> landing;  // on the nodes of the next phase
@@ -34,7 +34,8 @@ Row make_row(const AnyReturnMap& map, const NodeSpace& space, double state, int 
   row.landing.resize(space.nodes());
   const auto rest = map.rest_probability(state, phase);
   if (!rest || !map.landing_density(state, phase, space.nodes(next), row.landing))
-    throw std::invalid_argument("method integrated: the map does not tell its landing's density; use the sampled method");
+    throw std::invalid_argument(
+        "method integrated: the map does not tell its landing's density; use the sampled method");
   row.rest = *rest;
   double sum = 0;
   for (std::size_t j = 0; j < row.landing.size(); ++j) sum += row.landing[j] *= weights[j];

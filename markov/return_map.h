@@ -60,7 +60,9 @@ class AnyReturnMap {
     return self_->landing(state, phase, noise);
   }
   /// Exact probability of coming to rest from `state` (relative accuracy, tails included); nothing if unknown.
-  std::optional<double> rest_probability(double state, int phase) const { return self_->rest_probability(state, phase); }
+  std::optional<double> rest_probability(double state, int phase) const {
+    return self_->rest_probability(state, phase);
+  }
   /// {infimum, supremum} of the landing over the whole support of the noise; the infimum is rest_landing
   /// when rest is possible, the supremum is rest_landing when it is certain. Nothing if unknown.
   std::optional<std::pair<double, double>> landing_range(double state, int phase) const {
@@ -142,14 +144,19 @@ class AnyReturnMap {
       return map.landing(state, phase, noise);
     }
     std::optional<double> rest_probability(double state, int phase) const override {
-      if constexpr (requires { map.rest_probability(state, phase); }) return map.rest_probability(state, phase);
-      else return std::nullopt;
+      if constexpr (requires { map.rest_probability(state, phase); })
+        return map.rest_probability(state, phase);
+      else
+        return std::nullopt;
     }
     std::optional<std::pair<double, double>> landing_range(double state, int phase) const override {
-      if constexpr (requires { map.landing_range(state, phase); }) return map.landing_range(state, phase);
-      else return std::nullopt;
+      if constexpr (requires { map.landing_range(state, phase); })
+        return map.landing_range(state, phase);
+      else
+        return std::nullopt;
     }
-    bool landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const override {
+    bool landing_density(double state, int phase, std::span<const double> next,
+                         std::span<double> density) const override {
       if constexpr (requires { map.landing_density(state, phase, next, density); }) {
         map.landing_density(state, phase, next, density);
         return true;
@@ -164,21 +171,28 @@ class AnyReturnMap {
         return std::make_unique<PlainTable<M>>(map, phase, noise);
     }
     std::optional<double> duration(double next_state, int phase) const override {
-      if constexpr (requires { map.duration(next_state, phase); }) return map.duration(next_state, phase);
-      else return std::nullopt;
+      if constexpr (requires { map.duration(next_state, phase); })
+        return map.duration(next_state, phase);
+      else
+        return std::nullopt;
     }
     std::optional<double> advance(int phase) const override {
-      if constexpr (requires { map.advance(phase); }) return map.advance(phase);
-      else return std::nullopt;
+      if constexpr (requires { map.advance(phase); })
+        return map.advance(phase);
+      else
+        return std::nullopt;
     }
     std::vector<std::string> assumptions() const override {
-      if constexpr (requires { map.assumptions(); }) return map.assumptions();
-      else return {};
+      if constexpr (requires { map.assumptions(); })
+        return map.assumptions();
+      else
+        return {};
     }
     bool violates(int which, double state, int phase, std::span<const double> noise) const override {
       if constexpr (requires { map.violates(which, state, phase, noise); })
         return map.violates(which, state, phase, noise);
-      else return false;
+      else
+        return false;
     }
     M map;
   };

@@ -32,14 +32,16 @@ double high_landing(const NoiseTable& table, std::span<const double> weight, dou
   return rest_landing;
 }
 
-// Width of the bulk over the lowest state: the launch's own landings, then its top edge mapped until it no longer rises.
+// Width of the bulk over the lowest state: the launch's own landings, then its top edge mapped until it no longer
+// rises.
 double bulk_width(const AnyReturnMap& map, const LaunchState& launch, double lowest, std::uint64_t seed) {
   const int phases = map.phases();
   const Draws draws = make_draws(map.noise_dimension(), {.count = probe_draws, .seed = seed});
   std::vector<std::unique_ptr<NoiseTable>> tables;
   for (int p = 0; p < phases; ++p) tables.push_back(map.tabulate(p, draws.score));
   const auto land = [&](double state, int step) {
-    return std::max(lowest, high_landing(*tables[static_cast<std::size_t>((launch.phase + step) % phases)], draws.weight, state));
+    return std::max(
+        lowest, high_landing(*tables[static_cast<std::size_t>((launch.phase + step) % phases)], draws.weight, state));
   };
   double top = land(launch.state(launch_reach), 0);
   const double most = lowest + 10 * std::max(top - lowest, std::abs(lowest));  // reached if most noise gains energy

@@ -41,7 +41,8 @@ class Options {
   void add(const std::string& name, const std::string& value, const std::string& fallback, const std::string& help) {
     std::vector<std::string>& texts = texts_[name];
     CLI::Option* option = command_.add_option("--" + name, texts, help);
-    option->expected(1)->allow_extra_args(false)->type_name(value)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    option->expected(1)->allow_extra_args(false)->type_name(value)->multi_option_policy(
+        CLI::MultiOptionPolicy::TakeAll);
     if (!fallback.empty()) {
       option->default_str(fallback);
       fallback_[name] = fallback;
@@ -51,7 +52,8 @@ class Options {
   // An option without a value; `true` or `false` in a file.
   void add_flag(const std::string& name, const std::string& help) {
     std::vector<std::string>& texts = texts_[name];
-    command_.add_flag_callback("--" + name, [&texts] { texts = {"true"}; }, help);
+    command_.add_flag_callback(
+        "--" + name, [&texts] { texts = {"true"}; }, help);
     fallback_[name] = "false";
   }
   bool flag(const std::string& name) const {
@@ -70,8 +72,9 @@ class Options {
   void read(const std::string& file) {
     for (const ConfigEntry& entry : read_config(file)) {
       if (entry.key == "config" || !texts_.contains(entry.key))
-        throw std::invalid_argument(fmt::format("{}:{}: unknown key '{}' (keys are the long options of 'metastable {}')",
-                                                file, entry.line, entry.key, command_.get_name()));
+        throw std::invalid_argument(
+            fmt::format("{}:{}: unknown key '{}' (keys are the long options of 'metastable {}')", file, entry.line,
+                        entry.key, command_.get_name()));
       std::vector<std::string>& texts = texts_[entry.key];
       if (texts.empty()) texts = entry.values;
     }
@@ -102,10 +105,12 @@ class Options {
 // ---- options that several commands share -------------------------------------------------------------------------
 
 void add_wheel(Options& options) {
-  options.add("legs", "paper|L|L1,L2,...", "paper", "Leg lengths [m]: the paper's, one for all, or a list in landing order");
+  options.add("legs", "paper|L|L1,L2,...", "paper",
+              "Leg lengths [m]: the paper's, one for all, or a list in landing order");
   options.add("leg-count", "N", "8", "Number of legs when --legs is one length (3 or more)");
   options.add("mass", "KG", "1.39", "Hub mass M [kg]");
-  options.add("inertia", "KGM2", "", "About the stance foot [kg m^2] (default: M (mean L)^2; under coulomb and plastic plus M r_g^2)");
+  options.add("inertia", "KGM2", "",
+              "About the stance foot [kg m^2] (default: M (mean L)^2; under coulomb and plastic plus M r_g^2)");
   options.add("radius-of-gyration", "M", "", "About the hub [m] (default: 0.05 under coulomb, 0 under plastic)");
   options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m]");
   options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (default: the hub mass)");
@@ -182,7 +187,8 @@ analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& 
   const std::optional<analysis::Spread> paper = analysis::paper_launch(slope_deg);
   if (!paper)
     throw std::invalid_argument(fmt::format(
-        "--initial-speed: must be given at {} deg (the paper's launches are known at 7.02 and 9.59 deg only)", slope_deg));
+        "--initial-speed: must be given at {} deg (the paper's launches are known at 7.02 and 9.59 deg only)",
+        slope_deg));
   return *paper;
 }
 
@@ -190,8 +196,8 @@ analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& 
 void check_slope(const analysis::Setting& setting) {
   const double steepest = dynamics::steepest_slope(setting.wheel.legs()) * 180 / std::numbers::pi;
   if (!(setting.slope_deg > 0 && setting.slope_deg < steepest))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside (0, {:.6g}) deg (half the angle between legs)",
-                                            setting.slope_deg, steepest));
+    throw std::invalid_argument(fmt::format(
+        "slope: {:.6g} deg is outside (0, {:.6g}) deg (half the angle between legs)", setting.slope_deg, steepest));
 }
 
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
@@ -232,7 +238,8 @@ std::vector<analysis::Setting> several_settings(const Options& options, std::siz
 analysis::StudyOptions study_options(const Options& options) {
   analysis::StudyOptions study;
   if (options.text("method") != "sampled" && options.text("method") != "integrated")
-    throw std::invalid_argument(fmt::format("--method: '{}' is neither 'sampled' nor 'integrated'", options.text("method")));
+    throw std::invalid_argument(
+        fmt::format("--method: '{}' is neither 'sampled' nor 'integrated'", options.text("method")));
   study.method = analysis::method_from_name(options.text("method"));
   if (options.given("cells")) study.cells = options.whole("cells", 8, 4096);
   if (options.given("samples")) study.samples = options.whole("samples", 16, 1u << 24);
@@ -267,7 +274,8 @@ std::vector<Command> commands() {
       {"steps", "Expected steps before failure of one setting, with their interval",
        [](Options& o) {
          o.add("slope", "DEG", "7.02", "Ramp slope [deg], above 0 and below half the angle between legs");
-         o.add("initial-speed", "MEAN,SD", "", "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
+         o.add("initial-speed", "MEAN,SD", "",
+               "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
          add_wheel(o), add_contact(o), add_course(o), add_study(o);
          o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
          o.add("json", "FILE|-", "", "Write the results as JSON");
@@ -296,7 +304,8 @@ std::vector<Command> commands() {
          o.add("friction-sd", "RANGE", "", "Sd of mu");
          o.add("initial-speed", "MEAN,SD", "", "Of all points (default: the paper's if the one slope is 7.02 or 9.59)");
          add_wheel(o), add_contact(o), add_course(o), add_study(o);
-         o.add("out", "FILE", "sweep.csv", "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
+         o.add("out", "FILE", "sweep.csv",
+               "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
        },
        [](const Options& o, const std::string& line) {
          SweepRequest request;
@@ -310,17 +319,17 @@ std::vector<Command> commands() {
              request.axes.push_back(std::move(axis));
          }
          if (request.axes.empty())
-           throw std::invalid_argument("sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
-                                       "--friction-mean or --friction-sd as first:last:step)");
+           throw std::invalid_argument(
+               "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
+               "--friction-mean or --friction-sd as first:last:step)");
          for (const analysis::Axis& axis : request.axes)
            if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
-             throw std::invalid_argument(fmt::format("--{}: cannot vary with --contact-list",
-                                                     analysis::parameter_name(axis.parameter)));
+             throw std::invalid_argument(
+                 fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
          const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
          std::optional<std::string> launch;
          if (o.given("initial-speed")) launch = o.text("initial-speed");
-         if (!launch && !one_slope)
-           throw std::invalid_argument("--initial-speed: must be given when the slope varies");
+         if (!launch && !one_slope) throw std::invalid_argument("--initial-speed: must be given when the slope varies");
          request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
          request.study = study_options(o);
          request.out = o.text("out");
@@ -330,11 +339,13 @@ std::vector<Command> commands() {
       {"simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)",
        [](Options& o) {
          o.add("slope", "DEG", "7.02", "Ramp slope [deg]");
-         o.add("initial-speed", "MEAN,SD", "", "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
+         o.add("initial-speed", "MEAN,SD", "",
+               "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
          add_wheel(o), add_contact(o), add_course(o);
          o.add("trials", "N", "50", "Trials");
          o.add("collisions", "N", "16", "Most collisions of a trial");
-         o.add("angle-rate", "HZ", "", "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
+         o.add("angle-rate", "HZ", "",
+               "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
          o.add("angle-noise", "RAD", "", "White noise of the angle (default 0.0002; needs --angle-rate)");
          o.add("seed", "SEED", "1", "Seed of the random numbers");
          o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
@@ -342,9 +353,13 @@ std::vector<Command> commands() {
        },
        [](const Options& o, const std::string& line) {
          if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
-         SimulateRequest request{one_setting(o), static_cast<int>(o.whole("trials", 1, 1000000)),
-                                 static_cast<int>(o.whole("collisions", 1, 100000)), o.whole("seed", 0, UINT64_MAX),
-                                 static_cast<int>(o.whole("threads", 0, 1024)), o.text("out"), line};
+         SimulateRequest request{one_setting(o),
+                                 static_cast<int>(o.whole("trials", 1, 1000000)),
+                                 static_cast<int>(o.whole("collisions", 1, 100000)),
+                                 o.whole("seed", 0, UINT64_MAX),
+                                 static_cast<int>(o.whole("threads", 0, 1024)),
+                                 o.text("out"),
+                                 line};
          if (o.given("angle-noise") && !o.given("angle-rate"))
            throw std::invalid_argument("--angle-noise: needs --angle-rate");
          if (o.given("angle-rate")) {
@@ -360,10 +375,12 @@ std::vector<Command> commands() {
       {"collisions", "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
        [](Options& o) {
          o.add_place("DIR", "Experiment folder with experiment.toml and angle.csv");
-         o.add("window", "N", "", "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples)");
+         o.add("window", "N", "",
+               "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples)");
          o.add("collisions", "N", "16", "Most collisions of a trial");
          o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides");
-         o.add("omega-minus", "fit|peak", "fit", "Stance motion extrapolated to the collision, or the smoothed speed's peak");
+         o.add("omega-minus", "fit|peak", "fit",
+               "Stance motion extrapolated to the collision, or the smoothed speed's peak");
          o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision");
          o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
          o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
@@ -447,10 +464,12 @@ int parse_and_run(int argc, const char* const* argv) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
     options.emplace_back(*sub);
     command.declare(options.back());
-    sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")->type_name("FILE");
+    sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")
+        ->type_name("FILE");
     subcommands.push_back(sub);
   }
-  if (argc < 2 || (argv[1][0] != '-' && std::none_of(all.begin(), all.end(), [&](const Command& c) { return c.name == argv[1]; }))) {
+  if (argc < 2 || (argv[1][0] != '-' &&
+                   std::none_of(all.begin(), all.end(), [&](const Command& c) { return c.name == argv[1]; }))) {
     std::string names;
     for (const Command& command : all) names += (names.empty() ? "" : ", ") + command.name;
     throw std::invalid_argument(argc < 2 ? fmt::format("a subcommand is needed: {}", names)

@@ -71,8 +71,8 @@ Files write_files(const analysis::Experiment& experiment, const std::vector<anal
       const std::string fit = c.fit ? fmt::format("{:.6f},{:.6g},{:.6g},{:.3g}", c.fit->time, c.fit->omega_minus,
                                                   c.fit->omega_plus, c.fit->residual_sd)
                                     : ",,,";
-      fmt::format_to(std::back_inserter(files.details), "{},{:.6f},{:.6g},{},{:.6f},{:.6g},{}\n", key, c.peak_time, c.peak,
-                     fit, c.apex_time, c.apex, c.bounces);
+      fmt::format_to(std::back_inserter(files.details), "{},{:.6f},{:.6g},{},{:.6f},{:.6g},{}\n", key, c.peak_time,
+                     c.peak, fit, c.apex_time, c.apex, c.bounces);
     }
   }
   return files;
@@ -149,10 +149,11 @@ void run_collisions(const CollisionsRequest& request) {
   markov::parallel_for(angles.size(), request.threads, [&](std::size_t t) {
     const auto& [number, condition, recording] = angles[t];
     try {
-      found[t] = analysis::find_collisions(recording, maps[condition], experiment.conditions[condition].first_landing_leg,
-                                           request.finder);
+      found[t] = analysis::find_collisions(recording, maps[condition],
+                                           experiment.conditions[condition].first_landing_leg, request.finder);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(fmt::format("{}: trial {}: {}", (folder / "angle.csv").string(), number, error.what()));
+      throw std::invalid_argument(
+          fmt::format("{}: trial {}: {}", (folder / "angle.csv").string(), number, error.what()));
     }
   });
 
@@ -180,8 +181,10 @@ void run_collisions(const CollisionsRequest& request) {
   fmt::print("omega_minus is the {}\n", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
                                                      : "stance motion extrapolated to the collision");
   if (unfitted > 0)
-    fmt::print("{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left empty\n",
-               unfitted);
+    fmt::print(
+        "{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
+        "empty\n",
+        unfitted);
   for (const auto& [why, trials] : stopped) fmt::print("{} trials without a collision: {}\n", trials, why);
   if (known) print_comparison(*known, angles, found, request);
 }

@@ -1,10 +1,10 @@
 #include "reports/config_file.h"
 
 #include <fmt/format.h>
+#include <toml++/toml.h>
 
 #include <algorithm>
 #include <stdexcept>
-#include <toml++/toml.h>
 
 namespace metastable::reports {
 namespace {
@@ -45,9 +45,8 @@ std::vector<ConfigEntry> read_config(const std::filesystem::path& file) {
   for (const auto& [key, node] : table) {
     ConfigEntry entry{std::string(key.str()), {}, static_cast<int>(node.source().begin.line)};
     const toml::array* list = node.as_array();
-    const bool nested = list != nullptr && std::any_of(list->begin(), list->end(), [](const toml::node& item) {
-      return item.is_array();
-    });
+    const bool nested = list != nullptr &&
+                        std::any_of(list->begin(), list->end(), [](const toml::node& item) { return item.is_array(); });
     if (nested) {
       for (const toml::node& item : *list) entry.values.push_back(joined(file, entry.key, item));
     } else {

@@ -20,7 +20,7 @@ namespace metastable::reports {
 namespace {
 
 constexpr std::array<double, 4> energy_spreads = {0.05, 0.1, 0.15, 0.2};  // Fig. 8
-constexpr int energy_collisions = 16;  // of a trial
+constexpr int energy_collisions = 16;                                     // of a trial
 
 // The report as it grows: files in the folder, sections of the page.
 class Report {
@@ -33,9 +33,10 @@ class Report {
     make_folder(folder_ / "tables");
     make_folder(folder_ / "figures");
     page_.title = "Metastability of the rimless wheel";
-    page_.intro = {"Expected steps before a rimless wheel on a ramp comes to rest, from a Markov chain sampled from its "
-                   "stochastic return map. Model: Nanayakkara, Byl, Liu, Song, Villabona, “Dominant Sources of "
-                   "Variability in Passive Walking” (ICRA 2012)."};
+    page_.intro = {
+        "Expected steps before a rimless wheel on a ramp comes to rest, from a Markov chain sampled from its "
+        "stochastic return map. Model: Nanayakkara, Byl, Liu, Song, Villabona, “Dominant Sources of "
+        "Variability in Passive Walking” (ICRA 2012)."};
     for (const analysis::Setting& setting : request.settings) page_.intro.push_back(setting.describe() + ".");
     page_.provenance = provenance_for(request.settings);
   }
@@ -77,19 +78,22 @@ class Report {
       }
     }
     const Provenance provenance = provenance_for(settings);
-    section("ramps", "The ramps side by side",
-            "Read down a column for one ramp under one contact law; “infinite” means that launches this fast never come "
-            "to rest, whatever the contacts do.",
-            {}, {ramps_table(studied, provenance)});
-    section("regime", "What survivors look like",
-            "Left: speeds just before a collision once the start is forgotten; right: how fast the chance of still rolling "
-            "falls, straight on this scale as soon as the regime is metastable.",
-            {density_figure(studied, provenance), survival_figure(studied, provenance)}, {});
+    section(
+        "ramps", "The ramps side by side",
+        "Read down a column for one ramp under one contact law; “infinite” means that launches this fast never come "
+        "to rest, whatever the contacts do.",
+        {}, {ramps_table(studied, provenance)});
+    section(
+        "regime", "What survivors look like",
+        "Left: speeds just before a collision once the start is forgotten; right: how fast the chance of still rolling "
+        "falls, straight on this scale as soon as the regime is metastable.",
+        {density_figure(studied, provenance), survival_figure(studied, provenance)}, {});
     std::vector<Figure> maps;
     for (const analysis::Setting& setting : request_.settings)
       maps.push_back(return_map_figure(setting, provenance_for({setting})));
     section("return-map", "The return map and its cloud",
-            "Each dot is one simulated step; where the mean crosses the diagonal the wheel would roll steadily, and dots to "
+            "Each dot is one simulated step; where the mean crosses the diagonal the wheel would roll steadily, and "
+            "dots to "
             "the lower left are on their way to rest.",
             std::move(maps), {});
   }
@@ -121,7 +125,8 @@ class Report {
     const std::vector<double> values = analysis::axis_values(0.05, 0.2, 0.05);
     grid(slope_id("spreads", setting), fmt::format("Spreads of restitution and friction at {} deg", setting.slope_deg),
          fmt::format("Expected steps over the spreads of η and μ, {} deg", setting.slope_deg),
-         "Going right friction scatters more, going up restitution does; the direction in which the number changes faster holds "
+         "Going right friction scatters more, going up restitution does; the direction in which the number changes "
+         "faster holds "
          "the source that matters.",
          setting, {analysis::Parameter::restitution_sd, values}, {analysis::Parameter::friction_sd, values});
   }
@@ -129,8 +134,10 @@ class Report {
   void means(analysis::Setting setting) {
     setting.restitution.sd = setting.friction.sd = 0.15;  // Fig. 9
     grid(slope_id("means", setting), fmt::format("Means of restitution and friction at {} deg", setting.slope_deg),
-         fmt::format("Expected steps over the means of η and μ (sd 0.15, the grid of Fig. 9), {} deg", setting.slope_deg),
-         "Each cell is one floor: mean friction grows to the right, mean restitution upward, both with the paper's spread of 0.15.",
+         fmt::format("Expected steps over the means of η and μ (sd 0.15, the grid of Fig. 9), {} deg",
+                     setting.slope_deg),
+         "Each cell is one floor: mean friction grows to the right, mean restitution upward, both with the paper's "
+         "spread of 0.15.",
          setting, {analysis::Parameter::restitution_mean, {0.3, 0.5, 0.7}},
          {analysis::Parameter::friction_mean, analysis::axis_values(0.2, 0.5, 0.1)});
   }
@@ -149,12 +156,13 @@ class Report {
       progress_.advance(study_units);
     }
     section("energy", "Energy losses of a collision",
-            "Ours beside the paper's printed figures: means with 95 % intervals, and the spread from collision to collision.",
+            "Ours beside the paper's printed figures: means with 95 % intervals, and the spread from collision to "
+            "collision.",
             {}, {energy_table(losses, provenance_for(settings))});
   }
 
-  void section(const std::string& id, const std::string& heading, const std::string& reading, std::vector<Figure> figures,
-               std::vector<Table> tables) {
+  void section(const std::string& id, const std::string& heading, const std::string& reading,
+               std::vector<Figure> figures, std::vector<Table> tables) {
     PageSection section{id, heading, reading, {}, {}};
     for (const Figure& figure : figures) {
       const std::string svg = render_svg(figure);
@@ -167,7 +175,8 @@ class Report {
       write_file(stem.string() + ".md", to_markdown(table));
       write_file(stem.string() + ".tex", to_latex(table));
       const std::string href = "tables/" + table.id;
-      section.tables.push_back({std::move(table), {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}, {"LaTeX", href + ".tex"}}});
+      section.tables.push_back(
+          {std::move(table), {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}, {"LaTeX", href + ".tex"}}});
     }
     page_.sections.push_back(std::move(section));
   }

@@ -125,9 +125,8 @@ Figure return_map_figure(const analysis::Setting& setting, const Provenance& pro
 
   // Mean of sqrt(x') over the draws that survive, all legs together.
   const dynamics::WheelMap map = setting.map();
-  const markov::Draws draws =
-      markov::make_draws(map.noise_dimension(), {.count = mean_draws, .seed = provenance.seed,
-                                                 .weighting = markov::Weighting::plain});
+  const markov::Draws draws = markov::make_draws(
+      map.noise_dimension(), {.count = mean_draws, .seed = provenance.seed, .weighting = markov::Weighting::plain});
   Series mean{"mean of the survivors", Style::line, {}, {}, {}, {}, 1};
   const auto dimension = static_cast<std::size_t>(draws.dimension);
   for (int i = 0; i <= 60; ++i) {
@@ -135,7 +134,8 @@ Figure return_map_figure(const analysis::Setting& setting, const Provenance& pro
     double sum = 0, survivors = 0;
     for (int phase = 0; phase < map.phases(); ++phase)
       for (std::size_t k = 0; k < draws.count(); ++k)
-        if (const auto next = map.landing(omega * omega, phase, std::span(draws.score).subspan(k * dimension, dimension))) {
+        if (const auto next =
+                map.landing(omega * omega, phase, std::span(draws.score).subspan(k * dimension, dimension))) {
           sum += std::sqrt(*next);
           survivors += 1;
         }
@@ -147,8 +147,9 @@ Figure return_map_figure(const analysis::Setting& setting, const Provenance& pro
   return figure;
 }
 
-Figure grid_figure(const std::string& id, const std::string& title, const analysis::Axis& down, const analysis::Axis& across,
-                   const std::vector<analysis::Metastability>& studies, const Provenance& provenance) {
+Figure grid_figure(const std::string& id, const std::string& title, const analysis::Axis& down,
+                   const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+                   const Provenance& provenance) {
   Figure figure;
   figure.id = id;
   figure.title = title;

@@ -31,7 +31,8 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   for (const Studied& one : columns)
     table.columns.push_back({fmt::format("{}, {} deg", dynamics::law_name(one.setting.law), one.setting.slope_deg), "",
                              NumberFormat::general, 4});
-  const auto add = [&](const std::string& name, const std::string& unit, const std::function<Cell(const Studied&)>& of) {
+  const auto add = [&](const std::string& name, const std::string& unit,
+                       const std::function<Cell(const Studied&)>& of) {
     std::vector<Cell> row{name, unit};
     for (const Studied& one : columns) row.push_back(of(one));
     table.rows.push_back(std::move(row));
@@ -41,16 +42,16 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   add("the same from the metastable regime", "steps", [](S s) { return cell(s.study.from_quasi_stationary); });
   add("the same from the worst start", "steps", [](S s) { return cell(s.study.worst_start); });
   add("standard deviation of the steps", "steps", [](S s) { return Cell(s.study.steps.sd); });
-  add("median of the steps", "steps", [](S s) {
-    return s.study.steps.quantile.empty() ? Cell(Infinite{}) : Cell(s.study.steps.quantile[2]);
-  });
-  add("mean time to failure", "s", [](S s) { return s.study.seconds ? Cell(s.study.seconds->mean) : Cell(Infinite{}); });
-  add("mean distance to failure", "m", [](S s) { return s.study.metres ? Cell(s.study.metres->mean) : Cell(Infinite{}); });
+  add("median of the steps", "steps",
+      [](S s) { return s.study.steps.quantile.empty() ? Cell(Infinite{}) : Cell(s.study.steps.quantile[2]); });
+  add("mean time to failure", "s",
+      [](S s) { return s.study.seconds ? Cell(s.study.seconds->mean) : Cell(Infinite{}); });
+  add("mean distance to failure", "m",
+      [](S s) { return s.study.metres ? Cell(s.study.metres->mean) : Cell(Infinite{}); });
   add("failure rate per step, 1 − λ₁", "1", [](S s) { return Cell(s.study.failure_rate.value); });
   add("mixing, spectral", "steps", [](S s) { return Cell(s.study.mixing_steps); });
-  add("mixing from the launch, total variation", "steps", [](S s) {
-    return s.study.total_variation_steps ? Cell(*s.study.total_variation_steps) : Cell("");
-  });
+  add("mixing from the launch, total variation", "steps",
+      [](S s) { return s.study.total_variation_steps ? Cell(*s.study.total_variation_steps) : Cell(""); });
   add("reaches the end of the ramp", "1", [](S s) { return cell(s.study.reach_end); });
   add("speed before a collision, long-run mean", "rad/s", [](S s) { return Cell(s.study.observable_mean); });
   add("its standard deviation", "rad/s", [](S s) { return Cell(s.study.observable_sd); });
@@ -59,31 +60,36 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   add("slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); });
   const std::vector<analysis::Share>& shares = columns.front().study.violations;
   for (std::size_t a = 0; a < shares.size(); ++a) {
-    add(fmt::format("“{}”, share of collisions, long run", shares[a].name), "1", [a](S s) {
-      return s.study.violations.size() > a ? Cell(s.study.violations[a].quasi_stationary) : Cell("");
-    });
+    add(fmt::format("“{}”, share of collisions, long run", shares[a].name), "1",
+        [a](S s) { return s.study.violations.size() > a ? Cell(s.study.violations[a].quasi_stationary) : Cell(""); });
     add(fmt::format("“{}”, share of all collisions until rest", shares[a].name), "1",
         [a](S s) { return s.study.violations.size() > a ? Cell(s.study.violations[a].until_rest) : Cell(""); });
   }
   table.notes = {
-      "Brackets hold 95 % intervals: replicated randomisations plus the estimated discretization error. An empty cell means "
-      "that there is no such number. Long run: the metastable regime of wheels that still roll; where none ever rests, the "
+      "Brackets hold 95 % intervals: replicated randomisations plus the estimated discretization error. An empty cell "
+      "means "
+      "that there is no such number. Long run: the metastable regime of wheels that still roll; where none ever rests, "
+      "the "
       "stationary one, and “until rest” is then on the ramp.",
-      "The published law charges friction work on collisions in which Coulomb friction would stick; the coulomb law does "
-      "not, and keeps enough speed to make rest unreachable. Its radius of gyration about the hub is an assumption where "
+      "The published law charges friction work on collisions in which Coulomb friction would stick; the coulomb law "
+      "does "
+      "not, and keeps enough speed to make rest unreachable. Its radius of gyration about the hub is an assumption "
+      "where "
       "none is given (0.05 m)."};
   return table;
 }
 
-Table grid_table(const std::string& id, const std::string& title, const analysis::Axis& down, const analysis::Axis& across,
-                 const std::vector<analysis::Metastability>& studies, const Provenance& provenance) {
+Table grid_table(const std::string& id, const std::string& title, const analysis::Axis& down,
+                 const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+                 const Provenance& provenance) {
   Table table;
   table.id = id;
   table.title = title;
   table.provenance = provenance;
   table.columns = {{std::string(analysis::parameter_label(down.parameter)), "", NumberFormat::general, 3}};
   for (const double value : across.values)
-    table.columns.push_back({fmt::format("{} {}", analysis::parameter_label(across.parameter), value), "steps", NumberFormat::significant, 3});
+    table.columns.push_back({fmt::format("{} {}", analysis::parameter_label(across.parameter), value), "steps",
+                             NumberFormat::significant, 3});
   for (std::size_t i = 0; i < down.values.size(); ++i) {
     std::vector<Cell> row{down.values[i]};
     for (std::size_t j = 0; j < across.values.size(); ++j)
@@ -116,7 +122,8 @@ Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Prov
   for (std::size_t k = 0; k < losses.size(); ++k) {
     const analysis::EnergyLosses& loss = losses[k];
     const auto with_error = [](const analysis::MeanSpread& spread) {
-      return Estimate{spread.mean, spread.mean - 1.96 * spread.standard_error, spread.mean + 1.96 * spread.standard_error};
+      return Estimate{spread.mean, spread.mean - 1.96 * spread.standard_error,
+                      spread.mean + 1.96 * spread.standard_error};
     };
     const Printed paper = printed(k);
     table.rows.push_back({0.05 * static_cast<double>(k + 1), with_error(loss.tangential_net), paper.tangential,
@@ -124,9 +131,11 @@ Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Prov
                           loss.normal.sd, paper.normal_sd});
   }
   table.notes = {
-      "Reading of Fig. 8: no rest rule, x′ < 0 is set to 0, all collisions of all trials. The tangential net loss is the "
+      "Reading of Fig. 8: no rest rule, x′ < 0 is set to 0, all collisions of all trials. The tangential net loss is "
+      "the "
       "friction loss less the potential energy gained by slipping downhill.",
-      "The paper prints figures for the smallest and the largest spread only, and a normal mean of “around 0.17” for all."};
+      "The paper prints figures for the smallest and the largest spread only, and a normal mean of “around 0.17” for "
+      "all."};
   return table;
 }
 

@@ -17,8 +17,8 @@ namespace metastable::reports {
 struct StepsRequest {
   analysis::Setting setting;
   analysis::StudyOptions study;
-  std::string json;     ///< file, "-" for standard output, "" for none
-  std::string command;  ///< the command line, for provenance
+  std::string json;      ///< file, "-" for standard output, "" for none
+  std::string command;   ///< the command line, for provenance
   bool certify = false;  ///< guaranteed bounds as well
 };
 

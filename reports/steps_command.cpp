@@ -26,9 +26,9 @@ void run_steps(const StepsRequest& request) {
   std::optional<analysis::CertifiedSteps> certified;
   if (request.certify) {
     Progress progress("certificate", study_units);
-    certified = analysis::certify(request.setting, {.tolerance = request.study.tolerance,
-                                                    .threads = request.study.threads,
-                                                    .progress = study_progress(progress)});
+    certified = analysis::certify(
+        request.setting,
+        {.tolerance = request.study.tolerance, .threads = request.study.threads, .progress = study_progress(progress)});
   }
   if (json) {
     const Provenance provenance{request.command, request.setting.describe(), request.study.seed, version()};

@@ -48,11 +48,14 @@ Json certificate_json(const analysis::CertifiedSteps& certified) {
 }
 
 Json provenance_json(const Provenance& provenance) {
-  return {{"command", provenance.command}, {"settings", provenance.settings}, {"seed", provenance.seed},
+  return {{"command", provenance.command},
+          {"settings", provenance.settings},
+          {"seed", provenance.seed},
           {"version", provenance.version}};
 }
 
-Json study_json(const analysis::Setting& setting, const analysis::Metastability& study, const RestThresholds& thresholds) {
+Json study_json(const analysis::Setting& setting, const analysis::Metastability& study,
+                const RestThresholds& thresholds) {
   const bool endless = study.status == analysis::Status::rest_unreachable;
   const double median = study.steps.quantile.empty() ? study.from_start.value : study.steps.quantile[2];
   Json json;
@@ -72,16 +75,20 @@ Json study_json(const analysis::Setting& setting, const analysis::Metastability&
                             {"quantiles", accumulated(study.steps)["quantiles"]}};
   json["failure_rate_per_step"] = study.failure_rate.value;
   json["failure_rate_interval_95"] = interval(study.failure_rate);
-  json["seconds_before_failure"] = study.seconds ? accumulated(*study.seconds) : Json(endless ? "infinite" : Json(nullptr));
-  json["metres_before_failure"] = study.metres ? accumulated(*study.metres) : Json(endless ? "infinite" : Json(nullptr));
+  json["seconds_before_failure"] =
+      study.seconds ? accumulated(*study.seconds) : Json(endless ? "infinite" : Json(nullptr));
+  json["metres_before_failure"] =
+      study.metres ? accumulated(*study.metres) : Json(endless ? "infinite" : Json(nullptr));
   json["survival"] = study.survival;
   json["eigenvalue_moduli"] = study.eigenvalue_moduli;
   json["mixing_steps"] = number(study.mixing_steps);
-  json["total_variation_mixing_steps"] = study.total_variation_steps ? Json(*study.total_variation_steps) : Json(nullptr);
+  json["total_variation_mixing_steps"] =
+      study.total_variation_steps ? Json(*study.total_variation_steps) : Json(nullptr);
   Json legs = Json::array();
   for (const analysis::PhaseDistribution& phase : study.quasi_stationary)
     legs.push_back({{"mean_rad_s", phase.mean}, {"sd_rad_s", phase.sd}});
-  json["quasi_stationary"] = {{"mean_rad_s", study.observable_mean}, {"sd_rad_s", study.observable_sd}, {"per_leg", legs}};
+  json["quasi_stationary"] = {
+      {"mean_rad_s", study.observable_mean}, {"sd_rad_s", study.observable_sd}, {"per_leg", legs}};
   json["stationary_with_restart"] = {{"mean_rad_s", study.restart_mean}, {"sd_rad_s", study.restart_sd}};
   json["reach_ramp_end"] = optional_number(study.reach_end);
   Json shares = Json::object();
@@ -91,8 +98,11 @@ Json study_json(const analysis::Setting& setting, const analysis::Metastability&
   json["rest_unreachable_above"] = {{"speed_rad_s", optional_number(thresholds.safe_speed)},
                                     {"slope_deg", optional_number(thresholds.safe_slope_deg)}};
   json["error"] = {{"discretization", number(study.discretization_error)}, {"sampling", number(study.sampling_error)}};
-  json["resolution"] = {{"cells", study.cells}, {"samples", study.samples}, {"replicates", study.replicates},
-                        {"phases", study.phases}, {"period", study.period}};
+  json["resolution"] = {{"cells", study.cells},
+                        {"samples", study.samples},
+                        {"replicates", study.replicates},
+                        {"phases", study.phases},
+                        {"period", study.period}};
   json["solver_disagreement"] = study.solver_disagreement;
   return json;
 }

@@ -61,16 +61,20 @@ std::string study_text(const analysis::Setting& setting, const analysis::Metasta
     if (study.seconds) text += total_line("seconds", *study.seconds);
     if (study.metres) text += total_line("metres", *study.metres);
   }
-  if (study.reach_end) text += line(fmt::format("reaches the end of {} m", setting.ramp_length), show(*study.reach_end));
+  if (study.reach_end)
+    text += line(fmt::format("reaches the end of {} m", setting.ramp_length), show(*study.reach_end));
   text += line(endless ? "stationary speed" : "quasi-stationary speed",
                fmt::format("{:.4f} rad/s, sd {:.4f}", study.observable_mean, study.observable_sd));
   if (!endless)
-    text += line("stationary speed, relaunched", fmt::format("{:.4f} rad/s, sd {:.4f}", study.restart_mean, study.restart_sd));
+    text += line("stationary speed, relaunched",
+                 fmt::format("{:.4f} rad/s, sd {:.4f}", study.restart_mean, study.restart_sd));
   std::string moduli;
-  for (const double modulus : study.eigenvalue_moduli) moduli += fmt::format("{}{:.6g}", moduli.empty() ? "" : ", ", modulus);
+  for (const double modulus : study.eigenvalue_moduli)
+    moduli += fmt::format("{}{:.6g}", moduli.empty() ? "" : ", ", modulus);
   text += line("eigenvalue moduli per step", moduli);
   std::string mixing = fmt::format("{:.4g} steps (spectral)", study.mixing_steps);
-  if (study.total_variation_steps) mixing += fmt::format(", {} from the launch (total variation)", *study.total_variation_steps);
+  if (study.total_variation_steps)
+    mixing += fmt::format(", {} from the launch (total variation)", *study.total_variation_steps);
   text += line("mixing", mixing);
   text += "\n";
   text += line("rest", thresholds_text(thresholds));
@@ -86,8 +90,8 @@ std::string study_text(const analysis::Setting& setting, const analysis::Metasta
                                                study.replicates > 1 ? fmt::format("{} replicates", study.replicates)
                                                                     : std::string("one randomisation")));
   if (!endless) {
-    text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)", study.discretization_error,
-                                               study.sampling_error));
+    text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)",
+                                               study.discretization_error, study.sampling_error));
     text += line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.solver_disagreement));
     if (!study.message.empty()) text += "\n" + study.message + "\n";
   }

@@ -34,16 +34,20 @@ std::string head(const SweepRequest& request) {
   text += "\n";
   for (const dynamics::Contact& pair : request.setting.pairs)
     text += fmt::format("# pair: restitution {}, friction {}\n", pair.restitution, pair.friction);
-  const auto size = [](std::size_t given) { return given == 0 ? std::string("as the tolerance needs") : std::to_string(given); };
-  text += fmt::format("# method {}, cells {}, samples {}, tolerance {}, seed {}, replicates {}, sequence {}, draws {}, tail {}\n",
-                      analysis::method_name(study.method), size(study.cells), size(study.samples), study.tolerance, study.seed, study.replicates,
-                      study.sequence == markov::Sequence::sobol ? "sobol" : "random",
-                      study.weighting == markov::Weighting::weighted ? "weighted" : "plain", study.tail);
+  const auto size = [](std::size_t given) {
+    return given == 0 ? std::string("as the tolerance needs") : std::to_string(given);
+  };
+  text += fmt::format(
+      "# method {}, cells {}, samples {}, tolerance {}, seed {}, replicates {}, sequence {}, draws {}, tail {}\n",
+      analysis::method_name(study.method), size(study.cells), size(study.samples), study.tolerance, study.seed,
+      study.replicates, study.sequence == markov::Sequence::sobol ? "sobol" : "random",
+      study.weighting == markov::Weighting::weighted ? "weighted" : "plain", study.tail);
   text += fmt::format("# version: {}\n", version());
   for (const analysis::Axis& axis : request.axes)
     text += fmt::format("{} [{}],", analysis::parameter_name(axis.parameter), analysis::parameter_unit(axis.parameter));
-  text += "expected_steps,expected_steps_low95,expected_steps_high95,expected_steps_quasi_stationary,failure_rate_per_step,"
-          "quasi_stationary_mean_rad_s,quasi_stationary_sd_rad_s,reach_ramp_end,status\n";
+  text +=
+      "expected_steps,expected_steps_low95,expected_steps_high95,expected_steps_quasi_stationary,failure_rate_per_step,"
+      "quasi_stationary_mean_rad_s,quasi_stationary_sd_rad_s,reach_ramp_end,status\n";
   return text;
 }
 
@@ -55,10 +59,11 @@ std::string row(const analysis::SweepPoint& point) {
   for (const double value : point.at) text += fmt::format("{},", value);
   if (study.status == analysis::Status::solver_failed)
     return text + fmt::format(",,,,,,,,{}\n", analysis::status_text(study.status));
-  return text + fmt::format("{},{},{},{},{},{},{},{},{}\n", number(study.from_start.value), number(study.from_start.lower),
-                            number(study.from_start.upper), number(study.from_quasi_stationary.value),
-                            number(study.failure_rate.value), study.observable_mean, study.observable_sd,
-                            study.reach_end ? number(*study.reach_end) : "", analysis::status_text(study.status));
+  return text + fmt::format("{},{},{},{},{},{},{},{},{}\n", number(study.from_start.value),
+                            number(study.from_start.lower), number(study.from_start.upper),
+                            number(study.from_quasi_stationary.value), number(study.failure_rate.value),
+                            study.observable_mean, study.observable_sd, study.reach_end ? number(*study.reach_end) : "",
+                            analysis::status_text(study.status));
 }
 
 std::string whole_file(const std::filesystem::path& path) {

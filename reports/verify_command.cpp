@@ -18,7 +18,7 @@ namespace metastable::reports {
 namespace {
 
 constexpr double within_draws = 1e20;  // expected steps that draws down to a tail probability of 1e-30 can resolve
-constexpr double visible = 1e12;  // a relative error beyond is shown as "lost"
+constexpr double visible = 1e12;       // a relative error beyond is shown as "lost"
 
 struct Checked {
   analysis::Benchmark benchmark;
@@ -26,18 +26,19 @@ struct Checked {
 };
 
 Table accuracy_table(const std::string& id, const std::string& title, const std::vector<Checked>& rows) {
-  Table table{.id = id,
-              .title = title,
-              .notes = {"Change: largest relative change of the expected steps from the launch and of 1 − λ₁ when the "
-                        "number of nodes was last doubled. Error: largest relative distance of expected steps (from the "
-                        "launch, and from the quasi-stationary distribution) and of 1 − λ₁ from values computed to 60 digits."},
-              .columns = {{"benchmark"},
-                          {"nodes a phase"},
-                          {"expected steps", "", NumberFormat::significant, 14},
-                          {"from quasi-stationary", "", NumberFormat::significant, 14},
-                          {"1 − λ₁", "", NumberFormat::significant, 14},
-                          {"change", "", NumberFormat::significant, 2},
-                          {"error", "", NumberFormat::significant, 2}}};
+  Table table{
+      .id = id,
+      .title = title,
+      .notes = {"Change: largest relative change of the expected steps from the launch and of 1 − λ₁ when the "
+                "number of nodes was last doubled. Error: largest relative distance of expected steps (from the "
+                "launch, and from the quasi-stationary distribution) and of 1 − λ₁ from values computed to 60 digits."},
+      .columns = {{"benchmark"},
+                  {"nodes a phase"},
+                  {"expected steps", "", NumberFormat::significant, 14},
+                  {"from quasi-stationary", "", NumberFormat::significant, 14},
+                  {"1 − λ₁", "", NumberFormat::significant, 14},
+                  {"change", "", NumberFormat::significant, 2},
+                  {"error", "", NumberFormat::significant, 2}}};
   for (const auto& [benchmark, verified] : rows)
     table.rows.push_back({benchmark.name, verified.nodes, verified.from_start, verified.from_quasi_stationary,
                           verified.failure_rate, verified.change, verified.error ? Cell(*verified.error) : Cell("")});
@@ -55,18 +56,19 @@ Cell lost(const std::optional<double>& value, double right) {
 }
 
 Table solver_table(const std::vector<Checked>& rows) {
-  Table table{.id = "verify-solvers",
-              .title = "The same chains by three solvers",
-              .notes = {"Subtraction-free elimination, sparse LU of I − Q (KLU) and 1/(1 − λ₁) from Arnoldi with shift-invert "
-                        "(Spectra), and the relative difference of the last two from the first. As rest becomes rare they "
-                        "lose their digits; times can come out negative."},
-              .columns = {{"benchmark"},
-                          {"elimination", "", NumberFormat::significant, 8},
-                          {"LU", "", NumberFormat::significant, 8},
-                          {"LU differs by", "", NumberFormat::significant, 2},
-                          {"elimination, quasi-stationary", "", NumberFormat::significant, 8},
-                          {"Arnoldi", "", NumberFormat::significant, 8},
-                          {"Arnoldi differs by", "", NumberFormat::significant, 2}}};
+  Table table{
+      .id = "verify-solvers",
+      .title = "The same chains by three solvers",
+      .notes = {"Subtraction-free elimination, sparse LU of I − Q (KLU) and 1/(1 − λ₁) from Arnoldi with shift-invert "
+                "(Spectra), and the relative difference of the last two from the first. As rest becomes rare they "
+                "lose their digits; times can come out negative."},
+      .columns = {{"benchmark"},
+                  {"elimination", "", NumberFormat::significant, 8},
+                  {"LU", "", NumberFormat::significant, 8},
+                  {"LU differs by", "", NumberFormat::significant, 2},
+                  {"elimination, quasi-stationary", "", NumberFormat::significant, 8},
+                  {"Arnoldi", "", NumberFormat::significant, 8},
+                  {"Arnoldi differs by", "", NumberFormat::significant, 2}}};
   for (const auto& [benchmark, v] : rows)
     table.rows.push_back({benchmark.name, v.from_start, shown(v.lu_from_start), lost(v.lu_from_start, v.from_start),
                           v.from_quasi_stationary, shown(v.arnoldi_from_quasi_stationary),
@@ -96,10 +98,12 @@ Table coverage_table(const std::vector<Checked>& rows, const VerifyRequest& requ
     table.rows.push_back({benchmark.name, verified.from_start, found.seeds, found.inside, found.widest});
     progress.advance();
   }
-  table.notes.push_back(fmt::format(
-      "Benchmarks beyond {:.0e} steps are left out: the sampled method's default draws end at a tail probability of 1e-30.",
-      within_draws));
-  table.notes.push_back(fmt::format("Over all: {} of {} ({:.1f} %).", inside, seeds, 100.0 * inside / std::max(1, seeds)));
+  table.notes.push_back(
+      fmt::format("Benchmarks beyond {:.0e} steps are left out: the sampled method's default draws end at a tail "
+                  "probability of 1e-30.",
+                  within_draws));
+  table.notes.push_back(
+      fmt::format("Over all: {} of {} ({:.1f} %).", inside, seeds, 100.0 * inside / std::max(1, seeds)));
   return table;
 }
 
@@ -119,7 +123,8 @@ void export_chain(const Checked& checked, const std::filesystem::path& folder) {
 }  // namespace
 
 void run_verify(const VerifyRequest& request) {
-  const std::vector<analysis::Benchmark> terrain = analysis::rough_terrain_benchmarks(), wheels = analysis::wheel_benchmarks();
+  const std::vector<analysis::Benchmark> terrain = analysis::rough_terrain_benchmarks(),
+                                         wheels = analysis::wheel_benchmarks();
   Progress progress("verify", (terrain.size() + wheels.size()) * (request.seeds > 0 ? 2 : 1));
   const auto check = [&](const std::vector<analysis::Benchmark>& benchmarks) {
     std::vector<Checked> checked;
@@ -133,9 +138,9 @@ void run_verify(const VerifyRequest& request) {
   if (!request.export_to.empty()) export_chain(paper[1], request.export_to);
   std::vector<Checked> all = rough;
   all.insert(all.end(), paper.begin(), paper.end());
-  std::vector<Table> tables{
-      accuracy_table("verify-rough-terrain", "The rough-terrain wheel by integrated rows", rough),
-      accuracy_table("verify-wheel", "The paper's wheel by integrated rows", paper), solver_table(all)};
+  std::vector<Table> tables{accuracy_table("verify-rough-terrain", "The rough-terrain wheel by integrated rows", rough),
+                            accuracy_table("verify-wheel", "The paper's wheel by integrated rows", paper),
+                            solver_table(all)};
   if (request.seeds > 0) tables.push_back(coverage_table(all, request, progress));
   const Provenance provenance{request.command,
                               "rough terrain: mean slope 8 deg, g 9.8 m/s^2, l 1 m, from the fixed point\n"

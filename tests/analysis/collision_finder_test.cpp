@@ -23,7 +23,8 @@ Score score(const Setting& setting, double rate, double noise, const FinderOptio
   Score s;
   double fits = 0, bias = 0, squares = 0, plus = 0, plus_squares = 0, times = 0;
   for (std::size_t t = 0; t < trials.size(); ++t) {
-    const AngleRecording recording = record_angle(map, trials[t], {.rate = rate, .noise_sd = noise, .seed = 2, .threads = 1}, t);
+    const AngleRecording recording =
+        record_angle(map, trials[t], {.rate = rate, .noise_sd = noise, .seed = 2, .threads = 1}, t);
     const FoundTrial found = find_collisions(recording, map, setting.first_landing_leg, options);
     s.due += static_cast<double>(trials[t].collisions.size());
     for (const FoundCollision& c : found.collisions) {
@@ -59,7 +60,7 @@ TEST(CollisionFinder, FindsTheCollisionsOfAnOrdinaryCamera) {
     const Score s = score(paper_setting(slope, false), 120, 0.0002);
     EXPECT_GE(s.found, 0.99 * s.due) << slope;
     EXPECT_EQ(s.extra, 0) << slope;
-    EXPECT_LE(s.bounces, 0.01 * s.found) << slope;  // a wheel that falls back onto its feet may ring in the filter
+    EXPECT_LE(s.bounces, 0.01 * s.found) << slope;   // a wheel that falls back onto its feet may ring in the filter
     EXPECT_NEAR(s.peak_bias, -0.33, 0.06) << slope;  // what smoothing costs: the reason for the fit
     EXPECT_NEAR(s.bias, 0, 0.001) << slope;
     EXPECT_LT(s.sd, 0.005) << slope;
@@ -87,7 +88,8 @@ TEST(CollisionFinder, StopsAtTheNumberAskedForAndFindsTheApex) {
   setting.law = dynamics::Law::plastic;
   const auto trials = simulate_trials(setting, {.trials = 1, .collisions = 16, .seed = 4});
   const dynamics::WheelMap map = setting.map();
-  const AngleRecording recording = record_angle(map, trials[0], {.rate = 500, .noise_sd = 0, .seed = 1, .threads = 1}, 0);
+  const AngleRecording recording =
+      record_angle(map, trials[0], {.rate = 500, .noise_sd = 0, .seed = 1, .threads = 1}, 0);
   const FoundTrial found = find_collisions(recording, map, 0, {.collisions = 5});
   ASSERT_EQ(found.collisions.size(), 5u);
   EXPECT_EQ(found.stopped, "");

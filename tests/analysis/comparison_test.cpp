@@ -23,7 +23,8 @@ TEST(Comparison, RatioOfThePapersRampsOnCommonNumbers) {
 }
 
 TEST(Comparison, ASettingAgainstItselfDiffersByNothing) {
-  const Comparison comparison = compare({paper_setting(7.02, true), paper_setting(7.02, true)}, {.cells = 64, .samples = 1024});
+  const Comparison comparison =
+      compare({paper_setting(7.02, true), paper_setting(7.02, true)}, {.cells = 64, .samples = 1024});
   EXPECT_DOUBLE_EQ(comparison.contrasts[0].ratio->value, 1.0);
   // Common random numbers: nothing is left but the discretization errors.
   EXPECT_NEAR(comparison.contrasts[0].ratio->upper, std::exp(2 * comparison.studies[0].discretization_error), 1e-9);
@@ -52,9 +53,7 @@ TEST(Comparison, TrialsToTellApartByHand) {
   EXPECT_THROW(trials_to_tell_apart(a, b, 3), std::invalid_argument);
 }
 
-TEST(Comparison, NeedsTwoSettings) {
-  EXPECT_THROW(compare({paper_setting(7.02, true)}, {}), std::invalid_argument);
-}
+TEST(Comparison, NeedsTwoSettings) { EXPECT_THROW(compare({paper_setting(7.02, true)}, {}), std::invalid_argument); }
 
 }  // namespace
 }  // namespace metastable::analysis

@@ -59,9 +59,11 @@ TEST(CsvReader, ReadsNumbers) {
 }
 
 TEST(CsvReader, NamesPlaceAndReasonOfEachDefect) {
-  EXPECT_EQ(read("").defects, (Strings{"f.csv:1:1: the file is empty; a header with the names of the columns is expected"}));
+  EXPECT_EQ(read("").defects,
+            (Strings{"f.csv:1:1: the file is empty; a header with the names of the columns is expected"}));
   EXPECT_EQ(read("name,speed\na,1\n").defects, (Strings{"f.csv:1:1: missing column 'count'"}));
-  EXPECT_EQ(read("count,colour\n").defects, (Strings{"f.csv:1:7: unknown column 'colour' (known: name, count, speed)"}));
+  EXPECT_EQ(read("count,colour\n").defects,
+            (Strings{"f.csv:1:7: unknown column 'colour' (known: name, count, speed)"}));
   EXPECT_EQ(read("count,count\n").defects, (Strings{"f.csv:1:7: column 'count' appears twice"}));
   EXPECT_EQ(read("count,name\n1\n1,b,c\n").defects,
             (Strings{"f.csv:2:1: 1 field where the header has 2", "f.csv:3:1: 3 fields where the header has 2"}));
@@ -70,13 +72,15 @@ TEST(CsvReader, NamesPlaceAndReasonOfEachDefect) {
   EXPECT_EQ(read("count,name\n1,\"a\"b\n2,c\n").defects, (Strings{"f.csv:2:6: text after a closing quote"}));
   EXPECT_EQ(read("count,name\n1,b\n2,\"c\n3,d\n").defects, (Strings{"f.csv:3:3: quote that is never closed"}));
   EXPECT_EQ(read("count,name\n1,b\r2,c\n").defects, (Strings{"f.csv:2:4: carriage return without a line feed"}));
-  EXPECT_EQ(read(std::string_view("count,name\n1,\0\n", 14)).defects, (Strings{"f.csv:2:3: control character '\\x00'"}));
-  EXPECT_EQ(read("count,speed\n,1\nx,2\n0,nan\n1,-2\n1,1e999\n1,0x1\n").defects,
-            (Strings{"f.csv:2:1: count: is empty; a whole number is expected",
-                     "f.csv:3:1: count: 'x' is not a whole number in 1..99",
-                     "f.csv:4:1: count: '0' is not a whole number in 1..99", "f.csv:4:3: speed: 'nan' is not a finite number",
-                     "f.csv:5:3: speed: -2 is below 0", "f.csv:6:3: speed: '1e999' is not a finite number",
-                     "f.csv:7:3: speed: '0x1' is not a finite number"}));
+  EXPECT_EQ(read(std::string_view("count,name\n1,\0\n", 14)).defects,
+            (Strings{"f.csv:2:3: control character '\\x00'"}));
+  EXPECT_EQ(
+      read("count,speed\n,1\nx,2\n0,nan\n1,-2\n1,1e999\n1,0x1\n").defects,
+      (Strings{"f.csv:2:1: count: is empty; a whole number is expected",
+               "f.csv:3:1: count: 'x' is not a whole number in 1..99",
+               "f.csv:4:1: count: '0' is not a whole number in 1..99", "f.csv:4:3: speed: 'nan' is not a finite number",
+               "f.csv:5:3: speed: -2 is below 0", "f.csv:6:3: speed: '1e999' is not a finite number",
+               "f.csv:7:3: speed: '0x1' is not a finite number"}));
 }
 
 TEST(CsvReader, GoesOnAfterADefect) {

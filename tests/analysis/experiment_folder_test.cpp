@@ -41,7 +41,8 @@ TEST(ExperimentFolder, FilesFollowTheFormat) {
 TEST(ExperimentFolder, TrialsAreTheSameOnAnyNumberOfThreads) {
   const Setting setting = paper_setting(9.59, false);
   const auto text = [&](int threads) {
-    return experiment_files(setting, simulate_trials(setting, {.trials = 50, .threads = threads}), "t", {}).collisions_csv;
+    return experiment_files(setting, simulate_trials(setting, {.trials = 50, .threads = threads}), "t", {})
+        .collisions_csv;
   };
   EXPECT_EQ(text(1), text(4));
 }

@@ -39,8 +39,13 @@ first_landing_leg = 1
 )";
 const std::string header = "condition,trial,collision,leg,omega_minus_rad_s\n";
 
-ExperimentSource source(const std::string& toml, const std::string& collisions, std::optional<std::string> trials = {}) {
-  return {.folder = "", .experiment_toml = toml, .collisions_csv = collisions, .trials_csv = std::move(trials), .angle_csv = {}};
+ExperimentSource source(const std::string& toml, const std::string& collisions,
+                        std::optional<std::string> trials = {}) {
+  return {.folder = "",
+          .experiment_toml = toml,
+          .collisions_csv = collisions,
+          .trials_csv = std::move(trials),
+          .angle_csv = {}};
 }
 
 Strings defects(const ExperimentSource& of) {
@@ -57,11 +62,10 @@ std::string replaced(std::string text, const std::string& old, const std::string
 }
 
 TEST(Experiment, ReadsEverythingThatTheFilesSay) {
-  const Experiment e = parse_experiment(
-      source("title = \"t\"\n" + description + "[sensor]\nrate_hz = 120\n",
-             "omega_plus_rad_s,condition,trial,collision,leg,omega_minus_rad_s\n"
-             "4.5,b,7,1,1,5.5\n4.0,a,3,1,0,5.0\n,b,7,2,2,5.1\n",
-             "trial,condition,outcome\n3,a,rest\n7,b,end_of_ramp\n"));
+  const Experiment e = parse_experiment(source("title = \"t\"\n" + description + "[sensor]\nrate_hz = 120\n",
+                                               "omega_plus_rad_s,condition,trial,collision,leg,omega_minus_rad_s\n"
+                                               "4.5,b,7,1,1,5.5\n4.0,a,3,1,0,5.0\n,b,7,2,2,5.1\n",
+                                               "trial,condition,outcome\n3,a,rest\n7,b,end_of_ramp\n"));
   EXPECT_EQ(e.title, "t");
   EXPECT_EQ(e.system, System::rimless_wheel);
   EXPECT_EQ(e.wheel.leg_length, (std::vector<double>{0.15, 0.151, 0.15, 0.15}));
@@ -103,7 +107,8 @@ TEST(Experiment, NominalSettingTakesTheMeasuredLaunchWhereNoneIsStated) {
 
 TEST(Experiment, ReadsCoastDowns) {
   const std::string toml =
-      "system = \"coast_down\"\n[rotor]\ninertia_kg_m2 = 2.0\n[loss]\nconstant = 0.15\nlinear = 0.0\nquadratic = 0.00165\n"
+      "system = \"coast_down\"\n[rotor]\ninertia_kg_m2 = 2.0\n[loss]\nconstant = 0.15\nlinear = 0.0\nquadratic = "
+      "0.00165\n"
       "noise_sd = 0.1\n";
   const Experiment e = parse_experiment(source(toml, "trial,collision,omega_minus_rad_s\n1,1,50\n1,2,49\n2,1,48\n"));
   EXPECT_EQ(e.system, System::coast_down);
@@ -132,12 +137,15 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
   EXPECT_EQ(of("0.151", "nan"), "experiment.toml:3:24: wheel.leg_lengths_m[1]: nan is outside (0, inf)");
   EXPECT_EQ(of("[0.15, 0.151, 0.15, 0.15]", "[0.15]"),
             "experiment.toml:3:17: wheel.leg_lengths_m: a list of 3 to 1000 numbers [m] is expected");
-  EXPECT_EQ(of("coulomb", "sticky"), "experiment.toml:5:7: contact.law: \"published\", \"coulomb\" or \"plastic\" is expected");
+  EXPECT_EQ(of("coulomb", "sticky"),
+            "experiment.toml:5:7: contact.law: \"published\", \"coulomb\" or \"plastic\" is expected");
   EXPECT_EQ(of("mean = 0.4", "mean = 1.4"), "experiment.toml:6:24: contact.restitution.mean: 1.4 is outside [0, 1]");
   EXPECT_EQ(of("{ mean = 0.4, sd = 0.1 }", "0.4"),
             "experiment.toml:6:15: contact.restitution: { mean = ..., sd = ... } is expected");
-  EXPECT_EQ(of("slope_deg = 12", "slope_deg = 45"), "experiment.toml:14:13: condition[1].slope_deg: 45 is outside (0, 45)");
-  EXPECT_EQ(of("leg = 1", "leg = 4"), "experiment.toml:17:21: condition[1].first_landing_leg: a whole number in 0..3 is expected");
+  EXPECT_EQ(of("slope_deg = 12", "slope_deg = 45"),
+            "experiment.toml:14:13: condition[1].slope_deg: 45 is outside (0, 45)");
+  EXPECT_EQ(of("leg = 1", "leg = 4"),
+            "experiment.toml:17:21: condition[1].first_landing_leg: a whole number in 0..3 is expected");
   EXPECT_EQ(of("id = \"b\"", "id = \"a\""), "experiment.toml:13:6: id: a condition 'a' was there before");
   EXPECT_EQ(of("[wheel]\n", "[wheel]\nhub_mas = 1\n"),
             "experiment.toml:2:1: unknown key 'hub_mas' in wheel (known: hub_mass_kg, inertia_kg_m2, leg_lengths_m, "
@@ -151,21 +159,25 @@ TEST(Experiment, NamesWhatIsWrongWithTheRows) {
   EXPECT_EQ(of("a,1,2,0,5\n"), (Strings{"collisions.csv:2:5: collision: 2 skips: collision 1 of trial 1 is due"}));
   EXPECT_EQ(of("a,1,1,0,5\na,1,1,1,5\na,1,2,1,5\n"),
             (Strings{"collisions.csv:3:5: collision: 1 repeats or goes back: collision 2 of trial 1 is due"}));
-  EXPECT_EQ(of("a,1,1,0,5\na,1,3,1,5\n"), (Strings{"collisions.csv:3:5: collision: 3 skips: collision 2 of trial 1 is due"}));
+  EXPECT_EQ(of("a,1,1,0,5\na,1,3,1,5\n"),
+            (Strings{"collisions.csv:3:5: collision: 3 skips: collision 2 of trial 1 is due"}));
   EXPECT_EQ(of("a,1,1,0,5\na,1,2,2,5\n"), (Strings{"collisions.csv:3:7: leg: leg 2 does not land after leg 0"}));
   EXPECT_EQ(of("c,1,1,0,5\n"), (Strings{"collisions.csv:2:1: condition: unknown condition 'c'"}));
-  EXPECT_EQ(of("a,1,1,0,5\nb,1,2,1,5\n"),
-            (Strings{"collisions.csv:3:1: condition: trial 1 is of condition 'a' in line 2; numbers count over the whole "
-                     "experiment"}));
+  EXPECT_EQ(
+      of("a,1,1,0,5\nb,1,2,1,5\n"),
+      (Strings{"collisions.csv:3:1: condition: trial 1 is of condition 'a' in line 2; numbers count over the whole "
+               "experiment"}));
   EXPECT_EQ(of("a,1,1,4,-5\na,x,1,0,NaN\n"),
             (Strings{"collisions.csv:2:7: leg: '4' is not a whole number in 0..3",
                      "collisions.csv:2:9: omega_minus_rad_s: -5 is below 0",
                      "collisions.csv:3:3: trial: 'x' is not a whole number in 0..2147483647",
                      "collisions.csv:3:9: omega_minus_rad_s: 'NaN' is not a finite number"}));
-  EXPECT_EQ(defects(source(description, "trial,collision,omega_minus_rad_s\n1,1,5\n1,2,5\n")),
-            (Strings{"collisions.csv:2:1: trial: the column 'condition' is missing and experiment.toml has 2 conditions"}));
-  EXPECT_EQ(defects(source(description, "condition,trial,collision,time_s,position_m,omega_minus_rad_s\n"
-                                        "a,1,1,1.0,1.0,5\na,1,2,0.9,1.0,5\n")),
+  EXPECT_EQ(
+      defects(source(description, "trial,collision,omega_minus_rad_s\n1,1,5\n1,2,5\n")),
+      (Strings{"collisions.csv:2:1: trial: the column 'condition' is missing and experiment.toml has 2 conditions"}));
+  EXPECT_EQ(defects(source(description,
+                           "condition,trial,collision,time_s,position_m,omega_minus_rad_s\n"
+                           "a,1,1,1.0,1.0,5\na,1,2,0.9,1.0,5\n")),
             (Strings{"collisions.csv:3:7: time_s: 0.9 s is not after the collision before (1 s)",
                      "collisions.csv:3:11: position_m: 1 m is not below the collision before (1 m)"}));
 }
@@ -173,7 +185,8 @@ TEST(Experiment, NamesWhatIsWrongWithTheRows) {
 TEST(Experiment, NamesTrialsThatAreInOneFileOnly) {
   const std::string rows = header + "a,1,1,0,5\na,2,1,0,5\n", outcomes = "condition,trial,outcome\n";
   EXPECT_EQ(defects(source(description, rows, outcomes + "a,1,rest\na,3,rest\n")),
-            (Strings{"collisions.csv:3:1: trial 2 is not in trials.csv", "trials.csv:3:1: trial 3 is not in collisions.csv"}));
+            (Strings{"collisions.csv:3:1: trial 2 is not in trials.csv",
+                     "trials.csv:3:1: trial 3 is not in collisions.csv"}));
   EXPECT_EQ(defects(source(description, rows, outcomes + "a,1,rest\nb,2,stop\na,1,rest\n")),
             (Strings{"trials.csv:3:5: outcome: 'stop' is none of rest, end_of_ramp, max_collisions",
                      "trials.csv:3:1: condition: trial 2 is of condition 'a' in collisions.csv",
@@ -215,9 +228,11 @@ TEST(Experiment, ReadsFoldersAndNamesTheFileThatIsMissing) {
     }
     return std::string();
   };
-  EXPECT_EQ(message(), fmt::format("{}: there is no such file; an experiment needs it", (folder / "experiment.toml").string()));
+  EXPECT_EQ(message(),
+            fmt::format("{}: there is no such file; an experiment needs it", (folder / "experiment.toml").string()));
   std::ofstream(folder / "experiment.toml") << description;
-  EXPECT_EQ(message(), fmt::format("{}: there is no such file; an experiment needs it", (folder / "collisions.csv").string()));
+  EXPECT_EQ(message(),
+            fmt::format("{}: there is no such file; an experiment needs it", (folder / "collisions.csv").string()));
   std::ofstream(folder / "collisions.csv") << header << "a,1,1,0,5\n";
   EXPECT_EQ(read_experiment(folder).collisions(), 1u);
   std::filesystem::remove_all(folder);
@@ -230,8 +245,8 @@ TEST(Experiment, ReadsAMillionRowsQuickly) {
   constexpr int trials = 10000, collisions = 100;
   for (int t = 1; t <= trials; ++t)
     for (int c = 1; c <= collisions; ++c)
-      fmt::format_to(std::back_inserter(rows), "a,{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", t, c, c % 4, 0.2 * c, 0.1165 * c,
-                     5 + 0.001 * t / c, 4 + 0.001 * t / c);
+      fmt::format_to(std::back_inserter(rows), "a,{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", t, c, c % 4, 0.2 * c,
+                     0.1165 * c, 5 + 0.001 * t / c, 4 + 0.001 * t / c);
   const ExperimentSource text = source(description, rows);
   const auto start = std::chrono::steady_clock::now();
   const Experiment e = parse_experiment(text);

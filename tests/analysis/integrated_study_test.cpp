@@ -60,7 +60,8 @@ TEST(IntegratedStudy, ReproducesTheSixtyDigitValuesOfRoughTerrain) {
   StudyOptions options;
   options.method = Method::integrated;
   options.tolerance = 1e-11;
-  const Metastability result = study({wheel, {[start](double) { return start; }, 0}, [](double x) { return x; }, {}}, options);
+  const Metastability result =
+      study({wheel, {[start](double) { return start; }, 0}, [](double x) { return x; }, {}}, options);
   EXPECT_EQ(result.status, Status::converged);
   EXPECT_NEAR(result.failure_rate.value / 1.5280057867965971e-6, 1, 1e-11);
   EXPECT_NEAR(result.from_start.value / 654449.43992398285, 1, 1e-11);

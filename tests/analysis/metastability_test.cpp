@@ -88,7 +88,8 @@ TEST(Metastability, AgreesWithMonteCarloTrials) {
   ASSERT_TRUE(chain.reach_end);
   EXPECT_NEAR(*chain.reach_end, beyond_end / count, 4 * std::sqrt(beyond_end) / count + 1e-4);
   for (const int n : {1, 3, 10}) {
-    const double alive = static_cast<double>(std::count_if(steps.begin(), steps.end(), [&](double v) { return v > n; })) / count;
+    const double alive =
+        static_cast<double>(std::count_if(steps.begin(), steps.end(), [&](double v) { return v > n; })) / count;
     EXPECT_NEAR(chain.survival[static_cast<std::size_t>(n)], alive, 4 * std::sqrt(alive * (1 - alive) / count) + 5e-4);
   }
   ASSERT_FALSE(chain.violations.empty());
@@ -99,7 +100,8 @@ TEST(Metastability, AgreesWithMonteCarloTrials) {
 TEST(Metastability, RevolutionProductAgreesWithTheFullChain) {
   const Problem problem = paper_setting(7.02, false).problem();
   const markov::StateSpace space = markov::covering_space(problem.map, problem.launch, 48, 1);
-  const markov::SampledChain sampled = markov::discretize(problem.map, space, problem.launch, {.draws = {.count = 2048}});
+  const markov::SampledChain sampled =
+      markov::discretize(problem.map, space, problem.launch, {.draws = {.count = 2048}});
   const markov::ChainSolver product(sampled.chain);
   ASSERT_EQ(product.period().period, 8);
   const std::vector<double> ones(space.size(), 1.0);
@@ -206,7 +208,8 @@ TEST(Metastability, RandomAndPlainDrawsGiveWiderIntervalsAroundTheSameAnswer) {
 
 // Each was once answered wrongly with a narrow interval, or not at all.
 TEST(Metastability, FastLaunchesStayOnTheGridOnEveryLeg) {
-  Setting plastic = paper_setting(7.02, false);  // rolls 15 steps, fast at first, on legs the first landing does not see
+  Setting plastic =
+      paper_setting(7.02, false);  // rolls 15 steps, fast at first, on legs the first landing does not see
   plastic.law = dynamics::Law::plastic;
   plastic.slope_deg = 4.2;
   plastic.initial_speed = {5, 0.2};

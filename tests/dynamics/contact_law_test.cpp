@@ -1,8 +1,8 @@
 #include "dynamics/contact_law.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 #include "support.h"
 

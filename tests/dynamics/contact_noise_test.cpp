@@ -1,10 +1,10 @@
 #include "dynamics/contact_noise.h"
 
+#include <gtest/gtest.h>
+
 #include <array>
 #include <cmath>
 #include <limits>
-
-#include <gtest/gtest.h>
 
 #include "support.h"
 
@@ -58,7 +58,9 @@ TEST(ContactNoise, IllegalInputIsNamed) {
   EXPECT_EQ(message_of([] { ContactNoise::normal(0.4, 0.1, -0.2, 0); }),
             "friction: mean: the constant -0.2 is outside [0, inf]");
   EXPECT_EQ(message_of([] { ContactNoise::empirical({}); }), "pairs: the list of contacts is empty");
-  EXPECT_EQ(message_of([] { ContactNoise::empirical({{0.4, 0.4}, {1.2, 0.4}}); }),
+  EXPECT_EQ(message_of([] {
+              ContactNoise::empirical({{0.4, 0.4}, {1.2, 0.4}});
+            }),
             "pairs[1]: restitution 1.2 is outside [0, 1]");
   EXPECT_EQ(message_of([] { ContactNoise::empirical({{0.4, -0.4}}); }), "pairs[0]: friction -0.4 is outside [0, inf)");
 }

@@ -1,10 +1,10 @@
 #include "dynamics/coulomb_law.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
 
 #include "dynamics/plastic_law.h"
 #include "support.h"
@@ -18,7 +18,8 @@ struct Work {
 
 // Independent integration: small steps of normal impulse, friction from an implicit step (stick if the cone allows it).
 Work stepped(const ContactModel& m, const Collision& c, const Contact& contact) {
-  const double x = c.contact_x, y = c.contact_y, r2 = m.radius_of_gyration * m.radius_of_gyration, scale = 1 / (m.mass * r2);
+  const double x = c.contact_x, y = c.contact_y, r2 = m.radius_of_gyration * m.radius_of_gyration,
+               scale = 1 / (m.mass * r2);
   const double nn = (r2 + x * x) * scale, nt = x * y * scale, tt = (r2 + y * y) * scale;
   double vn = -c.normal_speed, vt = -c.tangential_speed;
   const double step = 2e-5 * m.mass * std::max(c.normal_speed, std::abs(c.tangential_speed));
@@ -72,12 +73,13 @@ RC_GTEST_PROP(CoulombLaw, DissipatesOverTheWholeBox, ()) {
   Wheel wheel = even_wheel();
   wheel.radius_of_gyration = uniform(0.005, 0.2);
   const ContactModel model = contact_model(wheel, Law::coulomb, uniform(0, 1));
-  const Collision c = make_collision(uniform(0.05, 0.3), uniform(0.05, 0.3), uniform(0.01, 10), uniform(-3, 3), 0.1, uniform(0.3, 1.5));
+  const Collision c =
+      make_collision(uniform(0.05, 0.3), uniform(0.05, 0.3), uniform(0.01, 10), uniform(-3, 3), 0.1, uniform(0.3, 1.5));
   const Loss loss = coulomb_loss(model, c, {uniform(0, 1), uniform(0, 5)});
   const double r2 = model.radius_of_gyration * model.radius_of_gyration, x = c.contact_x, y = c.contact_y;
   const double vn = c.normal_speed, vt = c.tangential_speed;
-  const double energy = model.mass / (2 * (r2 + x * x + y * y)) *
-                        ((r2 + y * y) * vn * vn - 2 * x * y * vn * vt + (r2 + x * x) * vt * vt);
+  const double energy =
+      model.mass / (2 * (r2 + x * x + y * y)) * ((r2 + y * y) * vn * vn - 2 * x * y * vn * vt + (r2 + x * x) * vt * vt);
   // Work is exchanged on the scale M v^2, of which the energy at the contact can be a small part.
   const double rounding = 1e-12 * model.mass * (vn * vn + vt * vt);
   RC_ASSERT(loss.normal() >= -rounding);
@@ -135,7 +137,8 @@ TEST(CoulombLaw, IsPlasticWithoutReboundAndWithoutGyration) {
     }
   }
   wheel.radius_of_gyration = 0;
-  EXPECT_NEAR(coulomb_loss(contact_model(wheel, Law::coulomb), make_collision(0.15, 0.15, 5, 0), {0.4, 0.2}).total(), 0, 1e-14);
+  EXPECT_NEAR(coulomb_loss(contact_model(wheel, Law::coulomb), make_collision(0.15, 0.15, 5, 0), {0.4, 0.2}).total(), 0,
+              1e-14);
 }
 
 }  // namespace

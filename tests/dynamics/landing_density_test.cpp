@@ -2,10 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 #include <numbers>
-
-#include <boost/math/quadrature/gauss.hpp>
 
 #include "dynamics/rest_probability.h"
 #include "dynamics/rough_terrain.h"
@@ -36,7 +35,8 @@ TEST(LandingDensity, SumsToTheSurvivors) {
   for (const double mean : {0.3, 0.4}) {
     const WheelMap map = wheel_map(Law::published, 7.02, ContactNoise::normal(0.4, 0.1, mean, 0.05));
     for (const double state : {20.0, 30.0, 54.0})
-      EXPECT_NEAR(total(map, state, 1.6 * state + 10, 40), 1 - rest_probability(map, state, 0), 1e-9) << mean << ' ' << state;
+      EXPECT_NEAR(total(map, state, 1.6 * state + 10, 40), 1 - rest_probability(map, state, 0), 1e-9)
+          << mean << ' ' << state;
   }
 }
 

@@ -1,11 +1,11 @@
 #include "dynamics/landing_range.h"
 
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include <gtest/gtest.h>
-#include <rapidcheck/gtest.h>
 
 #include "support.h"
 

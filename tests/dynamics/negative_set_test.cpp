@@ -1,10 +1,10 @@
 #include "dynamics/negative_set.h"
 
+#include <gtest/gtest.h>
+
 #include <array>
 #include <cmath>
 #include <numbers>
-
-#include <gtest/gtest.h>
 
 namespace metastable::dynamics {
 namespace {

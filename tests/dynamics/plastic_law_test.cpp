@@ -1,10 +1,10 @@
 #include "dynamics/plastic_law.h"
 
-#include <cmath>
-#include <numbers>
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <numbers>
 
 #include "support.h"
 

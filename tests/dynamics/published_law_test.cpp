@@ -1,12 +1,12 @@
 #include "dynamics/published_law.h"
 
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
-
-#include <gtest/gtest.h>
-#include <rapidcheck/gtest.h>
 
 #include "support.h"
 
@@ -50,7 +50,9 @@ Loss integrated(const Collision& c, const Contact& contact, double j) {
   loss.tangential_post = mu * integral(u, stop, end);
   const double xi = -std::log(eta) / std::hypot(std::numbers::pi, std::log(eta));
   const double whole = std::numbers::pi / std::sqrt(9000 / 1.39 * (1 - xi * xi));
-  const double slipping = loss.zeta <= 1 ? whole / 2 * loss.zeta : loss.zeta < 1 + eta ? whole / 2 * (1 + (loss.zeta - 1) / eta) : whole;
+  const double slipping = loss.zeta <= 1        ? whole / 2 * loss.zeta
+                          : loss.zeta < 1 + eta ? whole / 2 * (1 + (loss.zeta - 1) / eta)
+                                                : whole;
   const double before = stop > 0 ? loss.tangential_pre * slipping / stop : 0;
   const double after = end > stop ? loss.tangential_post * (whole - slipping) / (end - stop) : 0;
   loss.potential = j * 1.39 * 9.81 * (before - after) * std::sin(c.slope);

@@ -1,11 +1,11 @@
 #include "dynamics/rest_probability.h"
 
-#include <array>
-#include <algorithm>
-#include <cmath>
-
-#include <boost/math/quadrature/gauss.hpp>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/math/quadrature/gauss.hpp>
+#include <cmath>
 
 #include "support.h"
 
@@ -29,7 +29,8 @@ double two_dimensional(const WheelMap& map, double state) {
     bool inside = rests(map, state, {e, 0});
     const auto add = [&](double from, double to) {  // the density of mu itself, not its distribution function
       for (int i = 0; i < 20; ++i)
-        sum += Gauss::integrate([&](double m) { return mu.density(m); }, from + (to - from) * i / 20, from + (to - from) * (i + 1) / 20);
+        sum += Gauss::integrate([&](double m) { return mu.density(m); }, from + (to - from) * i / 20,
+                                from + (to - from) * (i + 1) / 20);
     };
     for (int i = 1; i <= grid; ++i) {
       double a = top * (i - 1) / grid, b = top * i / grid;
@@ -62,7 +63,8 @@ TEST(RestProbability, AgreesWithTwoDimensionalQuadrature) {
 }
 
 // All frictions above mu_c are one: the rest probability jumps as a function of eta. Reference: for each mu the set of
-// eta in closed form, over mu by a midpoint rule below mu_c (good to 1e-4 at its kinks) and by its distribution function above.
+// eta in closed form, over mu by a midpoint rule below mu_c (good to 1e-4 at its kinks) and by its distribution
+// function above.
 TEST(RestProbability, AgreesWithTheOtherOrderOfIntegrationForCoulomb) {
   const WheelMap map(even_wheel(), 3 * degree, Law::coulomb, ContactNoise::normal(0.4, 0.1, 0.4, 0.1));
   const TruncatedNormal &eta = map.noise().restitution(), &mu = map.noise().friction();
@@ -78,7 +80,8 @@ TEST(RestProbability, AgreesWithTheOtherOrderOfIntegrationForCoulomb) {
         if (at_a && at_b) sum += eta.between(a, b);
         if (at_a == at_b) continue;
         double low = a, high = b;
-        for (int k = 0; k < 55; ++k) (rests(map, state, {(low + high) / 2, friction}) == at_a ? low : high) = (low + high) / 2;
+        for (int k = 0; k < 55; ++k)
+          (rests(map, state, {(low + high) / 2, friction}) == at_a ? low : high) = (low + high) / 2;
         sum += at_a ? eta.between(a, low) : eta.between(low, b);
       }
       return sum;

@@ -1,15 +1,15 @@
 #include "dynamics/rough_terrain.h"
 
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
 #include <array>
+#include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <utility>
 #include <vector>
-
-#include <boost/math/quadrature/gauss.hpp>
-#include <gtest/gtest.h>
-#include <rapidcheck/gtest.h>
 
 #include "dynamics/truncated_normal.h"
 #include "support.h"
@@ -92,9 +92,12 @@ TEST(RoughTerrain, BenchmarkKillRates) {
 }
 
 TEST(RoughTerrain, IllegalInputIsNamed) {
-  EXPECT_EQ(message_of([] { RoughTerrainWheel({.mean_slope = 0, .sd_slope = -1 * degree}); }), "sd_slope [deg]: -1 is outside [0, 10]");
-  EXPECT_EQ(message_of([] { RoughTerrainWheel({.mean_slope = 60 * degree}); }), "mean_slope [deg]: 60 is outside (-45, 45)");
-  EXPECT_EQ(message_of([] { RoughTerrainWheel({.half_leg_angle = 50 * degree}); }), "half_leg_angle [deg]: 50 is outside (0, 45)");
+  EXPECT_EQ(message_of([] { RoughTerrainWheel({.mean_slope = 0, .sd_slope = -1 * degree}); }),
+            "sd_slope [deg]: -1 is outside [0, 10]");
+  EXPECT_EQ(message_of([] { RoughTerrainWheel({.mean_slope = 60 * degree}); }),
+            "mean_slope [deg]: 60 is outside (-45, 45)");
+  EXPECT_EQ(message_of([] { RoughTerrainWheel({.half_leg_angle = 50 * degree}); }),
+            "half_leg_angle [deg]: 50 is outside (0, 45)");
   EXPECT_EQ(message_of([] { RoughTerrainWheel({.gravity = 0}); }), "gravity [m/s^2]: 0 is outside (0, inf)");
   EXPECT_EQ(message_of([] { RoughTerrainWheel({.leg_length = -1}); }), "leg_length [m]: -1 is outside (0, inf)");
 }

@@ -33,7 +33,8 @@ TEST(StanceMotion, PassesTheNextCollisionWhenTheClosedFormSays) {
     const Stance& stance = map.stance(phase);
     for (const double excess : {0.5, 3.0, 20.0}) {
       const double after = stance.barrier + excess;
-      const auto [time, speed] = stance_passage(stance.pendulum, {stance.start_angle, std::sqrt(after)}, stance.end_angle);
+      const auto [time, speed] =
+          stance_passage(stance.pendulum, {stance.start_angle, std::sqrt(after)}, stance.end_angle);
       EXPECT_NEAR(time, map.duration(after + stance.gain, phase), 1e-8);
       EXPECT_NEAR(speed, std::sqrt(after + stance.gain), 1e-7);
     }

@@ -1,12 +1,12 @@
 #pragma once
 // What several tests of dynamics/ share.
 
+#include <rapidcheck.h>
+
 #include <numbers>
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <rapidcheck.h>
 
 #include "dynamics/contact_law.h"
 #include "dynamics/wheel_map.h"
@@ -30,8 +30,8 @@ inline Wheel even_wheel() {
 }
 
 /// A collision between two legs at v0 = c omega and u0.
-inline Collision make_collision(double first, double second, double omega, double tangential, double slope = 7.02 * degree,
-                                double angle = std::numbers::pi / 4) {
+inline Collision make_collision(double first, double second, double omega, double tangential,
+                                double slope = 7.02 * degree, double angle = std::numbers::pi / 4) {
   const Triangle t = triangle(first, second, angle);
   Collision c;
   c.stance_length = first;

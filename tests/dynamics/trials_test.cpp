@@ -1,11 +1,11 @@
 #include "dynamics/trials.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "support.h"
 
@@ -160,7 +160,9 @@ TEST(Trials, OutcomesAtTheirLimits) {
 
 TEST(Trials, IllegalInputIsNamed) {
   const WheelMap map(even_wheel(), 7.02 * degree, Law::plastic, ContactNoise::normal(0, 0, 1, 0));
-  const auto message = [&](TrialOptions options) { return message_of([&] { simulate_trial(map, launch_7, options, 0); }); };
+  const auto message = [&](TrialOptions options) {
+    return message_of([&] { simulate_trial(map, launch_7, options, 0); });
+  };
   EXPECT_EQ(message({.max_collisions = 0}), "max_collisions: 0 is outside [1, inf)");
   EXPECT_EQ(message({.ramp_length = -1}), "ramp_length: -1 m is outside [0, inf]");
   EXPECT_EQ(message({.first_landing_leg = 8}), "first_landing_leg: 8 is outside [0, 7]");

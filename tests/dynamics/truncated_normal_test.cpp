@@ -1,13 +1,13 @@
 #include "dynamics/truncated_normal.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
-#include <boost/math/special_functions/erf.hpp>
-#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <boost/math/special_functions/erf.hpp>
+#include <boost/multiprecision/cpp_bin_float.hpp>
+#include <cmath>
+#include <limits>
 
 #include "support.h"
 
@@ -22,8 +22,8 @@ Wide wide_cdf(const Wide& z) { return boost::math::erfc(Wide(-z / sqrt(Wide(2)))
 struct Case {
   double mean, sd, lower, upper;
 };
-const Case cases[] = {{0.4, 0.1, 0, 1}, {0.4, 0.2, 0, infinity}, {7.35, 0.19, 0, infinity}, {0.4, 0.05, 0, 1},
-                      {-0.5, 0.1, 0, 1}, {1.6, 0.1, 0, 1},       {0, 1, -infinity, infinity}, {0, 1, -infinity, -2}};
+const Case cases[] = {{0.4, 0.1, 0, 1},  {0.4, 0.2, 0, infinity}, {7.35, 0.19, 0, infinity},   {0.4, 0.05, 0, 1},
+                      {-0.5, 0.1, 0, 1}, {1.6, 0.1, 0, 1},        {0, 1, -infinity, infinity}, {0, 1, -infinity, -2}};
 
 // The score is exact when the mixture of the tails of both bounds is met; solved here by a Newton step in 50 digits.
 TEST(TruncatedNormal, AtScoreAgreesWithFiftyDigits) {
@@ -53,9 +53,7 @@ TEST(TruncatedNormal, AtScoreAgreesWithFiftyDigits) {
 TEST(TruncatedNormal, TailsAgreeWithFiftyDigits) {
   for (const Case& c : cases) {
     const TruncatedNormal normal(c.mean, c.sd, c.lower, c.upper);
-    const auto at = [&](double x) {
-      return std::isinf(x) ? Wide(x > 0 ? 1 : 0) : wide_cdf((Wide(x) - c.mean) / c.sd);
-    };
+    const auto at = [&](double x) { return std::isinf(x) ? Wide(x > 0 ? 1 : 0) : wide_cdf((Wide(x) - c.mean) / c.sd); };
     const Wide mass = at(c.upper) - at(c.lower);
     for (double score : {-30.0, -10.0, -4.0, -0.3, 0.0, 1.7, 6.0, 30.0}) {
       const double x = c.mean + c.sd * score;

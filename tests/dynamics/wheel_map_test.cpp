@@ -1,14 +1,14 @@
 #include "dynamics/wheel_map.h"
 
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
 #include <array>
+#include <boost/math/quadrature/tanh_sinh.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <vector>
-
-#include <boost/math/quadrature/tanh_sinh.hpp>
-#include <gtest/gtest.h>
-#include <rapidcheck/gtest.h>
 
 #include "support.h"
 
@@ -36,7 +36,8 @@ TEST(WheelMap, RevolutionOfUnevenLegsDropsByTheChords) {
     double gained = 0, chords = 0;
     for (int p = 0; p < 8; ++p) {
       const Stance& s = map.stance(p);
-      gained += s.inertia * s.gain / 2 - 1.39 * 9.81 * (map.triangle(p).hub_height - map.triangle((p + 1) % 8).hub_height) * std::cos(slope);
+      gained += s.inertia * s.gain / 2 -
+                1.39 * 9.81 * (map.triangle(p).hub_height - map.triangle((p + 1) % 8).hub_height) * std::cos(slope);
       chords += map.advance(p);
     }
     // The hub advances by x_cp of the old triangle plus the rest of the new one; over a revolution that is the chords.
@@ -122,7 +123,8 @@ TEST(WheelMap, DurationWithoutABarrier) {
     const double next = s.gain + 0.01;  // omega+^2 = 0.01
     boost::math::quadrature::tanh_sinh<double> rule;
     const double expected = rule.integrate(
-        [&](double t) { return 1 / std::sqrt(0.01 + s.pendulum * (std::sin(s.start_angle) - std::sin(t))); }, s.start_angle, s.end_angle);
+        [&](double t) { return 1 / std::sqrt(0.01 + s.pendulum * (std::sin(s.start_angle) - std::sin(t))); },
+        s.start_angle, s.end_angle);
     EXPECT_NEAR(map.duration(next, p) / expected, 1, 1e-9);
     EXPECT_EQ(map.duration(s.gain - 1e-3, p), std::numeric_limits<double>::infinity());
   }
@@ -156,7 +158,10 @@ TEST(WheelMap, IllegalInputIsNamed) {
   EXPECT_EQ(message_of([] { WheelMap(Wheel(), 0, Law::plastic, noise); }),
             "slope: 0 deg is outside (0, 22.5) deg (half the angle between legs)");
   const WheelMap map(Wheel(), 7.02 * degree, Law::plastic, noise);
-  EXPECT_EQ(message_of([&] { map.tabulate(0, std::array{1.0, 2.0, 3.0}); }), "score: 3 numbers are not a multiple of 2");
+  EXPECT_EQ(message_of([&] {
+              map.tabulate(0, std::array{1.0, 2.0, 3.0});
+            }),
+            "score: 3 numbers are not a multiple of 2");
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
 #include "dynamics/wheel.h"
 
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
 #include <cmath>
 #include <limits>
 #include <numbers>
-
-#include <gtest/gtest.h>
-#include <rapidcheck/gtest.h>
 
 #include "support.h"
 

@@ -1,5 +1,5 @@
-// Runs every file of a folder through the fuzz target's function. Files named good-* must be experiments without defects,
-// files named bad-* must have some; other names only have to be survived.
+// Runs every file of a folder through the fuzz target's function. Files named good-* must be experiments without
+// defects, files named bad-* must have some; other names only have to be survived.
 
 #include <algorithm>
 #include <cstdio>
@@ -26,7 +26,8 @@ int main(int argc, char** argv) {
     const std::string text(std::istreambuf_iterator<char>(in), {});
     std::printf("%s\n", file.filename().c_str());
     std::fflush(stdout);
-    const bool good = metastable::fuzz::read_experiment_input(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+    const bool good =
+        metastable::fuzz::read_experiment_input(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
     const std::string name = file.filename().string();
     if ((name.starts_with("good-") && !good) || (name.starts_with("bad-") && good)) {
       std::printf("  was %s\n", good ? "read without a defect" : "refused");

@@ -16,9 +16,7 @@ TEST(ChainFiles, HoldLaunchChainAndRest) {
       "%%MatrixMarket matrix coordinate real general\n% state 1: launch, last state: rest\n4 4 9\n1 2 0.75\n"));
 }
 
-TEST(ChainFiles, RefuseALaunchOfAnotherSize) {
-  EXPECT_THROW(chain_files(Chain(), {{1.0}, 0}), std::invalid_argument);
-}
+TEST(ChainFiles, RefuseALaunchOfAnotherSize) { EXPECT_THROW(chain_files(Chain(), {{1.0}, 0}), std::invalid_argument); }
 
 }  // namespace
 }  // namespace metastable::markov

@@ -32,7 +32,8 @@ struct InformedMap : LinearMap {
   struct Table {
     std::vector<double> shift;
     double a;
-    void land(double origin, double width, std::span<const double> offset, std::size_t first, std::span<double> next) const {
+    void land(double origin, double width, std::span<const double> offset, std::size_t first,
+              std::span<double> next) const {
       for (std::size_t k = 0; k < next.size(); ++k) {
         const double landed = a * (origin + width * offset[k]) + shift[first + k];
         next[k] = landed < 0 ? rest_landing : landed;
@@ -74,7 +75,8 @@ double reference_steps(const LinearMap& map) {
   for (int i = 0; i < n; ++i) {
     const double x = (i + 0.5) * h;
     double total = 0;
-    for (int j = 0; j < n; ++j) total += off[static_cast<std::size_t>(i) * n + static_cast<std::size_t>(j)] = density(x, (j + 0.5) * h) * h;
+    for (int j = 0; j < n; ++j)
+      total += off[static_cast<std::size_t>(i) * n + static_cast<std::size_t>(j)] = density(x, (j + 0.5) * h) * h;
     kill[static_cast<std::size_t>(i)] = 0.5 * std::erfc((map.a * x + map.b) / map.s / std::sqrt(2.0));
     EXPECT_NEAR(total + kill[static_cast<std::size_t>(i)], 1.0, 1e-6);
   }
@@ -120,12 +122,15 @@ TEST(Discretization, ExactRestAgreesWithCountedRest) {
 }
 
 TEST(Discretization, RowsAndLaunchSumToOne) {
-  const SampledChain sampled = discretize(TwoPhaseMap{}, covering_space(TwoPhaseMap{}, from_four, 64, 1), from_four, {});
+  const SampledChain sampled =
+      discretize(TwoPhaseMap{}, covering_space(TwoPhaseMap{}, from_four, 64, 1), from_four, {});
   for (std::size_t i = 0; i < sampled.chain.size(); ++i) {
     const auto values = sampled.chain.values(i);
-    EXPECT_NEAR(std::accumulate(values.begin(), values.end(), sampled.chain.kill(i)), 1.0, 1e-12);  // two phases: no staying
+    EXPECT_NEAR(std::accumulate(values.begin(), values.end(), sampled.chain.kill(i)), 1.0,
+                1e-12);  // two phases: no staying
   }
-  EXPECT_NEAR(std::accumulate(sampled.launch.after.begin(), sampled.launch.after.end(), sampled.launch.rest), 1.0, 1e-12);
+  EXPECT_NEAR(std::accumulate(sampled.launch.after.begin(), sampled.launch.after.end(), sampled.launch.rest), 1.0,
+              1e-12);
   EXPECT_EQ(find_period(sampled.chain).period, 2);
 }
 
@@ -184,7 +189,8 @@ TEST(StateSpace, GradedCellsKeepTheRangeThatMatters) {
     if (grid.lower(c) < 6) widest_low = std::max(widest_low, grid.width(c));
   }
   EXPECT_LE(widest_low / narrowest, 4.2);
-  EXPECT_NEAR(steps_from_launch_of(discretize(LinearMap{}, graded, from_four, options)) / reference_steps(LinearMap{}), 1.0, 0.02);
+  EXPECT_NEAR(steps_from_launch_of(discretize(LinearMap{}, graded, from_four, options)) / reference_steps(LinearMap{}),
+              1.0, 0.02);
 }
 
 TEST(StateSpace, UpperEdgeHoldsTheRegimeAndTheLaunch) {

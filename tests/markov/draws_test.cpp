@@ -20,7 +20,8 @@ double moment(const Draws& draws, int dimension, int power) {
   double sum = 0;
   for (std::size_t k = 0; k < draws.count(); ++k)
     sum += draws.weight[k] *
-           std::pow(draws.score[k * static_cast<std::size_t>(draws.dimension) + static_cast<std::size_t>(dimension)], power);
+           std::pow(draws.score[k * static_cast<std::size_t>(draws.dimension) + static_cast<std::size_t>(dimension)],
+                    power);
   return sum;
 }
 

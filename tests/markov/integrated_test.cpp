@@ -95,7 +95,8 @@ TEST(Integrate, KeepsThePeriodOfPhases) {
   const ChainSolver solver(b.chain.chain);
   EXPECT_EQ(solver.period().period, 3);
   EXPECT_NEAR(steps(b) / steps(a), 1, 1e-12);
-  EXPECT_NEAR(quasi_stationary(solver).failure_rate / quasi_stationary(ChainSolver(a.chain.chain)).failure_rate, 1, 1e-12);
+  EXPECT_NEAR(quasi_stationary(solver).failure_rate / quasi_stationary(ChainSolver(a.chain.chain)).failure_rate, 1,
+              1e-12);
 }
 
 TEST(Integrate, AgreesWithTheSampledChain) {

@@ -56,7 +56,8 @@ class CommandLine : public testing::Test {
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
   std::vector<std::string> left_behind() const {
     std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(folder_)) names.push_back(entry.path().filename().string());
+    for (const auto& entry : std::filesystem::directory_iterator(folder_))
+      names.push_back(entry.path().filename().string());
     std::sort(names.begin(), names.end());
     return names;
   }
@@ -119,7 +120,8 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"steps", "--config", path("missing.toml")}, "missing.toml"},
       {{"steps", "--config", file("key.toml", "slope = 7.02\nslop = 3\n")}, "key.toml:2: unknown key 'slop'"},
       {{"steps", "--config", file("toml.toml", "slope = = 3\n")}, "toml.toml:1"},
-      {{"steps", "--contact-list", file("list.csv", "restitution,friction\n0.4,0.3\n1.4,0.3\n")}, "list.csv:3: column restitution"},
+      {{"steps", "--contact-list", file("list.csv", "restitution,friction\n0.4,0.3\n1.4,0.3\n")},
+       "list.csv:3: column restitution"},
       {{"compare", "--slopes", "7.02"}, "--slopes: 1 given where at least 2"},
       {{"compare", "--slopes", "7.02,9.59", "--initial-speed", "7,0.1"}, "--initial-speed: 1 values for 2 slopes"},
       {{"sweep"}, "no range given"},
@@ -153,7 +155,8 @@ TEST_F(CommandLine, StepsWritesTheKeysThatWerePromised) {
     EXPECT_TRUE(steps.at(key).is_number()) << key;
   EXPECT_LT(steps.at("interval_95")[0].get<double>(), steps.at("from_start").get<double>());
   EXPECT_GT(steps.at("interval_95")[1].get<double>(), steps.at("from_start").get<double>());
-  for (const char* key : {"failure_rate_per_step", "mixing_steps", "reach_ramp_end"}) EXPECT_TRUE(json.at(key).is_number()) << key;
+  for (const char* key : {"failure_rate_per_step", "mixing_steps", "reach_ramp_end"})
+    EXPECT_TRUE(json.at(key).is_number()) << key;
   EXPECT_GE(json.at("eigenvalue_moduli").size(), 3u);
   EXPECT_TRUE(json.at("quasi_stationary").at("mean_rad_s").is_number());
   EXPECT_TRUE(json.at("quasi_stationary").at("sd_rad_s").is_number());
@@ -193,7 +196,8 @@ TEST_F(CommandLine, ComparePrintsTheContrast) {
 }
 
 TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
-  const std::vector<std::string> words = with({"sweep", "--friction-sd", "0.1:0.2:0.05", "--friction-mean", "0.3,0.4"}, quick);
+  const std::vector<std::string> words =
+      with({"sweep", "--friction-sd", "0.1:0.2:0.05", "--friction-mean", "0.3,0.4"}, quick);
   ASSERT_EQ(metastable(with(words, {"--out", path("whole.csv")})).code, 0);
   const std::string whole = content(path("whole.csv"));
   EXPECT_TRUE(std::filesystem::exists(path("whole.svg")));
@@ -208,8 +212,10 @@ TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
   EXPECT_FALSE(std::filesystem::exists(path("part.csv.partial")));
   // Nor does one over other contacts of as many pairs.
   const auto by_list = [&](const std::string& pairs) {
-    return metastable(with({"sweep", "--slope", "7:8:0.5", "--initial-speed", "7,0.2", "--out", path("list.csv"), "--contact-list",
-                            file("pairs.csv", "restitution,friction\n" + pairs)}, quick)).code;
+    return metastable(with({"sweep", "--slope", "7:8:0.5", "--initial-speed", "7,0.2", "--out", path("list.csv"),
+                            "--contact-list", file("pairs.csv", "restitution,friction\n" + pairs)},
+                           quick))
+        .code;
   };
   EXPECT_EQ(by_list("0.4,0.4\n0.5,0.3\n"), 0);
   EXPECT_EQ(by_list("0.4,0.4\n0.5,0.6\n"), 2);
