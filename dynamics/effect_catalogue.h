@@ -1,0 +1,60 @@
+#pragma once
+// Effects that a model of the wheel may lack: their names, parameters and meaning. No formula lives here: the virtual
+// laboratory and the diagnosis each put them into their own equations.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace metastable::dynamics {
+
+/// One parameter of an effect.
+struct EffectParameter {
+  std::string name;
+  std::string unit;               ///< "" for a ratio
+  std::optional<double> neutral;  ///< value without effect; nothing: as the model states it (NominalValues)
+  double lower = 0, upper = 0;    ///< allowed range, bounds included
+  std::string meaning;
+  bool integer = false;  ///< only whole numbers
+  bool per_leg = false;  ///< a list, one value a leg
+};
+
+/// One effect. eta and mu stand for the restitution and friction drawn at a collision.
+struct EffectInfo {
+  std::string id;
+  std::string summary;
+  std::vector<EffectParameter> parameters;
+};
+
+/// All effects, in a fixed order.
+const std::vector<EffectInfo>& effect_catalogue();
+/// @throws std::invalid_argument naming the id and all known ones
+const EffectInfo& effect_info(std::string_view id);
+
+/// An effect of given size. `values` follow the order of the parameters; a list takes as many places as it has values.
+struct Effect {
+  std::string id;
+  std::vector<double> values;
+};
+
+/// What the model states, for parameters without a neutral value of their own.
+struct NominalValues {
+  double restitution_mean = 0, restitution_sd = 0, friction_mean = 0, friction_sd = 0;
+  std::vector<double> leg_lengths;  ///< [m]
+};
+
+/// The effect with named values; a parameter that is not named is neutral.
+/// @throws std::invalid_argument naming effect, parameter, value and allowed range: unknown id or parameter, a value
+///         out of range, no whole number where one is needed, a list of the wrong length, from_m >= to_m
+Effect effect_from_values(std::string_view id, const std::map<std::string, std::vector<double>>& values,
+                          const NominalValues& nominal);
+
+/// "leg_contact:leg=3,friction_ratio=1.4" (the colon and what follows may be absent; a list is written 0.15;0.151;...).
+/// @throws std::invalid_argument as effect_from_values, and for text that cannot be read (quotes it)
+Effect effect_from_text(std::string_view text, const NominalValues& nominal);
+/// The inverse, with every value in as many digits as it needs.
+std::string effect_text(const Effect& effect);
+
+}  // namespace metastable::dynamics
