@@ -62,6 +62,8 @@ void CameraOptions::validate() const {
     throw std::invalid_argument(fmt::format("angle rate: {} Hz is outside [10, 100000]", rate));
   if (!(noise_sd >= 0) || !std::isfinite(noise_sd))
     throw std::invalid_argument(fmt::format("angle noise: {} rad is outside [0, inf)", noise_sd));
+  if (decimals < 1 || decimals > 15)
+    throw std::invalid_argument(fmt::format("angle decimals: {} is outside 1..15", decimals));
 }
 
 AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial& trial, const CameraOptions& options,
@@ -118,20 +120,28 @@ AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial
   }
 }
 
+std::string angle_csv(const std::vector<SimulatedCondition>& conditions, const CameraOptions& options) {
+  options.validate();
+  std::string text = "condition,trial,time_s,angle_rad\n";
+  std::size_t before = 0;
+  for (const auto& [id, setting, trials] : conditions) {
+    const dynamics::WheelMap map = setting.map();
+    std::vector<std::string> rows(trials.size());
+    markov::parallel_for(trials.size(), options.threads, [&](std::size_t t) {
+      const AngleRecording recording = record_angle(map, trials[t], options, before + t);
+      for (std::size_t k = 0; k < recording.time.size(); ++k)
+        fmt::format_to(std::back_inserter(rows[t]), "{},{},{:.6f},{:.{}f}\n", id, before + t + 1, recording.time[k],
+                       recording.angle[k], options.decimals);
+    });
+    for (const std::string& part : rows) text += part;
+    before += trials.size();
+  }
+  return text;
+}
+
 std::string angle_csv(const Setting& setting, const std::vector<dynamics::Trial>& trials,
                       const CameraOptions& options) {
-  options.validate();
-  const dynamics::WheelMap map = setting.map();
-  std::vector<std::string> rows(trials.size());
-  markov::parallel_for(trials.size(), options.threads, [&](std::size_t t) {
-    const AngleRecording recording = record_angle(map, trials[t], options, t);
-    for (std::size_t k = 0; k < recording.time.size(); ++k)
-      fmt::format_to(std::back_inserter(rows[t]), "{},{},{:.6f},{:.9f}\n", setting.slope_deg, t + 1, recording.time[k],
-                     recording.angle[k]);
-  });
-  std::string text = "condition,trial,time_s,angle_rad\n";
-  for (const std::string& part : rows) text += part;
-  return text;
+  return angle_csv({{fmt::format("{}", setting.slope_deg), setting, trials}}, options);
 }
 
 }  // namespace metastable::analysis

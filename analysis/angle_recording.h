@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/experiment_folder.h"
 #include "analysis/setting.h"
 #include "dynamics/trials.h"
 
@@ -18,6 +19,7 @@ struct AngleRecording {
 struct CameraOptions {
   double rate = 120;         ///< frames per second [Hz], [10, 100000]
   double noise_sd = 0.0002;  ///< white noise of the angle [rad], >= 0
+  int decimals = 9;          ///< of the angle in angle.csv, 1..15
   std::uint64_t seed = 1;
   int threads = 0;  ///< the same bits on any number
   /// @throws std::invalid_argument naming the option and its range
@@ -31,7 +33,9 @@ struct CameraOptions {
 AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial& trial, const CameraOptions& options,
                             std::uint64_t index);
 
-/// angle.csv of all trials, as text.
+/// angle.csv of all trials, as text; trials are numbered through all conditions.
+std::string angle_csv(const std::vector<SimulatedCondition>& conditions, const CameraOptions& options);
+/// The same for one condition, whose id is its slope.
 std::string angle_csv(const Setting& setting, const std::vector<dynamics::Trial>& trials, const CameraOptions& options);
 
 }  // namespace metastable::analysis

@@ -66,44 +66,55 @@ std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const Simul
                                      .ramp_length = setting.ramp_length,
                                      .seed = options.seed};
   std::vector<dynamics::Trial> trials(static_cast<std::size_t>(options.trials));
-  markov::parallel_for(trials.size(), options.threads,
-                       [&](std::size_t t) { trials[t] = dynamics::simulate_trial(map, launch, trial, t); });
+  markov::parallel_for(trials.size(), options.threads, [&](std::size_t t) {
+    trials[t] = dynamics::simulate_trial(map, launch, trial, options.first + t);
+  });
   return trials;
+}
+
+ExperimentFiles experiment_files(const std::vector<SimulatedCondition>& conditions, const std::string& title,
+                                 const std::vector<std::string>& comment) {
+  if (conditions.empty()) throw std::invalid_argument("experiment: no condition");
+  const Setting& first = conditions.front().setting;
+  const Nominal contact = nominal(first);
+  ExperimentFiles files;
+  std::string& toml = files.experiment_toml;
+  for (const std::string& line : comment) toml += "# " + line + "\n";
+  toml +=
+      fmt::format("title = {}\n\n[wheel]\nhub_mass_kg = {}\nleg_lengths_m = [", toml_text(title), first.wheel.hub_mass);
+  for (std::size_t i = 0; i < first.wheel.leg_length.size(); ++i)
+    toml += fmt::format("{}{}", i == 0 ? "" : ", ", first.wheel.leg_length[i]);
+  toml += "]\n";
+  if (first.wheel.inertia) toml += fmt::format("inertia_kg_m2 = {}\n", *first.wheel.inertia);
+  if (first.law != dynamics::Law::published)
+    toml +=
+        fmt::format("radius_of_gyration_m = {}\n", dynamics::contact_model(first.wheel, first.law).radius_of_gyration);
+  toml += fmt::format("\n[contact]\nlaw = \"{}\"\nrestitution = {}\nfriction = {}\n", dynamics::law_name(first.law),
+                      toml_spread(contact.restitution), toml_spread(contact.friction));
+  if (!first.pairs.empty()) toml += "# drawn from a list of pairs; these are its means and sds\n";
+
+  files.collisions_csv = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
+  files.trials_csv = "condition,trial,outcome\n";
+  std::size_t number = 0;
+  for (const auto& [id, setting, trials] : conditions) {
+    toml += fmt::format(
+        "\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\ninitial_speed_rad_s = {}\n"
+        "first_landing_leg = {}\n",
+        id, setting.slope_deg, setting.ramp_length, toml_spread(setting.initial_speed), setting.first_landing_leg);
+    for (const dynamics::Trial& trial : trials) {
+      ++number;
+      for (const dynamics::TrialCollision& c : trial.collisions)
+        files.collisions_csv += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", id, number, c.number, c.leg,
+                                            c.time, c.position, c.omega_minus, c.omega_plus);
+      files.trials_csv += fmt::format("{},{},{}\n", id, number, outcome_name(trial.outcome));
+    }
+  }
+  return files;
 }
 
 ExperimentFiles experiment_files(const Setting& setting, const std::vector<dynamics::Trial>& trials,
                                  const std::string& title, const std::vector<std::string>& comment) {
-  const std::string condition = fmt::format("{}", setting.slope_deg);
-  const Nominal contact = nominal(setting);
-  ExperimentFiles files;
-  std::string& toml = files.experiment_toml;
-  for (const std::string& line : comment) toml += "# " + line + "\n";
-  toml += fmt::format("title = {}\n\n[wheel]\nhub_mass_kg = {}\nleg_lengths_m = [", toml_text(title),
-                      setting.wheel.hub_mass);
-  for (std::size_t i = 0; i < setting.wheel.leg_length.size(); ++i)
-    toml += fmt::format("{}{}", i == 0 ? "" : ", ", setting.wheel.leg_length[i]);
-  toml += "]\n";
-  if (setting.wheel.inertia) toml += fmt::format("inertia_kg_m2 = {}\n", *setting.wheel.inertia);
-  if (setting.law != dynamics::Law::published)
-    toml += fmt::format("radius_of_gyration_m = {}\n",
-                        dynamics::contact_model(setting.wheel, setting.law).radius_of_gyration);
-  toml += fmt::format("\n[contact]\nlaw = \"{}\"\nrestitution = {}\nfriction = {}\n", dynamics::law_name(setting.law),
-                      toml_spread(contact.restitution), toml_spread(contact.friction));
-  if (!setting.pairs.empty()) toml += "# drawn from a list of pairs; these are its means and sds\n";
-  toml += fmt::format(
-      "\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\ninitial_speed_rad_s = {}\nfirst_landing_leg = "
-      "{}\n",
-      condition, setting.slope_deg, setting.ramp_length, toml_spread(setting.initial_speed), setting.first_landing_leg);
-
-  files.collisions_csv = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
-  files.trials_csv = "condition,trial,outcome\n";
-  for (std::size_t t = 0; t < trials.size(); ++t) {
-    for (const dynamics::TrialCollision& c : trials[t].collisions)
-      files.collisions_csv += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", condition, t + 1, c.number,
-                                          c.leg, c.time, c.position, c.omega_minus, c.omega_plus);
-    files.trials_csv += fmt::format("{},{},{}\n", condition, t + 1, outcome_name(trials[t].outcome));
-  }
-  return files;
+  return experiment_files({{fmt::format("{}", setting.slope_deg), setting, trials}}, title, comment);
 }
 
 }  // namespace metastable::analysis

@@ -14,19 +14,31 @@ struct SimulationOptions {
   int trials = 50;      ///< 1 .. 1000000
   int collisions = 16;  ///< most collisions of a trial, 1 .. 100000
   std::uint64_t seed = 1;
-  int threads = 0;  ///< the same bits on any number
+  int threads = 0;          ///< the same bits on any number
+  std::uint64_t first = 0;  ///< index of the first trial: conditions of one experiment take different ones
 };
 
-/// Trials 0 .. trials-1 under `setting`. @throws std::invalid_argument naming the option and its range
+/// Trials first .. first+trials-1 under `setting`. @throws std::invalid_argument naming the option and its range
 std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const SimulationOptions& options);
 
-/// The three files of an experiment folder with one condition, as text. Speeds in rad/s, lengths in m, times in s.
+/// One condition of a simulated experiment.
+struct SimulatedCondition {
+  std::string id;
+  Setting setting;
+  std::vector<dynamics::Trial> trials;
+};
+
+/// The three files of an experiment folder, as text. Speeds in rad/s, lengths in m, times in s.
 struct ExperimentFiles {
   std::string experiment_toml;
   std::string collisions_csv;
   std::string trials_csv;
 };
+/// Trials are numbered through all conditions. Wheel and contact are those of the first condition.
 /// @param title, comment  of experiment.toml; the comment's lines come first, each behind "# "
+ExperimentFiles experiment_files(const std::vector<SimulatedCondition>& conditions, const std::string& title,
+                                 const std::vector<std::string>& comment);
+/// The same for one condition, whose id is its slope.
 ExperimentFiles experiment_files(const Setting& setting, const std::vector<dynamics::Trial>& trials,
                                  const std::string& title, const std::vector<std::string>& comment);
 

@@ -50,6 +50,7 @@ struct SimulateRequest {
   std::string out;  ///< folder
   std::string command;
   std::optional<analysis::CameraOptions> camera = {};  ///< given: angle.csv too
+  bool stand_in = false;  ///< the paper's three conditions instead of `trials` of one (analysis/stand_in.h)
 };
 
 /// metastable collisions

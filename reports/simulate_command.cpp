@@ -4,13 +4,26 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <vector>
 
 #include "analysis/experiment_folder.h"
+#include "analysis/stand_in.h"
 #include "reports/output_file.h"
 #include "reports/table.h"
 #include "reports/version.h"
 
 namespace metastable::reports {
+namespace {
+
+analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
+  return {fmt::format("{}", request.setting.slope_deg), request.setting,
+          analysis::simulate_trials(request.setting, {.trials = request.trials,
+                                                      .collisions = request.collisions,
+                                                      .seed = request.seed,
+                                                      .threads = request.threads})};
+}
+
+}  // namespace
 
 void run_simulate(const SimulateRequest& request) {
   const std::filesystem::path folder = request.out;
@@ -18,24 +31,30 @@ void run_simulate(const SimulateRequest& request) {
     if (std::filesystem::exists(folder / name))
       throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
   make_folder(folder);
-  const std::vector<dynamics::Trial> trials = analysis::simulate_trials(
-      request.setting,
-      {.trials = request.trials, .collisions = request.collisions, .seed = request.seed, .threads = request.threads});
-  const Provenance provenance{request.command, request.setting.describe(), request.seed, version()};
-  analysis::ExperimentFiles files = analysis::experiment_files(
-      request.setting, trials, fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg),
-      provenance_lines(provenance));
+  const std::vector<analysis::SimulatedCondition> conditions =
+      request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
+                       : std::vector<analysis::SimulatedCondition>{one_condition(request)};
+  Provenance provenance{request.command, {}, request.seed, version()};
+  for (const analysis::SimulatedCondition& condition : conditions)
+    provenance.settings += (provenance.settings.empty() ? "" : "\n") + condition.setting.describe();
+  const std::string title = request.stand_in
+                                ? "Simulated stand-in of the paper's three experiments (not a measurement)"
+                                : fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg);
+  analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
   if (request.camera) {
     files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
-    write_file(folder / "angle.csv", analysis::angle_csv(request.setting, trials, *request.camera));
+    write_file(folder / "angle.csv", analysis::angle_csv(conditions, *request.camera));
   }
   // experiment.toml last: a folder without it is not an experiment yet.
   write_file(folder / "collisions.csv", files.collisions_csv);
   write_file(folder / "trials.csv", files.trials_csv);
   write_file(folder / "experiment.toml", files.experiment_toml);
-  const auto rested = std::count_if(trials.begin(), trials.end(),
-                                    [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
-  fmt::print("{}: {} trials, {} of them came to rest\n", request.out, trials.size(), rested);
+  for (const auto& [id, setting, trials] : conditions) {
+    const auto rested = std::count_if(trials.begin(), trials.end(),
+                                      [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
+    fmt::print("{}: {} trials{}, {} of them came to rest\n", request.out, trials.size(),
+               request.stand_in ? " of " + id : "", rested);
+  }
 }
 
 }  // namespace metastable::reports

@@ -1,0 +1,21 @@
+#pragma once
+// One command of the command line: its options, and its request from them.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "reports/options.h"
+
+namespace metastable::reports {
+
+struct Command {
+  std::string name, summary;
+  std::function<void(Options&)> declare;
+  std::function<void(const Options&, const std::string& command_line)> run;
+};
+
+/// simulate, collisions, describe, study: the commands about experiments.
+std::vector<Command> experiment_commands();
+
+}  // namespace metastable::reports

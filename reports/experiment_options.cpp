@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "analysis/stand_in.h"
+#include "reports/collisions_command.h"
+#include "reports/command.h"
+#include "reports/setting_options.h"
+#include "reports/simulate_command.h"
+
+namespace metastable::reports {
+namespace {
+
+// Its conditions come with slope, launch and number of trials; the rest can be chosen.
+analysis::Setting stand_in_base(const Options& o) {
+  for (const char* name : {"slope", "initial-speed", "trials", "collisions"})
+    if (o.given(name)) throw std::invalid_argument(fmt::format("--{}: is fixed by --stand-in", name));
+  analysis::Setting setting = common_setting(o);
+  const analysis::Setting chosen = analysis::stand_in_setting();
+  if (!o.given("restitution")) setting.restitution = chosen.restitution;
+  if (!o.given("friction")) setting.friction = chosen.friction;
+  return setting;
+}
+
+}  // namespace
+
+std::vector<Command> experiment_commands() {
+  return {
+      {"simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)",
+       [](Options& o) {
+         o.add("slope", "DEG", "7.02", "Ramp slope [deg]");
+         o.add("initial-speed", "MEAN,SD", "",
+               "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
+         add_wheel(o), add_contact(o), add_course(o);
+         o.add_flag("stand-in",
+                    "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
+                    "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
+         o.add("trials", "N", "50", "Trials");
+         o.add("collisions", "N", "16", "Most collisions of a trial");
+         o.add("angle-rate", "HZ", "",
+               "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
+         o.add("angle-noise", "RAD", "", "White noise of the angle (default 0.0002; needs --angle-rate)");
+         o.add("seed", "SEED", "1", "Seed of the random numbers");
+         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+       },
+       [](const Options& o, const std::string& line) {
+         if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
+         const bool stand_in = o.flag("stand-in");
+         SimulateRequest request{stand_in ? stand_in_base(o) : one_setting(o),
+                                 static_cast<int>(o.whole("trials", 1, 1000000)),
+                                 static_cast<int>(o.whole("collisions", 1, 100000)),
+                                 o.whole("seed", 0, UINT64_MAX),
+                                 static_cast<int>(o.whole("threads", 0, 1024)),
+                                 o.text("out"),
+                                 line};
+         if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
+           throw std::invalid_argument("--angle-noise: needs --angle-rate");
+         request.stand_in = stand_in;
+         if (o.given("angle-rate") || stand_in) {
+           analysis::CameraOptions& camera = request.camera.emplace();
+           if (o.given("angle-rate")) camera.rate = o.number("angle-rate");
+           if (stand_in) camera.decimals = 5;  // a twentieth of the noise; keeps the folder small
+           if (o.given("angle-noise")) camera.noise_sd = o.number("angle-noise");
+           camera.seed = request.seed;
+           camera.threads = request.threads;
+           camera.validate();
+         }
+         run_simulate(request);
+       }},
+      {"collisions", "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
+       [](Options& o) {
+         o.add_place("DIR", "Experiment folder with experiment.toml and angle.csv");
+         o.add("window", "N", "",
+               "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples)");
+         o.add("collisions", "N", "16", "Most collisions of a trial");
+         o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides");
+         o.add("omega-minus", "fit|peak", "fit",
+               "Stance motion extrapolated to the collision, or the smoothed speed's peak");
+         o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision");
+         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
+       },
+       [](const Options& o, const std::string&) {
+         CollisionsRequest request;
+         request.folder = o.text("DIR");
+         if (o.given("window")) request.finder.window = static_cast<int>(o.whole("window", 5, 10001));
+         request.finder.collisions = static_cast<int>(o.whole("collisions", 1, 100000));
+         request.finder.rise = o.number("rise");
+         request.finder.fit_span = o.number("fit-span");
+         request.finder.validate();
+         const std::string speed = o.text("omega-minus");
+         if (speed != "fit" && speed != "peak")
+           throw std::invalid_argument(fmt::format("--omega-minus: '{}' is neither 'fit' nor 'peak'", speed));
+         request.peak = speed == "peak";
+         request.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.out = o.text("out");
+         run_collisions(request);
+       }},
+  };
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,68 @@
+#include "reports/options.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <stdexcept>
+
+#include "reports/config_file.h"
+#include "reports/option_values.h"
+
+namespace metastable::reports {
+
+void Options::add(const std::string& name, const std::string& value, const std::string& fallback,
+                  const std::string& help) {
+  std::vector<std::string>& texts = texts_[name];
+  CLI::Option* option = command_.add_option("--" + name, texts, help);
+  option->expected(1)->allow_extra_args(false)->type_name(value)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  if (!fallback.empty()) {
+    option->default_str(fallback);
+    fallback_[name] = fallback;
+  }
+}
+
+void Options::add_flag(const std::string& name, const std::string& help) {
+  std::vector<std::string>& texts = texts_[name];
+  command_.add_flag_callback(
+      "--" + name, [&texts] { texts = {"true"}; }, help);
+  fallback_[name] = "false";
+}
+
+void Options::add_place(const std::string& name, const std::string& help) {
+  command_.add_option(name, texts_[name], help)->required()->expected(1)->type_name("");
+}
+
+void Options::read(const std::string& file) {
+  for (const ConfigEntry& entry : read_config(file)) {
+    if (entry.key == "config" || !texts_.contains(entry.key))
+      throw std::invalid_argument(fmt::format("{}:{}: unknown key '{}' (keys are the long options of 'metastable {}')",
+                                              file, entry.line, entry.key, command_.get_name()));
+    std::vector<std::string>& texts = texts_[entry.key];
+    if (texts.empty()) texts = entry.values;
+  }
+}
+
+std::string Options::text(const std::string& name) const {
+  const std::vector<std::string>& texts = texts_.at(name);
+  if (texts.size() > 1) throw std::invalid_argument(fmt::format("--{}: given {} times", name, texts.size()));
+  if (!texts.empty()) return texts.front();
+  const auto fallback = fallback_.find(name);
+  return fallback == fallback_.end() ? "" : fallback->second;
+}
+
+bool Options::flag(const std::string& name) const {
+  const std::string value = text(name);
+  if (value != "true" && value != "false")
+    throw std::invalid_argument(fmt::format("--{}: '{}' is neither true nor false", name, value));
+  return value == "true";
+}
+
+double Options::number(const std::string& name) const { return number_value(name, text(name)); }
+
+std::uint64_t Options::whole(const std::string& name, std::uint64_t least, std::uint64_t most) const {
+  return whole_value(name, text(name), least, most);
+}
+
+analysis::Spread Options::spread(const std::string& name) const { return spread_value(name, text(name)); }
+
+}  // namespace metastable::reports

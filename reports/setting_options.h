@@ -1,0 +1,30 @@
+#pragma once
+// Options that several commands share: wheel, contact, course, study.
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/metastability.h"
+#include "analysis/setting.h"
+#include "reports/options.h"
+
+namespace metastable::reports {
+
+void add_wheel(Options& options);
+void add_contact(Options& options);
+void add_course(Options& options);
+void add_study(Options& options);
+
+/// What the options above say, all but slope and launch speed.
+analysis::Setting common_setting(const Options& options);
+/// `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
+analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);
+/// With --slope and --initial-speed, checked.
+analysis::Setting one_setting(const Options& options);
+/// One a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
+std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least);
+analysis::StudyOptions study_options(const Options& options);
+
+}  // namespace metastable::reports
