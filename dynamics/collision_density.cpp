@@ -1,0 +1,180 @@
+#include "dynamics/collision_density.h"
+
+#include <algorithm>
+#include <array>
+#include <boost/math/quadrature/gauss.hpp>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "dynamics/coulomb_law.h"
+#include "dynamics/truncated_normal.h"
+
+namespace metastable::dynamics {
+namespace {
+
+constexpr double reach = 4.6;  // scores beyond it weigh 4e-6
+
+// Nodes in the standard score between `from` and `to`, with the normal's probabilities: equally spaced where the normal
+// fades out at both ends (then the rule converges exponentially), Gauss-Legendre where it is cut.
+template <class Add>
+void score_nodes(double from, double to, double spacing, Add add) {
+  if (from <= -reach && to >= reach) {
+    const int half = static_cast<int>(std::ceil(reach / spacing));
+    for (int i = -half; i <= half; ++i) add(i * spacing, spacing * normal_density(i * spacing));
+    return;
+  }
+  from = std::max(from, -reach);
+  to = std::min(to, reach);
+  if (!(from < to)) return;
+  using Rule = boost::math::quadrature::gauss<double, 30>;
+  const double middle = (from + to) / 2, half = (to - from) / 2;
+  for (std::size_t i = 0; i < Rule::abscissa().size(); ++i) {
+    const double offset = half * Rule::abscissa()[i], weight = half * Rule::weights()[i];
+    add(middle - offset, weight * normal_density(middle - offset));
+    if (offset != 0) add(middle + offset, weight * normal_density(middle + offset));
+  }
+}
+
+// Density and upper tail of mu = ratio N(mean, sd^2), mu >= 0.
+class Friction {
+ public:
+  Friction(const ContactSpread& contact, const CollisionChange& change)
+      : mean_((contact.friction_mean + change.friction_shift) * change.friction_ratio),
+        scale_(1 / (contact.friction_sd * change.friction_ratio)),
+        inverse_mass_(1 / normal_cdf(mean_ * scale_)) {}
+  double density(double mu) const { return normal_density((mu - mean_) * scale_) * scale_ * inverse_mass_; }
+  double above(double mu) const { return mu <= 0 ? 1 : normal_cdf((mean_ - mu) * scale_) * inverse_mass_; }
+  double below(double mu) const { return 1 - above(mu); }
+  double mean() const { return mean_; }
+  double sd() const { return 1 / scale_; }
+
+ private:
+  double mean_, scale_, inverse_mass_;
+};
+
+}  // namespace
+
+CollisionDensity::CollisionDensity(const ContactModel& model, const ContactSpread& contact)
+    : model_(model), contact_(contact) {
+  if (model.law == Law::plastic)
+    throw std::invalid_argument("law: plastic has no restitution and no friction that could be distributed");
+  if (!(contact.restitution_sd > 0 && contact.friction_sd > 0))
+    throw std::invalid_argument("contact: the sds of restitution and friction must be > 0");
+  const double from = -contact.restitution_mean / contact.restitution_sd;
+  const double to = (1 - contact.restitution_mean) / contact.restitution_sd;
+  restitution_mass_ = normal_cdf(to) - normal_cdf(from);
+  // Along the line of equal loss the product of the two densities is narrower than eta's alone by up to the ratio of
+  // what eta and mu contribute to the loss, about sd(eta) eta : sd(mu)/3.
+  const double contribution = 3 * contact.restitution_sd * contact.restitution_mean / contact.friction_sd;
+  const double spacing = std::clamp(1.1 / std::sqrt(1 + contribution * contribution), 0.1, 0.6);
+  score_nodes(from, to, spacing, [&](double score, double weight) {
+    restitution_.push_back({contact.restitution_mean + contact.restitution_sd * score, weight / restitution_mass_});
+  });
+}
+
+SpeedDensity CollisionDensity::at(const Collision& collision, double before, double after,
+                                  const CollisionChange& change, double speed) const {
+  return model_.law == Law::published ? published(collision, before, after, change, speed)
+                                      : coulomb(collision, before, after, change, speed);
+}
+
+SpeedDensity CollisionDensity::published(const Collision& c, double before, double after, const CollisionChange& change,
+                                         double speed) const {
+  // In units of M v0^2 r^2 / 2 the loss is [alpha D + (beta + delta D) mu (c mu - b)] / D^2 with D = a - b mu.
+  const double r2 = c.landing_length * c.landing_length;
+  const double a = r2 + c.contact_x * c.contact_x, b = c.contact_x * c.contact_y, cc = r2 + c.contact_y * c.contact_y;
+  const double v0 = c.normal_speed, omega = v0 / c.chord;
+  const double unit = model_.mass * v0 * v0 * r2 * change.loss_ratio;
+  const double loss = (before * omega * omega - after * speed * speed) / unit;
+  const double loss_rate = 2 * after * speed / unit;  // -d loss / d omega+
+  const double time = std::sqrt(model_.contact_mass / model_.ramp_stiffness);
+  const double pull = model_.gravity * std::sin(c.slope) / (v0 * r2);
+  const Friction friction(contact_, change);
+
+  SpeedDensity result;
+  for (const Node& node : restitution_) {
+    const double eta = std::min(1.0, node.value * change.restitution_ratio);
+    const double log_eta = std::log(std::max(eta, std::numeric_limits<double>::min()));
+    const double alpha = 1 - eta * eta * (1 - change.rebound_lost), beta = (1 + eta) * (1 + eta);
+    const double delta = pull * (1 + eta) * time * std::sqrt(std::numbers::pi * std::numbers::pi + log_eta * log_eta);
+    const double q2 = beta * cc - loss * b * b, q1 = b * (2 * loss * a - alpha - beta), q0 = a * (alpha - loss * a);
+    const double discriminant = q1 * q1 - 4 * q2 * q0;
+    if (!(discriminant > 0)) {  // every friction loses more
+      result.below += node.weight;
+      continue;
+    }
+    const double root = std::sqrt(discriminant);
+    const auto refine = [&](double mu) {  // Newton: the term with delta is a small cubic correction
+      double slope = 0;
+      for (int i = 0; i < 2; ++i) {
+        const double d = a - b * mu, s = mu * (cc * mu - b), ds = 2 * cc * mu - b;
+        slope = -alpha * b + (beta + delta * d) * ds - delta * b * s + 2 * loss * b * d;
+        mu -= (alpha * d + (beta + delta * d) * s - loss * d * d) / slope;
+      }
+      const double d = a - b * mu;
+      return std::pair{mu, d * d / std::abs(slope)};
+    };
+    const auto [upper, upper_rate] = refine(q1 <= 0 ? (root - q1) / (2 * q2) : -2 * q0 / (q1 + root));
+    result.below += node.weight * friction.above(upper);
+    if (upper > 0) result.density += node.weight * friction.density(upper) * upper_rate * loss_rate;
+    if (q2 <= 0) continue;
+    const double start = q1 <= 0 ? 2 * q0 / (root - q1) : -(q1 + root) / (2 * q2);
+    if (start <= 0) continue;  // there is no lower branch: friction below which the loss rises again
+    const auto [lower, lower_rate] = refine(start);
+    if (!(lower > 0 && lower < upper)) continue;
+    result.below += node.weight * friction.below(lower);
+    result.density += node.weight * friction.density(lower) * lower_rate * loss_rate;
+  }
+  result.below = std::clamp(result.below, 0.0, 1.0);
+  return result;
+}
+
+SpeedDensity CollisionDensity::coulomb(const Collision& c, double before, double after, const CollisionChange& change,
+                                       double speed) const {
+  const double omega = c.normal_speed / c.chord;
+  const double unit = c.normal_speed * c.normal_speed / 2 * change.loss_ratio;
+  const double loss = (before * omega * omega - after * speed * speed) / (2 * unit);
+  const double loss_rate = after * speed / unit;
+  const double rg2 = std::max(model_.radius_of_gyration * model_.radius_of_gyration, 1e-16);
+  const double x = c.contact_x, y = c.contact_y;
+  const double sticking = std::abs(x * y) / (rg2 + y * y);
+  const Friction friction(contact_, change);
+  const double eta_mean = contact_.restitution_mean * change.restitution_ratio;
+  const double eta_sd = contact_.restitution_sd * change.restitution_ratio;
+  const auto eta_below = [&](double eta) {
+    if (eta >= 1) return 1.0;
+    if (eta <= 0) return 0.0;
+    const double low = normal_cdf(-eta_mean / eta_sd);
+    return std::clamp((normal_cdf((eta - eta_mean) / eta_sd) - low) / restitution_mass_, 0.0, 1.0);
+  };
+  const auto eta_density = [&](double eta) {
+    return eta > 0 && eta < 1 ? normal_density((eta - eta_mean) / eta_sd) / (eta_sd * restitution_mass_) : 0.0;
+  };
+
+  SpeedDensity result;
+  // The loss at given mu: mass (1 - (1 - lost) eta^2) + rubbing (1 + eta)^2, in J per v0^2/2.
+  const auto add = [&](double weight, double mass, double rubbing) {
+    const double curvature = mass * (1 - change.rebound_lost) - rubbing;
+    const double discriminant = rubbing * rubbing + curvature * (mass + rubbing - loss);
+    if (!(discriminant > 0)) return;  // every restitution loses less
+    const double root = std::sqrt(discriminant);
+    const double high = (rubbing + root) / curvature, low = (rubbing - root) / curvature;
+    result.below += weight * (eta_below(high) - eta_below(low));
+    result.density += weight * (eta_density(high) + eta_density(low)) * loss_rate / (2 * root);
+  };
+  add(friction.above(sticking), model_.mass * (rg2 + y * y) / (rg2 + x * x + y * y), 0);
+  const double from = -friction.mean() / friction.sd(), to = (sticking - friction.mean()) / friction.sd();
+  const double mass_above_zero = normal_cdf(-from);
+  score_nodes(from, to, 0.5, [&](double score, double weight) {
+    const double mu = friction.mean() + friction.sd() * score;
+    const double normal = (rg2 + x * x - mu * x * y) / (model_.mass * rg2);
+    const double tangential = (x * y - mu * (rg2 + y * y)) / (model_.mass * rg2);
+    add(weight / mass_above_zero, 1 / normal, mu * std::abs(tangential) / (normal * normal));
+  });
+  result.below = std::clamp(result.below, 0.0, 1.0);
+  return result;
+}
+
+}  // namespace metastable::dynamics
