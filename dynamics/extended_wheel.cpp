@@ -118,7 +118,6 @@ double ExtendedWheel::barrier(const StepContext& context) const {
 }
 
 std::optional<double> ExtendedWheel::next(const StepContext& context, double omega_plus) const {
-  if (!(omega_plus >= barrier(context))) return std::nullopt;
   const Path p = path(context);
   const double squared = omega_plus * omega_plus + p.gain - work(p, omega_plus * omega_plus);
   if (!(squared > 0)) return std::nullopt;

@@ -69,7 +69,8 @@ class ExtendedWheel {
   std::optional<double> omega_plus(const StepContext& context, double omega, const Contact& drawn, bool outlier) const;
   /// Least omega+ that carries the hub over the foot [rad/s].
   double barrier(const StepContext& context) const;
-  /// omega just before the next collision [rad/s]; nothing: the wheel does not come over the foot.
+  /// omega just before the next collision [rad/s], by energy; nothing: there is none left. Whether the hub comes over the
+  /// foot is barrier()'s to say.
   std::optional<double> next(const StepContext& context, double omega_plus) const;
   /// omega+ from which the wheel arrives at the next collision with omega_next [rad/s]; nothing: there is none.
   std::optional<double> back(const StepContext& context, double omega_next) const;

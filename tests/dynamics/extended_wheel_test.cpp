@@ -66,7 +66,7 @@ TEST(ExtendedWheel, TorquesTakeTheirWork) {
     }
     const auto next = wheel.next({.leg = leg}, plus);
     ASSERT_TRUE(next);
-    EXPECT_NEAR(*next, omega, 2e-5);  // the torques take 0.13 rad/s here
+    EXPECT_NEAR(*next, omega, 1e-4);  // the torques take 0.13 rad/s here
     const auto back = wheel.back({.leg = leg}, *next);
     ASSERT_TRUE(back);
     EXPECT_NEAR(*back, plus, 1e-5);

@@ -1,0 +1,113 @@
+#pragma once
+// What the diagnosis knows of a system: one-step transition densities of its measured trials, with effects that can be
+// added. No wheel in here: any stochastic return map can be diagnosed that has these members.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace metastable::analysis {
+
+/// What a transition's density is of.
+enum class EventKind {
+  launch,     ///< the first speed
+  collision,  ///< omega+ given omega-
+  stance,     ///< the next omega- given omega+
+  step,       ///< the next omega- given this one
+  rest,       ///< coming to rest
+  survival    ///< not coming to rest after the last measured speed
+};
+
+/// One observed transition and where in the experiment it stands. The list of a data set does not depend on parameters.
+struct Event {
+  EventKind kind = EventKind::step;
+  std::size_t trial = 0;      ///< index, in the order the trials were run
+  std::size_t condition = 0;  ///< index
+  int number = 1;             ///< of the collision in its trial, from 1
+  std::optional<int> leg = {};
+  double position = 0;                        ///< [m]
+  std::optional<double> since_previous = {};  ///< collision [s]
+  double elapsed = 0;                         ///< since the trial's first collision [s]
+  double speed = 0;                           ///< given, the condition of the density [rad/s]
+};
+
+/// Logarithm of each event's density [events] and the normal score of its probability integral transform: independent
+/// and standard normal if the model is right. The score of a `survival` is 0.
+struct Evaluation {
+  std::vector<double> log_density;
+  std::vector<double> score;
+  std::vector<double> unit;  ///< change of the observed speed per unit of score, there [rad/s]
+  double total() const;
+};
+
+/// A parameter that is refitted with every hypothesis, held near its nominal value by a normal prior.
+struct Nuisance {
+  std::string name;
+  double nominal = 0;
+  double prior_sd = 1;
+  double step = 1e-4;  ///< for differences
+  double lower = 0, upper = 0;
+};
+
+/// A parameter of an effect that is fitted.
+struct FreeParameter {
+  double neutral = 0;
+  double lower = 0, upper = 0;
+  double step = 1e-4;  ///< for differences
+  double try_at = 0;   ///< a size worth starting from where the neutral value says nothing; 0: start at neutral
+};
+
+/// One reported number of an effect.
+using Named = std::pair<std::string, double>;
+
+/// An effect as it is fitted: some parameters are free, the others run over a list of variants (a leg, an interval).
+struct Candidate {
+  std::string id;
+  std::vector<FreeParameter> parameters;
+  std::vector<std::vector<double>> variants{{}};  ///< at least one
+  /// The fitted values under the names of the catalogue.
+  std::function<std::vector<Named>(const std::vector<double>& variant, const std::vector<double>& values)> report;
+  /// Why these data cannot tell it; empty if they can.
+  std::string undecidable;
+};
+
+/// A candidate with values.
+struct Term {
+  const Candidate* candidate = nullptr;
+  std::size_t variant = 0;
+  std::vector<double> values;
+};
+
+class TransitionModel {
+ public:
+  virtual ~TransitionModel() = default;
+  virtual const std::vector<Event>& events() const = 0;
+  virtual std::size_t trials() const = 0;
+  virtual std::size_t conditions() const = 0;
+  virtual int legs() const = 0;
+  virtual std::string condition_name(std::size_t condition) const = 0;
+  virtual const std::vector<Nuisance>& nuisances() const = 0;
+  virtual const std::vector<Candidate>& candidates() const = 0;
+  /// Densities with these nuisances and effects. Values outside a model's reach give a very small density, never a NaN.
+  virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const = 0;
+  /// The same design (trials, columns, conditions) with outcomes drawn from the model. Same seed, same data.
+  virtual std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
+                                                    std::uint64_t seed) const = 0;
+  /// Observed collisions at risk, and how many of them led to rest. Zero where outcomes are unknown.
+  virtual std::pair<double, double> rests() const = 0;
+  /// Expected steps before failure under the model, from its hazard along simulated trials as long as the measured
+  /// ones; infinity where it never rests.
+  virtual double expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
+                                std::uint64_t seed) const = 0;
+  /// What is not known or was assumed, a sentence each.
+  virtual const std::vector<std::string>& notes() const = 0;
+  /// The reported contact (or loss) parameters of a recalibration.
+  virtual std::vector<Named> report_nuisances(std::span<const double> nuisance) const = 0;
+};
+
+}  // namespace metastable::analysis

@@ -1,0 +1,19 @@
+#pragma once
+// The rimless wheel's measured trials as transitions.
+
+#include <memory>
+
+#include "analysis/experiment.h"
+#include "analysis/transition_model.h"
+
+namespace metastable::analysis {
+
+/// One-step densities of the wheel's trials under the nominal law with its (eta, mu), effects of the catalogue in
+/// between. With omega_plus, collision and stance are separate events; sensor noise is carried along by a Gaussian
+/// filter on the speed (exact while the noise is small beside the spread of a collision). Recalibration refits the
+/// contact's means and sds and a smooth change of shape (ScoreTilt). A missing leg is found from the stances where
+/// omega_plus is there, else legs of mean length are taken; notes() says so.
+/// @throws std::invalid_argument for a coast-down, for `plastic`, and for an experiment without a transition
+std::unique_ptr<TransitionModel> wheel_transitions(const Experiment& experiment);
+
+}  // namespace metastable::analysis
