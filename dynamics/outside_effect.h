@@ -1,0 +1,34 @@
+#pragma once
+// Effects of the laboratory that no catalogue holds, so that a diagnosis can be asked about what it does not know.
+// They stay out of effect_catalogue() for good.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace metastable::dynamics {
+
+/// One parameter sets the size, neutral at 0; the others are constants of the family.
+struct OutsideInfo {
+  std::string id;
+  std::string summary;
+  double upper = 1;  ///< largest size the laboratory takes
+};
+
+/// sloshing_fluid   a fluid in the hub keeps its spin through collisions and drags on the wheel afterwards; size: its
+///                  inertia over the wheel's (coupling time 0.15 s)
+/// planks           friction undulates along the ramp every 0.31 m: mu (1 + size cos(2 pi s / 0.31 m))
+/// frame_resonance  restitution dips in a band of speeds: eta (1 - size exp(-((omega - 5.3)/0.35)^2)), omega in rad/s
+/// stored_energy    a share `size` of what a collision lost beyond the trial's mean loss comes back at the next one
+/// speed_spread     contact noise grows with speed: the deviation of mu from its mean times (omega / 5 rad/s)^(8 size)
+/// double_plate     legs sit on two plates in turn: mu of odd legs times 1 + size, of even legs times 1 - size
+const std::vector<OutsideInfo>& outside_effects();
+/// @throws std::invalid_argument naming the id and all known ones
+const OutsideInfo& outside_info(std::string_view id);
+
+struct OutsideEffect {
+  std::string id;
+  double size = 0;  ///< in [0, upper]
+};
+
+}  // namespace metastable::dynamics
