@@ -9,6 +9,7 @@
 
 #include "analysis/chain_summary.h"
 #include "analysis/integrated_study.h"
+#include "analysis/pilot.h"
 #include "analysis/rest_reachability.h"
 #include "analysis/t_interval.h"
 #include "markov/chain_pool.h"
@@ -19,20 +20,9 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
-constexpr std::size_t pilot_cells = 96;
-constexpr std::size_t pilot_samples = 4096;
 constexpr std::size_t first_cells = 128;
 constexpr std::size_t first_samples = 4096;
 constexpr int sizes = 3;  // cell sizes a ladder holds: cells, cells / 2, cells / 4
-
-markov::DrawOptions draw_options(const StudyOptions& options, std::size_t samples, int replicate) {
-  return {.count = samples,
-          .seed = options.seed,
-          .replicate = static_cast<std::uint32_t>(replicate),
-          .sequence = options.sequence,
-          .weighting = options.weighting,
-          .tail = options.tail};
-}
 
 // Nested cells for the whole range, coarsest first.
 std::vector<markov::StateSpace> nested(markov::StateSpace coarsest) {
@@ -63,7 +53,8 @@ class Study {
  private:
   Metastability finite() {
     for (;;) {
-      const std::optional<Pilot> pilot = solve_pilot();
+      tell(0, "pilot");
+      const std::optional<Pilot> pilot = solve_pilot(problem_, options_);
       if (pilot) {
         std::optional<Metastability> result = refine(*pilot);
         if (result) return *std::move(result);
@@ -76,47 +67,9 @@ class Study {
 
   bool can_look_deeper() const { return options_.weighting == markov::Weighting::weighted && options_.tail > 1e-300; }
 
-  struct Pilot {
-    markov::StateSpace space;
-    std::vector<double> nu, h, visits;
-  };
-
-  std::optional<Pilot> solve_pilot() {
-    tell(0, "pilot");
-    for (double reach = 1.2;; reach *= reach > 3 ? 10 : 1.5) {
-      markov::StateSpace space =
-          markov::covering_space(problem_.map, problem_.launch, pilot_cells, options_.seed, reach);
-      const markov::SampledChain sampled =
-          markov::discretize(problem_.map, space, problem_.launch,
-                             {.draws = draw_options(options_, pilot_samples, 0), .threads = options_.threads});
-      if (!rests(sampled)) return std::nullopt;
-      const markov::ChainSolver solver(sampled.chain);
-      const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
-      if (markov::top_share(space, quasi.distribution) < 1e-10 || reach > 1e6)
-        return Pilot{std::move(space), quasi.distribution, quasi.survival_weight, early_visits(sampled)};
-    }
-  }
-
-  // Expected visits to each state in the steps after the launch: the transient that the cells must hold in every phase.
-  static std::vector<double> early_visits(const markov::SampledChain& sampled) {
-    constexpr int steps = 64;
-    std::vector<double> now = sampled.launch.after, visits = now;
-    for (int step = 1; step < steps; ++step) {
-      now = markov::apply_left(sampled.chain, now);
-      for (std::size_t i = 0; i < visits.size(); ++i) visits[i] += now[i];
-    }
-    return visits;
-  }
-
-  static bool rests(const markov::SampledChain& sampled) {
-    const markov::Reachability reach = markov::classify(sampled.chain);
-    return std::all_of(reach.must_rest.begin(), reach.must_rest.end(), [](auto yes) { return yes != 0; });
-  }
-
   // All replicates at one resolution, in batches of as many as there are threads; sums run in replicate order.
   Ladder climb(const Pilot& pilot, std::size_t cells, std::size_t samples, double work_before, double work_after) {
-    Ladder ladder{
-        nested(markov::graded_space(pilot.space, pilot.nu, pilot.h, pilot.visits, cells >> (sizes - 1))), {}, {}};
+    Ladder ladder{nested(pilot.graded(cells >> (sizes - 1))), {}, {}};
     std::vector<markov::ChainPool> pools(sizes);
     const auto replicates = static_cast<std::size_t>(options_.replicates);
     const auto threads = static_cast<std::size_t>(markov::thread_count(options_.threads));

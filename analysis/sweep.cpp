@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <mutex>
@@ -14,60 +12,6 @@
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
-namespace {
-
-struct Known {
-  Parameter parameter;
-  std::string_view name, label;
-};
-
-constexpr std::array<Known, 5> known = {{
-    {Parameter::slope, "slope", "slope γ"},
-    {Parameter::restitution_mean, "restitution-mean", "mean of restitution η"},
-    {Parameter::restitution_sd, "restitution-sd", "sd of restitution η"},
-    {Parameter::friction_mean, "friction-mean", "mean of friction μ"},
-    {Parameter::friction_sd, "friction-sd", "sd of friction μ"},
-}};
-
-const Known& entry(Parameter parameter) {
-  return *std::find_if(known.begin(), known.end(), [&](const Known& one) { return one.parameter == parameter; });
-}
-
-void set(Setting& setting, Parameter parameter, double value) {
-  switch (parameter) {
-    case Parameter::slope:
-      setting.slope_deg = value;
-      return;
-    case Parameter::restitution_mean:
-      setting.restitution.mean = value;
-      return;
-    case Parameter::restitution_sd:
-      setting.restitution.sd = value;
-      return;
-    case Parameter::friction_mean:
-      setting.friction.mean = value;
-      return;
-    case Parameter::friction_sd:
-      setting.friction.sd = value;
-      return;
-  }
-}
-
-}  // namespace
-
-Parameter parameter_from_name(std::string_view name) {
-  for (const Known& one : known)
-    if (one.name == name) return one.parameter;
-  throw std::invalid_argument(fmt::format(
-      "sweep parameter: '{}' is none of slope, restitution-mean, restitution-sd, friction-mean, friction-sd", name));
-}
-
-std::string_view parameter_name(Parameter parameter) { return entry(parameter).name; }
-
-std::string_view parameter_label(Parameter parameter) { return entry(parameter).label; }
-
-std::string_view parameter_unit(Parameter parameter) { return parameter == Parameter::slope ? "deg" : "1"; }
-
 std::vector<double> axis_values(double first, double last, double step) {
   if (!(step > 0) || !(last >= first) || !std::isfinite(first) || !std::isfinite(last))
     throw std::invalid_argument(fmt::format("range {}:{}:{}: needs first <= last and step > 0", first, last, step));
@@ -92,7 +36,7 @@ Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::s
   for (std::size_t a = axes.size(); a-- > 0;) {
     place[a] = axes[a].values[index % axes[a].values.size()];
     index /= axes[a].values.size();
-    set(setting, axes[a].parameter, place[a]);
+    set_parameter(setting, axes[a].parameter, place[a]);
   }
   if (at != nullptr) *at = std::move(place);
   return setting;

@@ -5,22 +5,13 @@
 #include <exception>
 #include <functional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "analysis/metastability.h"
+#include "analysis/parameter.h"
 #include "analysis/setting.h"
 
 namespace metastable::analysis {
-
-/// What a sweep may vary.
-enum class Parameter { slope, restitution_mean, restitution_sd, friction_mean, friction_sd };
-
-/// "slope", "restitution-mean", ... @throws std::invalid_argument naming them all
-Parameter parameter_from_name(std::string_view name);
-std::string_view parameter_name(Parameter parameter);
-std::string_view parameter_unit(Parameter parameter);   ///< "deg" or "1"
-std::string_view parameter_label(Parameter parameter);  ///< for axes: "slope γ", "sd of friction μ", ...
 
 struct Axis {
   Parameter parameter = Parameter::slope;
