@@ -37,10 +37,15 @@ std::vector<Command> commands() {
                "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
          add_wheel(o), add_contact(o), add_course(o), add_study(o);
          o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
+         o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
+         add_standard_errors(o);
          o.add("json", "FILE|-", "", "Write the results as JSON");
        },
        [](const Options& o, const std::string& line) {
-         run_steps({one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")});
+         StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
+         request.sensitivities = o.flag("sensitivities");
+         request.standard_errors = standard_errors(o, request.setting);
+         run_steps(request);
        }},
       {"compare", "Expected steps of two or more slopes on common random numbers",
        [](Options& o) {
@@ -48,11 +53,14 @@ std::vector<Command> commands() {
          o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
          add_wheel(o), add_contact(o), add_course(o), add_study(o);
          o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
+         add_standard_errors(o);
          o.add("json", "FILE|-", "", "Write the results as JSON");
        },
        [](const Options& o, const std::string& line) {
-         run_compare({several_settings(o, 2), study_options(o), static_cast<int>(o.whole("collisions", 1, 63)),
-                      o.text("json"), line});
+         CompareRequest request{several_settings(o, 2), study_options(o),
+                                static_cast<int>(o.whole("collisions", 1, 63)), o.text("json"), line};
+         request.standard_errors = standard_errors(o, request.settings.front());
+         run_compare(request);
        }},
       {"sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
        [](Options& o) {

@@ -8,6 +8,7 @@
 #include "analysis/angle_recording.h"
 #include "analysis/collision_finder.h"
 #include "analysis/metastability.h"
+#include "analysis/propagation.h"
 #include "analysis/setting.h"
 #include "analysis/sweep.h"
 
@@ -20,6 +21,8 @@ struct StepsRequest {
   std::string json;      ///< file, "-" for standard output, "" for none
   std::string command;   ///< the command line, for provenance
   bool certify = false;  ///< guaranteed bounds as well
+  bool sensitivities = false;
+  std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to the expected steps
 };
 
 /// metastable compare
@@ -29,6 +32,7 @@ struct CompareRequest {
   int collisions = 16;  ///< of a measured trial
   std::string json;
   std::string command;
+  std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to expected steps and ratios
 };
 
 /// metastable sweep

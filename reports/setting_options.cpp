@@ -171,4 +171,43 @@ analysis::StudyOptions study_options(const Options& options) {
   return study;
 }
 
+void add_standard_errors(Options& options) {
+  options.add("slope-se", "DEG", "",
+              "Standard error of each slope: an interval from it is given apart; likewise below");
+  options.add("restitution-se", "MEAN,SD", "", "Of the mean of eta, and of its sd");
+  options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd");
+  options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]");
+  options.add("inertia-se", "KGM2", "", "[kg m^2]");
+  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb)");
+  options.add("ramp-stiffness-se", "N/M", "", "[N/m] (published)");
+  options.add("contact-mass-se", "KG", "", "[kg] (published)");
+}
+
+std::vector<analysis::StandardError> standard_errors(const Options& options, const analysis::Setting& setting) {
+  using analysis::Parameter;
+  std::vector<analysis::StandardError> errors;
+  const auto add = [&](Parameter parameter, double value) {
+    if (value != 0) errors.push_back({parameter, value});
+  };
+  const auto one = [&](const char* name, Parameter parameter) {
+    if (options.given(name)) add(parameter, options.number(name));
+  };
+  const auto both = [&](const char* name, Parameter mean, Parameter sd) {
+    if (!options.given(name)) return;
+    const analysis::Spread given = options.spread(name);
+    add(mean, given.mean);
+    add(sd, given.sd);
+  };
+  one("slope-se", Parameter::slope);
+  both("restitution-se", Parameter::restitution_mean, Parameter::restitution_sd);
+  both("friction-se", Parameter::friction_mean, Parameter::friction_sd);
+  one("legs-se", Parameter::leg_length);
+  one("inertia-se", Parameter::inertia);
+  one("radius-of-gyration-se", Parameter::radius_of_gyration);
+  one("ramp-stiffness-se", Parameter::ramp_stiffness);
+  one("contact-mass-se", Parameter::contact_mass);
+  analysis::check_standard_errors(setting, errors);
+  return errors;
+}
+
 }  // namespace metastable::reports

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/metastability.h"
+#include "analysis/propagation.h"
 #include "analysis/setting.h"
 #include "reports/options.h"
 
@@ -16,6 +17,7 @@ void add_wheel(Options& options);
 void add_contact(Options& options);
 void add_course(Options& options);
 void add_study(Options& options);
+void add_standard_errors(Options& options);
 
 /// What the options above say, all but slope and launch speed.
 analysis::Setting common_setting(const Options& options);
@@ -26,5 +28,7 @@ analysis::Setting one_setting(const Options& options);
 /// One a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
 std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least);
 analysis::StudyOptions study_options(const Options& options);
+/// The standard errors above 0 that were given, checked against the setting. @throws std::invalid_argument
+std::vector<analysis::StandardError> standard_errors(const Options& options, const analysis::Setting& setting);
 
 }  // namespace metastable::reports

@@ -47,6 +47,28 @@ Json certificate_json(const analysis::CertifiedSteps& certified) {
   return json;
 }
 
+Json sensitivities_json(const analysis::Sensitivities& sensitivities) {
+  if (!sensitivities.reason.empty()) return {{"reason", sensitivities.reason}};
+  Json list = Json::array();
+  for (const analysis::Sensitivity& one : sensitivities.ranked)
+    list.push_back({{"parameter", analysis::sensitivity_name(one)},
+                    {"unit", analysis::parameter_unit(one.parameter)},
+                    {"value", one.value},
+                    {"d_ln_steps", one.derivative},
+                    {"d_ln_steps_error", one.error},
+                    {"elasticity", one.elasticity()}});
+  return list;
+}
+
+Json propagated_json(const analysis::Propagated& propagated) {
+  Json shares = Json::object();
+  for (const analysis::Propagated::Share& one : propagated.shares)
+    shares[std::string(analysis::parameter_name(one.parameter))] = one.share;
+  return {{"interval_95", interval(propagated.interval)},
+          {"log_standard_error", propagated.log_sd},
+          {"variance_shares", shares}};
+}
+
 Json provenance_json(const Provenance& provenance) {
   return {{"command", provenance.command},
           {"settings", provenance.settings},
@@ -117,30 +139,37 @@ RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis:
 }
 
 std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
-                       const RestThresholds& thresholds, const Provenance& provenance,
-                       const analysis::CertifiedSteps* certified) {
+                       const RestThresholds& thresholds, const Provenance& provenance, const StepsExtras& extras) {
   Json json = {{"schema", 1}};
   json.update(study_json(setting, study, thresholds));
-  if (certified) json["certificate"] = certificate_json(*certified);
+  if (extras.certified) json["certificate"] = certificate_json(*extras.certified);
+  if (extras.sensitivities) json["sensitivities"] = sensitivities_json(*extras.sensitivities);
+  if (extras.propagated) json["from_standard_errors"] = propagated_json(*extras.propagated);
   json["provenance"] = provenance_json(provenance);
   return json.dump(2) + "\n";
 }
 
 std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,
-                         const Provenance& provenance) {
+                         const Provenance& provenance, const CompareExtras& extras) {
   Json json = {{"schema", 1}, {"settings", Json::array()}, {"contrasts", Json::array()}};
-  for (std::size_t i = 0; i < comparison.settings.size(); ++i)
+  for (std::size_t i = 0; i < comparison.settings.size(); ++i) {
     json["settings"].push_back(study_json(comparison.settings[i], comparison.studies[i], thresholds[i]));
+    if (!extras.steps.empty()) json["settings"].back()["from_standard_errors"] = propagated_json(extras.steps[i]);
+  }
   const auto estimate = [](const std::optional<analysis::Estimate>& value) {
     return value ? Json{{"value", number(value->value)}, {"interval_95", interval(*value)}} : Json(nullptr);
   };
-  for (const analysis::Contrast& contrast : comparison.contrasts)
+  for (std::size_t i = 0; i < comparison.contrasts.size(); ++i) {
+    const analysis::Contrast& contrast = comparison.contrasts[i];
     json["contrasts"].push_back({{"slope_deg", comparison.settings[contrast.of].slope_deg},
                                  {"against_slope_deg", comparison.settings[contrast.against].slope_deg},
                                  {"ratio", estimate(contrast.ratio)},
                                  {"difference", estimate(contrast.difference)},
                                  {"trials_needed", optional_number(contrast.trials_needed)},
                                  {"sentence", contrast.sentence}});
+    if (!extras.ratios.empty())
+      json["contrasts"].back()["ratio_from_standard_errors"] = propagated_json(extras.ratios[i]);
+  }
   json["provenance"] = provenance_json(provenance);
   return json.dump(2) + "\n";
 }

@@ -8,6 +8,8 @@
 #include "analysis/certify.h"
 #include "analysis/comparison.h"
 #include "analysis/metastability.h"
+#include "analysis/propagation.h"
+#include "analysis/sensitivity.h"
 #include "analysis/setting.h"
 #include "reports/table.h"
 
@@ -20,15 +22,26 @@ struct RestThresholds {
 };
 RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis::Metastability& study);
 
+/// What `steps` finds beyond the study, where it is asked for.
+struct StepsExtras {
+  std::optional<analysis::CertifiedSteps> certified = {};
+  std::optional<analysis::Sensitivities> sensitivities = {};
+  std::optional<analysis::Propagated> propagated = {};  ///< from the parameters' standard errors
+};
+
+/// What `compare` finds beyond the comparison; empty without standard errors.
+struct CompareExtras {
+  std::vector<analysis::Propagated> steps = {};   ///< a setting each
+  std::vector<analysis::Propagated> ratios = {};  ///< a contrast each
+};
+
 /// The result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as many
 /// digits as a double holds. Keys as in the README ("steps --json").
-/// @param certified  adds "certificate" if not null
 std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
-                       const RestThresholds& thresholds, const Provenance& provenance,
-                       const analysis::CertifiedSteps* certified = nullptr);
+                       const RestThresholds& thresholds, const Provenance& provenance, const StepsExtras& extras = {});
 
 /// The result of `compare`: "settings" (each as in steps_json) and "contrasts".
 std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,
-                         const Provenance& provenance);
+                         const Provenance& provenance, const CompareExtras& extras = {});
 
 }  // namespace metastable::reports

@@ -33,6 +33,29 @@ std::string estimate_text(const analysis::Estimate& estimate) {
                      to_the_digit(estimate.lower, half), to_the_digit(estimate.upper, half));
 }
 
+std::string sensitivities_text(const analysis::Sensitivities& sensitivities) {
+  if (!sensitivities.reason.empty()) return "No sensitivities: " + sensitivities.reason + ".\n";
+  std::string text = fmt::format("{:<22}{:>10} {:<8}{:>15}{:>11}{:>24}\n", "Sensitivities to", "value", "",
+                                 "d ln steps / d", "+- (95 %)", "steps for 1 % more");
+  for (const analysis::Sensitivity& one : sensitivities.ranked) {
+    const std::string_view unit = analysis::parameter_unit(one.parameter);
+    text += fmt::format("  {:<20}{:>10.5g} {:<8}{:>15}{:>11.2g}{:>22.3f} %\n", analysis::sensitivity_name(one),
+                        one.value, unit == "1" ? "" : unit, to_the_digit(one.derivative, one.error), one.error,
+                        100 * std::expm1(0.01 * one.elasticity()));
+  }
+  return text;
+}
+
+std::string propagated_text(const analysis::Propagated& propagated) {
+  const double half = 0.5 * (propagated.interval.upper - propagated.interval.lower);
+  std::string shares;
+  for (const analysis::Propagated::Share& one : propagated.shares)
+    shares += fmt::format("{}{} {:.0f} %", shares.empty() ? "" : ", ", analysis::parameter_name(one.parameter),
+                          100 * one.share);
+  return fmt::format("{} to {} (variance: {})", to_the_digit(propagated.interval.lower, half),
+                     to_the_digit(propagated.interval.upper, half), shares);
+}
+
 std::string thresholds_text(const RestThresholds& thresholds) {
   std::string text = thresholds.safe_speed
                          ? fmt::format("out of reach for launches of {:.4g} rad/s and faster", *thresholds.safe_speed)

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -277,6 +278,36 @@ TEST_F(CommandLine, HelpAndVersion) {
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("--config"), std::string::npos) << command;
   }
+}
+
+TEST_F(CommandLine, SensitivitiesAndStandardErrorsComeOutRanked) {
+  const Ran ran = metastable({"steps", "--legs", "0.1519", "--cells", "32", "--samples", "256", "--sensitivities",
+                              "--friction-se", "0.01,0.004", "--slope-se", "0.1", "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto json = nlohmann::json::parse(ran.out);
+  const auto& list = json["sensitivities"];
+  ASSERT_EQ(list.size(), 9u);
+  for (std::size_t i = 1; i < list.size(); ++i)
+    EXPECT_GE(std::abs(list[i - 1]["elasticity"].get<double>()), std::abs(list[i]["elasticity"].get<double>()));
+  const auto& apart = json["from_standard_errors"];
+  EXPECT_LT(apart["interval_95"][0], json["expected_steps"]["from_start"]);
+  EXPECT_GT(apart["interval_95"][1], json["expected_steps"]["from_start"]);
+  EXPECT_EQ(apart["variance_shares"].size(), 3u);
+
+  const Ran compared = metastable(
+      {"compare", "--legs", "0.1519", "--cells", "32", "--samples", "256", "--slope-se", "0.1", "--json", "-"});
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  const auto both = nlohmann::json::parse(compared.out);
+  EXPECT_TRUE(both["settings"][1].contains("from_standard_errors"));
+  EXPECT_LT(both["contrasts"][0]["ratio_from_standard_errors"]["interval_95"][0],
+            both["contrasts"][0]["ratio"]["value"]);
+}
+
+TEST_F(CommandLine, StandardErrorsOfWhatDoesNotMatterAreRefused) {
+  const Ran ran = metastable({"steps", "--radius-of-gyration-se", "0.01"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_NE(ran.err.find("radius-of-gyration: a standard error was given"), std::string::npos) << ran.err;
+  EXPECT_EQ(metastable({"steps", "--slope-se", "-1"}).code, 2);
 }
 
 }  // namespace
