@@ -99,30 +99,35 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
     const double log_eta = std::log(std::max(eta, std::numeric_limits<double>::min()));
     const double alpha = 1 - eta * eta * (1 - change.rebound_lost), beta = (1 + eta) * (1 + eta);
     const double delta = pull * (1 + eta) * time * std::sqrt(std::numbers::pi * std::numbers::pi + log_eta * log_eta);
-    const double q2 = beta * cc - loss * b * b, q1 = b * (2 * loss * a - alpha - beta), q0 = a * (alpha - loss * a);
+    // The term with delta is small and nearly constant: put into beta, it leaves a quadratic in mu.
+    const double steady = beta + delta * (a - b * friction.mean());
+    const double q2 = steady * cc - loss * b * b, q1 = b * (2 * loss * a - alpha - steady), q0 = a * (alpha - loss * a);
     const double discriminant = q1 * q1 - 4 * q2 * q0;
     if (!(discriminant > 0)) {  // every friction loses more
       result.below += node.weight;
       continue;
     }
-    const double root = std::sqrt(discriminant);
-    const auto refine = [&](double mu) {  // Newton: the term with delta is a small cubic correction
-      double slope = 0;
-      for (int i = 0; i < 2; ++i) {
-        const double d = a - b * mu, s = mu * (cc * mu - b), ds = 2 * cc * mu - b;
-        slope = -alpha * b + (beta + delta * d) * ds - delta * b * s + 2 * loss * b * d;
-        mu -= (alpha * d + (beta + delta * d) * s - loss * d * d) / slope;
-      }
+    const double root = std::sqrt(discriminant);  // the slope of the quadratic at its roots
+    const auto refine = [&](double mu, double side) {
+      const auto slope = [&](double d) {
+        return -alpha * b + (beta + delta * d) * (2 * cc * mu - b) - delta * b * mu * (cc * mu - b) + 2 * loss * b * d;
+      };
+      // One Newton step for what is left, no further than the quadratic's other side.
       const double d = a - b * mu;
-      return std::pair{mu, d * d / std::abs(slope)};
+      const double left = (alpha * d + (beta + delta * d) * mu * (cc * mu - b) - loss * d * d) / slope(d);
+      if (std::abs(left) < root / std::abs(4 * q2)) mu -= left;
+      const double there = a - b * mu, steep = side * slope(there);
+      // Where the loss turns as a function of mu the density has an integrable singularity, which a sum must not meet.
+      const double blunt = 0.1 * steady * cc * friction.sd();
+      return std::pair{mu, steep > 0 ? there * there * steep / (steep * steep + blunt * blunt) : 0.0};
     };
-    const auto [upper, upper_rate] = refine(q1 <= 0 ? (root - q1) / (2 * q2) : -2 * q0 / (q1 + root));
+    const auto [upper, upper_rate] = refine(q1 <= 0 ? (root - q1) / (2 * q2) : -2 * q0 / (q1 + root), 1);
     result.below += node.weight * friction.above(upper);
     if (upper > 0) result.density += node.weight * friction.density(upper) * upper_rate * loss_rate;
     if (q2 <= 0) continue;
     const double start = q1 <= 0 ? 2 * q0 / (root - q1) : -(q1 + root) / (2 * q2);
     if (start <= 0) continue;  // there is no lower branch: friction below which the loss rises again
-    const auto [lower, lower_rate] = refine(start);
+    const auto [lower, lower_rate] = refine(start, -1);
     if (!(lower > 0 && lower < upper)) continue;
     result.below += node.weight * friction.below(lower);
     result.density += node.weight * friction.density(lower) * lower_rate * loss_rate;

@@ -32,7 +32,7 @@ struct SpeedDensity {
 
 /// omega+ just after a collision of a rolling wheel (u0 = 0) with random (eta, mu): under `published` a sum over eta
 /// with mu in closed form (the root of (18)-(34) in mu), under `coulomb` a sum over mu with eta in closed form, the
-/// sticking collisions (mu >= mu_c) being one term. Error about 4e-4 of the peak, 2e-2 near the fastest speeds possible for sds of 0.1 (the sum is
+/// sticking collisions (mu >= mu_c) being one term. Error about 4e-4 of the peak, 3e-2 near the fastest speeds possible for sds of 0.1 (the sum is
 /// trapezoidal in the normal score, Gauss-Legendre where truncation cuts inside four sds); LandingDensity is the exact,
 /// slower way. One value costs about a microsecond.
 class CollisionDensity {

@@ -1,0 +1,172 @@
+#include "analysis/effect_scan.h"
+
+#include <Random123/philox.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/truncated_normal.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+// Gain of the score `u` with information `info`; one parameter at its lower bound gains only upwards.
+double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,
+                     Eigen::VectorXd* start) {
+  if (u.size() == 1) {
+    if (!(info(0, 0) > 0)) return 0;
+    const FreeParameter& p = candidate.parameters[0];
+    const double step = u[0] / info(0, 0);
+    if (start) *start = Eigen::VectorXd::Constant(1, step);
+    const bool blocked = (p.lower >= p.neutral && u[0] < 0) || (p.upper <= p.neutral && u[0] > 0);
+    return blocked ? 0 : u[0] * step;
+  }
+  Eigen::MatrixXd steadied = info;
+  steadied.diagonal() *= 1 + 1e-8;
+  const Eigen::VectorXd step = steadied.ldlt().solve(u);
+  if (start) *start = step;
+  const double gain = u.dot(step);
+  return std::isfinite(gain) && gain > 0 ? gain : 0;
+}
+
+}  // namespace
+
+EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
+                        int threads) {
+  EffectScan scan;
+  struct Work {
+    std::size_t effect, variant;
+    Eigen::Index first;
+    std::vector<Term> terms;
+  };
+  std::vector<Work> work;
+  Eigen::Index columns = 0;
+  for (const Candidate* candidate : candidates) {
+    if (candidate->parameters.empty() || !candidate->undecidable.empty()) continue;
+    ScannedEffect effect;
+    effect.candidate = candidate;
+    for (std::size_t v = 0; v < candidate->variants.size(); ++v) {
+      Term term{candidate, v, {}};
+      for (const FreeParameter& p : candidate->parameters) term.values.push_back(p.neutral);
+      effect.first.push_back(columns);
+      Work one{scan.effects.size(), v, columns, fit.terms};
+      one.terms.push_back(term);
+      work.push_back(one);
+      columns += static_cast<Eigen::Index>(candidate->parameters.size());
+    }
+    scan.effects.push_back(std::move(effect));
+  }
+  const auto events = static_cast<Eigen::Index>(model.events().size());
+  Derivatives all{Eigen::MatrixXd(events, columns), Eigen::MatrixXd(events, columns)};
+  markov::parallel_for(work.size(), threads, [&](std::size_t i) {
+    const Work& one = work[i];
+    // Only the new term's parameters are moved.
+    const std::size_t count = one.terms.back().values.size();
+    for (std::size_t p = 0; p < count; ++p) {
+      std::vector<Term> moved = one.terms;
+      const double step = moved.back().candidate->parameters[p].step;
+      moved.back().values[p] += step;
+      const Evaluation there = model.evaluate(fit.nuisance, moved);
+      const auto column = one.first + static_cast<Eigen::Index>(p);
+      for (Eigen::Index k = 0; k < events; ++k) {
+        const auto event = static_cast<std::size_t>(k);
+        all.slope(k, column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
+        all.change(k, column) = (there.score[event] - fit.evaluation.score[event]) / step;
+      }
+    }
+  });
+
+  // Efficient scores and information: what the fitted parameters could take up is projected out.
+  const Eigen::Map<const Eigen::VectorXd> z(fit.evaluation.score.data(), events);
+  const Eigen::MatrixXd stretch = all.slope + z.asDiagonal() * all.change;
+  const Derivatives& held = fit.derivatives;
+  const Eigen::MatrixXd held_stretch = held.slope + z.asDiagonal() * held.change;
+  const Eigen::MatrixXd cross =
+      held.change.transpose() * all.change + held_stretch.transpose() * stretch;  // [held x columns]
+  const Eigen::MatrixXd weights = fit.information.ldlt().solve(cross);
+  scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch - cross.transpose() * weights;
+  const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
+  scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
+  for (Eigen::Index k = 0; k < events; ++k)
+    scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
+  // At the fit the nuisances' scores and their prior's balance: the plain sum of the slopes is efficient already.
+  const Eigen::VectorXd total = all.slope.colwise().sum();
+
+  for (ScannedEffect& effect : scan.effects) {
+    const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
+    for (const Eigen::Index first : effect.first) {
+      Eigen::VectorXd start;
+      effect.gain.push_back(promised_gain(*effect.candidate, total.segment(first, count),
+                                          scan.information.block(first, first, count, count), &start));
+      effect.start.push_back(start.size() == count ? start : Eigen::VectorXd::Zero(count));
+    }
+    effect.best =
+        static_cast<std::size_t>(std::max_element(effect.gain.begin(), effect.gain.end()) - effect.gain.begin());
+  }
+  return scan;
+}
+
+ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) {
+  const auto trials = scan.by_trial.rows();
+  // Around their mean, so that a gap does not count as chance.
+  const Eigen::RowVectorXd mean = scan.by_trial.colwise().mean();
+  const Eigen::MatrixXd centred = scan.by_trial.rowwise() - mean;
+  sorted_.resize(scan.effects.size());
+  for (const ScannedEffect& effect : scan.effects)
+    degrees_.push_back(static_cast<double>(effect.candidate->parameters.size()));
+  std::vector<std::vector<double>> gains(scan.effects.size());
+  Eigen::VectorXd multiplier(trials);
+  for (int draw = 0; draw < draws; ++draw) {
+    for (Eigen::Index t = 0; t < trials; t += 4) {
+      const r123::Philox4x64::ctr_type counter{{static_cast<std::uint64_t>(draw), static_cast<std::uint64_t>(t), 1, 0}};
+      const auto bits = r123::Philox4x64()(counter, {{seed, 0x6d756c74}});
+      for (Eigen::Index i = 0; i < 4 && t + i < trials; ++i)
+        multiplier[t + i] =
+            dynamics::normal_quantile((static_cast<double>(bits[static_cast<std::size_t>(i)] >> 12) + 0.5) * 0x1p-52);
+    }
+    const Eigen::VectorXd score = centred.transpose() * multiplier;
+    for (std::size_t e = 0; e < scan.effects.size(); ++e) {
+      const ScannedEffect& effect = scan.effects[e];
+      const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
+      double largest = 0;
+      for (const Eigen::Index first : effect.first)
+        largest = std::max(largest, promised_gain(*effect.candidate, score.segment(first, count),
+                                                  scan.information.block(first, first, count, count), nullptr));
+      gains[e].push_back(largest);
+    }
+  }
+  for (std::size_t e = 0; e < gains.size(); ++e) {
+    sorted_[e] = gains[e];
+    std::sort(sorted_[e].begin(), sorted_[e].end(), std::greater<>());
+  }
+  for (int draw = 0; draw < draws; ++draw) {
+    double least = 1;
+    for (std::size_t e = 0; e < gains.size(); ++e)
+      least = std::min(least, p_value(e, gains[e][static_cast<std::size_t>(draw)]));
+    least_.push_back(least);
+  }
+  std::sort(least_.begin(), least_.end());
+}
+
+double ChanceGains::p_value(std::size_t effect, double gain) const {
+  const std::vector<double>& sorted = sorted_[effect];
+  const auto draws = static_cast<double>(sorted.size());
+  const auto more = static_cast<double>(
+      std::lower_bound(sorted.begin(), sorted.end(), gain, [](double s, double g) { return s >= g; }) - sorted.begin());
+  const double counted = (more + 1) / (draws + 1);
+  // Beyond the largest few per cent the tail is taken as chi-squared.
+  const double anchor = sorted[static_cast<std::size_t>(0.03 * draws)];
+  if (gain <= anchor || anchor <= 0) return counted;
+  return std::min(1.0, 0.03 * std::pow(gain / anchor, degrees_[effect] / 2 - 1) * std::exp(-(gain - anchor) / 2));
+}
+
+double ChanceGains::look_elsewhere(double p) const {
+  const auto draws = static_cast<double>(least_.size());
+  const auto fewer = static_cast<double>(std::upper_bound(least_.begin(), least_.end(), p) - least_.begin());
+  const double anchor = least_[static_cast<std::size_t>(0.03 * draws)];
+  if (p >= anchor) return (fewer + 1) / (draws + 1);
+  return std::min(1.0, 0.03 * p / anchor);
+}
+
+}  // namespace metastable::analysis

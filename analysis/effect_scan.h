@@ -1,0 +1,49 @@
+#pragma once
+// Which effects would a fit gain from: score tests of every effect and variant at one fit.
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <vector>
+
+#include "analysis/model_fit.h"
+
+namespace metastable::analysis {
+
+/// Score statistics of one candidate at a fit.
+struct ScannedEffect {
+  const Candidate* candidate = nullptr;
+  std::vector<double> gain;            ///< by variant: 2 Delta log likelihood that the scores promise
+  std::vector<Eigen::VectorXd> start;  ///< by variant: the values they point to
+  std::vector<Eigen::Index> first;     ///< by variant: first of its columns
+  std::size_t best = 0;                ///< variant
+};
+
+/// Efficient scores (nuisances projected out) of all candidates at a fit.
+struct EffectScan {
+  std::vector<ScannedEffect> effects;
+  Eigen::MatrixXd by_trial;     ///< [trials x columns] efficient scores, summed over a trial's events
+  Eigen::MatrixXd information;  ///< [columns x columns] efficient
+};
+
+/// @param fit  of nuisances, and possibly terms, whose derivatives are projected out
+/// @param candidates  those to scan; candidates without parameters are skipped
+EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
+                        int threads);
+
+/// How large the scan's gains get by chance alone, by signs and sizes of whole trials' scores drawn anew (multiplier
+/// bootstrap), and what that says of gains found.
+class ChanceGains {
+ public:
+  ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed);
+  /// P(the effect's largest gain over its variants >= gain) by chance.
+  double p_value(std::size_t effect, double gain) const;
+  /// P(some effect's p-value is <= p) by chance.
+  double look_elsewhere(double p) const;
+
+ private:
+  std::vector<std::vector<double>> sorted_;  // by effect, descending
+  std::vector<double> degrees_;              // by effect: parameters
+  std::vector<double> least_;                // smallest p-value of each draw, ascending
+};
+
+}  // namespace metastable::analysis

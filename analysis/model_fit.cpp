@@ -1,0 +1,187 @@
+#include "analysis/model_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace metastable::analysis {
+namespace {
+
+// All parameters of a hypothesis as one vector.
+class Point {
+ public:
+  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<Term> terms, bool with_nuisances)
+      : model_(model), nuisance_(std::move(nuisance)), terms_(std::move(terms)) {
+    if (with_nuisances)
+      for (std::size_t i = 0; i < nuisance_.size(); ++i) {
+        const Nuisance& n = model.nuisances()[i];
+        slots_.push_back({&nuisance_[i], n.step, n.lower, n.upper, n.nominal, n.prior_sd});
+      }
+    for (Term& term : terms_)
+      for (std::size_t i = 0; i < term.values.size(); ++i) {
+        const FreeParameter& p = term.candidate->parameters[i];
+        slots_.push_back({&term.values[i], p.step, p.lower, p.upper, 0, 0});
+      }
+  }
+  Point(const Point&) = delete;
+  Point& operator=(const Point&) = delete;
+
+  struct Slot {
+    double* value;
+    double step, lower, upper, nominal, prior_sd;  // prior_sd 0: none
+  };
+  std::vector<Slot>& slots() { return slots_; }
+  const std::vector<double>& nuisance() const { return nuisance_; }
+  const std::vector<Term>& terms() const { return terms_; }
+  Evaluation evaluate() const { return model_.evaluate(nuisance_, terms_); }
+  double log_prior() const {
+    double sum = 0;
+    for (const Slot& s : slots_)
+      if (s.prior_sd > 0) sum -= 0.5 * std::pow((*s.value - s.nominal) / s.prior_sd, 2);
+    return sum;
+  }
+
+ private:
+  const TransitionModel& model_;
+  std::vector<double> nuisance_;
+  std::vector<Term> terms_;
+  std::vector<Slot> slots_;
+};
+
+Derivatives differences(Point& point, const Evaluation& here) {
+  const auto events = static_cast<Eigen::Index>(here.score.size());
+  auto& slots = point.slots();
+  Derivatives d{Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())),
+                Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size()))};
+  for (std::size_t p = 0; p < slots.size(); ++p) {
+    const double value = *slots[p].value;
+    const double step = value + slots[p].step <= slots[p].upper ? slots[p].step : -slots[p].step;
+    *slots[p].value = value + step;
+    const Evaluation moved = point.evaluate();
+    *slots[p].value = value;
+    for (Eigen::Index i = 0; i < events; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      // Events at the floor of the density have no slope there.
+      d.slope(i, static_cast<Eigen::Index>(p)) =
+          std::clamp((moved.log_density[k] - here.log_density[k]) / step, -1e9, 1e9);
+      d.change(i, static_cast<Eigen::Index>(p)) = std::clamp((moved.score[k] - here.score[k]) / step, -1e9, 1e9);
+    }
+  }
+  return d;
+}
+
+double counted(const Evaluation& e, const Eigen::VectorXd& weights) {
+  return Eigen::Map<const Eigen::VectorXd>(e.log_density.data(), weights.size()).dot(weights);
+}
+
+}  // namespace
+
+Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.events().size()));
+  if (!count.empty())
+    for (std::size_t i = 0; i < model.events().size(); ++i)
+      weights[static_cast<Eigen::Index>(i)] = count[model.events()[i].trial] ? 1 : 0;
+  return weights;
+}
+
+Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, const Eigen::VectorXd& weights) {
+  const Eigen::Map<const Eigen::VectorXd> z(here.score.data(), weights.size());
+  const Eigen::MatrixXd stretch = columns.slope + z.asDiagonal() * columns.change;
+  return columns.change.transpose() * weights.asDiagonal() * columns.change +
+         stretch.transpose() * weights.asDiagonal() * stretch;
+}
+
+Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
+                        const std::vector<Term>& terms, const Evaluation& here, bool with_nuisances) {
+  Point point(model, nuisance, terms, with_nuisances);
+  return differences(point, here);
+}
+
+Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+        const FitOptions& options) {
+  Point point(model, nuisance, terms, options.refit_nuisances);
+  auto& slots = point.slots();
+  const auto size = static_cast<Eigen::Index>(slots.size());
+  const Eigen::VectorXd weights = event_weights(model, options.count);
+  Fit result;
+  result.evaluation = point.evaluate();
+  double best = counted(result.evaluation, weights) + point.log_prior();
+  result.converged = slots.empty();
+  for (int iteration = 0; iteration < options.most_iterations && !slots.empty(); ++iteration) {
+    result.derivatives = differences(point, result.evaluation);
+    result.information = information(result.derivatives, result.evaluation, weights);
+    Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
+    for (Eigen::Index p = 0; p < size; ++p) {
+      const Point::Slot& s = slots[static_cast<std::size_t>(p)];
+      if (s.prior_sd > 0) {
+        gradient[p] -= (*s.value - s.nominal) / (s.prior_sd * s.prior_sd);
+        result.information(p, p) += 1 / (s.prior_sd * s.prior_sd);
+      }
+    }
+    // Parameters held at a bound by the gradient stay there.
+    std::vector<Eigen::Index> free;
+    for (Eigen::Index p = 0; p < size; ++p) {
+      const Point::Slot& s = slots[static_cast<std::size_t>(p)];
+      const bool held = (*s.value <= s.lower && gradient[p] <= 0) || (*s.value >= s.upper && gradient[p] >= 0);
+      if (!held && result.information(p, p) > 0) free.push_back(p);
+    }
+    if (free.empty()) {
+      result.converged = true;
+      break;
+    }
+    Eigen::MatrixXd part(free.size(), free.size());
+    Eigen::VectorXd slope(free.size());
+    for (std::size_t a = 0; a < free.size(); ++a) {
+      slope[static_cast<Eigen::Index>(a)] = gradient[free[a]];
+      for (std::size_t b = 0; b < free.size(); ++b)
+        part(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = result.information(free[a], free[b]);
+    }
+    part.diagonal() *= 1 + 1e-9;
+    const Eigen::VectorXd step = part.ldlt().solve(slope);
+    const double promised = 0.5 * slope.dot(step);
+    if (!(promised > 0.003)) {
+      result.converged = std::isfinite(promised);
+      if (!result.converged) result.reason = "its information matrix is singular";
+      break;
+    }
+    const std::vector<double> before = [&] {
+      std::vector<double> v;
+      for (const auto& s : slots) v.push_back(*s.value);
+      return v;
+    }();
+    double share = 1;
+    bool better = false;
+    for (int halving = 0; halving < 8 && !better; ++halving, share /= 2) {
+      for (std::size_t a = 0; a < free.size(); ++a) {
+        const Point::Slot& s = slots[static_cast<std::size_t>(free[a])];
+        *s.value = std::clamp(before[static_cast<std::size_t>(free[a])] + share * step[static_cast<Eigen::Index>(a)],
+                              s.lower, s.upper);
+      }
+      Evaluation tried = point.evaluate();
+      const double value = counted(tried, weights) + point.log_prior();
+      if (value > best) {
+        better = true;
+        const double gained = value - best;
+        best = value;
+        result.evaluation = std::move(tried);
+        if (gained < 0.003) result.converged = true;
+      }
+    }
+    if (!better) {
+      for (std::size_t p = 0; p < slots.size(); ++p) *slots[p].value = before[p];
+      // No step of the search direction improves: at the optimum up to the noise of the differences.
+      result.converged = promised < 0.5;
+      if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
+      break;
+    }
+    if (result.converged) break;
+  }
+  if (!result.converged && result.reason.empty())
+    result.reason = "the likelihood was still rising after " + std::to_string(options.most_iterations) + " steps";
+  result.nuisance = point.nuisance();
+  result.terms = point.terms();
+  result.log_likelihood = counted(result.evaluation, weights);
+  result.penalised = best;
+  return result;
+}
+
+}  // namespace metastable::analysis
