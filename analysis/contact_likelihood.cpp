@@ -1,0 +1,197 @@
+#include "analysis/contact_likelihood.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <utility>
+
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t columns = 161;           // eta = 0 .. 1
+constexpr double gauss = 0.28867513459481288;  // 1 / (2 sqrt(3)): two-point rule on [0, 1]
+
+// Nodes of mu, with those where the loss has a kink.
+std::vector<double> friction_nodes(const dynamics::WheelMap& map, int phase) {
+  std::vector<double> nodes = dynamics::friction_breaks(map.contact_model(), map.collision(phase, 1));
+  for (int i = 0; i <= 144; ++i) nodes.push_back(i / 160.0);
+  for (int i = 1; i <= 42; ++i) nodes.push_back(0.9 + i / 20.0);
+  std::erase_if(nodes, [](double mu) { return !(mu >= 0 && mu <= 3); });
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
+}
+
+// omega+^2 = scale x - drag sqrt(x) of one phase on the grid, column by column.
+struct Surface {
+  std::vector<double> friction;
+  std::vector<dynamics::StepCoefficients> node;
+  Surface(const dynamics::WheelMap& map, int phase) : friction(friction_nodes(map, phase)) {
+    for (std::size_t j = 0; j < columns; ++j)
+      for (const double mu : friction)
+        node.push_back(map.coefficients(phase, {static_cast<double>(j) / (columns - 1), mu}));
+  }
+  std::vector<double> after(double state) const {
+    const double omega = std::sqrt(state);
+    std::vector<double> values(node.size());
+    for (std::size_t i = 0; i < node.size(); ++i) values[i] = node[i].scale * state - node[i].drag * omega;
+    return values;
+  }
+};
+
+struct Corner {
+  double restitution, friction, value;
+};
+
+}  // namespace
+
+ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps,
+                                     std::span<const MeasuredTransition> transitions, int threads)
+    : threads_(threads) {
+  std::map<std::pair<std::size_t, int>, Surface> surfaces;
+  for (const MeasuredTransition& t : transitions)
+    surfaces.try_emplace({t.condition, t.phase}, maps[t.condition], t.phase);
+
+  std::vector<Term> terms(transitions.size());
+  markov::parallel_for(transitions.size(), threads, [&](std::size_t number) {
+    const MeasuredTransition& t = transitions[number];
+    const dynamics::WheelMap& map = maps[t.condition];
+    const dynamics::Stance& stance = map.stance(t.phase);
+    const Surface& surface = surfaces.at({t.condition, t.phase});
+    const std::vector<double> after = surface.after(t.state);
+    const std::vector<double>& mu = surface.friction;
+    const std::size_t rows = mu.size();
+    Term& term = terms[number];
+    term.landing = t.landing.has_value();
+    term.rested = t.rested;
+    const auto eta = [](std::size_t j) { return static_cast<double>(j) / (columns - 1); };
+    if (!term.landing) {
+      // Intervals of mu that rest, for each eta.
+      for (std::size_t j = 0; j < columns; ++j) {
+        const double width = (j == 0 || j + 1 == columns ? 0.5 : 1.0) / (columns - 1);
+        const double* column = after.data() + j * rows;
+        for (std::size_t i = 0; i + 1 < rows; ++i) {
+          const double a = column[i] - stance.barrier, b = column[i + 1] - stance.barrier;
+          if (a >= 0 && b >= 0) continue;
+          double from = mu[i], to = mu[i + 1];
+          if (a >= 0) from = std::isinf(b) ? to : from + (to - from) * a / (a - b);
+          if (b >= 0) to = std::isinf(a) ? from : from + (to - from) * a / (a - b);
+          if (!term.pieces.empty() && term.pieces.back().restitution == eta(j) &&
+              term.pieces.back().friction_to == from)
+            term.pieces.back().friction_to = to;
+          else
+            term.pieces.push_back({eta(j), from, width, to});
+        }
+        if (column[rows - 1] < stance.barrier && !term.pieces.empty()) term.pieces.back().friction_to = infinity;
+      }
+      return;
+    }
+    const double level = *t.landing - stance.gain;
+    const auto cross = [&](const Corner& a, const Corner& b) {
+      const double share = (level - a.value) / (b.value - a.value);
+      return std::pair{a.restitution + share * (b.restitution - a.restitution),
+                       a.friction + share * (b.friction - a.friction)};
+    };
+    const auto triangle = [&](const Corner& a, const Corner& b, const Corner& c) {
+      const bool above_a = a.value > level, above_b = b.value > level, above_c = c.value > level;
+      if (above_a == above_b && above_b == above_c) return;
+      const Corner& lone = above_b == above_c ? a : above_a == above_c ? b : c;
+      const Corner& one = above_b == above_c ? b : a;
+      const Corner& two = above_b == above_c || above_a == above_c ? c : b;
+      const auto [x1, y1] = cross(lone, one);
+      const auto [x2, y2] = cross(lone, two);
+      const double dx1 = b.restitution - a.restitution, dy1 = b.friction - a.friction, dv1 = b.value - a.value;
+      const double dx2 = c.restitution - a.restitution, dy2 = c.friction - a.friction, dv2 = c.value - a.value;
+      double gradient = std::hypot(dv1 * dy2 - dv2 * dy1, dx1 * dv2 - dx2 * dv1) / std::abs(dx1 * dy2 - dx2 * dy1);
+      double shift_x = 0, shift_y = 0;
+      // That is the gradient of the plane through the corners; the surface's own takes its place unless it changes
+      // within the triangle, as it does about its extremes.
+      constexpr double h = 1e-5;
+      const double x = std::clamp((x1 + x2) / 2, h, 1 - h), y = std::max((y1 + y2) / 2, h);
+      const auto value = [&](double dx, double dy) { return map.after_collision(t.state, t.phase, {x + dx, y + dy}); };
+      const double gx = (value(h, 0) - value(-h, 0)) / (2 * h), gy = (value(0, h) - value(0, -h)) / (2 * h);
+      const double own = std::hypot(gx, gy);
+      if (own > gradient / 1.5 && own < gradient * 1.5) {
+        const double miss = (level - value(0, 0)) / (own * own);
+        shift_x = miss * gx;
+        shift_y = miss * gy;
+        gradient = own;
+      }
+      const double weight = std::hypot(x2 - x1, y2 - y1) / gradient / 2;
+      for (const double at : {0.5 - gauss, 0.5 + gauss})
+        term.pieces.push_back({x1 + at * (x2 - x1) + shift_x, y1 + at * (y2 - y1) + shift_y, weight, 0});
+    };
+    for (std::size_t j = 0; j + 1 < columns; ++j)
+      for (std::size_t i = 0; i + 1 < rows; ++i) {
+        const double* p = after.data() + j * rows + i;
+        const double* q = p + rows;
+        const bool above = p[0] > level;
+        if (above == (p[1] > level) && above == (q[0] > level) && above == (q[1] > level)) continue;
+        if (!(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(q[0]) && std::isfinite(q[1]))) continue;
+        const Corner a{eta(j), mu[i], p[0]}, b{eta(j), mu[i + 1], p[1]}, c{eta(j + 1), mu[i], q[0]},
+            d{eta(j + 1), mu[i + 1], q[1]};
+        triangle(a, b, c);
+        triangle(b, c, d);
+      }
+  });
+  for (Term& term : terms) {
+    // A survivor whose region of rest is empty is certain, not impossible.
+    if (term.pieces.empty() && (term.landing || term.rested)) {
+      ++impossible_;
+      continue;
+    }
+    rests_ += term.rested;
+    terms_.push_back(std::move(term));
+  }
+}
+
+double ContactLikelihood::density(const Term& term, const ContactParameters& p) {
+  double sum = 0;
+  const double a = 1 / p[1], b = 1 / p[3];
+  for (const Piece& piece : term.pieces) {
+    const double u = (piece.restitution - p[0]) * a, v = (piece.friction - p[2]) * b;
+    sum += piece.weight * std::exp(-0.5 * (u * u + v * v));
+  }
+  return sum;
+}
+
+double ContactLikelihood::rest(const Term& term, const dynamics::TruncatedNormal& restitution,
+                               const dynamics::TruncatedNormal& friction) {
+  double sum = 0;
+  for (const Piece& piece : term.pieces) {
+    const double density = restitution.density(piece.restitution);
+    if (density > 0) sum += piece.weight * density * friction.between(piece.friction, piece.friction_to);
+  }
+  return std::min(sum, 1.0);
+}
+
+double ContactLikelihood::operator()(const ContactParameters& p) const {
+  const dynamics::TruncatedNormal restitution(p[0], p[1], 0, 1), friction(p[2], p[3], 0);
+  // Of the untruncated normals: what the truncation leaves, once for all terms.
+  const double inside = (dynamics::normal_cdf((1 - p[0]) / p[1]) - dynamics::normal_cdf(-p[0] / p[1])) *
+                        dynamics::normal_cdf(p[2] / p[3]);
+  const double scale = 1 / (2 * std::numbers::pi * p[1] * p[3] * inside);
+  constexpr std::size_t block = 256;  // sums in an order that does not depend on the threads
+  std::vector<double> sums((terms_.size() + block - 1) / block, 0.0);
+  markov::parallel_for(sums.size(), threads_, [&](std::size_t s) {
+    for (std::size_t i = s * block; i < std::min(terms_.size(), (s + 1) * block); ++i) {
+      const Term& term = terms_[i];
+      if (term.landing) {
+        sums[s] += std::log(scale * density(term, p));
+      } else {
+        const double probability = rest(term, restitution, friction);
+        sums[s] += term.rested ? std::log(probability) : std::log1p(-probability);
+      }
+    }
+  });
+  double sum = 0;
+  for (const double one : sums) sum += one;
+  return std::isnan(sum) ? -infinity : sum;
+}
+
+}  // namespace metastable::analysis

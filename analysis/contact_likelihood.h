@@ -1,0 +1,56 @@
+#pragma once
+// Likelihood of (eta, mu) distributions for many parameter values: the geometry is worked out once.
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "analysis/transitions.h"
+#include "dynamics/truncated_normal.h"
+
+namespace metastable::analysis {
+
+/// eta ~ N(mean, sd^2) on [0, 1] and mu ~ N(mean, sd^2) on [0, inf), independent: mean and sd of eta, then of mu.
+using ContactParameters = std::array<double, 4>;
+
+/// Which (eta, mu) lead from a state to its landing is a curve that does not depend on how eta and mu are distributed.
+/// The density of the landing is the integral of f(eta) f(mu) / |grad x'| along it; the probability of rest, that of
+/// the region below the barrier. Curves are found once, on triangles of a grid over [0, 1] x [0, 3] (spacing 1/160 up
+/// to mu = 0.9, a line of it on the law's kink); a likelihood is then a sum over their pieces. Good to about 1e-3 of a
+/// density for sds of 0.01 and more (dynamics/landing_density.h is the exact form).
+class ContactLikelihood {
+ public:
+  /// @param maps  one a condition of the transitions; their noise does not matter
+  /// O(transitions x 60000), once
+  ContactLikelihood(const std::vector<dynamics::WheelMap>& maps, std::span<const MeasuredTransition> transitions,
+                    int threads);
+
+  /// Sum of ln density of the landings [1/(rad^2/s^2)] and ln probability of rest or survival. -infinity where one of
+  /// them vanishes.
+  double operator()(const ContactParameters& parameters) const;
+
+  /// Transitions that some eta and mu can lead to, and how many others there are.
+  std::size_t possible() const { return terms_.size(); }
+  std::size_t possible_rests() const { return rests_; }
+  std::size_t impossible() const { return impossible_; }
+
+ private:
+  struct Piece {  // of a curve: a point, and its share of length / |grad x'|; of a region: eta and its width, mu from
+                  // and to
+    double restitution, friction, weight, friction_to;
+  };
+  struct Term {
+    bool landing, rested;
+    std::vector<Piece> pieces;
+  };
+  static double density(const Term& term, const ContactParameters& parameters);
+  static double rest(const Term& term, const dynamics::TruncatedNormal& restitution,
+                     const dynamics::TruncatedNormal& friction);
+
+  std::vector<Term> terms_;
+  std::size_t rests_ = 0, impossible_ = 0;
+  int threads_ = 0;
+};
+
+}  // namespace metastable::analysis
