@@ -10,18 +10,6 @@
 namespace metastable::analysis {
 namespace {
 
-std::string_view outcome_name(dynamics::Outcome outcome) {
-  switch (outcome) {
-    case dynamics::Outcome::rest:
-      return "rest";
-    case dynamics::Outcome::end_of_ramp:
-      return "end_of_ramp";
-    case dynamics::Outcome::max_collisions:
-      return "max_collisions";
-  }
-  throw std::logic_error("unknown outcome");
-}
-
 std::string toml_text(const std::string& text) {
   std::string quoted = "\"";
   for (const char c : text) {
@@ -72,6 +60,45 @@ std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const Simul
   return trials;
 }
 
+std::string_view outcome_name(dynamics::Outcome outcome) {
+  switch (outcome) {
+    case dynamics::Outcome::rest:
+      return "rest";
+    case dynamics::Outcome::end_of_ramp:
+      return "end_of_ramp";
+    case dynamics::Outcome::max_collisions:
+      return "max_collisions";
+  }
+  throw std::logic_error("unknown outcome");
+}
+
+std::string wheel_description(const Setting& setting, Spread restitution, Spread friction, const std::string& title,
+                              const std::vector<std::string>& comment) {
+  std::string toml;
+  for (const std::string& line : comment) toml += "# " + line + "\n";
+  toml += fmt::format("title = {}\n\n[wheel]\nhub_mass_kg = {}\nleg_lengths_m = [", toml_text(title),
+                      setting.wheel.hub_mass);
+  for (std::size_t i = 0; i < setting.wheel.leg_length.size(); ++i)
+    toml += fmt::format("{}{}", i == 0 ? "" : ", ", setting.wheel.leg_length[i]);
+  toml += "]\n";
+  if (setting.wheel.inertia) toml += fmt::format("inertia_kg_m2 = {}\n", *setting.wheel.inertia);
+  if (setting.law != dynamics::Law::published)
+    toml += fmt::format("radius_of_gyration_m = {}\n",
+                        dynamics::contact_model(setting.wheel, setting.law).radius_of_gyration);
+  else if (setting.wheel.radius_of_gyration)
+    toml += fmt::format("radius_of_gyration_m = {}\n", *setting.wheel.radius_of_gyration);
+  toml += fmt::format("\n[contact]\nlaw = \"{}\"\nrestitution = {}\nfriction = {}\n", dynamics::law_name(setting.law),
+                      toml_spread(restitution), toml_spread(friction));
+  return toml;
+}
+
+std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated) {
+  std::string toml = fmt::format("\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\n", id,
+                                 setting.slope_deg, setting.ramp_length);
+  if (launch_stated) toml += fmt::format("initial_speed_rad_s = {}\n", toml_spread(setting.initial_speed));
+  return toml + fmt::format("first_landing_leg = {}\n", setting.first_landing_leg);
+}
+
 ExperimentFiles experiment_files(const std::vector<SimulatedCondition>& conditions, const std::string& title,
                                  const std::vector<std::string>& comment) {
   if (conditions.empty()) throw std::invalid_argument("experiment: no condition");
@@ -79,28 +106,14 @@ ExperimentFiles experiment_files(const std::vector<SimulatedCondition>& conditio
   const Nominal contact = nominal(first);
   ExperimentFiles files;
   std::string& toml = files.experiment_toml;
-  for (const std::string& line : comment) toml += "# " + line + "\n";
-  toml +=
-      fmt::format("title = {}\n\n[wheel]\nhub_mass_kg = {}\nleg_lengths_m = [", toml_text(title), first.wheel.hub_mass);
-  for (std::size_t i = 0; i < first.wheel.leg_length.size(); ++i)
-    toml += fmt::format("{}{}", i == 0 ? "" : ", ", first.wheel.leg_length[i]);
-  toml += "]\n";
-  if (first.wheel.inertia) toml += fmt::format("inertia_kg_m2 = {}\n", *first.wheel.inertia);
-  if (first.law != dynamics::Law::published)
-    toml +=
-        fmt::format("radius_of_gyration_m = {}\n", dynamics::contact_model(first.wheel, first.law).radius_of_gyration);
-  toml += fmt::format("\n[contact]\nlaw = \"{}\"\nrestitution = {}\nfriction = {}\n", dynamics::law_name(first.law),
-                      toml_spread(contact.restitution), toml_spread(contact.friction));
+  toml = wheel_description(first, contact.restitution, contact.friction, title, comment);
   if (!first.pairs.empty()) toml += "# drawn from a list of pairs; these are its means and sds\n";
 
   files.collisions_csv = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
   files.trials_csv = "condition,trial,outcome\n";
   std::size_t number = 0;
   for (const auto& [id, setting, trials] : conditions) {
-    toml += fmt::format(
-        "\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\ninitial_speed_rad_s = {}\n"
-        "first_landing_leg = {}\n",
-        id, setting.slope_deg, setting.ramp_length, toml_spread(setting.initial_speed), setting.first_landing_leg);
+    toml += condition_description(id, setting);
     for (const dynamics::Trial& trial : trials) {
       ++number;
       for (const dynamics::TrialCollision& c : trial.collisions)

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "analysis/setting.h"
@@ -34,6 +35,12 @@ struct ExperimentFiles {
   std::string collisions_csv;
   std::string trials_csv;
 };
+/// experiment.toml up to its [[condition]] tables, and one of those. Launches may be left unstated.
+std::string wheel_description(const Setting& setting, Spread restitution, Spread friction, const std::string& title,
+                              const std::vector<std::string>& comment);
+std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated = true);
+std::string_view outcome_name(dynamics::Outcome outcome);
+
 /// Trials are numbered through all conditions. Wheel and contact are those of the first condition.
 /// @param title, comment  of experiment.toml; the comment's lines come first, each behind "# "
 ExperimentFiles experiment_files(const std::vector<SimulatedCondition>& conditions, const std::string& title,

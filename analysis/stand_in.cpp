@@ -9,28 +9,26 @@ Setting stand_in_setting() {
   return setting;
 }
 
+std::vector<RealityCondition> stand_in_conditions(const Setting& base) {
+  std::vector<RealityCondition> conditions{{"fast-9.59", base, 51}, {"slow-9.59", base, 48}, {"fast-7.02", base, 50}};
+  conditions[0].setting.slope_deg = conditions[1].setting.slope_deg = 9.59;
+  conditions[2].setting.slope_deg = 7.02;
+  conditions[0].setting.initial_speed = {5.83, 0.28};
+  conditions[1].setting.initial_speed = {4.51, 0.36};
+  conditions[2].setting.initial_speed = {7.35, 0.19};
+  return conditions;
+}
+
 std::vector<SimulatedCondition> stand_in(const Setting& base, std::uint64_t seed, int threads) {
-  struct Condition {
-    const char* id;
-    double slope_deg;
-    Spread initial_speed;
-    int trials;
-  };
   constexpr int collisions = 16;
   std::vector<SimulatedCondition> conditions;
   std::uint64_t first = 0;
-  for (const Condition& c : {Condition{"fast-9.59", 9.59, {5.83, 0.28}, 51},
-                             {"slow-9.59", 9.59, {4.51, 0.36}, 48},
-                             {"fast-7.02", 7.02, {7.35, 0.19}, 50}}) {
-    Setting setting = base;
-    setting.slope_deg = c.slope_deg;
-    setting.initial_speed = c.initial_speed;
+  for (const auto& [id, setting, trials] : stand_in_conditions(base)) {
     conditions.push_back(
-        {c.id, setting,
+        {id, setting,
          simulate_trials(
-             setting,
-             {.trials = c.trials, .collisions = collisions, .seed = seed, .threads = threads, .first = first})});
-    first += static_cast<std::uint64_t>(c.trials);
+             setting, {.trials = trials, .collisions = collisions, .seed = seed, .threads = threads, .first = first})});
+    first += static_cast<std::uint64_t>(trials);
   }
   return conditions;
 }

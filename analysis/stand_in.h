@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/experiment_folder.h"
+#include "analysis/reality.h"
 
 namespace metastable::analysis {
 
@@ -12,6 +13,9 @@ namespace metastable::analysis {
 /// values, with which that law stops nearly every trial within a few steps: chosen so that the steady speeds are near
 /// those of rigid-body wheels and about one trial in ten rests at 7.02 deg, the "intermittent failures" of Sec. III.
 Setting stand_in_setting();
+
+/// The conditions of stand_in() with their numbers of trials, for the virtual laboratory.
+std::vector<RealityCondition> stand_in_conditions(const Setting& base);
 
 /// The paper's conditions (Sec. III): "fast-9.59" 51 trials launched at N(5.83, 0.28^2) rad/s, "slow-9.59" 48 at
 /// N(4.51, 0.36^2), "fast-7.02" 50 at N(7.35, 0.19^2); first 16 collisions each.

@@ -19,6 +19,7 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr double reference_speed = 5;  // [rad/s] of the catalogue's power laws
 constexpr double plank = 0.31;         // [m]
 constexpr double slosh_time = 0.15;    // [s]
+constexpr double lead = 0.3;           // [s] of motion kept before collision 1
 
 enum class Stream : std::uint64_t { trial = 100, contact = 101, sensor = 102 };
 
@@ -141,7 +142,7 @@ class Laboratory::Roll {
     trial_.condition = condition_;
     const Pose first = landing_pose(body_, surface_, condition.first_landing_leg, 0, launch_);
     Touch touch = touch_standing(body_, first, inertia(first.leg));
-    trial_.motion.push_back({0, 0, launch_});
+    trial_.motion = run_up(body_, surface_, first, inertia(first.leg), lead);
     double time = 0, turn = 0;
     for (;;) {
       const Pose pose = touch.leg == touch.before.leg ? hop(touch) : land(touch, time);
@@ -285,7 +286,7 @@ class Laboratory::Roll {
     collision.omega_plus = pose.speed;
     const double window = lab_.setup_.smoothing;
     double seen = collision.omega_minus;
-    if (window > 0) seen = mean_speed(time - window, time, touch);
+    if (window > 0) seen = mean_speed(std::max(time - window, trial_.motion.front().time), time);
     collision.reported_minus = sensed(seen, 0);
     trial_.collisions.push_back(collision);
     return pose;
@@ -298,31 +299,12 @@ class Laboratory::Roll {
     LaboratoryCollision& last = trial_.collisions.back();
     const double window = lab_.setup_.smoothing, end = trial_.motion.back().time;
     double seen = last.omega_plus;
-    if (window > 0 && end > last.time) {
-      const double until = std::min(end, last.time + window);
-      seen = (angle_at(trial_.motion, until) - angle_at(trial_.motion, last.time)) / (until - last.time);
-    }
+    if (window > 0 && end > last.time) seen = mean_speed(last.time, std::min(end, last.time + window));
     last.reported_plus = sensed(seen, 1);
   }
 
-  double mean_speed(double from, double to, const Touch& touch) const {
-    if (from >= 0) return (angle_at(trial_.motion, to) - angle_at(trial_.motion, from)) / (to - from);
-    // Before collision 1 the wheel was on its way to it: Taylor's series backwards from there.
-    const double window = to - from, step = 1e-4;
-    Pose earlier = touch.before;
-    double angle = 0, speed = earlier.speed;
-    for (double t = 0; t < window; t += step) {
-      const double h = std::min(step, window - t);
-      const Point c = centre_of_mass(body_, earlier);
-      const double x = c.x - earlier.foot.x, z = c.z - earlier.foot.z;
-      const double drag = c_.constant_drag + c_.linear_drag * speed + c_.quadratic_drag * speed * speed;
-      const double torque = body_.mass * body_.gravity * (x * std::cos(body_.slope) + z * std::sin(body_.slope)) - drag;
-      const double rate = torque / inertia_about_foot(body_, earlier, inertia(earlier.leg));
-      angle += h * (speed - rate * h / 2);
-      earlier.angle -= h * (speed - rate * h / 2);
-      speed -= rate * h;
-    }
-    return angle / window;
+  double mean_speed(double from, double to) const {
+    return (angle_at(trial_.motion, to) - angle_at(trial_.motion, from)) / (to - from);
   }
 
   double sensed(double speed, int which) const {

@@ -60,7 +60,8 @@ struct LaboratoryTrial {
   std::size_t condition = 0;
   std::vector<LaboratoryCollision> collisions;
   Outcome outcome = Outcome::max_collisions;
-  /// The wheel's angle in continuous time, from collision 1 on: 0 there [rad], rising.
+  /// The wheel's angle in continuous time, 0 at collision 1 [rad], rising; from at most 0.3 s before it to the next
+  /// touch after the last collision, or to where the wheel turns back.
   std::vector<Moment> motion;
 };
 

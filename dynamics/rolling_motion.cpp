@@ -233,6 +233,25 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
   return rest_at(stance.pose(state), time);
 }
 
+std::vector<Moment> run_up(const RollingBody& body, const RampSurface& surface, const Pose& end, double inertia,
+                           double seconds) {
+  const Stance stance(body, surface, end, inertia);
+  std::vector<Moment> moments{{0, 0, end.speed}};
+  State state{end.angle, end.speed, end.fluid_speed};
+  constexpr double step = 0.005;
+  for (double time = 0; time > -seconds;) {
+    const double length = std::min(step, seconds + time);
+    State earlier{};
+    Stepper().do_step(std::cref(stance), state, time, earlier, -length);
+    time -= length;
+    if (earlier[1] <= 0 || earlier[0] < end.angle - body.leg_angle()) break;
+    state = earlier;
+    moments.push_back({time, state[0] - end.angle, state[1]});
+  }
+  std::reverse(moments.begin(), moments.end());
+  return moments;
+}
+
 Pose landing_pose(const RollingBody& body, const RampSurface& surface, int leg, double along, double speed) {
   Pose pose;
   pose.leg = (leg + body.legs() - 1) % body.legs();

@@ -79,6 +79,11 @@ Touch touch_standing(const RollingBody& body, const Pose& pose, double inertia);
 Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& start, double inertia,
               std::vector<Moment>* moments = nullptr);
 
+/// The motion that led to a pose, backwards in time for at most `seconds`, to the start of that stance or to where the
+/// wheel was held: moments with rising, not positive times and turns, the last one at (0, 0).
+std::vector<Moment> run_up(const RollingBody& body, const RampSurface& surface, const Pose& end, double inertia,
+                           double seconds);
+
 /// The pose on both feet with `leg` about to land at the point (along, surface) and its predecessor as the stance leg.
 Pose landing_pose(const RollingBody& body, const RampSurface& surface, int leg, double along, double speed);
 

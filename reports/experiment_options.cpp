@@ -1,10 +1,14 @@
 #include <fmt/format.h>
 
+#include <sstream>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "analysis/stand_in.h"
 #include "reports/collisions_command.h"
 #include "reports/command.h"
+#include "reports/option_values.h"
 #include "reports/setting_options.h"
 #include "reports/simulate_command.h"
 
@@ -20,6 +24,60 @@ analysis::Setting stand_in_base(const Options& o) {
   if (!o.given("restitution")) setting.restitution = chosen.restitution;
   if (!o.given("friction")) setting.friction = chosen.friction;
   return setting;
+}
+
+void add_reality(Options& o) {
+  o.add_flag("reality", "In the virtual laboratory: motion in continuous time, sharing no formula with the model");
+  o.add("effect", "ID:NAME=VALUE,...", "",
+        "With --reality, repeatable: an effect the model lacks, e.g. leg_contact:leg=3,friction_ratio=1.4");
+  o.add("outside", "ID:SIZE", "",
+        "With --reality, repeatable: an effect outside the catalogue (sloshing_fluid, planks, frame_resonance, "
+        "stored_energy, speed_spread, double_plate)");
+  o.add("skewness", "G", "0", "With --reality: skewness of restitution, (-2, 2)");
+  o.add("sensor-noise", "SD", "0", "With --reality: white noise of every reported speed [rad/s]");
+  o.add("smoothing", "S", "0", "With --reality: reported speeds are means over this time, 0..0.1 [s]");
+  o.add("drop", "NAME,...", "",
+        "With --reality: columns and statements left out (leg, time_s, position_m, omega_plus_rad_s, outcome, "
+        "initial_speed_rad_s, noise)");
+  o.add_flag("no-flight", "With --reality: feet that should lift stay on the ramp");
+  o.add_flag("shuffle", "With --reality: conditions take turns at random");
+}
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, separator);) parts.push_back(part);
+  return parts;
+}
+
+void simulate_reality(const Options& o, const SimulateRequest& plain) {
+  RealityRequest request;
+  request.conditions = plain.stand_in ? analysis::stand_in_conditions(plain.setting)
+                                      : std::vector<analysis::RealityCondition>{
+                                            {fmt::format("{}", plain.setting.slope_deg), plain.setting, plain.trials}};
+  analysis::RealityOptions& reality = request.reality;
+  const analysis::Setting& s = plain.setting;
+  const dynamics::NominalValues stated{s.restitution.mean, s.restitution.sd, s.friction.mean, s.friction.sd,
+                                       s.wheel.leg_length};
+  for (const std::string& text : o.all("effect")) reality.effects.push_back(dynamics::effect_from_text(text, stated));
+  for (const std::string& text : o.all("outside")) {
+    const std::vector<std::string> parts = split(text, ':');
+    if (parts.size() != 2) throw std::invalid_argument(fmt::format("--outside: '{}' is not of the form ID:SIZE", text));
+    reality.outside.push_back({parts[0], number_value("outside", parts[1])});
+  }
+  reality.restitution_skewness = o.number("skewness");
+  reality.sensor_noise = o.number("sensor-noise");
+  reality.smoothing = o.number("smoothing");
+  reality.flight = !o.flag("no-flight");
+  reality.shuffled = o.flag("shuffle");
+  reality.collisions = plain.collisions;
+  reality.seed = plain.seed;
+  reality.threads = plain.threads;
+  if (o.given("drop")) request.dropped = split(o.text("drop"), ',');
+  request.camera = plain.camera;
+  request.out = plain.out;
+  request.command = plain.command;
+  run_reality(request);
 }
 
 }  // namespace
@@ -40,6 +98,7 @@ std::vector<Command> experiment_commands() {
          o.add("angle-rate", "HZ", "",
                "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
          o.add("angle-noise", "RAD", "", "White noise of the angle (default 0.0002; needs --angle-rate)");
+         add_reality(o);
          o.add("seed", "SEED", "1", "Seed of the random numbers");
          o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
          o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
@@ -57,7 +116,11 @@ std::vector<Command> experiment_commands() {
          if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
            throw std::invalid_argument("--angle-noise: needs --angle-rate");
          request.stand_in = stand_in;
-         if (o.given("angle-rate") || stand_in) {
+         const bool reality = o.flag("reality");
+         for (const char* name :
+              {"effect", "outside", "skewness", "sensor-noise", "smoothing", "drop", "no-flight", "shuffle"})
+           if (o.given(name) && !reality) throw std::invalid_argument(fmt::format("--{}: needs --reality", name));
+         if (o.given("angle-rate") || (stand_in && !reality)) {
            analysis::CameraOptions& camera = request.camera.emplace();
            if (o.given("angle-rate")) camera.rate = o.number("angle-rate");
            if (stand_in) camera.decimals = 5;  // a twentieth of the noise; keeps the folder small
@@ -66,7 +129,10 @@ std::vector<Command> experiment_commands() {
            camera.threads = request.threads;
            camera.validate();
          }
-         run_simulate(request);
+         if (reality)
+           simulate_reality(o, request);
+         else
+           run_simulate(request);
        }},
       {"collisions", "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
        [](Options& o) {

@@ -9,6 +9,7 @@
 #include "analysis/collision_finder.h"
 #include "analysis/metastability.h"
 #include "analysis/propagation.h"
+#include "analysis/reality.h"
 #include "analysis/setting.h"
 #include "analysis/sweep.h"
 
@@ -55,6 +56,16 @@ struct SimulateRequest {
   std::string command;
   std::optional<analysis::CameraOptions> camera = {};  ///< given: angle.csv too
   bool stand_in = false;  ///< the paper's three conditions instead of `trials` of one (analysis/stand_in.h)
+};
+
+/// metastable simulate --reality
+struct RealityRequest {
+  std::vector<analysis::RealityCondition> conditions;
+  analysis::RealityOptions reality;
+  std::vector<std::string> dropped;
+  std::optional<analysis::CameraOptions> camera;
+  std::string out;
+  std::string command;
 };
 
 /// metastable collisions

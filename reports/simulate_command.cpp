@@ -23,13 +23,17 @@ analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
                                                       .threads = request.threads})};
 }
 
+void check_empty(const std::filesystem::path& folder) {
+  for (const char* name : {"experiment.toml", "collisions.csv", "trials.csv", "angle.csv"})
+    if (std::filesystem::exists(folder / name))
+      throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
+}
+
 }  // namespace
 
 void run_simulate(const SimulateRequest& request) {
   const std::filesystem::path folder = request.out;
-  for (const char* name : {"experiment.toml", "collisions.csv", "trials.csv", "angle.csv"})
-    if (std::filesystem::exists(folder / name))
-      throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
+  check_empty(folder);
   make_folder(folder);
   const std::vector<analysis::SimulatedCondition> conditions =
       request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
@@ -55,6 +59,33 @@ void run_simulate(const SimulateRequest& request) {
     fmt::print("{}: {} trials{}, {} of them came to rest\n", request.out, trials.size(),
                request.stand_in ? " of " + id : "", rested);
   }
+}
+
+void run_reality(const RealityRequest& request) {
+  const std::filesystem::path folder = request.out;
+  check_empty(folder);
+  const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
+  const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
+  Provenance provenance{request.command, {}, request.reality.seed, version()};
+  analysis::FolderOptions options;
+  options.title = "Rimless wheel in the virtual laboratory";
+  options.comment = provenance_lines(provenance);
+  options.dropped = request.dropped;
+  options.camera = request.camera;
+  const analysis::RealityFiles made = analysis::reality_files(request.conditions, setup, trials, options);
+  make_folder(folder);
+  if (made.angle_csv) write_file(folder / "angle.csv", *made.angle_csv);
+  write_file(folder / "collisions.csv", made.files.collisions_csv);
+  if (!made.files.trials_csv.empty()) write_file(folder / "trials.csv", made.files.trials_csv);
+  write_file(folder / "experiment.toml", made.files.experiment_toml);
+  std::size_t collisions = 0, rested = 0, flown = 0;
+  for (const dynamics::LaboratoryTrial& trial : trials) {
+    collisions += trial.collisions.size();
+    rested += trial.outcome == dynamics::Outcome::rest;
+    for (const dynamics::LaboratoryCollision& c : trial.collisions) flown += c.flew;
+  }
+  fmt::print("{}: {} trials, {} of them came to rest; {} collisions, {} of them after a flight\n", request.out,
+             trials.size(), rested, collisions, flown);
 }
 
 }  // namespace metastable::reports

@@ -6,5 +6,6 @@
 namespace metastable::reports {
 
 void run_simulate(const SimulateRequest& request);
+void run_reality(const RealityRequest& request);
 
 }  // namespace metastable::reports
