@@ -1,0 +1,315 @@
+#include "analysis/gap_map.h"
+
+#include <Random123/philox.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <numeric>
+
+#include "dynamics/truncated_normal.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double tail_score = 2.2;
+
+// Members of one cell: the events that it holds.
+struct Cell {
+  std::string facet, at;
+  std::vector<std::size_t> events;
+};
+
+bool is_stance(EventKind kind) { return kind == EventKind::stance; }
+bool is_collision(EventKind kind) { return kind == EventKind::collision || kind == EventKind::step; }
+
+// Cuts into `parts` of equal counts.
+std::vector<double> quantile_cuts(std::vector<double> values, int parts) {
+  std::sort(values.begin(), values.end());
+  std::vector<double> cuts;
+  for (int i = 1; i < parts; ++i)
+    cuts.push_back(values[values.size() * static_cast<std::size_t>(i) / static_cast<std::size_t>(parts)]);
+  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
+  return cuts;
+}
+
+class Cutter {
+ public:
+  explicit Cutter(const TransitionModel& model) : model_(model) {}
+
+  std::vector<Cell> cells() {
+    const auto& events = model_.events();
+    const bool two_phases = std::any_of(events.begin(), events.end(), [](const Event& e) { return is_stance(e.kind); });
+    for (const bool stance : {false, true}) {
+      if (stance && !two_phases) continue;
+      std::vector<std::size_t> members;
+      for (std::size_t i = 0; i < events.size(); ++i)
+        if (stance ? is_stance(events[i].kind) : is_collision(events[i].kind)) members.push_back(i);
+      if (members.size() < 20) continue;
+      const std::string where = !two_phases ? "" : stance ? ", stance" : ", collision";
+      ranges("speed", members, where, 5, "rad/s", [](const Event& e) { return std::optional(e.speed); });
+      groups("leg", members, where, [](const Event& e) {
+        return e.leg ? std::optional(std::pair{*e.leg, fmt::format("leg {}", *e.leg)}) : std::nullopt;
+      });
+      ranges("position", members, where, 6, "m", [](const Event& e) { return std::optional(e.position); });
+      groups("collision", members, where, [](const Event& e) {
+        static constexpr int ends[] = {1, 2, 4, 8, 12, 16};
+        int from = 1;
+        for (int i = 0; i < 6; ++i) {
+          if (e.number <= ends[i])
+            return std::optional(std::pair{i, from == ends[i] ? fmt::format("collision {}", from)
+                                                              : fmt::format("collisions {} to {}", from, ends[i])});
+          from = ends[i] + 1;
+        }
+        return std::optional(std::pair{6, std::string("collisions from 17")});
+      });
+      ranges("trial", members, where, 6, "",
+             [](const Event& e) { return std::optional(static_cast<double>(e.trial + 1)); });
+      ranges("time", members, where, 5, "s since the previous collision",
+             [](const Event& e) { return e.since_previous; });
+      if (model_.conditions() > 1)
+        groups("condition", members, where, [this](const Event& e) {
+          return std::optional(std::pair{static_cast<int>(e.condition), model_.condition_name(e.condition)});
+        });
+      cells_.push_back({"phase", !two_phases ? "step" : stance ? "stance" : "collision", members});
+    }
+    std::vector<std::size_t> launches;
+    for (std::size_t i = 0; i < events.size(); ++i)
+      if (events[i].kind == EventKind::launch) launches.push_back(i);
+    if (launches.size() >= 10) cells_.push_back({"collision", "launch", launches});
+    return std::move(cells_);
+  }
+
+ private:
+  template <class Key>
+  void groups(const char* facet, const std::vector<std::size_t>& members, const std::string& where, Key key) {
+    std::map<int, Cell> found;
+    for (const std::size_t i : members)
+      if (const auto k = key(model_.events()[i])) {
+        Cell& cell = found[k->first];
+        cell.facet = facet;
+        cell.at = k->second + where;
+        cell.events.push_back(i);
+      }
+    if (found.size() < 2) return;
+    for (auto& [index, cell] : found)
+      if (cell.events.size() >= 20) cells_.push_back(std::move(cell));
+  }
+  template <class Value>
+  void ranges(const char* facet, const std::vector<std::size_t>& members, const std::string& where, int parts,
+              const char* unit, Value value) {
+    std::vector<double> all;
+    for (const std::size_t i : members)
+      if (const auto v = value(model_.events()[i])) all.push_back(*v);
+    if (all.size() < 40) return;
+    const auto [least, most] = std::minmax_element(all.begin(), all.end());
+    const double low = *least, high = *most;
+    if (!(low < high)) return;
+    const std::vector<double> cuts = quantile_cuts(all, parts);
+    groups(facet, members, where, [&](const Event& e) -> std::optional<std::pair<int, std::string>> {
+      const auto v = value(e);
+      if (!v) return std::nullopt;
+      const auto at = std::upper_bound(cuts.begin(), cuts.end(), *v) - cuts.begin();
+      const double from = at == 0 ? low : cuts[static_cast<std::size_t>(at) - 1];
+      const double to = static_cast<std::size_t>(at) == cuts.size() ? high : cuts[static_cast<std::size_t>(at)];
+      return std::pair{static_cast<int>(at),
+                       fmt::format("{} {:.3g} to {:.3g}{}{}", facet, from, to, *unit ? " " : "", unit)};
+    });
+  }
+
+  const TransitionModel& model_;
+  std::vector<Cell> cells_;
+};
+
+}  // namespace
+
+Eigen::MatrixXd mean_columns(const TransitionModel& model) {
+  const std::vector<Cell> cells = Cutter(model).cells();
+  Eigen::MatrixXd columns =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.events().size()), static_cast<Eigen::Index>(cells.size()));
+  for (std::size_t c = 0; c < cells.size(); ++c)
+    for (const std::size_t i : cells[c].events) columns(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c)) = 1;
+  return columns;
+}
+
+GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uint64_t seed) {
+  const auto& events = model.events();
+  const std::vector<double>& z = fit.evaluation.score;
+  const auto count = static_cast<Eigen::Index>(events.size());
+  std::vector<Cell> cells = Cutter(model).cells();
+
+  // Each column of `raw` sums to the statistic of one cell and aspect; its mean is zero without a gap.
+  GapMap map;
+  std::vector<std::vector<std::pair<std::size_t, double>>> raw;
+  const auto add = [&](const Cell& cell, const char* aspect, std::string unit, double size,
+                       std::vector<std::pair<std::size_t, double>> column) {
+    GapCell out;
+    out.facet = cell.facet;
+    out.aspect = aspect;
+    out.at = cell.at;
+    out.unit = std::move(unit);
+    out.size = size;
+    out.events = cell.events.size();
+    map.cells.push_back(std::move(out));
+    raw.push_back(std::move(column));
+  };
+  const double share_below = 2 * dynamics::normal_cdf(-tail_score);
+  for (const Cell& cell : cells) {
+    const auto n = static_cast<double>(cell.events.size());
+    std::vector<std::pair<std::size_t, double>> mean, spread, tail;
+    double shift = 0, squares = 0, beyond = 0;
+    for (const std::size_t i : cell.events) {
+      const double s = std::clamp(z[i], -6.0, 6.0);
+      mean.emplace_back(i, s);
+      spread.emplace_back(i, (s * s - 1) / std::numbers::sqrt2);
+      const double rare = std::abs(s) > tail_score ? 1 : 0;
+      tail.emplace_back(i, rare - share_below);
+      shift += z[i] * fit.evaluation.unit[i];
+      squares += s * s;
+      beyond += rare;
+    }
+    add(cell, "mean", "rad/s", shift / n, std::move(mean));
+    add(cell, "spread", "of the model's", std::sqrt(squares / n) - 1, std::move(spread));
+    if (cell.facet == "phase") add(cell, "tail", "share", beyond / n - share_below, std::move(tail));
+  }
+  // Memory: successive scores of a trial, of each phase; and trials that differ as a whole.
+  for (const bool stance : {false, true}) {
+    std::vector<std::pair<std::size_t, double>> memory, whole;
+    Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}};
+    Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}};
+    double sum = 0, between = 0;
+    std::optional<std::size_t> previous;
+    double partial = 0;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      if (!(stance ? is_stance(events[i].kind) : is_collision(events[i].kind))) continue;
+      const double s = std::clamp(z[i], -6.0, 6.0);
+      if (previous && events[*previous].trial == events[i].trial) {
+        const double before = std::clamp(z[*previous], -6.0, 6.0);
+        memory.emplace_back(i, s * before);
+        sum += s * before;
+        cell.events.push_back(i);
+        whole.emplace_back(i, s * partial);  // adds up to half of (sum^2 - sum of squares)
+        between += s * partial;
+        partial += s;
+        trials.events.push_back(i);
+      } else {
+        partial = s;
+      }
+      previous = i;
+    }
+    if (memory.size() < 20) continue;
+    const double n = static_cast<double>(memory.size());
+    add(cell, "memory", "correlation", sum / n, std::move(memory));
+    const double pairs =
+        n * (static_cast<double>(model.trials()) > 0 ? n / static_cast<double>(model.trials()) : 1) / 2;
+    add(trials, "spread", "correlation", between / std::max(1.0, pairs), std::move(whole));
+  }
+  // Rests against what the model expects at the same speeds.
+  std::map<std::size_t, Cell> outcomes;
+  for (std::size_t i = 0; i < events.size(); ++i)
+    if (events[i].kind == EventKind::rest || events[i].kind == EventKind::survival) {
+      Cell& cell = outcomes[events[i].condition];
+      cell.facet = "outcome";
+      cell.at = "rests in " + model.condition_name(events[i].condition);
+      cell.events.push_back(i);
+    }
+  for (auto& [condition, cell] : outcomes) {
+    if (cell.events.size() < 5) continue;
+    std::vector<std::pair<std::size_t, double>> column;
+    double excess = 0;
+    for (const std::size_t i : cell.events) {
+      const bool rested = events[i].kind == EventKind::rest;
+      const double given = std::exp(fit.evaluation.log_density[i]);
+      const double expected = rested ? given : 1 - given;
+      column.emplace_back(i, (rested ? 1 : 0) - expected);
+      excess += column.back().second;
+    }
+    add(cell, "mean", "share of trials", excess / static_cast<double>(cell.events.size()), std::move(column));
+  }
+
+  // Efficient: what the fitted parameters' scores explain is taken off, event by event.
+  const auto columns = static_cast<Eigen::Index>(raw.size());
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(count, columns);
+  for (Eigen::Index c = 0; c < columns; ++c)
+    for (const auto& [i, value] : raw[static_cast<std::size_t>(c)]) dense(static_cast<Eigen::Index>(i), c) = value;
+  if (fit.derivatives.slope.cols() > 0) {
+    const Eigen::MatrixXd& held = fit.derivatives.slope;
+    Eigen::MatrixXd gram = held.transpose() * held;
+    gram.diagonal() *= 1 + 1e-9;
+    gram.diagonal().array() += 1e-12;
+    dense -= held * gram.ldlt().solve(held.transpose() * dense);
+  }
+  Eigen::MatrixXd by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
+  for (Eigen::Index i = 0; i < count; ++i)
+    by_trial.row(static_cast<Eigen::Index>(events[static_cast<std::size_t>(i)].trial)) += dense.row(i);
+  Eigen::RowVectorXd scale(columns);
+  for (Eigen::Index c = 0; c < columns; ++c) {
+    // Event-wise variance: independent without a gap, and many more of them than trials.
+    const double sum = by_trial.col(c).sum();
+    scale[c] = std::max({std::sqrt(dense.col(c).squaredNorm()), std::sqrt(by_trial.col(c).squaredNorm()), 1e-12});
+    GapCell& cell = map.cells[static_cast<std::size_t>(c)];
+    cell.statistic = sum / scale[c];
+    cell.p_value = std::min(1.0, 2 * dynamics::normal_cdf(-std::abs(cell.statistic)));
+  }
+  const Eigen::RowVectorXd mean = by_trial.colwise().mean();
+  Eigen::MatrixXd centred = by_trial.rowwise() - mean;
+  for (Eigen::Index c = 0; c < columns; ++c) {
+    const double norm = std::sqrt(centred.col(c).squaredNorm());
+    centred.col(c) /= norm > 0 ? norm : 1;
+  }
+
+  // Step-down max-T (Westfall and Young): the largest statistic against the largest by chance, the next against the
+  // largest of those left, and so on.
+  std::vector<std::size_t> order(map.cells.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::abs(map.cells[a].statistic) > std::abs(map.cells[b].statistic);
+  });
+  std::vector<int> exceeded(order.size());
+  std::vector<double> largest_by_chance;
+  Eigen::VectorXd multiplier(by_trial.rows());
+  for (int draw = 0; draw < draws; ++draw) {
+    for (Eigen::Index t = 0; t < multiplier.size(); t += 4) {
+      const r123::Philox4x64::ctr_type counter{{static_cast<std::uint64_t>(draw), static_cast<std::uint64_t>(t), 2, 0}};
+      const auto bits = r123::Philox4x64()(counter, {{seed, 0x6d756c74}});
+      for (Eigen::Index i = 0; i < 4 && t + i < multiplier.size(); ++i)
+        multiplier[t + i] =
+            dynamics::normal_quantile((static_cast<double>(bits[static_cast<std::size_t>(i)] >> 12) + 0.5) * 0x1p-52);
+    }
+    const Eigen::VectorXd chance = centred.transpose() * multiplier;
+    double largest = 0;
+    for (std::size_t k = order.size(); k-- > 0;) {
+      largest = std::max(largest, std::abs(chance[static_cast<Eigen::Index>(order[k])]));
+      exceeded[k] += largest >= std::abs(map.cells[order[k]].statistic);
+    }
+    largest_by_chance.push_back(largest);
+  }
+  std::sort(largest_by_chance.begin(), largest_by_chance.end());
+  const double critical = largest_by_chance.empty() ? 3.5 : largest_by_chance[largest_by_chance.size() * 95 / 100];
+  double adjusted = 0, discovery = 1;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    GapCell& cell = map.cells[order[k]];
+    double p = (exceeded[k] + 1.0) / (draws + 1.0);
+    // Where no draw reached it: Sidak's bound from the cell's own p-value, if that is smaller.
+    if (exceeded[k] == 0) p = std::min(p, static_cast<double>(order.size() - k) * cell.p_value);
+    adjusted = std::max(adjusted, std::min(1.0, p));
+    cell.p_adjusted = adjusted;
+    const double spread = std::abs(cell.statistic) > 1e-9 ? std::abs(cell.size / cell.statistic) : 0;
+    cell.band = critical * spread;
+  }
+  for (std::size_t k = order.size(); k-- > 0;) {
+    GapCell& cell = map.cells[order[k]];
+    discovery = std::min(discovery, cell.p_value * static_cast<double>(order.size()) / static_cast<double>(k + 1));
+    cell.false_discovery = discovery;
+  }
+  for (const GapCell& cell : map.cells) {
+    map.p_value = std::min(map.p_value, cell.p_adjusted);
+    map.largest = std::max(map.largest, cell.statistic * cell.statistic);
+  }
+  return map;
+}
+
+}  // namespace metastable::analysis
