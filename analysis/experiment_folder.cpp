@@ -10,15 +10,6 @@
 namespace metastable::analysis {
 namespace {
 
-std::string toml_text(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    quoted += c;
-  }
-  return quoted + '"';
-}
-
 std::string toml_spread(const Spread& spread) {
   return fmt::format("{{ mean = {}, sd = {} }}", spread.mean, spread.sd);
 }
@@ -70,6 +61,15 @@ std::string_view outcome_name(dynamics::Outcome outcome) {
       return "max_collisions";
   }
   throw std::logic_error("unknown outcome");
+}
+
+std::string toml_text(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + '"';
 }
 
 std::string wheel_description(const Setting& setting, Spread restitution, Spread friction, const std::string& title,

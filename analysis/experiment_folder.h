@@ -40,6 +40,8 @@ std::string wheel_description(const Setting& setting, Spread restitution, Spread
                               const std::vector<std::string>& comment);
 std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated = true);
 std::string_view outcome_name(dynamics::Outcome outcome);
+/// In quotes, as TOML wants it.
+std::string toml_text(const std::string& text);
 
 /// Trials are numbered through all conditions. Wheel and contact are those of the first condition.
 /// @param title, comment  of experiment.toml; the comment's lines come first, each behind "# "

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/stand_in.h"
+#include "reports/coast_down_command.h"
 #include "reports/collisions_command.h"
 #include "reports/command.h"
 #include "reports/option_values.h"
@@ -133,6 +134,43 @@ std::vector<Command> experiment_commands() {
            simulate_reality(o, request);
          else
            run_simulate(request);
+       }},
+      {"coast-down", "Logs of a drum's revolution counter to an experiment folder (system = \"coast_down\")",
+       [](Options& o) {
+         o.add_places("LOG",
+                      "Files without header: time [us], drum speed [km/h], drum revolutions, wheel speed, wheel "
+                      "revolutions; each becomes a condition");
+         o.add("stop", "RAD/S", "5", "Speed at which a run ends");
+         o.add("block", "N", "50", "Revolutions of a block, which serves as a trial");
+         o.add("blocks", "all|odd|even", "all", "Which blocks: one half to fit a nominal loss, the other to check it");
+         o.add("nominal", "DIR", "", "Take the nominal loss of this experiment folder (default: fitted to the logs)");
+         o.add_flag("linear", "Fit a loss proportional to omega too, beside the constant and the quadratic one");
+         o.add("rotor-inertia", "KGM2", "", "Of the drum [kg m^2]: turns losses into torques");
+         o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+       },
+       [](const Options& o, const std::string& line) {
+         CoastDownRequest request;
+         request.logs = o.all("LOG");
+         request.options.stop = o.number("stop");
+         request.options.block = static_cast<int>(o.whole("block", 10, 100000));
+         request.options.validate();
+         request.blocks = o.text("blocks");
+         if (request.blocks != "all" && request.blocks != "odd" && request.blocks != "even")
+           throw std::invalid_argument(fmt::format("--blocks: '{}' is none of 'all', 'odd', 'even'", request.blocks));
+         request.nominal = o.text("nominal");
+         request.linear = o.flag("linear");
+         if (request.linear && !request.nominal.empty())
+           throw std::invalid_argument("--linear: nothing is fitted with --nominal");
+         if (o.given("rotor-inertia")) {
+           request.rotor_inertia = o.number("rotor-inertia");
+           if (!(*request.rotor_inertia > 0))
+             throw std::invalid_argument(
+                 fmt::format("--rotor-inertia: {} is outside (0, inf)", *request.rotor_inertia));
+         }
+         request.out = o.text("out");
+         if (request.out.empty()) throw std::invalid_argument("--out: a folder must be given");
+         request.command = line;
+         run_coast_down(request);
        }},
       {"collisions", "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
        [](Options& o) {

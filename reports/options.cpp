@@ -32,6 +32,10 @@ void Options::add_place(const std::string& name, const std::string& help) {
   command_.add_option(name, texts_[name], help)->required()->expected(1)->type_name("");
 }
 
+void Options::add_places(const std::string& name, const std::string& help) {
+  command_.add_option(name, texts_[name], help)->required()->expected(1, -1)->type_name("");
+}
+
 void Options::read(const std::string& file) {
   for (const ConfigEntry& entry : read_config(file)) {
     if (entry.key == "config" || !texts_.contains(entry.key))

@@ -25,6 +25,8 @@ class Options {
   void add_flag(const std::string& name, const std::string& help);
   /// What the command is about, given by its place on the command line; required.
   void add_place(const std::string& name, const std::string& help);
+  /// One or more of those.
+  void add_places(const std::string& name, const std::string& help);
   /// Keys of the file that the command line did not give.
   void read(const std::string& file);
 

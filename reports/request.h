@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/angle_recording.h"
+#include "analysis/coast_down.h"
 #include "analysis/collision_finder.h"
 #include "analysis/metastability.h"
 #include "analysis/propagation.h"
@@ -75,6 +76,18 @@ struct CollisionsRequest {
   bool peak = false;  ///< omega_minus is the peak of the smoothed speed instead of the stance fit
   std::string out;    ///< file; "": collisions.csv in the folder, or collisions-from-angle.csv if that is there
   int threads = 0;
+};
+
+/// metastable coast-down
+struct CoastDownRequest {
+  std::vector<std::string> logs;
+  analysis::CoastDownOptions options;
+  bool linear = false;  ///< a term proportional to omega is fitted too
+  std::string nominal;  ///< folder whose [loss] is taken; "": fitted to the logs
+  std::string blocks = "all";
+  std::optional<double> rotor_inertia;
+  std::string out;
+  std::string command;
 };
 
 /// metastable report
