@@ -6,9 +6,11 @@
 #include <vector>
 
 #include "analysis/stand_in.h"
+#include "dynamics/contact_law.h"
 #include "reports/coast_down_command.h"
 #include "reports/collisions_command.h"
 #include "reports/command.h"
+#include "reports/describe_command.h"
 #include "reports/option_values.h"
 #include "reports/setting_options.h"
 #include "reports/simulate_command.h"
@@ -200,6 +202,36 @@ std::vector<Command> experiment_commands() {
          request.threads = static_cast<int>(o.whole("threads", 0, 1024));
          request.out = o.text("out");
          run_collisions(request);
+       }},
+      {"describe", "What the trials of an experiment folder show: speeds, tests, survival, restitution and friction",
+       [](Options& o) {
+         o.add_place("DIR", "Experiment folder");
+         o.add("transition", "auto|collision|step", "auto",
+               "Restitution and friction from omega_minus to omega_plus, or to the next omega_minus");
+         o.add("against", "LAW,LAW,...", "", "Compare with simulated trials under published, coulomb, plastic");
+         o.add("trials", "N", "2000", "Simulated trials of that comparison, 2..1000000");
+         o.add("seed", "SEED", "1", "Seed of the random numbers");
+         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add("out", "DIR", "", "Folder for tables, figures and index.html (default: tables on the terminal)");
+       },
+       [](const Options& o, const std::string& line) {
+         DescribeRequest request;
+         request.folder = o.text("DIR");
+         request.out = o.text("out");
+         const std::string transition = o.text("transition");
+         if (transition == "collision" || transition == "step")
+           request.options.transition =
+               transition == "step" ? analysis::Transition::step : analysis::Transition::collision;
+         else if (transition != "auto")
+           throw std::invalid_argument(
+               fmt::format("--transition: '{}' is none of 'auto', 'collision' and 'step'", transition));
+         std::istringstream laws(o.text("against"));
+         for (std::string law; std::getline(laws, law, ',');) request.against.push_back(dynamics::law_from_name(law));
+         request.trials = static_cast<int>(o.whole("trials", 2, 1000000));
+         request.options.seed = o.whole("seed", 0, UINT64_MAX);
+         request.options.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.command = line;
+         run_describe(request);
        }},
   };
 }

@@ -4,12 +4,12 @@
 
 #include <array>
 #include <filesystem>
+#include <utility>
 
 #include "analysis/energy_losses.h"
 #include "analysis/sweep.h"
 #include "dynamics/contact_law.h"
-#include "reports/output_file.h"
-#include "reports/page.h"
+#include "reports/page_folder.h"
 #include "reports/report_figures.h"
 #include "reports/report_tables.h"
 #include "reports/study_progress.h"
@@ -27,18 +27,17 @@ class Report {
  public:
   explicit Report(const ReportRequest& request)
       : request_(request),
-        folder_(request.out),
+        pages_(request.out),
         progress_("report", work()),
         provenance_{request.command, {}, request.study.seed, version()} {
-    make_folder(folder_ / "tables");
-    make_folder(folder_ / "figures");
-    page_.title = "Metastability of the rimless wheel";
-    page_.intro = {
+    Page& page = pages_.page();
+    page.title = "Metastability of the rimless wheel";
+    page.intro = {
         "Expected steps before a rimless wheel on a ramp comes to rest, from a Markov chain sampled from its "
         "stochastic return map. Model: Nanayakkara, Byl, Liu, Song, Villabona, “Dominant Sources of "
         "Variability in Passive Walking” (ICRA 2012)."};
-    for (const analysis::Setting& setting : request.settings) page_.intro.push_back(setting.describe() + ".");
-    page_.provenance = provenance_for(request.settings);
+    for (const analysis::Setting& setting : request.settings) page.intro.push_back(setting.describe() + ".");
+    page.provenance = provenance_for(request.settings);
   }
 
   void write() {
@@ -46,7 +45,7 @@ class Report {
     for (const analysis::Setting& setting : request_.settings) spreads(setting);
     for (const analysis::Setting& setting : request_.settings) means(setting);
     energies();
-    write_file(folder_ / "index.html", render_page(page_));
+    pages_.write_index();
   }
 
  private:
@@ -162,30 +161,14 @@ class Report {
   }
 
   void section(const std::string& id, const std::string& heading, const std::string& reading,
-               std::vector<Figure> figures, std::vector<Table> tables) {
-    PageSection section{id, heading, reading, {}, {}};
-    for (const Figure& figure : figures) {
-      const std::string svg = render_svg(figure);
-      write_file(folder_ / "figures" / (figure.id + ".svg"), svg);
-      section.figures.push_back({figure.id, svg, ""});
-    }
-    for (Table& table : tables) {
-      const std::filesystem::path stem = folder_ / "tables" / table.id;
-      write_file(stem.string() + ".csv", to_csv(table));
-      write_file(stem.string() + ".md", to_markdown(table));
-      write_file(stem.string() + ".tex", to_latex(table));
-      const std::string href = "tables/" + table.id;
-      section.tables.push_back(
-          {std::move(table), {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}, {"LaTeX", href + ".tex"}}});
-    }
-    page_.sections.push_back(std::move(section));
+               const std::vector<Figure>& figures, std::vector<Table> tables) {
+    pages_.section(id, heading, reading, figures, std::move(tables));
   }
 
   const ReportRequest& request_;
-  std::filesystem::path folder_;
+  PageFolder pages_;
   Progress progress_;
   Provenance provenance_;
-  Page page_;
 };
 
 }  // namespace

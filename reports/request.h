@@ -8,6 +8,7 @@
 #include "analysis/angle_recording.h"
 #include "analysis/coast_down.h"
 #include "analysis/collision_finder.h"
+#include "analysis/description.h"
 #include "analysis/metastability.h"
 #include "analysis/propagation.h"
 #include "analysis/reality.h"
@@ -87,6 +88,16 @@ struct CoastDownRequest {
   std::string blocks = "all";
   std::optional<double> rotor_inertia;
   std::string out;
+  std::string command;
+};
+
+/// metastable describe
+struct DescribeRequest {
+  std::string folder;
+  std::string out;  ///< folder for tables, figures and the page; "": tables on the terminal only
+  analysis::DescriptionOptions options;
+  std::vector<dynamics::Law> against;  ///< laws to compare with
+  int trials = 2000;                   ///< simulated trials of that comparison
   std::string command;
 };
 

@@ -347,7 +347,7 @@ std::vector<std::string> provenance_lines(const Provenance& provenance) {
     add("settings", settings.substr(0, end));
     settings.remove_prefix(end == std::string_view::npos ? settings.size() : end + 1);
   }
-  add("seed", fmt::format("{}", provenance.seed));
+  if (!lines.empty()) add("seed", fmt::format("{}", provenance.seed));
   add("version", provenance.version);
   return lines;
 }

@@ -1,0 +1,83 @@
+#include "reports/describe_command.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "analysis/input_error.h"
+#include "analysis/stand_in.h"
+#include "reports/simulate_command.h"
+
+namespace metastable::reports {
+namespace {
+namespace fs = std::filesystem;
+
+class DescribeCommandTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("metastable_describe_" + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+    SimulateRequest request;
+    request.setting = analysis::stand_in_setting();
+    request.trials = 12;
+    request.out = (folder_ / "in").string();
+    testing::internal::CaptureStdout();
+    run_simulate(request);
+    testing::internal::GetCapturedStdout();
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string run(const std::string& out) const {
+    DescribeRequest request;
+    request.folder = (folder_ / "in").string();
+    request.out = out;
+    request.against = {dynamics::Law::plastic};
+    request.trials = 100;
+    testing::internal::CaptureStdout();
+    try {
+      run_describe(request);
+    } catch (...) {
+      testing::internal::GetCapturedStdout();
+      throw;
+    }
+    return testing::internal::GetCapturedStdout();
+  }
+  static std::string read(const fs::path& path) {
+    std::ostringstream text;
+    text << std::ifstream(path).rdbuf();
+    return text.str();
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(DescribeCommandTest, TablesOnTheTerminal) {
+  const std::string said = run("");
+  for (const char* text : {"**The conditions**", "**Restitution and friction by maximum likelihood**", "plastic"})
+    EXPECT_NE(said.find(text), std::string::npos) << text << said;
+  EXPECT_EQ(said.find("seed:"), std::string::npos);
+}
+
+TEST_F(DescribeCommandTest, AFolderWithEverythingTheSameTwice) {
+  const fs::path one = folder_ / "one", two = folder_ / "two";
+  run(one.string());
+  run(two.string());
+  for (const char* file : {"index.html", "tables/conditions.csv", "tables/profiles.tex", "tables/survival.md",
+                           "tables/contact.csv", "tables/laws.csv", "figures/profiles.svg", "figures/survival.svg",
+                           "figures/legs.svg", "figures/return-map-7-02.svg"}) {
+    EXPECT_FALSE(read(one / file).empty()) << file;
+    EXPECT_EQ(read(one / file), read(two / file)) << file;
+  }
+}
+
+TEST_F(DescribeCommandTest, BadFolder) {
+  fs::remove(folder_ / "in/collisions.csv");
+  EXPECT_THROW(run(""), analysis::InputError);
+}
+
+}  // namespace
+}  // namespace metastable::reports
