@@ -98,6 +98,10 @@ class TransitionModel {
   /// The same design (trials, columns, conditions) with outcomes drawn from the model. Same seed, same data.
   virtual std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
                                                     std::uint64_t seed) const = 0;
+  /// Changed experiments in words, each with data drawn from the model without effects: another slope or launch speed,
+  /// more columns, more trials.
+  virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
+      std::span<const double> nuisance, std::uint64_t seed) const = 0;
   /// Observed collisions at risk, and how many of them led to rest. Zero where outcomes are unknown.
   virtual std::pair<double, double> rests() const = 0;
   /// Expected steps before failure under the model, from its hazard along simulated trials as long as the measured

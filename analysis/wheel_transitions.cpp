@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -84,6 +85,8 @@ class WheelTransitions : public TransitionModel {
   Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
                                             std::uint64_t seed) const override;
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
+                                                                                     std::uint64_t seed) const override;
   std::pair<double, double> rests() const override;
   double expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
                         std::uint64_t seed) const override;
@@ -623,6 +626,45 @@ std::unique_ptr<TransitionModel> WheelTransitions::simulate(std::span<const doub
   copy->events_.clear();
   copy->list_events();
   return copy;
+}
+
+std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTransitions::alternatives(
+    std::span<const double> nuisance, std::uint64_t seed) const {
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
+  const auto add = [&](std::string words, const std::function<void(WheelTransitions&)>& change) {
+    WheelTransitions changed = *this;
+    change(changed);
+    all.emplace_back(std::move(words), changed.simulate(nuisance, {}, seed));
+  };
+  add("the same experiment once more", [](WheelTransitions&) {});
+  const double steepest = dynamics::steepest_slope(wheel_.legs()) / degree;
+  for (const double by : {-2.0, 2.0})
+    if (std::all_of(conditions_.begin(), conditions_.end(),
+                    [&](const Condition& c) { return c.slope_deg + by > 1 && c.slope_deg + by < steepest; }))
+      add(fmt::format("slopes {} by 2 deg", by < 0 ? "flatter" : "steeper"), [by](WheelTransitions& w) {
+        for (Condition& c : w.conditions_) c.slope_deg += by;
+      });
+  for (const double by : {-1.0, 1.0})
+    add(fmt::format("launches {} by 1 rad/s", by < 0 ? "slower" : "faster"), [by](WheelTransitions& w) {
+      for (Condition& c : w.conditions_)
+        if (c.initial_speed) c.initial_speed->mean = std::max(1.0, c.initial_speed->mean + by);
+      for (MeasuredRun& run : w.runs_)
+        run.collisions.front().before = std::max(1.0, run.collisions.front().before + by);
+    });
+  if (!speeds_after_)
+    add("the speed after each collision measured as well", [](WheelTransitions& w) {
+      w.speeds_after_ = true;
+      w.noise_ = std::max(w.noise_, 0.005);
+      for (MeasuredRun& run : w.runs_)
+        for (Measured& m : run.collisions) m.after = m.before;  // a value to be drawn anew
+    });
+  add("trials of twice as many collisions", [](WheelTransitions& w) {
+    for (MeasuredRun& run : w.runs_) {
+      const auto count = run.collisions.size();
+      run.collisions.resize(2 * count, run.collisions.back());
+    }
+  });
+  return all;
 }
 
 std::pair<double, double> WheelTransitions::rests() const {

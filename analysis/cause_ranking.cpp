@@ -1,0 +1,186 @@
+#include "analysis/cause_ranking.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "dynamics/truncated_normal.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double expected_gain = 36;  // of an effect before its size is known
+constexpr double pair_prior = 0.2;    // odds of two effects to one
+
+// Log of the mean likelihood ratio over variants and sizes. `gain` is the fitted one of the best variant.
+double log_evidence(const ScannedEffect& scanned, double gain) {
+  const auto parameters = static_cast<double>(scanned.candidate->parameters.size());
+  const double g = expected_gain / std::max(1.0, parameters), shrink = g / (1 + g);
+  const double best = scanned.gain[scanned.best];
+  double sum = 0;
+  for (std::size_t v = 0; v < scanned.gain.size(); ++v) {
+    const double share = v == scanned.best || !(best > 0) ? 1 : scanned.gain[v] / best;
+    sum += std::exp(0.5 * shrink * gain * (std::min(1.0, share) - 1));
+  }
+  return 0.5 * shrink * gain + std::log(sum / static_cast<double>(scanned.gain.size())) -
+         0.5 * parameters * std::log1p(g);
+}
+
+Term term_at(const ScannedEffect& scanned, std::size_t variant) {
+  Term term{scanned.candidate, variant, {}};
+  for (std::size_t p = 0; p < scanned.candidate->parameters.size(); ++p) {
+    const FreeParameter& parameter = scanned.candidate->parameters[p];
+    // No further than a quarter of the range: far from the neutral value the scores say little.
+    const double reach = 0.25 * (parameter.upper - parameter.lower);
+    const double step = std::clamp(scanned.start[variant][static_cast<Eigen::Index>(p)], -reach, reach);
+    term.values.push_back(std::clamp(parameter.neutral + step, parameter.lower, parameter.upper));
+  }
+  return term;
+}
+
+// Variants worth a full fit.
+std::vector<std::size_t> leading_variants(const ScannedEffect& scanned) {
+  std::vector<std::size_t> order(scanned.gain.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return scanned.gain[a] > scanned.gain[b]; });
+  std::vector<std::size_t> leading;
+  for (const std::size_t v : order)
+    if (leading.empty() ||
+        (leading.size() < 3 && scanned.gain[v] > 8 && scanned.gain[v] > 0.8 * scanned.gain[order[0]]))
+      leading.push_back(v);
+  return leading;
+}
+
+// The best fit of `base` with one more effect.
+RankedCause fit_cause(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned) {
+  RankedCause cause;
+  bool first = true;
+  for (const std::size_t variant : leading_variants(scanned)) {
+    std::vector<Term> terms = base.terms;
+    terms.push_back(term_at(scanned, variant));
+    Fit tried = fit(model, base.nuisance, terms);
+    if (tried.penalised < base.penalised) {  // a bad start: from nothing instead
+      for (std::size_t p = 0; p < terms.back().values.size(); ++p) {
+        const FreeParameter& parameter = scanned.candidate->parameters[p];
+        terms.back().values[p] = parameter.try_at != 0 ? parameter.try_at * 0.1 : parameter.neutral;
+      }
+      Fit again = fit(model, base.nuisance, terms);
+      if (again.penalised > tried.penalised) tried = std::move(again);
+    }
+    if (first || tried.penalised > cause.fit.penalised) cause.fit = std::move(tried);
+    first = false;
+  }
+  cause.terms = cause.fit.terms;
+  if (!cause.fit.converged) cause.not_decided = cause.fit.reason;
+  return cause;
+}
+
+}  // namespace
+
+CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
+                         const std::vector<const Candidate*>& candidates, const RankingOptions& options) {
+  const auto progress = [&](double share) {
+    if (options.progress) options.progress(share);
+  };
+  CauseRanking ranking;
+  ranking.scan = scan_effects(model, recalibrated, candidates, options.threads);
+  progress(0.15);
+  const ChanceGains chance(ranking.scan, options.draws, options.seed);
+
+  ranking.singles.resize(candidates.size());
+  const auto scanned_of = [&](const EffectScan& scan, const Candidate* candidate) -> const ScannedEffect* {
+    for (const ScannedEffect& effect : scan.effects)
+      if (effect.candidate == candidate) return &effect;
+    return nullptr;
+  };
+  markov::parallel_for(candidates.size(), options.threads, [&](std::size_t i) {
+    const Candidate* candidate = candidates[i];
+    RankedCause& cause = ranking.singles[i];
+    cause.terms = {Term{candidate, 0, {}}};
+    if (!candidate->undecidable.empty()) {
+      cause.not_decided = candidate->undecidable;
+      cause.evidence = -std::numeric_limits<double>::infinity();
+      return;
+    }
+    if (candidate->parameters.empty()) {  // another law: nothing to scan
+      cause.fit = fit(model, recalibrated.nuisance, {Term{candidate, 0, {}}});
+      if (!cause.fit.converged) cause.not_decided = cause.fit.reason;
+      cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
+      cause.p_value = 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, cause.gain)));
+      cause.evidence = 0.5 * cause.gain;
+      return;
+    }
+    const ScannedEffect& scanned = *scanned_of(ranking.scan, candidate);
+    cause = fit_cause(model, recalibrated, scanned);
+    cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
+    // At the optimum up to what the differences resolve: small gains that the scores confirm are decided.
+    if (!cause.not_decided.empty() && cause.gain < 10 && scanned.gain[scanned.best] < 10) cause.not_decided.clear();
+    for (std::size_t e = 0; e < ranking.scan.effects.size(); ++e)
+      if (ranking.scan.effects[e].candidate == candidate) cause.p_value = chance.p_value(e, cause.gain);
+    cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
+  });
+  progress(0.6);
+  double least = 1;
+  for (const RankedCause& cause : ranking.singles)
+    if (!cause.fit.nuisance.empty()) least = std::min(least, cause.p_value);
+  ranking.p_value = chance.look_elsewhere(least);
+
+  // Pairs: what the leaders leave, scanned again.
+  std::vector<std::size_t> leaders;
+  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
+    if (ranking.singles[i].evidence > 2) leaders.push_back(i);
+  std::sort(leaders.begin(), leaders.end(),
+            [&](std::size_t a, std::size_t b) { return ranking.singles[a].evidence > ranking.singles[b].evidence; });
+  if (leaders.size() > 3) leaders.resize(3);
+  const double prior = std::log(pair_prior / std::max(1.0, 0.5 * static_cast<double>(candidates.size() - 1)));
+  struct Try {
+    std::size_t leader;
+    ScannedEffect scanned;
+  };
+  std::vector<Try> tries;
+  for (const std::size_t leader : leaders) {
+    const RankedCause& first = ranking.singles[leader];
+    std::vector<const Candidate*> others;
+    for (const Candidate* other : candidates)
+      if (other != first.terms[0].candidate) others.push_back(other);
+    const EffectScan scan = scan_effects(model, first.fit, others, options.threads);
+    std::vector<std::pair<double, const ScannedEffect*>> promising;
+    for (const ScannedEffect& effect : scan.effects) {
+      const double gain = effect.gain[effect.best] - model_error * model_error * first.gain;
+      if (gain > 7) promising.emplace_back(log_evidence(effect, gain), &effect);
+    }
+    std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    for (std::size_t k = 0; k < std::min<std::size_t>(3, promising.size()); ++k)
+      tries.push_back({leader, *promising[k].second});
+  }
+  progress(0.8);
+  std::vector<RankedCause> pairs(tries.size());
+  markov::parallel_for(tries.size(), options.threads, [&](std::size_t i) {
+    const RankedCause& first = ranking.singles[tries[i].leader];
+    RankedCause& pair = pairs[i];
+    pair = fit_cause(model, first.fit, tries[i].scanned);
+    const double gain = 2 * (pair.fit.penalised - first.fit.penalised);
+    pair.gain = first.gain + gain;
+    const double earned = std::max(0.0, gain - model_error * model_error * first.gain);
+    pair.evidence = first.evidence + log_evidence(tries[i].scanned, earned) + prior;
+    pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(earned));
+  });
+  // The same pair from either side counts once, the better fit.
+  for (RankedCause& pair : pairs) {
+    const auto same = std::find_if(ranking.pairs.begin(), ranking.pairs.end(), [&](const RankedCause& other) {
+      return (other.terms[0].candidate == pair.terms[1].candidate &&
+              other.terms[1].candidate == pair.terms[0].candidate);
+    });
+    if (same == ranking.pairs.end())
+      ranking.pairs.push_back(std::move(pair));
+    else if (pair.evidence > same->evidence)
+      *same = std::move(pair);
+  }
+  progress(1);
+  return ranking;
+}
+
+}  // namespace metastable::analysis

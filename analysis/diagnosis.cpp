@@ -1,0 +1,426 @@
+#include "analysis/diagnosis.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include "analysis/cause_ranking.h"
+#include "analysis/gap_shrinkage.h"
+#include "analysis/visibility.h"
+#include "dynamics/truncated_normal.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes
+constexpr double recalibration_level = 0.02;
+constexpr double left_over_level = 0.002;
+
+std::vector<double> nominal_values(const TransitionModel& model) {
+  std::vector<double> values;
+  for (const Nuisance& n : model.nuisances()) values.push_back(n.nominal);
+  return values;
+}
+
+// P of as large a quadratic form of the nuisances' scores by chance: the prior shrinks each direction of the
+// information.
+double recalibration_p_value(const TransitionModel& model, const Fit& as_given, double gain) {
+  const Eigen::Index size = as_given.information.rows();
+  Eigen::MatrixXd root_prior = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index p = 0; p < size; ++p) root_prior(p, p) = model.nuisances()[static_cast<std::size_t>(p)].prior_sd;
+  // In units of the prior: eigenvalues l of the information; a direction's share of chance gain is l/(1+l) chi^2_1.
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(root_prior * as_given.information * root_prior).eigenvalues();
+  double mean = 0, variance = 0;
+  for (const double one : eigenvalues) {
+    const double l = std::max(0.0, one - 1);  // the prior is part of the information
+    const double weight = l / (1 + l);
+    mean += weight;
+    variance += 2 * weight * weight;
+  }
+  if (!(mean > 0)) return 1;
+  // Satterthwaite: a chi-squared of the same mean and variance.
+  const double scale = variance / (2 * mean), degrees = mean / scale;
+  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), std::max(0.0, gain) / scale));
+}
+
+std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixXd& covariance, Eigen::Index first) {
+  constexpr double score90 = 1.6448536269514722;
+  const std::vector<double>& variant = term.candidate->variants[term.variant];
+  const std::vector<Named> here = term.candidate->report(variant, term.values);
+  std::vector<EstimatedParameter> all;
+  for (const Named& one : here) all.push_back({one.first, one.second, one.second, one.second, false});
+  const auto count = term.values.size();
+  if (count == 1) {  // reported numbers are monotone in the one value: its ends are theirs
+    const FreeParameter& p = term.candidate->parameters[0];
+    const double half = score90 * std::sqrt(std::max(0.0, covariance(first, first)));
+    for (const double end : {-half, half}) {
+      const auto there = term.candidate->report(variant, {std::clamp(term.values[0] + end, p.lower, p.upper)});
+      for (std::size_t k = 0; k < all.size(); ++k) {
+        all[k].lower = std::min(all[k].lower, there[k].second);
+        all[k].upper = std::max(all[k].upper, there[k].second);
+        all[k].fitted = all[k].fitted || there[k].second != here[k].second;
+      }
+    }
+    return all;
+  }
+  // By the slopes of the reported numbers.
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    Eigen::VectorXd slope(static_cast<Eigen::Index>(count));
+    for (std::size_t p = 0; p < count; ++p) {
+      std::vector<double> moved = term.values;
+      const double step = term.candidate->parameters[p].step;
+      moved[p] += step;
+      slope[static_cast<Eigen::Index>(p)] = (term.candidate->report(variant, moved)[k].second - here[k].second) / step;
+    }
+    const auto block = covariance.block(first, first, slope.size(), slope.size());
+    const double half = score90 * std::sqrt(std::max(0.0, slope.dot(block * slope)));
+    all[k].lower -= half;
+    all[k].upper += half;
+    all[k].fitted = half > 0;
+  }
+  return all;
+}
+
+Cause describe(const TransitionModel& model, const RankedCause& ranked) {
+  Cause cause;
+  for (const Term& term : ranked.terms) cause.effects.push_back(term.candidate->id);
+  cause.gain = ranked.gain;
+  cause.p_value = ranked.p_value;
+  cause.evidence = ranked.evidence;
+  cause.not_decided = ranked.not_decided;
+  if (ranked.fit.information.rows() == 0) {
+    cause.parameters.resize(ranked.terms.size());
+    return cause;
+  }
+  Eigen::MatrixXd steadied = ranked.fit.information;
+  steadied.diagonal().array() += 1e-12;
+  const Eigen::MatrixXd covariance = steadied.ldlt().solve(Eigen::MatrixXd::Identity(steadied.rows(), steadied.cols()));
+  auto first = static_cast<Eigen::Index>(model.nuisances().size());
+  for (const Term& term : ranked.terms) {
+    cause.parameters.push_back(estimates(term, covariance, first));
+    first += static_cast<Eigen::Index>(term.values.size());
+  }
+  return cause;
+}
+
+std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit) {
+  const Eigen::MatrixXd covariance =
+      fit.information.ldlt().solve(Eigen::MatrixXd::Identity(fit.information.rows(), fit.information.cols()));
+  std::vector<EstimatedParameter> all;
+  const std::vector<Named> here = model.report_nuisances(fit.nuisance);
+  for (std::size_t k = 0; k < here.size(); ++k) {
+    Eigen::VectorXd slope(covariance.rows());
+    for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
+      std::vector<double> moved = fit.nuisance;
+      moved[p] += model.nuisances()[p].step;
+      slope[static_cast<Eigen::Index>(p)] =
+          (model.report_nuisances(moved)[k].second - here[k].second) / model.nuisances()[p].step;
+    }
+    const double half = 1.645 * std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
+    all.push_back({here[k].first, here[k].second, here[k].second - half, here[k].second + half, true});
+  }
+  return all;
+}
+
+StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std::vector<double>& nominal,
+                                        const Fit& recalibrated, const Fit& chosen, std::uint64_t seed) {
+  StepsBeforeFailure steps;
+  const auto [at_risk, rests] = model.rests();
+  if (at_risk > 0) {
+    // Rests are counts: exact limits of a Poisson mean.
+    const auto limit = [](double degrees, double p) {
+      return degrees > 0 ? boost::math::quantile(boost::math::chi_squared(degrees), p) / 2 : 0.0;
+    };
+    const double most = limit(2 * rests + 2, 0.95), least = limit(2 * rests, 0.05);
+    const double infinity = std::numeric_limits<double>::infinity();
+    steps.observed = rests > 0 ? at_risk / rests : infinity;
+    steps.observed_lower = at_risk / most;
+    steps.observed_upper = least > 0 ? at_risk / least : infinity;
+  }
+  steps.baseline = model.expected_steps(nominal, {}, seed);
+  steps.recalibrated = model.expected_steps(recalibrated.nuisance, {}, seed);
+  steps.with_effect = model.expected_steps(chosen.nuisance, chosen.terms, seed);
+  return steps;
+}
+
+// Mean speed before each collision, by condition.
+std::vector<ProfilePoint> profiles(const TransitionModel& model, const std::vector<double>& nominal, const Fit& chosen,
+                                   std::uint64_t seed) {
+  struct Sum {
+    double count = 0, sum = 0, squares = 0;
+  };
+  const auto gather = [&](const TransitionModel& m, std::vector<std::vector<Sum>>& sums) {
+    const Event* previous = nullptr;
+    for (const Event& e : m.events()) {
+      const bool before = e.kind == EventKind::collision || e.kind == EventKind::step || e.kind == EventKind::rest ||
+                          e.kind == EventKind::survival;
+      if (!before || e.number > 40) continue;
+      if (previous && previous->trial == e.trial && previous->number == e.number) continue;
+      previous = &e;
+      auto& of = sums[e.condition];
+      if (of.size() < static_cast<std::size_t>(e.number)) of.resize(static_cast<std::size_t>(e.number));
+      Sum& s = of[static_cast<std::size_t>(e.number) - 1];
+      s.count += 1;
+      s.sum += e.speed;
+      s.squares += e.speed * e.speed;
+    }
+  };
+  std::vector<std::vector<Sum>> measured(model.conditions()), given(model.conditions()), with(model.conditions());
+  gather(model, measured);
+  for (std::uint64_t round = 0; round < 4; ++round) {
+    gather(*model.simulate(nominal, {}, seed + round), given);
+    gather(*model.simulate(chosen.nuisance, chosen.terms, seed + round), with);
+  }
+  std::vector<ProfilePoint> points;
+  for (std::size_t c = 0; c < measured.size(); ++c)
+    for (std::size_t k = 0; k < measured[c].size(); ++k) {
+      const Sum& m = measured[c][k];
+      if (m.count < 3) continue;
+      const auto mean = [](const Sum& s) { return s.count > 0 ? s.sum / s.count : 0.0; };
+      const auto sd = [&](const Sum& s) {
+        return s.count > 1 ? std::sqrt(std::max(0.0, s.squares / s.count - mean(s) * mean(s)) * s.count / (s.count - 1))
+                           : 0;
+      };
+      ProfilePoint p;
+      p.condition = c;
+      p.collision = static_cast<int>(k) + 1;
+      p.trials = static_cast<std::size_t>(m.count);
+      p.measured = mean(m);
+      p.measured_error = sd(m) / std::sqrt(m.count);
+      if (k < given[c].size()) p.baseline = mean(given[c][k]);
+      if (k < with[c].size()) {
+        p.with_effect = mean(with[c][k]);
+        p.band = 1.96 * sd(with[c][k]) / std::sqrt(m.count);
+      }
+      points.push_back(p);
+    }
+  return points;
+}
+
+std::string quantity(double value) { return fmt::format("{:.3g}", value); }
+
+std::string with_parameters(const Cause& cause) {
+  std::string text;
+  for (std::size_t e = 0; e < cause.effects.size(); ++e) {
+    text += (e ? " and " : "") + cause.effects[e];
+    std::string inside;
+    for (const EstimatedParameter& p : cause.parameters[e]) {
+      if (cause.parameters[e].size() > 3 && inside.size() > 40) break;
+      inside += (inside.empty() ? "" : ", ") + p.name + " " + quantity(p.value);
+    }
+    if (!inside.empty() && cause.parameters[e].size() <= 3) text += " (" + inside + ")";
+  }
+  return text;
+}
+
+void say(Diagnosis& d) {
+  auto& s = d.sentences;
+  switch (d.verdict) {
+    case Verdict::no_gap:
+      s.push_back("No gap beyond chance: the data agree with the model as given.");
+      break;
+    case Verdict::recalibrate:
+      s.push_back("There is a gap as given, and other contact parameters remove it: no missing physics shows.");
+      break;
+    case Verdict::explained:
+      if (d.cause_set.size() == 1)
+        s.push_back(fmt::format("There is a gap that recalibration does not remove, and one cause explains it: {}.",
+                                with_parameters(d.causes.front())));
+      else {
+        std::string names;
+        for (const std::string& name : d.cause_set) names += (names.empty() ? "" : ", ") + name;
+        s.push_back(fmt::format(
+            "There is a gap that recalibration does not remove. These data cannot tell {} causes apart: {}.",
+            d.cause_set.size(), names));
+        s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(d.causes.front()),
+                                d.causes.front().probability));
+      }
+      break;
+    case Verdict::unexplained:
+      s.push_back("There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
+      if (!d.causes.empty() && d.causes.front().gain > 10)
+        s.push_back(
+            fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.", d.causes.front().name()));
+      break;
+  }
+  const GapMap& map = d.verdict == Verdict::unexplained ? d.left : d.recalibrated;
+  if (d.verdict == Verdict::explained || d.verdict == Verdict::unexplained) {
+    const auto largest = std::min_element(map.cells.begin(), map.cells.end(), [](const GapCell& a, const GapCell& b) {
+      return std::abs(a.statistic) > std::abs(b.statistic);
+    });
+    if (largest != map.cells.end() && largest->p_adjusted < 0.05)
+      s.push_back(fmt::format("It shows most in the {} of {} ({:+.2g} {}).", largest->aspect, largest->at,
+                              largest->size, largest->unit));
+  }
+  if (!d.shrinkage.empty() && d.shrinkage[0].closed && d.verdict != Verdict::no_gap) {
+    const Shrinkage& log_score = d.shrinkage[0];
+    s.push_back(
+        fmt::format("Held out, {:.0f} % of the gap closes (90 %: {:.0f} to {:.0f} %), from {:.2g} to {:.2g} nats a "
+                    "collision.",
+                    100 * *log_score.closed, 100 * *log_score.closed_lower, 100 * *log_score.closed_upper,
+                    log_score.baseline, log_score.with_effect));
+  }
+}
+
+}  // namespace
+
+std::string verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::no_gap:
+      return "no_gap";
+    case Verdict::recalibrate:
+      return "recalibrate";
+    case Verdict::explained:
+      return "explained";
+    case Verdict::unexplained:
+      return "unexplained";
+  }
+  throw std::logic_error("verdict_name: unknown verdict");
+}
+
+std::string Cause::name() const {
+  std::string joined;
+  for (const std::string& effect : effects) joined += (joined.empty() ? "" : "+") + effect;
+  return joined;
+}
+
+Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options) {
+  if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
+  if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
+  if (!(options.level > 0 && options.level < 0.5))
+    throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
+  std::vector<const Candidate*> candidates;
+  for (const Candidate& candidate : model.candidates())
+    if (options.catalogue.empty() ||
+        std::find(options.catalogue.begin(), options.catalogue.end(), candidate.id) != options.catalogue.end())
+      candidates.push_back(&candidate);
+  const auto progress = [&](double share, const char* doing) {
+    if (options.progress) options.progress(share, doing);
+  };
+
+  Diagnosis d;
+  d.trials = model.trials();
+  d.events = model.events().size();
+  for (const Event& e : model.events()) d.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
+  for (std::size_t c = 0; c < model.conditions(); ++c) d.condition_names.push_back(model.condition_name(c));
+  d.notes = model.notes();
+  if (d.trials < 20)
+    d.notes.push_back(
+        fmt::format("{} trials: chance levels are rough below 20 trials, and held-out figures say little", d.trials));
+
+  progress(0, "the model as given");
+  const std::vector<double> nominal = nominal_values(model);
+  const Fit as_given = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
+  Fit given;  // nothing refitted: nothing to project out
+  given.nuisance = nominal;
+  given.evaluation = model.evaluate(nominal, {});
+  given.log_likelihood = given.evaluation.total();
+  d.as_given = gap_map(model, given, options.draws / 2, options.seed);
+  const Fit recalibrated = fit(model, nominal, {});
+  if (!recalibrated.converged) d.notes.push_back("recalibration: " + recalibrated.reason);
+  d.contact = contact_estimates(model, recalibrated);
+  const double recalibration_gain = 2 * (recalibrated.penalised - given.log_likelihood);
+  d.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
+
+  progress(0.1, "where the gap lies");
+  d.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
+  d.p_where = d.recalibrated.p_value;
+
+  const CauseRanking ranking = rank_causes(
+      model, recalibrated, candidates,
+      {.threads = options.threads, .draws = options.draws, .seed = options.seed, .progress = [&](double share) {
+         progress(0.15 + 0.5 * share, "which effect");
+       }});
+  d.p_effects = ranking.p_value;
+  d.p_value = std::min(1.0, std::min(d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects)));
+  d.p_as_given = std::min(1.0, 2 * std::min(d.p_recalibration, d.p_value));
+
+  // All hypotheses by falling evidence.
+  std::vector<const RankedCause*> ordered;
+  for (const RankedCause& cause : ranking.singles) {
+    if (cause.not_decided.empty())
+      ordered.push_back(&cause);
+    else
+      d.not_decided.push_back(describe(model, cause));
+  }
+  for (const RankedCause& pair : ranking.pairs) ordered.push_back(&pair);
+  std::stable_sort(ordered.begin(), ordered.end(),
+                   [](const RankedCause* a, const RankedCause* b) { return a->evidence > b->evidence; });
+  const bool gap = d.p_value < options.level;
+
+  // What the best hypothesis leaves: judged beyond its own model error.
+  const RankedCause* best = ordered.empty() ? nullptr : ordered.front();
+  const Fit* chosen = &recalibrated;
+  double none = 0;
+  if (gap && best && best->evidence > 0) {
+    progress(0.68, "what is left");
+    chosen = &best->fit;
+    d.left = gap_map(model, *chosen, options.draws, options.seed + 1);
+    const double beyond = d.left.largest - model_error * model_error * best->gain;
+    if (d.left.p_value < left_over_level && beyond > 14) none = std::exp(std::min(300.0, 0.5 * (beyond - 14)));
+  } else {
+    d.left = d.recalibrated;
+    if (gap) none = 1e6;  // cells of the map stand out, and no effect does
+  }
+  // Probabilities over everything; the prior gives a gap even odds, shared by the effects.
+  double top = best ? std::max(0.0, best->evidence) : 0, sum = 0;
+  const double effects = std::max<double>(1, static_cast<double>(candidates.size()));
+  const double weight_null = std::exp(-top);
+  double given_gap = 0;
+  for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
+  const double weight_none = (none + 0.01) * given_gap;
+  sum = weight_null + given_gap + weight_none;
+  d.p_none = weight_none / sum;
+  const bool needs_recalibration = d.p_recalibration < recalibration_level;
+  (needs_recalibration ? d.p_recalibrate : d.p_no_gap) = weight_null / sum;
+  double covered = 0;
+  for (const RankedCause* cause : ordered) {
+    Cause one = describe(model, *cause);
+    one.probability = std::exp(cause->evidence - top) / effects / sum;
+    d.causes.push_back(std::move(one));
+  }
+
+  if (!gap) {
+    d.verdict = needs_recalibration ? Verdict::recalibrate : Verdict::no_gap;
+  } else if (none >= 1) {
+    d.verdict = Verdict::unexplained;
+  } else {
+    d.verdict = Verdict::explained;
+    for (const Cause& cause : d.causes) {
+      if (covered >= 0.95 * (given_gap / sum)) break;
+      d.cause_set.push_back(cause.name());
+      covered += cause.probability;
+    }
+  }
+  if (d.verdict != Verdict::explained && d.verdict != Verdict::unexplained) chosen = &recalibrated;
+  if (d.verdict == Verdict::recalibrate) d.cause_set = {"contact_distribution"};
+
+  progress(0.7, "how far it shrinks");
+  std::vector<std::vector<Term>> rivals;
+  if (chosen != &recalibrated)
+    for (const RankedCause* cause : ordered) {
+      if (rivals.size() == 3 || cause->evidence < best->evidence - 4) break;
+      rivals.push_back(cause->terms);
+    }
+  d.shrinkage = gap_shrinkage(model, recalibrated, rivals, options.folds, options.threads, options.seed);
+  progress(0.88, "steps before failure");
+  d.steps = steps_before_failure(model, nominal, recalibrated, *chosen, options.seed);
+  d.profile = profiles(model, nominal, *chosen, options.seed);
+  progress(0.93, "what could not be seen");
+  d.visible = visibility(ranking.scan, candidates);
+  if (d.verdict == Verdict::explained && d.cause_set.size() > 1 && ordered.size() > 1)
+    d.next = next_experiments(model, ordered[0]->fit, ordered[1]->terms, options.threads, options.seed);
+  progress(1, "done");
+  say(d);
+  return d;
+}
+
+}  // namespace metastable::analysis

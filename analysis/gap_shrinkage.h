@@ -1,0 +1,21 @@
+#pragma once
+// How far the gap shrinks: models compared on trials they were not fitted to.
+
+#include <functional>
+#include <vector>
+
+#include "analysis/diagnosis.h"
+#include "analysis/model_fit.h"
+
+namespace metastable::analysis {
+
+/// Cross-validated by trial: in every fold nuisances and each of `rivals` are refitted to the other trials, the rival
+/// with the best penalised likelihood there is used on the held-out ones (an empty list of terms: none). Measures:
+/// log score per collision below that of a flexible model (the chosen one plus a ridge-fitted shift in every cell of
+/// the gap map, cross-fitted), and CRPS of the next speed. The floor is the same measure on data of the chosen model
+/// itself.
+std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& recalibrated,
+                                     const std::vector<std::vector<Term>>& rivals, int folds, int threads,
+                                     std::uint64_t seed);
+
+}  // namespace metastable::analysis
