@@ -12,7 +12,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double expected_gain = 36;  // of an effect before its size is known
-constexpr double pair_prior = 0.2;    // odds of two effects to one
+constexpr double pair_prior = 0.05;   // odds of two effects to one
 
 // Log of the mean likelihood ratio over variants and sizes. `gain` is the fitted one of the best variant.
 double log_evidence(const ScannedEffect& scanned, double gain) {
@@ -29,7 +29,7 @@ double log_evidence(const ScannedEffect& scanned, double gain) {
 }
 
 Term term_at(const ScannedEffect& scanned, std::size_t variant) {
-  Term term{scanned.candidate, variant, {}};
+  Term term{scanned.candidate, scanned.candidate->variants[variant], {}};
   for (std::size_t p = 0; p < scanned.candidate->parameters.size(); ++p) {
     const FreeParameter& parameter = scanned.candidate->parameters[p];
     // No further than a quarter of the range: far from the neutral value the scores say little.
@@ -52,6 +52,26 @@ std::vector<std::size_t> leading_variants(const ScannedEffect& scanned) {
         (leading.size() < 3 && scanned.gain[v] > 8 && scanned.gain[v] > 0.8 * scanned.gain[order[0]]))
       leading.push_back(v);
   return leading;
+}
+
+// Moves the last term's variant between the list's values as long as the likelihood rises, halving the moves.
+void refine_variant(const TransitionModel& model, Fit& best) {
+  const std::vector<double> spacing = best.terms.back().candidate->refine;
+  double share = 0.5;
+  for (int round = 0; round < 3; ++round, share /= 2)
+    for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
+      if (spacing[entry] == 0) continue;
+      for (const double sign : {1.0, -1.0}) {
+        std::vector<Term> terms = best.terms;
+        terms.back().variant[entry] += sign * share * spacing[entry];
+        Fit tried = fit(model, best.nuisance, terms, {.count = {}, .refit_nuisances = true, .most_iterations = 4});
+        if (!(tried.penalised > best.penalised + 0.2)) continue;
+        const bool was_converged = best.converged;
+        best = std::move(tried);
+        best.converged = best.converged || was_converged;
+        break;
+      }
+    }
 }
 
 // The best fit of `base` with one more effect.
@@ -78,7 +98,26 @@ RankedCause fit_cause(const TransitionModel& model, const Fit& base, const Scann
   return cause;
 }
 
+// What a second effect gained beyond the model error of the first.
+double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& plain) {
+  const PhaseGain before = phase_gain(model, first, plain), now = phase_gain(model, pair, first);
+  const double tolerated = model_error * model_error;
+  // Only what the second effect gained by itself: one phase may have paid for the other.
+  const double all = now.collisions + now.stances;
+  const double beyond = std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +
+                        std::max(0.0, now.stances - tolerated * std::max(0.0, before.stances));
+  return std::max(0.0, std::min(all, beyond));
+}
+
 }  // namespace
+
+PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse) {
+  PhaseGain gain;
+  for (std::size_t i = 0; i < model.events().size(); ++i)
+    (model.events()[i].kind == EventKind::stance ? gain.stances : gain.collisions) +=
+        2 * (better.evaluation.log_density[i] - worse.evaluation.log_density[i]);
+  return gain;
+}
 
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options) {
@@ -90,6 +129,9 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   progress(0.15);
   const ChanceGains chance(ranking.scan, options.draws, options.seed);
 
+  double largest = 0;
+  for (const ScannedEffect& effect : ranking.scan.effects) largest = std::max(largest, effect.gain[effect.best]);
+
   ranking.singles.resize(candidates.size());
   const auto scanned_of = [&](const EffectScan& scan, const Candidate* candidate) -> const ScannedEffect* {
     for (const ScannedEffect& effect : scan.effects)
@@ -99,21 +141,32 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   markov::parallel_for(candidates.size(), options.threads, [&](std::size_t i) {
     const Candidate* candidate = candidates[i];
     RankedCause& cause = ranking.singles[i];
-    cause.terms = {Term{candidate, 0, {}}};
+    cause.terms = {Term{candidate, candidate->variants[0], {}}};
     if (!candidate->undecidable.empty()) {
       cause.not_decided = candidate->undecidable;
       cause.evidence = -std::numeric_limits<double>::infinity();
       return;
     }
     if (candidate->parameters.empty()) {  // another law: nothing to scan
-      cause.fit = fit(model, recalibrated.nuisance, {Term{candidate, 0, {}}});
-      if (!cause.fit.converged) cause.not_decided = cause.fit.reason;
+      cause.fit =
+          fit(model, recalibrated.nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = 12});
       cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
+      // Far below and hardly rising any more: decided against.
+      if (!cause.fit.converged && cause.gain > -30) cause.not_decided = cause.fit.reason;
       cause.p_value = 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, cause.gain)));
       cause.evidence = 0.5 * cause.gain;
       return;
     }
     const ScannedEffect& scanned = *scanned_of(ranking.scan, candidate);
+    const double promised = scanned.gain[scanned.best];
+    if (promised < 2 || promised < 0.2 * largest - 40) {  // far behind: the scores say enough
+      cause.gain = promised;
+      cause.evidence = log_evidence(scanned, promised);
+      cause.terms = {term_at(scanned, scanned.best)};
+      for (std::size_t e = 0; e < ranking.scan.effects.size(); ++e)
+        if (ranking.scan.effects[e].candidate == candidate) cause.p_value = chance.p_value(e, promised);
+      return;
+    }
     cause = fit_cause(model, recalibrated, scanned);
     cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
     // At the optimum up to what the differences resolve: small gains that the scores confirm are decided.
@@ -122,16 +175,39 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
       if (ranking.scan.effects[e].candidate == candidate) cause.p_value = chance.p_value(e, cause.gain);
     cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
   });
+  progress(0.5);
+  double least = 1, top = 0;
+  std::vector<std::size_t> strongest;
+  for (std::size_t i = 0; i < ranking.singles.size(); ++i) {
+    const RankedCause& cause = ranking.singles[i];
+    if (cause.candidate_undecided()) continue;
+    least = std::min(least, cause.p_value);
+    top = std::max(top, cause.evidence);
+    if (cause.evidence > 2 && !cause.fit.nuisance.empty() && !cause.terms[0].candidate->refine.empty())
+      strongest.push_back(i);
+  }
+  std::sort(strongest.begin(), strongest.end(),
+            [&](std::size_t a, std::size_t b) { return ranking.singles[a].evidence > ranking.singles[b].evidence; });
+  if (strongest.size() > 3) strongest.resize(3);
+  markov::parallel_for(strongest.size(), options.threads, [&](std::size_t k) {
+    RankedCause& cause = ranking.singles[strongest[k]];
+    if (cause.evidence < 0.7 * top - 10) return;
+    refine_variant(model, cause.fit);
+    const double gain = 2 * (cause.fit.penalised - recalibrated.penalised);
+    cause.evidence += 0.5 * (gain - cause.gain);
+    cause.gain = gain;
+    cause.terms = cause.fit.terms;
+  });
+  // A fit that did not settle is decided where all it could still rise leaves it far behind.
+  for (RankedCause& cause : ranking.singles)
+    if (!cause.candidate_undecided() && cause.evidence + 3 * cause.fit.promised < top - 12) cause.not_decided.clear();
   progress(0.6);
-  double least = 1;
-  for (const RankedCause& cause : ranking.singles)
-    if (!cause.fit.nuisance.empty()) least = std::min(least, cause.p_value);
   ranking.p_value = chance.look_elsewhere(least);
 
   // Pairs: what the leaders leave, scanned again.
   std::vector<std::size_t> leaders;
   for (std::size_t i = 0; i < ranking.singles.size(); ++i)
-    if (ranking.singles[i].evidence > 2) leaders.push_back(i);
+    if (ranking.singles[i].evidence > 2 && !ranking.singles[i].fit.nuisance.empty()) leaders.push_back(i);
   std::sort(leaders.begin(), leaders.end(),
             [&](std::size_t a, std::size_t b) { return ranking.singles[a].evidence > ranking.singles[b].evidence; });
   if (leaders.size() > 3) leaders.resize(3);
@@ -149,7 +225,7 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
     const EffectScan scan = scan_effects(model, first.fit, others, options.threads);
     std::vector<std::pair<double, const ScannedEffect*>> promising;
     for (const ScannedEffect& effect : scan.effects) {
-      const double gain = effect.gain[effect.best] - model_error * model_error * first.gain;
+      const double gain = effect.gain[effect.best];
       if (gain > 7) promising.emplace_back(log_evidence(effect, gain), &effect);
     }
     std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -162,11 +238,10 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
     const RankedCause& first = ranking.singles[tries[i].leader];
     RankedCause& pair = pairs[i];
     pair = fit_cause(model, first.fit, tries[i].scanned);
-    const double gain = 2 * (pair.fit.penalised - first.fit.penalised);
-    pair.gain = first.gain + gain;
-    const double earned = std::max(0.0, gain - model_error * model_error * first.gain);
-    pair.evidence = first.evidence + log_evidence(tries[i].scanned, earned) + prior;
-    pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(earned));
+    pair.gain = 2 * (pair.fit.penalised - recalibrated.penalised);
+    const double second = earned(model, pair.fit, first.fit, recalibrated);
+    pair.evidence = first.evidence + log_evidence(tries[i].scanned, second) + prior;
+    pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
   });
   // The same pair from either side counts once, the better fit.
   for (RankedCause& pair : pairs) {

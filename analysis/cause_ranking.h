@@ -14,10 +14,11 @@ namespace metastable::analysis {
 struct RankedCause {
   std::vector<Term> terms;
   Fit fit;
-  double gain = 0;      ///< 2 Delta penalised log likelihood over the recalibrated model
-  double p_value = 1;   ///< of the (last) effect's gain by chance
-  double evidence = 0;  ///< log Bayes factor against the recalibrated model, prior odds of pairs included
-  std::string not_decided;
+  double gain = 0;          ///< 2 Delta penalised log likelihood over the recalibrated model
+  double p_value = 1;       ///< of the (last) effect's gain by chance
+  double evidence = 0;      ///< log Bayes factor against the recalibrated model, prior odds of pairs included
+  std::string not_decided;  ///< why, where the data cannot tell or the fit did not settle
+  bool candidate_undecided() const { return !terms[0].candidate->undecidable.empty(); }
 };
 
 struct CauseRanking {
@@ -37,12 +38,19 @@ struct RankingOptions {
 /// Evidence: the likelihood ratio averaged over an effect's variants and over a normal prior on its p parameters whose
 /// expected gain is 36 (so that effects of one and of eight parameters start level), by Laplace's approximation:
 /// log mean_v exp(gain_v g/(1+g)/2) - p/2 log(1+g), g = 36/p.
-/// A second effect must earn beyond `model_error`^2 of the first one's gain: no catalogue entry has exactly the form of
-/// what nature did, and a misfit of 2 % of a large effect is none of its own.
+/// A second effect must earn beyond `model_error`^2 of what the first one gained in the same phase (collisions,
+/// stances): no catalogue entry has exactly the form of what nature did, and a misfit of 6 % of a large effect is none
+/// of its own. Candidates whose scores promise less than a fifth of a large best gain are not fitted.
 /// @param candidates  to be considered
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options);
 
-inline constexpr double model_error = 0.02;
+inline constexpr double model_error = 0.06;
+
+/// 2 Delta log likelihood of one fit over another, in stances and in everything else.
+struct PhaseGain {
+  double collisions = 0, stances = 0;
+};
+PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse);
 
 }  // namespace metastable::analysis

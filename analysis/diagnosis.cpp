@@ -53,7 +53,7 @@ double recalibration_p_value(const TransitionModel& model, const Fit& as_given, 
 
 std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixXd& covariance, Eigen::Index first) {
   constexpr double score90 = 1.6448536269514722;
-  const std::vector<double>& variant = term.candidate->variants[term.variant];
+  const std::vector<double>& variant = term.variant;
   const std::vector<Named> here = term.candidate->report(variant, term.values);
   std::vector<EstimatedParameter> all;
   for (const Named& one : here) all.push_back({one.first, one.second, one.second, one.second, false});
@@ -364,7 +364,9 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     progress(0.68, "what is left");
     chosen = &best->fit;
     d.left = gap_map(model, *chosen, options.draws, options.seed + 1);
-    const double beyond = d.left.largest - model_error * model_error * best->gain;
+    const PhaseGain gained = phase_gain(model, *chosen, recalibrated);
+    const double tolerated = model_error * model_error;
+    const double beyond = d.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
     if (d.left.p_value < left_over_level && beyond > 14) none = std::exp(std::min(300.0, 0.5 * (beyond - 14)));
   } else {
     d.left = d.recalibrated;

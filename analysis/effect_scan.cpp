@@ -11,6 +11,8 @@
 namespace metastable::analysis {
 namespace {
 
+constexpr double largest_step = 0.1;  // of a difference, in standard errors
+
 // Gain of the score `u` with information `info`; one parameter at its lower bound gains only upwards.
 double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,
                      Eigen::VectorXd* start) {
@@ -47,7 +49,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
     ScannedEffect effect;
     effect.candidate = candidate;
     for (std::size_t v = 0; v < candidate->variants.size(); ++v) {
-      Term term{candidate, v, {}};
+      Term term{candidate, candidate->variants[v], {}};
       for (const FreeParameter& p : candidate->parameters) term.values.push_back(p.neutral);
       effect.first.push_back(columns);
       Work one{scan.effects.size(), v, columns, fit.terms};
@@ -61,18 +63,23 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   Derivatives all{Eigen::MatrixXd(events, columns), Eigen::MatrixXd(events, columns)};
   markov::parallel_for(work.size(), threads, [&](std::size_t i) {
     const Work& one = work[i];
-    // Only the new term's parameters are moved.
+    // Only the new term's parameters are moved, by a small share of what the data resolve.
     const std::size_t count = one.terms.back().values.size();
     for (std::size_t p = 0; p < count; ++p) {
-      std::vector<Term> moved = one.terms;
-      const double step = moved.back().candidate->parameters[p].step;
-      moved.back().values[p] += step;
-      const Evaluation there = model.evaluate(fit.nuisance, moved);
       const auto column = one.first + static_cast<Eigen::Index>(p);
-      for (Eigen::Index k = 0; k < events; ++k) {
-        const auto event = static_cast<std::size_t>(k);
-        all.slope(k, column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
-        all.change(k, column) = (there.score[event] - fit.evaluation.score[event]) / step;
+      double step = one.terms.back().candidate->parameters[p].step;
+      for (int attempt = 0; attempt < 2; ++attempt) {
+        std::vector<Term> moved = one.terms;
+        moved.back().values[p] += step;
+        const Evaluation there = model.evaluate(fit.nuisance, moved);
+        for (Eigen::Index k = 0; k < events; ++k) {
+          const auto event = static_cast<std::size_t>(k);
+          all.slope(k, column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
+          all.change(k, column) = (there.score[event] - fit.evaluation.score[event]) / step;
+        }
+        const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(column).squaredNorm()));
+        if (step < largest_step * resolved) break;
+        step = 0.5 * largest_step * resolved;
       }
     }
   });

@@ -21,6 +21,7 @@ constexpr double tail_score = 2.2;
 struct Cell {
   std::string facet, at;
   std::vector<std::size_t> events;
+  bool stance = false;
 };
 
 bool is_stance(EventKind kind) { return kind == EventKind::stance; }
@@ -49,6 +50,7 @@ class Cutter {
       for (std::size_t i = 0; i < events.size(); ++i)
         if (stance ? is_stance(events[i].kind) : is_collision(events[i].kind)) members.push_back(i);
       if (members.size() < 20) continue;
+      const std::size_t first = cells_.size();
       const std::string where = !two_phases ? "" : stance ? ", stance" : ", collision";
       ranges("speed", members, where, 5, "rad/s", [](const Event& e) { return std::optional(e.speed); });
       groups("leg", members, where, [](const Event& e) {
@@ -74,12 +76,13 @@ class Cutter {
         groups("condition", members, where, [this](const Event& e) {
           return std::optional(std::pair{static_cast<int>(e.condition), model_.condition_name(e.condition)});
         });
-      cells_.push_back({"phase", !two_phases ? "step" : stance ? "stance" : "collision", members});
+      cells_.push_back({"phase", !two_phases ? "step" : stance ? "stance" : "collision", members, stance});
+      for (std::size_t c = first; c < cells_.size(); ++c) cells_[c].stance = stance;
     }
     std::vector<std::size_t> launches;
     for (std::size_t i = 0; i < events.size(); ++i)
       if (events[i].kind == EventKind::launch) launches.push_back(i);
-    if (launches.size() >= 10) cells_.push_back({"collision", "launch", launches});
+    if (launches.size() >= 10) cells_.push_back({"collision", "launch", launches, false});
     return std::move(cells_);
   }
 
@@ -135,6 +138,13 @@ Eigen::MatrixXd mean_columns(const TransitionModel& model) {
   return columns;
 }
 
+double GapMap::largest_beyond(double collisions, double stances) const {
+  double most = 0;
+  for (const GapCell& cell : cells)
+    most = std::max(most, cell.statistic * cell.statistic - (cell.stance ? stances : collisions));
+  return most;
+}
+
 GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uint64_t seed) {
   const auto& events = model.events();
   const std::vector<double>& z = fit.evaluation.score;
@@ -153,6 +163,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     out.unit = std::move(unit);
     out.size = size;
     out.events = cell.events.size();
+    out.stance = cell.stance;
     map.cells.push_back(std::move(out));
     raw.push_back(std::move(column));
   };
@@ -178,8 +189,8 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   // Memory: successive scores of a trial, of each phase; and trials that differ as a whole.
   for (const bool stance : {false, true}) {
     std::vector<std::pair<std::size_t, double>> memory, whole;
-    Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}};
-    Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}};
+    Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}, stance};
+    Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance};
     double sum = 0, between = 0;
     std::optional<std::size_t> previous;
     double partial = 0;

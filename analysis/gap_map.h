@@ -14,6 +14,7 @@ struct GapCell {
   std::string facet;           ///< speed, leg, position, collision, trial, time, phase, condition, outcome
   std::string aspect;          ///< mean, spread, tail, memory
   std::string at;              ///< the cell in words, with its phase where stance and collision are separate
+  bool stance = false;         ///< of stance events, where they are separate
   double statistic = 0;        ///< standard normal without a gap
   double p_value = 1;          ///< of this cell alone
   double p_adjusted = 1;       ///< step-down max-T over all cells
@@ -28,6 +29,8 @@ struct GapMap {
   std::vector<GapCell> cells;  ///< in the order of the facets
   double p_value = 1;          ///< smallest adjusted p-value
   double largest = 0;          ///< largest squared statistic
+  /// Largest squared statistic beyond what a misfit of the given size in collisions and in stances would explain.
+  double largest_beyond(double collisions, double stances) const;
 };
 
 /// Scores of the events of `fit` in every cell: mean, spread, tail share, correlation with the previous one; what the

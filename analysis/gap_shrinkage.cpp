@@ -169,8 +169,8 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& re
   std::vector<Shrinkage> all;
   all.push_back(summarise(held, seed, "held-out log score per collision", "nats", [](const HeldOut& h, double* v) {
     const double best = h.log_score[2] + h.flexible;
-    for (int m = 0; m < 3; ++m) v[m] = best - h.log_score[m];
-    v[3] = h.flexible_floor;
+    for (int m = 0; m < 3; ++m) v[m] = best - h.log_score[m] - h.flexible_floor;
+    v[3] = 0;
   }));
   all.push_back(summarise(held, seed, "held-out CRPS of the next speed", "rad/s", [](const HeldOut& h, double* v) {
     for (int m = 0; m < 3; ++m) v[m] = h.crps[m];

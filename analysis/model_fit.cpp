@@ -14,12 +14,12 @@ class Point {
     if (with_nuisances)
       for (std::size_t i = 0; i < nuisance_.size(); ++i) {
         const Nuisance& n = model.nuisances()[i];
-        slots_.push_back({&nuisance_[i], n.step, n.lower, n.upper, n.nominal, n.prior_sd});
+        slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n.nominal, n.prior_sd});
       }
     for (Term& term : terms_)
       for (std::size_t i = 0; i < term.values.size(); ++i) {
         const FreeParameter& p = term.candidate->parameters[i];
-        slots_.push_back({&term.values[i], p.step, p.lower, p.upper, 0, 0});
+        slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, 0, 0});
       }
   }
   Point(const Point&) = delete;
@@ -27,7 +27,7 @@ class Point {
 
   struct Slot {
     double* value;
-    double step, lower, upper, nominal, prior_sd;  // prior_sd 0: none
+    double step, largest_step, lower, upper, nominal, prior_sd;  // prior_sd 0: none
   };
   std::vector<Slot>& slots() { return slots_; }
   const std::vector<double>& nuisance() const { return nuisance_; }
@@ -105,10 +105,15 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   Fit result;
   result.evaluation = point.evaluate();
   double best = counted(result.evaluation, weights) + point.log_prior();
+  const double start = best;
   result.converged = slots.empty();
   for (int iteration = 0; iteration < options.most_iterations && !slots.empty(); ++iteration) {
     result.derivatives = differences(point, result.evaluation);
     result.information = information(result.derivatives, result.evaluation, weights);
+    for (Eigen::Index p = 0; p < size; ++p) {  // differences over a small share of what the data resolve
+      Point::Slot& s = slots[static_cast<std::size_t>(p)];
+      if (result.information(p, p) > 0) s.step = std::min(s.largest_step, 0.05 / std::sqrt(result.information(p, p)));
+    }
     Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
     for (Eigen::Index p = 0; p < size; ++p) {
       const Point::Slot& s = slots[static_cast<std::size_t>(p)];
@@ -138,6 +143,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     part.diagonal() *= 1 + 1e-9;
     const Eigen::VectorXd step = part.ldlt().solve(slope);
     const double promised = 0.5 * slope.dot(step);
+    result.promised = promised;
     if (!(promised > 0.003)) {
       result.converged = std::isfinite(promised);
       if (!result.converged) result.reason = "its information matrix is singular";
@@ -169,7 +175,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     if (!better) {
       for (std::size_t p = 0; p < slots.size(); ++p) *slots[p].value = before[p];
       // No step of the search direction improves: at the optimum up to the noise of the differences.
-      result.converged = promised < 0.5;
+      result.converged = promised < 0.5 + 1e-4 * (best - start);
       if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
       break;
     }

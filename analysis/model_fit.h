@@ -25,7 +25,8 @@ struct Fit {
   Derivatives derivatives;      ///< at the optimum: nuisances first, then the terms' free parameters in order
   Eigen::MatrixXd information;  ///< of the counted events, with the prior
   bool converged = true;
-  std::string reason;  ///< why it did not
+  double promised = 0;  ///< rise that the last step could have brought, to first order
+  std::string reason;   ///< why it did not converge
 };
 
 struct FitOptions {

@@ -70,6 +70,8 @@ struct Candidate {
   std::string id;
   std::vector<FreeParameter> parameters;
   std::vector<std::vector<double>> variants{{}};  ///< at least one
+  /// By entry of a variant: how far apart the list's values lie, where those between are possible too; 0: they are not.
+  std::vector<double> refine = {};
   /// The fitted values under the names of the catalogue.
   std::function<std::vector<Named>(const std::vector<double>& variant, const std::vector<double>& values)> report;
   /// Why these data cannot tell it; empty if they can.
@@ -79,7 +81,7 @@ struct Candidate {
 /// A candidate with values.
 struct Term {
   const Candidate* candidate = nullptr;
-  std::size_t variant = 0;
+  std::vector<double> variant;
   std::vector<double> values;
 };
 

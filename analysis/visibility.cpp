@@ -92,8 +92,8 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
     const Fit plain = fit(changed, cause.nuisance, {});
     // The same effects in the changed experiment: with the one variant that was fitted.
     Candidate first = *cause.terms[0].candidate, second = *rival[0].candidate;
-    first.variants = {first.variants[cause.terms[0].variant]};
-    second.variants = {second.variants[rival[0].variant]};
+    first.variants = {cause.terms[0].variant};
+    second.variants = {rival[0].variant};
     const EffectScan scan = scan_effects(changed, plain, {&first, &second}, 1);
     if (scan.effects.size() != 2) return;
     const auto n = static_cast<Eigen::Index>(first.parameters.size());

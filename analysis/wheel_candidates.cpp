@@ -103,13 +103,14 @@ WheelCandidate slope_profile(const WheelDesign& design) {
   c.candidate.id = "slope_profile";
   c.candidate.parameters = {{0, -0.1, 0.1, 1e-6}};
   c.candidate.variants.clear();
-  for (const double to : {design.furthest, design.ramp_length})
-    for (const double shape : {0.0, 1.0, 2.0})
-      if (c.candidate.variants.empty() || to > 1.1 * design.furthest || to == design.furthest)
-        c.candidate.variants.push_back({shape, 0, to});
+  std::vector<double> ends{design.furthest, 1.25 * design.furthest};
+  if (design.ramp_length > 1.4 * design.furthest) ends.push_back(design.ramp_length);
+  for (const double to : ends)
+    for (const double shape : {0.0, 1.0}) c.candidate.variants.push_back({shape, 0, to});
   // A bend anywhere is a step in the slope: stretches whose middle lies there.
-  for (const double share : {0.25, 0.375, 0.625, 0.75})
+  for (const double share : {0.25, 0.375, 0.5, 0.625, 0.75})
     c.candidate.variants.push_back({2, 0, 2 * share * design.furthest});
+  c.candidate.refine = {0, 0, 0.25 * design.furthest};
   c.candidate.report = [](const Values& variant, const Values& v) {
     return std::vector<Named>{{"sag_m", v[0]}, {"from_m", variant[1]}, {"to_m", variant[2]}};
   };
@@ -127,6 +128,7 @@ WheelCandidate speed_dependent_friction() {
   c.candidate.id = "speed_dependent_friction";
   c.candidate.parameters = {{0, -0.9, 5, 1e-3}};
   c.candidate.variants = {{1.0}, {2.0}, {4.0}, {8.0}};
+  c.candidate.refine = {0.8};
   c.candidate.report = [](const Values& variant, const Values& v) {
     return std::vector<Named>{{"amplitude", v[0]}, {"speed_rad_s", variant[0]}};
   };
@@ -148,6 +150,7 @@ WheelCandidate friction_patch(const WheelDesign& design) {
   for (int from = 0; from < parts; ++from)
     for (int to = from + 1; to <= std::min(parts, from + 8); ++to)
       c.candidate.variants.push_back({from * part - 0.03, to * part - 0.03});
+  c.candidate.refine = {part, part};
   c.candidate.report = [](const Values& variant, const Values& v) {
     return std::vector<Named>{{"from_m", std::max(0.0, variant[0])}, {"to_m", variant[1]}, {"friction_ratio", v[0]}};
   };
@@ -164,6 +167,7 @@ WheelCandidate contact_outliers() {
   c.candidate.id = "contact_outliers";
   c.candidate.parameters = {{0, 0, 0.5, 2e-4, 0.01}};
   c.candidate.variants = {{1.4}, {1.8}, {2.5}};
+  c.candidate.refine = {0.3};
   c.candidate.report = [](const Values& variant, const Values& v) {
     return std::vector<Named>{{"share", v[0]}, {"friction_ratio", variant[0]}};
   };
@@ -197,6 +201,7 @@ WheelCandidate ramp_vibration() {
   c.candidate.parameters = {{0, -1, 1, 1e-3}, {0, -1, 1, 1e-3}};
   c.candidate.variants.clear();
   for (double f = 2; f <= 60; f *= 1.06) c.candidate.variants.push_back({f});
+  c.candidate.refine = {0.6};
   c.candidate.report = [](const Values& variant, const Values& v) {
     return std::vector<Named>{
         {"amplitude", std::hypot(v[0], v[1])}, {"frequency_hz", variant[0]}, {"phase_rad", std::atan2(-v[1], v[0])}};

@@ -36,13 +36,11 @@ struct Node {  // of Gauss-Hermite's rules for the standard normal
 };
 constexpr std::array<Node, 3> three_nodes{
     {{-1.7320508075688772, 1.0 / 6}, {0, 2.0 / 3}, {1.7320508075688772, 1.0 / 6}}};
-constexpr std::array<Node, 7> seven_nodes{{{-3.750439717725742, 5.482688559722180e-4},
-                                           {-2.366759410734541, 0.03075712396758651},
-                                           {-1.154405394739968, 0.2401231786050126},
-                                           {0, 0.4571428571428571},
-                                           {1.154405394739968, 0.2401231786050126},
-                                           {2.366759410734541, 0.03075712396758651},
-                                           {3.750439717725742, 5.482688559722180e-4}}};
+constexpr std::array<Node, 5> five_nodes{{{-2.856970013872806, 0.01125741132772069},
+                                          {-1.355626179974266, 0.2220759220056126},
+                                          {0, 0.5333333333333333},
+                                          {1.355626179974266, 0.2220759220056126},
+                                          {2.856970013872806, 0.01125741132772069}}};
 
 double score_of(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
 
@@ -330,8 +328,7 @@ Extension WheelTransitions::extension(std::span<const Term> terms) const {
   Extension e;
   for (const Term& term : terms)
     for (const WheelCandidate& effect : effects_)
-      if (effect.candidate.id == term.candidate->id)
-        effect.apply(e, term.candidate->variants[term.variant], term.values);
+      if (effect.candidate.id == term.candidate->id) effect.apply(e, term.variant, term.values);
   return e;
 }
 
@@ -471,11 +468,11 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
   result.unit.reserve(events_.size());
   // A friction of the trial's own is integrated over: every node follows the trial, weighted by what it has explained.
   const bool spread = e.trial_friction_sd > 0;
-  const std::size_t nodes = spread ? seven_nodes.size() : 1;
+  const std::size_t nodes = spread ? five_nodes.size() : 1;
   for (const MeasuredRun& run : runs_) {
     std::vector<Filter> filters(nodes, Filter(e, tilt, noise_));
-    std::array<double, seven_nodes.size()> log_weight{};
-    for (std::size_t q = 0; q < nodes && spread; ++q) log_weight[q] = std::log(seven_nodes[q].weight);
+    std::array<double, five_nodes.size()> log_weight{};
+    for (std::size_t q = 0; q < nodes && spread; ++q) log_weight[q] = std::log(five_nodes[q].weight);
     const ExtendedWheel& at = wheel[run.condition];
     const auto add = [&](auto observe) {
       if (!spread) {
@@ -485,10 +482,10 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
         result.unit.push_back(out.unit);
         return;
       }
-      std::array<Filter::Out, seven_nodes.size()> out;
+      std::array<Filter::Out, five_nodes.size()> out;
       double largest = -std::numeric_limits<double>::infinity(), before = 0, now = 0, below = 0, unit = 0;
       for (std::size_t q = 0; q < nodes; ++q) {
-        out[q] = observe(filters[q], seven_nodes[q].score * e.trial_friction_sd);
+        out[q] = observe(filters[q], five_nodes[q].score * e.trial_friction_sd);
         largest = std::max(largest, log_weight[q]);
       }
       for (std::size_t q = 0; q < nodes; ++q) {
