@@ -65,13 +65,19 @@ CollisionDensity::CollisionDensity(const ContactModel& model, const ContactSprea
   const double from = -contact.restitution_mean / contact.restitution_sd;
   const double to = (1 - contact.restitution_mean) / contact.restitution_sd;
   restitution_mass_ = normal_cdf(to) - normal_cdf(from);
-  // Along the line of equal loss the product of the two densities is narrower than eta's alone by up to the ratio of
-  // what eta and mu contribute to the loss, about sd(eta) eta : sd(mu)/3.
-  const double contribution = 3 * contact.restitution_sd * contact.restitution_mean / contact.friction_sd;
-  const double spacing = std::clamp(1.1 / std::sqrt(1 + contribution * contribution), 0.1, 0.6);
+  // Along the line of equal loss the product of the two densities is narrower than eta's alone by the ratio of what eta
+  // and mu contribute to the loss, about sd(eta) eta : 3 sd(mu); twice that, to be safe.
+  const double contribution = 0.6 * contact.restitution_sd * contact.restitution_mean / contact.friction_sd;
+  const double spacing = std::clamp(0.8 / std::sqrt(1 + contribution * contribution), 0.1, 0.8);
   score_nodes(from, to, spacing, [&](double score, double weight) {
-    restitution_.push_back({contact.restitution_mean + contact.restitution_sd * score, weight / restitution_mass_});
+    const double eta = contact.restitution_mean + contact.restitution_sd * score;
+    nodes_.push_back({eta, weight / restitution_mass_, contact_duration(eta)});
   });
+}
+
+double CollisionDensity::contact_duration(double restitution) {
+  const double log_eta = std::log(std::max(restitution, std::numeric_limits<double>::min()));
+  return std::sqrt(std::numbers::pi * std::numbers::pi + log_eta * log_eta);
 }
 
 SpeedDensity CollisionDensity::at(const Collision& collision, double before, double after,
@@ -94,11 +100,11 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
   const Friction friction(contact_, change);
 
   SpeedDensity result;
-  for (const Node& node : restitution_) {
-    const double eta = std::min(1.0, node.value * change.restitution_ratio);
-    const double log_eta = std::log(std::max(eta, std::numeric_limits<double>::min()));
+  for (const Node& node : nodes_) {
+    const bool usual = change.restitution_ratio == 1;
+    const double eta = usual ? node.restitution : std::min(1.0, node.restitution * change.restitution_ratio);
     const double alpha = 1 - eta * eta * (1 - change.rebound_lost), beta = (1 + eta) * (1 + eta);
-    const double delta = pull * (1 + eta) * time * std::sqrt(std::numbers::pi * std::numbers::pi + log_eta * log_eta);
+    const double delta = pull * (1 + eta) * time * (usual ? node.duration : contact_duration(eta));
     // The term with delta is small and nearly constant: put into beta, it leaves a quadratic in mu.
     const double steady = beta + delta * (a - b * friction.mean());
     const double q2 = steady * cc - loss * b * b, q1 = b * (2 * loss * a - alpha - steady), q0 = a * (alpha - loss * a);

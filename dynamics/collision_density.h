@@ -32,9 +32,9 @@ struct SpeedDensity {
 
 /// omega+ just after a collision of a rolling wheel (u0 = 0) with random (eta, mu): under `published` a sum over eta
 /// with mu in closed form (the root of (18)-(34) in mu), under `coulomb` a sum over mu with eta in closed form, the
-/// sticking collisions (mu >= mu_c) being one term. Error about 4e-4 of the peak, 3e-2 near the fastest speeds possible for sds of 0.1 (the sum is
-/// trapezoidal in the normal score, Gauss-Legendre where truncation cuts inside four sds); LandingDensity is the exact,
-/// slower way. One value costs about a microsecond.
+/// sticking collisions (mu >= mu_c) being one term. Error about 4e-4 of the peak, 5e-2 near the fastest speeds possible
+/// for sds of 0.1 (the sum is trapezoidal in the normal score, Gauss-Legendre where truncation cuts inside four sds);
+/// LandingDensity is the exact, slower way. One value costs about a microsecond.
 class CollisionDensity {
  public:
   /// @throws std::invalid_argument for `plastic`, which has neither eta nor mu, and for sds <= 0
@@ -48,9 +48,10 @@ class CollisionDensity {
 
  private:
   struct Node {
-    double value;   // of the variable summed over
-    double weight;  // its probability
+    double restitution, weight;
+    double duration;  // of the contact, in units of the half period sqrt(m_c/K_r) (26), (27)
   };
+  static double contact_duration(double restitution);
   SpeedDensity published(const Collision& collision, double before, double after, const CollisionChange& change,
                          double speed) const;
   SpeedDensity coulomb(const Collision& collision, double before, double after, const CollisionChange& change,
@@ -58,8 +59,8 @@ class CollisionDensity {
 
   ContactModel model_;
   ContactSpread contact_;
-  std::vector<Node> restitution_;  // published
-  double restitution_mass_ = 1;    // of the untruncated normal in [0, 1]
+  std::vector<Node> nodes_;      // published: restitutions
+  double restitution_mass_ = 1;  // of the untruncated normal in [0, 1]
 };
 
 }  // namespace metastable::dynamics
