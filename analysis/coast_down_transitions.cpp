@@ -39,8 +39,8 @@ class CoastDownTransitions : public TransitionModel {
   Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
                                             std::uint64_t seed) const override;
-  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
-      std::span<const double> nuisance, std::uint64_t seed) const override;
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
+                                                                                     std::uint64_t seed) const override;
   std::pair<double, double> rests() const override { return {0, 0}; }
   double expected_steps(std::span<const double>, std::span<const Term>, std::uint64_t) const override {
     return std::numeric_limits<double>::infinity();  // a drum does not fail by a step
