@@ -14,6 +14,12 @@
 #include "dynamics/landing_range.h"
 #include "dynamics/rest_probability.h"
 
+#ifdef METASTABLE_AVX2
+#define METASTABLE_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define METASTABLE_WIDE
+#endif
+
 namespace metastable::dynamics {
 namespace {
 
@@ -34,6 +40,20 @@ Stance make_stance(const Wheel& wheel, Law law, double length, const Triangle& l
   s.barrier = s.start_angle < std::numbers::pi / 2 ? s.pendulum * (1 - std::sin(s.start_angle)) : 0;
   s.gain = s.pendulum * (std::sin(s.start_angle) - std::sin(s.end_angle));
   return s;
+}
+
+struct Landing {
+  double origin, width, barrier, gain;
+};
+
+METASTABLE_WIDE void land_all(const Landing& of, const double* offset, const double* scale, const double* drag,
+                              std::span<double> next) {
+  const auto [origin, width, barrier, gain] = of;
+  for (std::size_t k = 0; k < next.size(); ++k) {
+    const double state = origin + width * offset[k];
+    const double after = scale[k] * state - drag[k] * std::sqrt(state);
+    next[k] = after >= barrier ? after + gain : -infinity;
+  }
 }
 
 // Integral of d phi / sqrt(a + b sin^2 phi) over sin^2 phi in [from, to], phi in [0, pi/2] (DLMF 19.29.4).
@@ -163,10 +183,24 @@ bool WheelMap::violates(int which, double state, int phase, std::span<const doub
 
 void WheelMap::Table::land(double origin, double width, std::span<const double> offset, std::size_t first,
                            std::span<double> next) const {
-  for (std::size_t k = 0; k < next.size(); ++k) {
-    const double state = origin + width * offset[k];
-    const double after = scale_[first + k] * state - drag_[first + k] * std::sqrt(state);
-    next[k] = after >= barrier_ ? after + gain_ : -infinity;
+  land_all({origin, width, barrier_, gain_}, offset.data(), scale_.data() + first, drag_.data() + first, next);
+}
+
+// The root of scale x - drag sqrt(x) = barrier; a loss of more than all energy may leave survivors at low speeds, by
+// the potential energy gained.
+double WheelMap::Table::lowest_survivor(std::size_t k) const {
+  const double scale = scale_[k], drag = drag_[k];
+  if (!(scale > 0)) return drag < 0 && scale > -infinity ? 0 : infinity;
+  constexpr double rounding = 1e-12;
+  const double root = (drag + std::sqrt(drag * drag + 4 * scale * barrier_)) / (2 * scale);
+  return root > 0 ? root * root * (1 - rounding) : 0;
+}
+
+void WheelMap::Table::reorder(std::span<const std::uint32_t> order) {
+  for (std::vector<double>* of : {&scale_, &drag_}) {
+    std::vector<double> moved;
+    for (const std::uint32_t k : order) moved.push_back((*of)[k]);
+    *of = std::move(moved);
   }
 }
 

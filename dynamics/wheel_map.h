@@ -1,6 +1,8 @@
 #pragma once
 // The wheel's stochastic return map on x = omega^2 just before a collision.
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -86,6 +88,8 @@ class WheelMap {
    public:
     void land(double origin, double width, std::span<const double> offset, std::size_t first,
               std::span<double> next) const;
+    double lowest_survivor(std::size_t k) const;
+    void reorder(std::span<const std::uint32_t> order);
 
    private:
     friend class WheelMap;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numeric>
 #include <stdexcept>
 
@@ -11,8 +12,8 @@
 namespace metastable::markov {
 namespace {
 
-constexpr std::size_t chunk = 1024;         // draws landed at a time
-constexpr std::size_t rows_per_block = 16;  // rows that share a chunk while it is in cache
+constexpr std::size_t block_size = 1024;   // draws landed at a time
+constexpr std::size_t rows_together = 16;  // rows that share a block while it is in cache
 
 // Draws of one phase: phases and the launch have randomisations of their own.
 DrawOptions draws_of_phase(DrawOptions options, int phase) {
@@ -20,29 +21,58 @@ DrawOptions draws_of_phase(DrawOptions options, int phase) {
   return options;
 }
 
-// Adds the landings of all draws from [origin, origin + width) to a dense row and returns the weight that rests.
-class RowSampler {
- public:
-  RowSampler(const NoiseTable& table, const Draws& draws, const Grid& target)
-      : table_(table), draws_(draws), target_(target), next_(chunk) {}
+// Some draws of one phase, ready to be landed: those that survive from the lowest states first.
+struct Block {
+  std::unique_ptr<NoiseTable> table;
+  std::vector<double> offset, weight;
+  std::vector<double> lowest;      // state that just survives, ascending
+  std::vector<double> rest_after;  // [k]: weight of the draws k and after
+};
 
-  double add(double origin, double width, std::size_t first, std::size_t count, std::span<double> row) {
+Block make_block(const AnyReturnMap& map, int phase, const Draws& draws, std::size_t first, std::size_t count) {
+  const auto dimension = static_cast<std::size_t>(draws.dimension);
+  Block block;
+  block.table = map.tabulate(phase, std::span(draws.score).subspan(first * dimension, count * dimension));
+  std::vector<double> lowest(count);
+  for (std::size_t k = 0; k < count; ++k) lowest[k] = block.table->lowest_survivor(k);
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return lowest[a] < lowest[b]; });
+  block.table->reorder(order);
+  for (const std::uint32_t k : order) {
+    block.offset.push_back(draws.offset[first + k]);
+    block.weight.push_back(draws.weight[first + k]);
+    block.lowest.push_back(lowest[k]);
+  }
+  block.rest_after.assign(count + 1, 0.0);
+  for (std::size_t k = count; k-- > 0;) block.rest_after[k] = block.rest_after[k + 1] + block.weight[k];
+  return block;
+}
+
+std::vector<Block> make_blocks(const AnyReturnMap& map, int phase, const Draws& draws, int threads) {
+  std::vector<Block> blocks((draws.count() + block_size - 1) / block_size);
+  parallel_for(blocks.size(), threads, [&](std::size_t b) {
+    blocks[b] = make_block(map, phase, draws, b * block_size, std::min(block_size, draws.count() - b * block_size));
+  });
+  return blocks;
+}
+
+// Adds the landings of a block's draws from [origin, origin + width) to `sums` (as Grid::tally()).
+class Lander {
+ public:
+  explicit Lander(const Grid& target) : target_(target), next_(block_size) {}
+
+  void add(const Block& block, double origin, double width, std::span<double> sums) {
+    // From this cell the draws behind `count` rest wherever in it they start.
+    const auto count = static_cast<std::size_t>(
+        std::upper_bound(block.lowest.begin(), block.lowest.end(), origin + width) - block.lowest.begin());
     const std::span<double> next(next_.data(), count);
-    table_.land(origin, width, std::span(draws_.offset).subspan(first, count), first, next);
-    double rest = 0;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double weight = draws_.weight[first + k];
-      if (next[k] == rest_landing)
-        rest += weight;
-      else
-        row[target_.cell(next[k])] += weight;
-    }
-    return rest;
+    block.table->land(origin, width, std::span(block.offset).first(count), 0, next);
+    target_.tally(next, std::span(block.weight).first(count), sums);
+    sums[0] += block.rest_after[count];
   }
 
  private:
-  const NoiseTable& table_;
-  const Draws& draws_;
   const Grid& target_;
   std::vector<double> next_;
 };
@@ -56,61 +86,46 @@ double mean_rest_probability(const AnyReturnMap& map, const Grid& grid, std::siz
   return mean;
 }
 
-struct DenseRow {
-  std::vector<double> landing;  // over the cells of the next phase
-  double rest = 0;
-};
-
 }  // namespace
 
 SampledChain discretize(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch,
                         const Discretization& options) {
   const std::size_t cells = space.cells();
-  std::vector<DenseRow> rows(space.size());
-  for (int phase = 0; phase < space.phases(); ++phase) {
-    const Draws draws = make_draws(map.noise_dimension(), draws_of_phase(options.draws, phase));
-    const std::unique_ptr<NoiseTable> table = map.tabulate(phase, draws.score);
-    const Grid& grid = space.grid(phase);
-    const Grid& target = space.grid((phase + 1) % space.phases());
-    const bool exact = options.exact_rest && map.rest_probability(grid.lower(0), phase).has_value();
-    const std::size_t blocks = (cells + rows_per_block - 1) / rows_per_block;
-    parallel_for(blocks, options.threads, [&](std::size_t block) {
-      RowSampler sampler(*table, draws, target);
-      const std::size_t begin = block * rows_per_block, end = std::min(cells, begin + rows_per_block);
-      for (std::size_t c = begin; c < end; ++c) rows[space.index(phase, c)].landing.assign(cells, 0.0);
-      for (std::size_t first = 0; first < draws.count(); first += chunk) {
-        const std::size_t count = std::min(chunk, draws.count() - first);
-        for (std::size_t c = begin; c < end; ++c) {
-          DenseRow& row = rows[space.index(phase, c)];
-          row.rest += sampler.add(grid.lower(c), grid.width(c), first, count, row.landing);
-        }
-      }
-      if (exact)
-        for (std::size_t c = begin; c < end; ++c)
-          rows[space.index(phase, c)].rest = mean_rest_probability(map, grid, c, phase);
-    });
-  }
-
   std::vector<std::size_t> row_start{0};
   std::vector<std::uint32_t> column;
   std::vector<double> value, kill;
-  row_start.reserve(space.size() + 1);
-  kill.reserve(space.size());
-  for (std::size_t i = 0; i < space.size(); ++i) {
-    const std::size_t base = space.index((space.phase(i) + 1) % space.phases(), 0);
+  for (int phase = 0; phase < space.phases(); ++phase) {
+    const Draws draws = make_draws(map.noise_dimension(), draws_of_phase(options.draws, phase));
+    const std::vector<Block> blocks = make_blocks(map, phase, draws, options.threads);
+    const Grid& grid = space.grid(phase);
+    const int next_phase = (phase + 1) % space.phases();
+    const bool exact = options.exact_rest && map.rest_probability(grid.lower(0), phase).has_value();
+    std::vector<double> sums(cells * (cells + 1), 0.0);  // rest, then the cells of the next phase
+    parallel_for((cells + rows_together - 1) / rows_together, options.threads, [&](std::size_t group) {
+      Lander lander(space.grid(next_phase));
+      const std::size_t begin = group * rows_together, end = std::min(cells, begin + rows_together);
+      for (const Block& block : blocks)
+        for (std::size_t c = begin; c < end; ++c)
+          lander.add(block, grid.lower(c), grid.width(c), std::span(sums).subspan(c * (cells + 1), cells + 1));
+      if (exact)
+        for (std::size_t c = begin; c < end; ++c) sums[c * (cells + 1)] = mean_rest_probability(map, grid, c, phase);
+    });
+    const std::size_t base = space.index(next_phase, 0);
     for (std::size_t c = 0; c < cells; ++c) {
-      if (base + c == i || rows[i].landing[c] == 0) continue;
-      column.push_back(static_cast<std::uint32_t>(base + c));
-      value.push_back(rows[i].landing[c]);
+      const double* const row = sums.data() + c * (cells + 1);
+      for (std::size_t to = 0; to < cells; ++to) {
+        if (row[to + 1] == 0 || base + to == space.index(phase, c)) continue;
+        column.push_back(static_cast<std::uint32_t>(base + to));
+        value.push_back(row[to + 1]);
+      }
+      row_start.push_back(value.size());
+      kill.push_back(row[0]);
     }
-    row_start.push_back(value.size());
-    kill.push_back(rows[i].rest);
-    std::vector<double>().swap(rows[i].landing);
   }
 
   SampledChain sampled;
   sampled.chain = Chain(std::move(row_start), std::move(column), std::move(value), std::move(kill));
-  sampled.launch = launch_row(map, space, launch, options.draws);
+  sampled.launch = launch_row(map, space, launch, options.draws, options.threads);
   const auto before = [&](std::size_t i) { return (space.phase(i) + space.phases() - 1) % space.phases(); };
   if (map.duration(space.grid(0).midpoint(0), before(0))) {
     sampled.duration.resize(space.size());
@@ -125,20 +140,24 @@ SampledChain discretize(const AnyReturnMap& map, const StateSpace& space, const 
 }
 
 Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch,
-                  const DrawOptions& options) {
+                  const DrawOptions& options, int threads) {
   const Draws draws = make_draws(map.noise_dimension(), draws_of_phase(options, space.phases()));
-  std::vector<double> start(draws.count()), landing(draws.count());
-  for (std::size_t k = 0; k < draws.count(); ++k) start[k] = launch.state(normal_score(draws.offset[k]));
-  map.tabulate(launch.phase, draws.score)->land(0.0, 1.0, start, 0, landing);
+  const auto dimension = static_cast<std::size_t>(draws.dimension);
+  std::vector<double> landing(draws.count());
+  parallel_for((draws.count() + block_size - 1) / block_size, threads, [&](std::size_t b) {
+    const std::size_t first = b * block_size, count = std::min(block_size, draws.count() - first);
+    std::vector<double> start(count);
+    for (std::size_t k = 0; k < count; ++k) start[k] = launch.state(normal_score(draws.offset[first + k]));
+    map.tabulate(launch.phase, std::span(draws.score).subspan(first * dimension, count * dimension))
+        ->land(0.0, 1.0, start, 0, std::span(landing).subspan(first, count));
+  });
   const int next_phase = (launch.phase + 1) % space.phases();
+  std::vector<double> sums(space.cells() + 1, 0.0);
+  space.grid(next_phase).tally(landing, draws.weight, sums);
   Launch row;
+  row.rest = sums[0];
   row.after.assign(space.size(), 0.0);
-  for (std::size_t k = 0; k < draws.count(); ++k) {
-    if (landing[k] == rest_landing)
-      row.rest += draws.weight[k];
-    else
-      row.after[space.index(next_phase, space.grid(next_phase).cell(landing[k]))] += draws.weight[k];
-  }
+  std::copy(sums.begin() + 1, sums.end(), row.after.begin() + static_cast<std::ptrdiff_t>(space.index(next_phase, 0)));
   return row;
 }
 

@@ -40,8 +40,8 @@ SampledChain discretize(const AnyReturnMap& map, const StateSpace& space, const 
                         const Discretization& options);
 
 /// The launch row alone: where event number 1 leads.
-Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch,
-                  const DrawOptions& draws);
+Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch, const DrawOptions& draws,
+                  int threads = 1);
 
 /// How often events violate each of the map's assumptions: [assumption][state], and for the launch [assumption] at the
 /// back (one extra entry: index size()). `draws.count` plain draws a state, another randomisation for each; states with

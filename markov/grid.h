@@ -25,13 +25,21 @@ class Grid {
   /// Cell of a state: a table look-up and a short scan, O(1).
   std::uint32_t cell(double state) const;
 
+  /// sums[1 + cell(state[k])] += weight[k] for all k in order; where state[k] is -infinity, sums[0] += weight[k].
+  /// @param sums  size cells() + 1
+  void tally(std::span<const double> state, std::span<const double> weight, std::span<double> sums) const;
+
   /// Every cell split in two at its midpoint.
   Grid halved() const;
 
  private:
   std::vector<double> edges_;
-  std::vector<std::uint32_t> table_;
+  std::vector<double> upper_;         // edges above the cells, +infinity above the last
+  std::vector<std::uint32_t> table_;  // bucket of the axis to the cell that its start lies in
   double table_scale_ = 0;
+  // For tally(), where no bucket holds two edges; bucket 0 stands for rest, the others follow.
+  std::vector<std::int32_t> start_;  // 1 + cell
+  std::vector<double> edge_;         // above that cell
 };
 
 }  // namespace metastable::markov

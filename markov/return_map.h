@@ -3,6 +3,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -45,6 +46,11 @@ class NoiseTable {
   /// rest_landing where the system comes to rest. offset.size() == next.size().
   virtual void land(double origin, double width, std::span<const double> offset, std::size_t first,
                     std::span<double> next) const = 0;
+  /// No state below this one survives draw k: where landings rise with the state, the state that just does. -infinity
+  /// if unknown.
+  virtual double lowest_survivor(std::size_t) const { return rest_landing; }
+  /// Puts draw order[k] in place k; order is a permutation. Nothing happens where lowest_survivor() is unknown.
+  virtual void reorder(std::span<const std::uint32_t>) {}
 };
 
 /// Any return map, held by shared pointer; cheap to copy, immutable, safe to share between threads.
@@ -130,6 +136,15 @@ class AnyReturnMap {
     void land(double origin, double width, std::span<const double> offset, std::size_t first,
               std::span<double> next) const override {
       table.land(origin, width, offset, first, next);
+    }
+    double lowest_survivor(std::size_t k) const override {
+      if constexpr (requires { table.lowest_survivor(k); })
+        return table.lowest_survivor(k);
+      else
+        return rest_landing;
+    }
+    void reorder(std::span<const std::uint32_t> order) override {
+      if constexpr (requires { table.lowest_survivor(0); }) table.reorder(order);
     }
     Table table;
   };

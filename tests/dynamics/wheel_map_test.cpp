@@ -164,5 +164,35 @@ TEST(WheelMap, IllegalInputIsNamed) {
             "score: 3 numbers are not a multiple of 2");
 }
 
+// Below the lowest survivor of a draw everything rests, above it nothing (where landings rise with the state).
+TEST(WheelMapTable, LowestSurvivorIsWhereRestEnds) {
+  for (const Law law : {Law::published, Law::coulomb}) {
+    const WheelMap map(Wheel{}, 3.0 * std::numbers::pi / 180, law, ContactNoise::normal(0.4, 0.2, 0.4, 0.2));
+    std::vector<double> score;
+    for (int k = 0; k < 200; ++k) score.push_back(-9.5 + 0.1 * ((k * 37) % 191));
+    auto table = map.tabulate(2, score);
+    std::vector<std::uint32_t> order(100);
+    for (std::uint32_t k = 0; k < 100; ++k) order[k] = 99 - k;
+    const std::vector<double> offset(100, 0.0);
+    std::vector<double> before(100), after(100);
+    table.land(20, 0, offset, 0, before);
+    for (std::size_t k = 0; k < 100; ++k) {
+      const double lowest = table.lowest_survivor(k);
+      double next = 0;
+      if (lowest > 0) {
+        table.land(std::min(lowest, 1e300) * (1 - 1e-9), 0, std::span(offset).first(1), k, {&next, 1});
+        EXPECT_EQ(next, -INFINITY) << k;
+      }
+      if (lowest > 0 && std::isfinite(lowest)) {
+        table.land(lowest * (1 + 1e-9), 0, std::span(offset).first(1), k, {&next, 1});
+        EXPECT_GT(next, 0) << k;
+      }
+    }
+    table.reorder(order);
+    table.land(20, 0, offset, 0, after);
+    for (std::size_t k = 0; k < 100; ++k) EXPECT_EQ(after[k], before[99 - k]);
+  }
+}
+
 }  // namespace
 }  // namespace metastable::dynamics::test
