@@ -8,20 +8,21 @@
 #include <string>
 #include <utility>
 
+#include "markov/dense_elimination.h"
+#include "markov/parallel.h"
+
 namespace metastable::markov {
 namespace {
 
 using Index = Eigen::Index;
 using Vector = Eigen::Map<Eigen::VectorXd>;
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-using Block = Eigen::Map<RowMajor, 0, Eigen::OuterStride<>>;
 
-/// Pivots eliminated together before the rest of a full matrix is updated in one product.
-constexpr std::size_t kPanel = 64;
 /// Below this size, or below this fill of the square, the row-by-row elimination is used.
-constexpr std::size_t kBlockedSize = 2 * kPanel;
+constexpr std::size_t kBlockedSize = 2 * dense::panel;
 constexpr double kBlockedFill = 0.6;
+/// Rows, and columns, of a full matrix that one thread takes at a time.
+constexpr std::size_t kShare = 64;
 
 /// row += weight * source, over columns [from, to).
 void add_multiple(double* row, double weight, const double* source, std::size_t from, std::size_t to) {
@@ -39,7 +40,7 @@ double sum(const double* row, std::size_t from, std::size_t to) {
 /// right of it, the expected visits to j > i before the chain is back among 0 .. i (the entries of U). What is stored
 /// on the diagonal is never read.
 struct Elimination::Factors {
-  explicit Factors(const Chain& chain);
+  Factors(const Chain& chain, int threads);
 
   /// Row i, to be indexed by column low[i] .. high[i] (offset[i] >= i >= low[i]: no row is shorter than its diagonal).
   double* row(std::size_t i) { return entries.data() + offset[i] - low[i]; }
@@ -55,9 +56,10 @@ struct Elimination::Factors {
 
  private:
   std::size_t find_envelope(const Chain& chain);
-  void eliminate_rows(std::size_t first, std::size_t last, std::size_t top);
-  void eliminate_panels();
-  double exit_rate(std::size_t n) const;
+  void eliminate_rows();
+  void eliminate_square(std::size_t first, std::size_t last);
+  void eliminate_panels(int threads);
+  static double checked_rate(std::size_t n, double rate);
 
   std::vector<std::size_t> top_;  ///< first row whose envelope reaches column n
 };
@@ -87,7 +89,7 @@ std::size_t Elimination::Factors::find_envelope(const Chain& chain) {
   return total;
 }
 
-Elimination::Factors::Factors(const Chain& chain) : kill(chain.kill().begin(), chain.kill().end()) {
+Elimination::Factors::Factors(const Chain& chain, int threads) : kill(chain.kill().begin(), chain.kill().end()) {
   const std::size_t n = chain.size();
   std::size_t total = find_envelope(chain);
   const bool blocked = n >= kBlockedSize && static_cast<double>(total) > kBlockedFill * static_cast<double>(n * n);
@@ -109,14 +111,13 @@ Elimination::Factors::Factors(const Chain& chain) : kill(chain.kill().begin(), c
   }
   exit.resize(n);
   if (blocked) {
-    eliminate_panels();
+    eliminate_panels(threads);
   } else {
-    eliminate_rows(0, n, 0);
+    eliminate_rows();
   }
 }
 
-double Elimination::Factors::exit_rate(std::size_t n) const {
-  const double rate = kill[n] + sum(row(n), low[n], n);
+double Elimination::Factors::checked_rate(std::size_t n, double rate) {
   if (!(rate >= std::numeric_limits<double>::min())) {
     throw ConvergenceError("elimination", rate,
                            "state " + std::to_string(n) + " is left too rarely for double precision");
@@ -124,12 +125,11 @@ double Elimination::Factors::exit_rate(std::size_t n) const {
   return rate;
 }
 
-/// Eliminates the pivots last-1 .. first from the rows from `top` on.
-void Elimination::Factors::eliminate_rows(std::size_t first, std::size_t last, std::size_t top) {
-  for (std::size_t n = last; n-- > first;) {
-    exit[n] = exit_rate(n);
+void Elimination::Factors::eliminate_rows() {
+  for (std::size_t n = size(); n-- > 0;) {
     const double* pivot = row(n);
-    for (std::size_t i = std::max(top, top_[n]); i < n; ++i) {
+    exit[n] = checked_rate(n, kill[n] + sum(pivot, low[n], n));
+    for (std::size_t i = top_[n]; i < n; ++i) {
       if (high[i] < n) continue;
       double* target = row(i);
       if (target[n] == 0) continue;
@@ -140,30 +140,44 @@ void Elimination::Factors::eliminate_rows(std::size_t first, std::size_t last, s
   }
 }
 
-/// The same on a full square, a panel of pivots at a time: the panel's rows among themselves, the visits of the rows
-/// above to the panel, and then all that these visits lead to as one matrix product.
-void Elimination::Factors::eliminate_panels() {
-  const std::size_t n = size();
-  std::fill(top_.begin(), top_.end(), 0);
-  for (std::size_t last = n; last > 0;) {
-    const std::size_t first = last > kPanel ? last - kPanel : 0;
-    eliminate_rows(first, last, first);
-    for (std::size_t i = 0; i < first; ++i) {
+/// The pivots last-1 .. first among themselves, in the columns first .. last-1 only. What lies left of these and the
+/// kill rate enter the rate of leaving as one number, carried along as a kill rate is.
+void Elimination::Factors::eliminate_square(std::size_t first, std::size_t last) {
+  std::vector<double> beyond;
+  for (std::size_t i = first; i < last; ++i) beyond.push_back(kill[i] + sum(row(i), 0, first));
+  for (std::size_t n = last; n-- > first;) {
+    exit[n] = checked_rate(n, beyond[n - first] + sum(row(n), first, n));
+    for (std::size_t i = first; i < n; ++i) {
       double* target = row(i);
-      for (std::size_t pivot = last; pivot-- > first;) {
-        target[pivot] /= exit[pivot];
-        add_multiple(target, target[pivot], row(pivot), first, pivot);
-        kill[i] += target[pivot] * kill[pivot];
-      }
+      target[n] /= exit[n];
+      add_multiple(target, target[n], row(n), first, n);
+      beyond[i - first] += target[n] * beyond[n - first];
+      kill[i] += target[n] * kill[n];
     }
-    if (first > 0) {
-      const Eigen::OuterStride<> stride(static_cast<Index>(n));
-      const auto rows = static_cast<Index>(first);
-      const auto pivots = static_cast<Index>(last - first);
-      const Block visits(row(0) + first, rows, pivots, stride);
-      const Block onward(row(first), pivots, rows, stride);
-      Block(row(0), rows, rows, stride).noalias() += visits * onward;
-    }
+  }
+}
+
+/// The same on a full square, a panel of pivots at a time: the panel's square, the rest of its rows, the visits of the
+/// rows above to the panel, and all that these visits lead to as one matrix product.
+void Elimination::Factors::eliminate_panels(int threads) {
+  const std::size_t n = size();
+  for (std::size_t last = n; last > 0;) {
+    const std::size_t first = last > dense::panel ? last - dense::panel : 0, pivots = last - first;
+    eliminate_square(first, last);
+    const double* const square = row(first) + first;
+    const std::size_t shares = (first + kShare - 1) / kShare;
+    parallel_for(shares, threads, [&](std::size_t share) {
+      const std::size_t from = share * kShare;
+      dense::eliminate_columns(row(first) + from, n, square, n, pivots, std::min(kShare, first - from));
+    });
+    parallel_for(shares, threads, [&](std::size_t share) {
+      const std::size_t from = share * kShare, rows = std::min(kShare, first - from);
+      double* const visits = row(from) + first;
+      dense::visit_panel(visits, n, rows, square, n, exit.data() + first, pivots);
+      for (std::size_t i = from; i < from + rows; ++i)
+        for (std::size_t pivot = last; pivot-- > first;) kill[i] += row(i)[pivot] * kill[pivot];
+      dense::add_product(row(from), n, visits, n, row(first), n, rows, pivots, first);
+    });
     last = first;
   }
 }
@@ -194,14 +208,14 @@ std::vector<double> checked(std::vector<double> solution) {
 
 }  // namespace
 
-Elimination::Elimination(const Chain& chain) {
+Elimination::Elimination(const Chain& chain, int threads) {
   const std::vector<std::uint8_t> can_rest = classify(chain).can_rest;
   const auto stuck = std::find(can_rest.begin(), can_rest.end(), 0);
   if (stuck != can_rest.end()) {
     throw std::domain_error("elimination: rest cannot be reached from state " +
                             std::to_string(stuck - can_rest.begin()));
   }
-  factors_ = std::make_unique<Factors>(chain);
+  factors_ = std::make_unique<Factors>(chain, threads);
 }
 
 Elimination::~Elimination() = default;

@@ -21,7 +21,8 @@ class Elimination {
  public:
   /// @throws std::domain_error if some state cannot reach rest (names the state).
   /// @throws ConvergenceError("elimination", ...) if a probability falls below the range of double precision.
-  explicit Elimination(const Chain& chain);
+  /// @param threads  for full chains; 0: all cores. The bits do not depend on it.
+  explicit Elimination(const Chain& chain, int threads = 1);
   ~Elimination();
   Elimination(Elimination&&) noexcept;
   Elimination& operator=(Elimination&&) noexcept;

@@ -161,11 +161,11 @@ Chain revolution_chain(const Chain& chain, const Period& period) {
                kRowExcess * period.period);
 }
 
-ChainSolver::ChainSolver(const Chain& chain)
+ChainSolver::ChainSolver(const Chain& chain, int threads)
     : chain_(must_reach_rest(chain)),
       period_(find_period(chain_)),
       revolution_(revolution_chain(chain_, period_)),
-      elimination_(revolution_) {}
+      elimination_(revolution_, threads) {}
 
 std::vector<double> ChainSolver::solve(std::span<const double> rhs) const {
   if (period_.period == 1) return elimination_.solve(rhs);

@@ -25,7 +25,8 @@ class ChainSolver {
  public:
   /// @throws std::domain_error naming a state from which rest cannot be reached.
   /// @throws ConvergenceError("elimination", ...) as Elimination does.
-  explicit ChainSolver(const Chain& chain);
+  /// @param threads  of the elimination of full chains; 0: all cores. The bits do not depend on it.
+  explicit ChainSolver(const Chain& chain, int threads = 1);
 
   const Chain& chain() const { return chain_; }
   const Period& period() const { return period_; }

@@ -94,6 +94,13 @@ TEST(Elimination, BlockedAndRowByRowAgree) {
   }
 }
 
+TEST(Elimination, BitsDoNotDependOnThreads) {
+  const Chain chain = reference::random_chain(333, 7, 1e-6);
+  const std::vector<double> one = Elimination(chain, 1).solve(ones(333)),
+                            three = Elimination(chain, 3).solve(ones(333));
+  EXPECT_EQ(one, three);
+}
+
 // A chain whose rare exits (1e-25) are all in one state, full and larger than the panels: closed form by symmetry.
 TEST(Elimination, BlockedKeepsAllDigitsWhenRestIsRare) {
   constexpr std::size_t n = 200;
