@@ -130,6 +130,8 @@ std::vector<Command> commands() {
   };
   const std::vector<Command> experiments = experiment_commands();
   all.insert(all.begin() + 3, experiments.begin(), experiments.end());
+  const std::vector<Command> blind = blind_commands();
+  all.insert(all.end(), blind.begin(), blind.end());
   return all;
 }
 

@@ -15,6 +15,8 @@ struct Command {
   std::function<void(const Options&, const std::string& command_line)> run;
 };
 
+/// blind
+std::vector<Command> blind_commands();
 /// simulate, collisions, describe, study: the commands about experiments.
 std::vector<Command> experiment_commands();
 

@@ -29,7 +29,7 @@ void Options::add_flag(const std::string& name, const std::string& help) {
 }
 
 void Options::add_place(const std::string& name, const std::string& help) {
-  command_.add_option(name, texts_[name], help)->required()->expected(1)->type_name("");
+  command_.add_option(name, texts_[name], help)->required()->expected(1)->allow_extra_args(false)->type_name("");
 }
 
 void Options::add_places(const std::string& name, const std::string& help) {

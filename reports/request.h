@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/angle_recording.h"
+#include "analysis/blind_cases.h"
 #include "analysis/coast_down.h"
 #include "analysis/collision_finder.h"
 #include "analysis/description.h"
@@ -77,6 +78,18 @@ struct CollisionsRequest {
   bool peak = false;  ///< omega_minus is the peak of the smoothed speed instead of the stance fit
   std::string out;    ///< file; "": collisions.csv in the folder, or collisions-from-angle.csv if that is there
   int threads = 0;
+};
+
+/// metastable blind
+struct BlindRequest {
+  std::string folder;                 ///< of the run: cases, answers
+  std::string sealed;                 ///< folder of the truths; "": beside the run, with "-sealed" added
+  std::optional<std::uint64_t> seed;  ///< nothing: from the system's entropy
+  analysis::BlindSize size;
+  std::string tool;  ///< program that answers; "": this one
+  int threads = 0;
+  std::string out;  ///< of open; "": report in the run's folder
+  std::string command;
 };
 
 /// metastable coast-down

@@ -7,7 +7,7 @@ set(FORBIDDEN_IN_dynamics "markov/|analysis/|reports/")
 set(FORBIDDEN_IN_markov "dynamics/|analysis/|reports/")
 set(FORBIDDEN_IN_analysis "reports/")
 set(FORBIDDEN_IN_reports "tests/")
-set(HEAVY "Spectra/|suitesparse/|klu\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
+set(HEAVY "openssl/|Spectra/|suitesparse/|klu\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
 
 # Lists in `result` every offending include under `root` as "file: header (reason)".
 function(layering_violations root result)

@@ -1,0 +1,251 @@
+#include "analysis/blind_grade.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double claim = 0.05;        // adjusted p-value of a claim of where
+constexpr double no_power_left = 9;   // 2 Delta log likelihood after recalibration: nobody finds that reliably
+constexpr double alike_share = 0.25;  // of the cause sets of an effect that another one must be in
+
+bool contains(const std::vector<std::string>& list, const std::string& one) {
+  return std::find(list.begin(), list.end(), one) != list.end();
+}
+
+std::string joined(const std::string& a, const std::string& b) { return a + "+" + b; }
+
+// The effects a name stands for: "a" or "a+b".
+std::vector<std::string> members(const std::string& name) {
+  const auto plus = name.find('+');
+  if (plus == std::string::npos) return {name};
+  return {name.substr(0, plus), name.substr(plus + 1)};
+}
+
+bool gap(const BlindAnswer& a) { return a.verdict == "explained" || a.verdict == "unexplained"; }
+bool confident(const BlindAnswer& a) { return a.verdict == "explained" && a.cause_set.size() == 1; }
+
+std::string said(const std::optional<BlindAnswer>& answer) {
+  if (!answer) return "no answer";
+  if (answer->verdict != "explained") return answer->verdict;
+  return answer->cause_set.empty() ? "explained" : answer->cause_set.front();
+}
+
+std::string asked(const BlindTruth& truth) {
+  switch (truth.kind) {
+    case BlindKind::none:
+      return truth.nominal_is_true ? "no gap" : "no gap, contact unlike nominal";
+    case BlindKind::effect:
+      return truth.effects.front().id;
+    case BlindKind::pair:
+      return "a pair";
+    case BlindKind::outside:
+      return "outside: " + truth.outside->id;
+    case BlindKind::left_out:
+      return "left out";
+  }
+  throw std::logic_error("unknown kind");
+}
+
+// The true value of a parameter, where it is one number.
+std::optional<double> true_value(const BlindTruth& truth, const std::string& effect, const std::string& name) {
+  for (const dynamics::Effect& e : truth.effects) {
+    if (e.id != effect) continue;
+    const dynamics::EffectInfo& info = dynamics::effect_info(effect);
+    for (std::size_t p = 0; p < info.parameters.size(); ++p)
+      if (info.parameters[p].name == name && !info.parameters[p].per_leg) return e.values[p];
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+const std::vector<std::string>& rightful_places(const std::string& effect) {
+  static const std::map<std::string, std::vector<std::string>> all{
+      {"contact_distribution", {"phase", "speed", "condition", ":spread", ":mean"}},
+      {"initial_speed", {"collision", "phase", "condition", "speed"}},
+      {"leg_lengths", {"leg"}},
+      {"leg_contact", {"leg"}},
+      {"hub_eccentricity", {"leg"}},
+      {"inertia", {"phase", "speed", "condition"}},
+      {"slope_offset", {"phase", "condition", "speed"}},
+      {"slope_profile", {"position", "collision", "time"}},
+      {"axle_drag_viscous", {"phase", "speed", "condition"}},
+      {"rolling_resistance", {"phase", "speed", "condition"}},
+      {"air_drag", {"phase", "speed", "condition"}},
+      {"speed_dependent_restitution", {"speed", "phase", "condition"}},
+      {"speed_dependent_friction", {"speed", "phase", "condition"}},
+      {"contact_memory", {":memory"}},
+      {"friction_patch", {"position", "collision", "time"}},
+      {"trial_drift", {"trial"}},
+      {"trial_spread", {"trial", ":memory"}},
+      {"contact_outliers", {":tail", ":spread", "outcome"}},
+      {"sensor_noise", {":spread", ":memory", "phase"}},
+      {"sensor_bias", {"phase", ":mean"}},
+      {"bounce", {"phase", "speed", "condition"}},
+      {"ramp_vibration", {"time", "speed", "phase", ":spread"}},
+      {"slip_reversal", {"phase", "speed", ":spread", ":tail", "condition"}},
+  };
+  static const std::vector<std::string> none;
+  const auto found = all.find(effect);
+  return found == all.end() ? none : found->second;
+}
+
+std::pair<double, double> wilson(const Proportion& proportion) {
+  if (proportion.of == 0) return {0, 1};
+  constexpr double z = 1.959963984540054;
+  const double n = proportion.of, p = proportion.right / n;
+  const double middle = (p + z * z / (2 * n)) / (1 + z * z / n);
+  const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
+  return {std::max(0.0, middle - half), std::min(1.0, middle + half)};
+}
+
+BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::optional<BlindAnswer>>& answers) {
+  if (truths.size() != answers.size())
+    throw std::invalid_argument(fmt::format("grade: {} truths and {} answers", truths.size(), answers.size()));
+  BlindGrades result;
+
+  // Ambiguity groups, from the cause sets of the effects that were in the catalogue.
+  std::map<std::string, std::map<std::string, int>> together;
+  std::map<std::string, int> sets;
+  for (std::size_t i = 0; i < truths.size(); ++i)
+    if (truths[i].kind == BlindKind::effect && answers[i] && answers[i]->verdict == "explained") {
+      const std::string& id = truths[i].effects.front().id;
+      ++sets[id];
+      for (const std::string& name : answers[i]->cause_set)
+        if (name != id && members(name).size() == 1) ++together[id][name];
+    }
+  for (const auto& [id, others] : together)
+    for (const auto& [other, count] : others)
+      if (count >= alike_share * sets[id]) result.alike[id].push_back(other);
+
+  Proportion alarms, alarms_true, alarms_unlike, place_alarms, absorbed;
+  std::map<int, Proportion> found, found_left, cause, holds, facet;
+  Proportion misnamed, unexplained, left_misnamed, left_right, both, no_third, interval, shrinkage;
+  std::map<int, std::pair<double, int>> set_size;
+  std::vector<std::pair<double, bool>> forecasts;
+  for (std::size_t i = 0; i < truths.size(); ++i) {
+    const BlindTruth& truth = truths[i];
+    const std::optional<BlindAnswer>& answer = answers[i];
+    ++result.confusion[asked(truth)][said(answer)];
+    const bool alarm = !answer || gap(*answer) || (truth.nominal_is_true && answer->verdict == "recalibrate");
+    switch (truth.kind) {
+      case BlindKind::none: {
+        alarms.count(alarm);
+        (truth.nominal_is_true ? alarms_true : alarms_unlike).count(alarm);
+        place_alarms.count(!answer || std::any_of(answer->where.begin(), answer->where.end(),
+                                                  [](const auto& w) { return w.p_adjusted <= claim; }));
+        break;
+      }
+      case BlindKind::effect: {
+        const std::string& id = truth.effects.front().id;
+        found[truth.strength].count(answer && answer->verdict != "no_gap");
+        const bool in_set = answer && contains(answer->cause_set, id);
+        const bool recalibration = id == "contact_distribution";
+        if (recalibration || truth.left < no_power_left) {
+          absorbed.count(answer && (in_set || answer->verdict == "recalibrate" || answer->verdict == "no_gap"));
+        } else {
+          found_left[truth.strength].count(answer && gap(*answer));
+          if (!answer || gap(*answer)) cause[truth.strength].count(in_set);
+        }
+        if (answer && answer->verdict == "explained") {
+          holds[truth.strength].count(in_set);
+          set_size[truth.strength].first += static_cast<double>(answer->cause_set.size());
+          ++set_size[truth.strength].second;
+          if (!answer->causes.empty())
+            forecasts.emplace_back(answer->causes.front().second, answer->causes.front().first == id);
+        }
+        if (truth.strength >= 2 && !recalibration && truth.left >= no_power_left) {
+          const std::vector<std::string>& places = rightful_places(id);
+          facet[truth.strength].count(
+              answer && std::any_of(answer->where.begin(), answer->where.end(), [&](const auto& w) {
+                return w.p_adjusted <= claim && (contains(places, w.facet) || contains(places, ":" + w.aspect));
+              }));
+        }
+        if (answer && !answer->causes.empty() && answer->causes.front().first == id) {
+          for (const AnsweredParameter& p : answer->parameters) {
+            const std::optional<double> value = true_value(truth, p.effect, p.name);
+            if (value && p.lower && p.upper && *p.lower < *p.upper)
+              interval.count(*p.lower <= *value && *value <= *p.upper);
+          }
+          // The true effect leaves nothing: all of the gap is closed.
+          if (answer->closed_lower && answer->closed_upper)
+            shrinkage.count(*answer->closed_lower <= 1 && *answer->closed_upper >= 1 - 1e-9);
+        }
+        break;
+      }
+      case BlindKind::pair: {
+        const std::string &a = truth.effects[0].id, &b = truth.effects[1].id;
+        both.count(answer && (contains(answer->cause_set, joined(a, b)) || contains(answer->cause_set, joined(b, a))));
+        if (answer && answer->verdict == "explained" && !answer->cause_set.empty()) {
+          const std::vector<std::string> named = members(answer->cause_set.front());
+          no_third.count(
+              std::all_of(named.begin(), named.end(), [&](const std::string& id) { return id == a || id == b; }));
+        }
+        break;
+      }
+      case BlindKind::outside:
+        misnamed.count(!answer || confident(*answer));
+        unexplained.count(answer && answer->verdict == "unexplained");
+        break;
+      case BlindKind::left_out: {
+        const auto group = result.alike.find(truth.effects.front().id);
+        const bool own = answer && answer->verdict == "explained" && group != result.alike.end() &&
+                         std::all_of(answer->cause_set.begin(), answer->cause_set.end(),
+                                     [&](const std::string& name) { return contains(group->second, name); });
+        left_misnamed.count(!answer || (confident(*answer) && !own));
+        const bool absorbed_here =
+            answer && truth.left < no_power_left && (answer->verdict == "recalibrate" || answer->verdict == "no_gap");
+        left_right.count(answer && (answer->verdict == "unexplained" || own || absorbed_here));
+        break;
+      }
+    }
+  }
+  const auto add = [&](std::string measure, const Proportion& p, double low, double high) {
+    result.grades.push_back({std::move(measure), p, low, high});
+  };
+  add("false alarms where there is no gap", alarms, 0, 0.05);
+  add("  nominal contact true", alarms_true, 0, 0.05);
+  add("  nominal contact not true", alarms_unlike, 0, 0.05);
+  for (const auto& [strength, aim] : {std::pair{1, 0.85}, {2, 0.99}, {4, 0.99}})
+    add(fmt::format("effect found, {}x", strength), found[strength], aim, 1);
+  for (const auto& [strength, aim] : {std::pair{1, 0.85}, {2, 0.99}, {4, 0.99}})
+    add(fmt::format("effect with power left found after recalibration, {}x", strength), found_left[strength], aim, 1);
+  for (const auto& [strength, aim] : {std::pair{1, 0.95}, {2, 0.99}, {4, 0.99}})
+    add(fmt::format("cause right up to stated ambiguity, {}x", strength), cause[strength], aim, 1);
+  for (const int strength : {1, 2, 4})
+    add(fmt::format("95 % set holds the truth, {}x", strength), holds[strength], 0.95, 1);
+  add("effect outside the catalogue confidently misnamed", misnamed, 0, 0.1);
+  add("effect outside the catalogue called unexplained", unexplained, 0.7, 1);
+  add("left-out effect confidently misnamed", left_misnamed, 0, 0.1);
+  add("left-out effect unexplained, or of its ambiguity group", left_right, 0.7, 1);
+  add("two effects: both named", both, 0.7, 1);
+  add("two effects: no false third", no_third, 0.9, 1);
+  add("where: claims in cases without a gap", place_alarms, 0, 0.1);
+  for (const int strength : {2, 4}) add(fmt::format("where: right facet, {}x", strength), facet[strength], 0.9, 1);
+  add("90 % intervals of effect size hold the truth", interval, 0.87, 0.93);
+  add("90 % intervals of shrinkage hold the truth", shrinkage, 0.87, 0.93);
+  add("effect absorbed by recalibration not blamed on another", absorbed, 0.95, 1);
+  for (const auto& [strength, size] : {std::pair{1, &result.mean_set_size_1x}, {2, &result.mean_set_size_2x}})
+    if (set_size[strength].second > 0) *size = set_size[strength].first / set_size[strength].second;
+
+  for (const double from : {0.0, 0.3, 0.5, 0.7, 0.9}) {
+    CalibrationBin bin{from, from == 0.9 ? 1.0 : from + (from == 0.0 ? 0.3 : 0.2), 0, 0, {}};
+    for (const auto& [probability, is_right] : forecasts)
+      if (probability >= bin.from && (probability < bin.to || bin.to == 1.0)) {
+        bin.right.count(is_right);
+        bin.mean_probability += probability;
+      }
+    bin.count = bin.right.of;
+    if (bin.count > 0) bin.mean_probability /= bin.count;
+    result.calibration.push_back(bin);
+  }
+  return result;
+}
+
+}  // namespace metastable::analysis

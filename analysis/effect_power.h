@@ -1,0 +1,42 @@
+#pragma once
+// How visible an effect is in an experiment: the strength of blind cases is defined by it.
+
+#include <optional>
+#include <vector>
+
+#include "analysis/experiment.h"
+#include "analysis/reality.h"
+#include "analysis/transition_model.h"
+
+namespace metastable::analysis {
+
+/// An experiment in the laboratory, with what its folder tells.
+struct PowerDesign {
+  std::vector<RealityCondition> conditions;  ///< stated; contact as it truly is
+  RealityOptions reality;                    ///< without effects
+  std::vector<std::string> dropped;
+};
+
+/// A catalogue effect as the diagnosis' model takes it: a candidate of one variant, and its values.
+struct FittedForm {
+  Candidate candidate;
+  std::vector<double> values;
+};
+/// @param stated  leg lengths for leg_lengths
+/// @throws std::invalid_argument for contact_distribution, which is no candidate but the nuisances
+FittedForm fitted_form(const dynamics::Effect& effect, const std::vector<double>& stated_legs, double ramp_length);
+
+/// The nuisances of a model at a true contact distribution (others at their nominal values).
+std::vector<double> true_nuisances(const TransitionModel& model, const dynamics::NominalValues& contact);
+
+/// Mean over `replicates` laboratory experiments with the effects of 2 log(likelihood with them / without), true
+/// contact known to both: about the effects' own noncentrality. Seeds follow design.reality.seed, apart from the case's
+/// own.
+double expected_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects, int replicates);
+
+/// 2 log(likelihood of the truth / of the best recalibrated model without the effects) on one experiment: what is left
+/// to be found once the contact is refitted.
+double power_left(const Experiment& experiment, const dynamics::NominalValues& truth,
+                  const std::vector<dynamics::Effect>& effects);
+
+}  // namespace metastable::analysis
