@@ -2,6 +2,7 @@
 
 #include <Random123/philox.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,12 +17,15 @@ namespace {
 using Values = std::vector<double>;
 constexpr double pi = std::numbers::pi;
 constexpr double log_sqrt_two_pi = 0.91893853320467274178;
-constexpr double outlier_size = 6;  // times the noise
+constexpr double outlier_size = 6;  // losses of contact_outliers, in noises
+constexpr double glitch_size = 10;  // spread of a revolution that the counter garbled, in noises
 
 struct Losses {
   double constant = 0, linear = 0, quadratic = 0;  // a revolution
   double noise = 0.1, sensor = 0, bias = 0;
   double memory = 0, drift = 0, trial_sd = 0, outliers = 0;
+  double jitter = 0;    // of the counter's ticks [s]
+  double glitches = 0;  // share
 };
 
 class CoastDownTransitions : public TransitionModel {
@@ -46,7 +50,10 @@ class CoastDownTransitions : public TransitionModel {
     return std::numeric_limits<double>::infinity();  // a drum does not fail by a step
   }
   std::vector<Named> report_nuisances(std::span<const double> nuisance) const override {
-    return {{"noise_sd", std::exp(nuisance[0])}};
+    return {{"noise_sd", std::exp(nuisance[0])},
+            {"tick_jitter_s", std::exp(nuisance[1])},
+            {"glitch_share", 1 / (1 + std::exp(-nuisance[2]))},
+            {"block_loss_sd", std::exp(nuisance[3])}};
   }
 
  private:
@@ -59,6 +66,7 @@ class CoastDownTransitions : public TransitionModel {
   std::vector<std::vector<double>> speeds_;  // by trial
   std::vector<std::size_t> condition_;       // by trial
   std::vector<std::string> names_;
+  bool fresh_runs_ = false;  // a later trial starts faster than an earlier one
   std::vector<Event> events_;
   std::vector<Nuisance> nuisances_;
   std::vector<Candidate> candidates_;
@@ -77,10 +85,17 @@ CoastDownTransitions::CoastDownTransitions(const Experiment& experiment) : state
     auto& speeds = speeds_.emplace_back();
     for (const MeasuredCollision& c : trial.collisions) speeds.push_back(c.omega_minus);
   }
+  for (std::size_t t = 1; t < speeds_.size(); ++t)
+    if (condition_[t] == condition_[t - 1] && speeds_[t].front() > speeds_[t - 1].front()) fresh_runs_ = true;
   list_events();
   if (events_.empty())
     throw std::invalid_argument("collisions.csv: no trial has two revolutions: there is no transition");
-  nuisances_ = {{"log noise_sd", std::log(std::max(1e-6, stated_.noise_sd)), 2, 1e-3, -14, 7}};
+  // Counters jitter and garble revolutions, and blocks of one run differ a little (air, temperature): none of it is a
+  // cause, so all are refitted with every hypothesis.
+  nuisances_ = {{"log noise_sd", std::log(std::max(1e-6, stated_.noise_sd)), 2, 1e-3, -14, 7},
+                {"log tick_jitter_s", std::log(3e-6), 4, 1e-2, std::log(1e-9), std::log(0.1)},
+                {"logit glitch_share", -5, 2, 1e-2, -12, -2},
+                {"log block_loss_sd", std::log(0.3 * std::max(1e-6, stated_.noise_sd)), 4, 1e-2, -20, 5}};
   set_up_candidates();
 }
 
@@ -119,16 +134,21 @@ void CoastDownTransitions::set_up_candidates() {
   add("air_drag", "n_m_s2", {0, -large, large, 1e-7 * inertia_});
   add("contact_memory", "correlation", {0, -0.95, 0.95, 1e-3});
   add("trial_drift", "relative_change", {0, -5, 20, 1e-3});
-  add("trial_spread", "loss_sd", {0, 0, 1e6, 1e-6, 1e-4}, 0.5);
   add("contact_outliers", "share", {0, 0, 0.5, 1e-4, 0.01});
   add("sensor_noise", "sd_rad_s", {0, 0, 1, 1e-9, 1e-7}, 0.5);
   add("sensor_bias", "bias_rad_s", {0, -5, 5, 1e-4});
+  for (Candidate& c : candidates_)
+    if (c.id == "trial_drift" && !fresh_runs_)
+      c.undecidable = "the trials are blocks of one run: a drift cannot be told from a loss that varies with the speed";
 }
 
 Losses CoastDownTransitions::losses(std::span<const double> nuisance, std::span<const Term> terms) const {
   Losses l{.constant = stated_.constant, .linear = stated_.linear, .quadratic = stated_.quadratic};
   l.noise = std::exp(nuisance[0]);
   l.sensor = sensor_;
+  l.jitter = std::exp(nuisance[1]);
+  l.glitches = 1 / (1 + std::exp(-nuisance[2]));
+  l.trial_sd = std::exp(nuisance[3]);
   const double per_torque = 4 * pi / inertia_;  // work 2 pi T, kinetic energy I omega^2 / 2
   for (const Term& term : terms) {
     const std::string& id = term.candidate->id;
@@ -138,7 +158,6 @@ Losses CoastDownTransitions::losses(std::span<const double> nuisance, std::span<
     if (id == "air_drag") l.quadratic += per_torque * v;
     if (id == "contact_memory") l.memory = v;
     if (id == "trial_drift") l.drift = v;
-    if (id == "trial_spread") l.trial_sd = std::sqrt(std::max(0.0, v));
     if (id == "contact_outliers") l.outliers = v;
     if (id == "sensor_noise") l.sensor = std::hypot(l.sensor, std::sqrt(std::max(0.0, v)));
     if (id == "sensor_bias") l.bias = v;
@@ -153,43 +172,69 @@ Evaluation CoastDownTransitions::evaluate(std::span<const double> nuisance, std:
     const auto& speeds = speeds_[t];
     const double run = speeds_.size() > 1 ? static_cast<double>(t) / static_cast<double>(speeds_.size() - 1) : 0;
     const double constant = l.constant * (1 + l.drift * run);
-    // Kalman filter on omega^2, with the trial's own loss as a second state.
-    double mean = 0, variance = 0, shift = 0, shift_variance = l.trial_sd * l.trial_sd, together = 0, previous = 0;
+    // Kalman filter. State: omega^2, the block's own loss, and the jitter of the tick that began the last period and of
+    // the one that ended it; a tick too late makes one period long and the next one short.
+    Eigen::Vector4d state = Eigen::Vector4d::Zero();
+    Eigen::Matrix4d spread = Eigen::Matrix4d::Zero();
+    spread(1, 1) = l.trial_sd * l.trial_sd;
+    const double jitter2 = l.jitter * l.jitter;
+    double carried = 0;
     for (std::size_t k = 0; k + 1 < speeds.size(); ++k) {
-      const double omega = std::max(0.0, speeds[k] - l.bias);
+      const double omega = std::max(1e-3, speeds[k] - l.bias);
       if (k == 0) {
-        mean = omega * omega;
-        variance = 4 * mean * l.sensor * l.sensor;
+        const double slope = 2 * omega * omega * omega / (2 * pi);
+        state[0] = omega * omega;
+        spread(0, 0) = 4 * state[0] * l.sensor * l.sensor + 2 * slope * slope * jitter2;
+        spread(3, 3) = jitter2;
+        spread(0, 3) = spread(3, 0) = slope * jitter2;  // a late end of the period: seen too slow
       }
-      const double root = std::sqrt(std::max(0.0, mean));
-      const double rate = 1 - l.quadratic - (root > 0 ? l.linear / (2 * root) : 0);
-      const double predicted = mean - constant - l.linear * root - l.quadratic * mean - shift + l.memory * previous;
-      const double noise = l.noise * l.noise * (1 - l.memory * l.memory);
-      const double spread = rate * rate * variance + shift_variance - 2 * rate * together + noise;
-      const double next = std::max(1e-6, speeds[k + 1] - l.bias), seen = next * next;
-      const double error = 4 * seen * l.sensor * l.sensor;
-      const double total = spread + error, sd = std::sqrt(total), residual = seen - predicted;
-      const double jacobian = 2 * next;
+      const double root = std::sqrt(std::max(1e-6, state[0]));
+      Eigen::Matrix4d move = Eigen::Matrix4d::Zero();
+      move(0, 0) = 1 - l.quadratic - l.linear / (2 * root);
+      move(0, 1) = -1;
+      move(1, 1) = 1;
+      move(2, 3) = 1;
+      const double kept = state[1];
+      state << state[0] - constant - l.linear * root - l.quadratic * state[0] - kept + l.memory * carried, kept,
+          state[3], 0;
+      spread = move * spread * move.transpose();
+      spread(0, 0) += l.noise * l.noise * (1 - l.memory * l.memory);
+      spread(3, 3) = jitter2;
+      const double next = std::max(1e-3, speeds[k + 1] - l.bias), seen = next * next;
+      const double slope = 2 * next * next * next / (2 * pi);
+      const Eigen::Vector4d look(1, 0, slope, -slope);
+      const Eigen::Vector4d cross = spread * look;
+      const double total = look.dot(cross) + 4 * seen * l.sensor * l.sensor;
+      const double sd = std::sqrt(total), residual = seen - look.dot(state), jacobian = 2 * next;
       double z = residual / sd;
       double log_density = -0.5 * z * z - log_sqrt_two_pi - std::log(sd);
-      if (l.outliers > 0) {  // a loss of outlier_size noises more, as uncertain
-        const double wide = outlier_size * l.noise, far = (residual + wide) / std::sqrt(total + wide * wide);
-        const double rare = std::exp(-0.5 * far * far - log_sqrt_two_pi) / std::sqrt(total + wide * wide);
-        const double below = (1 - l.outliers) * dynamics::normal_cdf(z) + l.outliers * dynamics::normal_cdf(far);
-        log_density = std::log((1 - l.outliers) * std::exp(log_density) + l.outliers * rare + 1e-300);
+      // Mixes in a rare kind of revolution; returns its share given what was seen.
+      const auto mix = [&](double share, double centre, double extra) {
+        const double wide = std::sqrt(total + extra * extra), far = (residual - centre) / wide;
+        const double below = (1 - share) * dynamics::normal_cdf(z) + share * dynamics::normal_cdf(far);
+        const double usual = std::log1p(-share) + log_density;
+        const double other = std::log(share) - 0.5 * far * far - log_sqrt_two_pi - std::log(wide);
+        log_density = std::max(usual, other) + std::log1p(std::exp(-std::abs(usual - other)));
         z = dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15));
-      }
-      result.log_density.push_back(std::max(-60.0, log_density + std::log(jacobian)));
+        return std::exp(other - log_density);
+      };
+      const double garbled = mix(l.glitches, 0, glitch_size * l.noise);
+      if (l.outliers > 0) mix(l.outliers, -outlier_size * l.noise, outlier_size * l.noise);
+      result.log_density.push_back(log_density + std::log(jacobian));
       result.score.push_back(std::clamp(z, -1e4, 1e4));
       result.unit.push_back(sd / jacobian);
-      // Update; the noise that has just been seen is what memory carries on.
-      const double gain = spread / total, cross = rate * together - shift_variance;
-      mean = predicted + gain * residual;
-      variance = gain * error;
-      shift += cross / total * residual;
-      together = cross * error / total;
-      shift_variance -= cross * cross / total;
-      previous = gain * residual + l.memory * previous;
+      if (garbled > 0.5) {  // it says nothing of the loss: what was seen becomes the speed
+        state[0] = seen;
+        spread.row(0).setZero();
+        spread.col(0).setZero();
+        spread(0, 0) = 4 * seen * l.sensor * l.sensor + 2 * slope * slope * jitter2;
+        carried = 0;
+        continue;
+      }
+      const Eigen::Vector4d gain = cross / total;
+      state += gain * residual;
+      spread -= gain * cross.transpose();
+      carried = gain[0] * residual + l.memory * carried;
     }
   }
   return result;
@@ -205,11 +250,12 @@ std::unique_ptr<TransitionModel> CoastDownTransitions::simulate(std::span<const 
       const auto bits = r123::Philox4x64()({{t, event, 0x636f617374, 0}}, {{seed, 0}});
       return dynamics::normal_quantile((static_cast<double>(bits[which] >> 12) + 0.5) * 0x1p-52);
     };
-    const double own = l.trial_sd * normal(0, 3);
+    const double own = l.trial_sd * normal(2000000, 3);
     double squared = speeds_[t].empty() ? 0 : speeds_[t][0] * speeds_[t][0], carried = 0;
     for (std::size_t k = 0; k < speeds_[t].size(); ++k) {
       const double omega = std::sqrt(std::max(0.0, squared));
-      copy->speeds_[t][k] = std::max(0.0, omega + l.bias + l.sensor * normal(k, 1));
+      copy->speeds_[t][k] = std::max(0.0, omega + l.bias + l.sensor * normal(k, 1) -
+                                              omega * omega / (2 * pi) * l.jitter * (normal(k + 1, 3) - normal(k, 3)));
       carried = l.memory * carried + l.noise * std::sqrt(1 - l.memory * l.memory) * normal(k, 0);
       const bool rare = dynamics::normal_cdf(normal(k, 2)) < l.outliers;
       squared -= l.constant * (1 + l.drift * run) + own + l.linear * omega + l.quadratic * squared - carried +
