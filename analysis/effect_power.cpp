@@ -28,7 +28,7 @@ dynamics::NominalValues contact_of(const dynamics::NominalValues& stated,
 double log_likelihood(const TransitionModel& model, const std::vector<double>& nuisance,
                       const std::vector<FittedForm>& forms) {
   std::vector<Term> terms;
-  for (const FittedForm& form : forms) terms.push_back({&form.candidate, 0, form.values});
+  for (const FittedForm& form : forms) terms.push_back({&form.candidate, form.candidate.variants[0], form.values});
   return model.evaluate(nuisance, terms).total();
 }
 
