@@ -16,7 +16,7 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::size_t first_panels = 2;
+constexpr std::size_t first_panels = 1;
 constexpr double rounding = 1e-13;  // of the solvers: no error is claimed to be smaller
 
 struct Level {
