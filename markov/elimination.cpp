@@ -22,7 +22,7 @@ using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 constexpr std::size_t kBlockedSize = 2 * dense::panel;
 constexpr double kBlockedFill = 0.6;
 /// Rows, and columns, of a full matrix that one thread takes at a time.
-constexpr std::size_t kShare = 64;
+constexpr std::size_t kShare = 128;
 
 /// row += weight * source, over columns [from, to).
 void add_multiple(double* row, double weight, const double* source, std::size_t from, std::size_t to) {

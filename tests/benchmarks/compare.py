@@ -63,45 +63,49 @@ def paper_wheel():
 
 
 def numpy_chain(cells=1000, samples=100000, every=20):
-    """Seconds for the whole chain, from every 20th row."""
+    """Wall and CPU seconds for the whole chain, from every 20th row."""
     wheel, rng = paper_wheel(), np.random.default_rng(1)
     lower = wheel["barrier"] + wheel["gain"]
     sampled_cell(rng, 0, cells, samples, lower, 4.3 * lower, wheel)
-    start = time.perf_counter()
+    start, cpu = time.perf_counter(), time.process_time()
     for cell in range(0, cells, every):
         sampled_cell(rng, cell, cells, samples, lower, 4.3 * lower, wheel)
-    return (time.perf_counter() - start) * every
+    return (time.perf_counter() - start) * every, (time.process_time() - cpu) * every
 
 
 def scipy_lu(n, repeats=5):
-    """Best seconds of dense LU and solve of (I - Q) m = 1, and the largest relative error of m."""
+    """Best wall and CPU seconds of dense LU and solve of (I - Q) m = 1, and the largest relative error of m."""
     rng = np.random.default_rng(1)
     q = rng.uniform(0.01, 1, (n, n))
     q *= (1 - 1e-9) / q.sum(axis=1)[:, None]
-    best, error = math.inf, 0
+    best, least, error = math.inf, math.inf, 0
     for _ in range(repeats):
         matrix = np.eye(n) - q
-        start = time.perf_counter()
+        start, cpu = time.perf_counter(), time.process_time()
         mean = scipy.linalg.lu_solve(scipy.linalg.lu_factor(matrix, overwrite_a=True), np.ones(n))
-        best = min(best, time.perf_counter() - start)
+        best, least = min(best, time.perf_counter() - start), min(least, time.process_time() - cpu)
         error = float(np.max(np.abs(mean * 1e-9 - 1)))
-    return best, error
+    return best, least, error
 
 
 def blas_name():
     with open("/proc/self/maps") as maps:
-        found = {line.split("/", 1)[1].strip() for line in maps if "blas" in line and "/" in line}
-    return ", ".join(sorted({"/" + name for name in found})) or "unknown"
+        files = {os.path.basename(line.split()[-1]) for line in maps if "/" in line}
+    names = ("libopenblas", "libblas", "libblis", "libmkl", "libatlas")
+    return ", ".join(sorted(name for name in files if name.startswith(names))) or "unknown"
 
 
 def run_measured(command):
     """Wall seconds and peak resident megabytes of one program."""
-    start = time.perf_counter()
-    child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(child.pid, 0)
-    if status:
+    # By a small process: a child begins with the peak of the one that made it.
+    code = ("import os, subprocess, sys, time; start = time.perf_counter(); "
+            "child = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL); "
+            "_, status, usage = os.wait4(child.pid, 0); print(status, time.perf_counter() - start, usage.ru_maxrss)")
+    out = subprocess.run([sys.executable, "-c", code, *command], check=True, capture_output=True, text=True).stdout
+    status, seconds, kilobytes = out.split()
+    if status != "0":
         sys.exit(f"{command[0]}: status {status}")
-    return time.perf_counter() - start, usage.ru_maxrss / 1024
+    return float(seconds), float(kilobytes) / 1024
 
 
 def google_benchmark(program):
@@ -118,8 +122,8 @@ def google_benchmark(program):
     return best
 
 
-def milliseconds(result):
-    return result["real_time"] * {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}[result["time_unit"]]
+def milliseconds(result, which="real_time"):
+    return result[which] * {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}[result["time_unit"]]
 
 
 def exponent(points):
@@ -129,7 +133,7 @@ def exponent(points):
 
 
 def curve(best, label, names):
-    points = [(x, milliseconds(best[name])) for x, name in names]
+    points = [(x, milliseconds(best[name], "real_time" if label == "threads" else "cpu_time")) for x, name in names]
     values = ", ".join(f"{x}: {t:.3g} ms" for x, t in points)
     return f"| {label} | {values} | {exponent(points):.2f} |"
 
@@ -147,11 +151,11 @@ def main():
     def chain(cells, samples, legs, threads):
         return f"sampled_chain/cells:{cells}/samples:{samples}/legs:{legs}/threads:{threads}"
     ours = milliseconds(best[chain(1000, 100000, 1, 2)]) / 1e3
-    one_core = milliseconds(best[chain(1000, 100000, 1, 1)]) / 1e3
-    theirs = numpy_chain()
-    lu, lu_error = scipy_lu(2000)
+    one_cpu = milliseconds(best[chain(1000, 100000, 1, 1)], "cpu_time") / 1e3
+    theirs, theirs_cpu = numpy_chain()
+    lu, lu_cpu, lu_error = scipy_lu(2000)
     dense = milliseconds(best["first_passage/states:2000/threads:2"]) / 1e3
-    dense_one = milliseconds(best["first_passage/states:2000/threads:1"]) / 1e3
+    dense_cpu = milliseconds(best["first_passage/states:2000/threads:1"], "cpu_time") / 1e3
     landed = best[chain(1000, 100000, 1, 1)]["landed_share"]
     root, count = best["square_roots"]["ns_each"], best["count_landings"]["ns_each"]
     floor = landed * 1e8 * (root + count) * 1e-9
@@ -159,21 +163,22 @@ def main():
     lines = ["# Benchmarks", "",
              f"{time.strftime('%Y-%m-%d')}, {platform.machine()}, {os.cpu_count()} cores; NumPy {np.__version__}, "
              f"SciPy {scipy.__version__}, BLAS {blas_name()}.", "",
-             "| work | here, 2 threads | here, 1 thread | NumPy/SciPy | ratio (2 threads) |", "|---|---|---|---|---|",
-             f"| sampled chain, 1000 cells x 100,000 samples | {ours:.3f} s | {one_core:.3f} s | {theirs:.2f} s | "
-             f"{theirs / ours:.0f} |",
-             f"| first passage, 2000 states, full | {dense:.3f} s | {dense_one:.3f} s | {lu:.3f} s (relative error "
-             f"{lu_error:.0e} at 1e9 steps) | {lu / dense:.2f} |"]
+             "| work | here, 2 threads: s | NumPy/SciPy: s | ratio | here, 1 thread: CPU s | NumPy/SciPy: CPU s | ratio |",
+             "|---|---|---|---|---|---|---|",
+             f"| sampled chain, 1000 cells x 100,000 samples | {ours:.3f} | {theirs:.2f} | {theirs / ours:.0f} | "
+             f"{one_cpu:.3f} | {theirs_cpu:.2f} | {theirs_cpu / one_cpu:.0f} |",
+             f"| first passage, 2000 states, full (LU's relative error at 1e9 steps: {lu_error:.0e}) | {dense:.3f} | "
+             f"{lu:.3f} | {lu / dense:.2f} | {dense_cpu:.3f} | {lu_cpu:.3f} | {lu_cpu / dense_cpu:.2f} |"]
     for name in ("integrated_study/digits:4/legs:1/threads:1", "integrated_study/digits:8/legs:1/threads:1"):
-        lines.append(f"| {name.split('/')[1].split(':')[1]} digits of the paper's wheel, integrated study | | "
-                     f"{milliseconds(best[name]):.0f} ms | | |")
+        lines.append(f"| {name.split('/')[1].split(':')[1]} digits of the paper's wheel, integrated study | | | | "
+                     f"{milliseconds(best[name], 'cpu_time') / 1e3:.3f} | | |")
     if options.sweep:
         with tempfile.TemporaryDirectory() as folder:
             seconds, memory = run_measured(
                 [metastable, "sweep", "--legs", "0.1519", "--initial-speed", "6,0.3", "--slope", "6:10.8:0.2",
                  "--friction-mean", "0.3:0.49:0.01", "--friction-sd", "0.05:0.145:0.005", "--method", "integrated",
                  "--tolerance", "1e-4", "--out", os.path.join(folder, "sweep.csv")])
-        lines.append(f"| sweep of 10,000 settings to 1e-4 | {seconds:.1f} s, {memory:.0f} MB | | | |")
+        lines.append(f"| sweep of 10,000 settings to 1e-4 | {seconds:.1f} ({memory:.0f} MB) | | | | | |")
     memory = [run_measured([program, f"--benchmark_filter={name}"])[1]
               for name in ("sampled_chain/cells:1000/samples:100000/", "first_passage/states:2000", "integrated")]
     lines += ["", f"Peak memory: sampled chain {memory[0]:.0f} MB, first passage {memory[1]:.0f} MB, integrated "
@@ -184,8 +189,8 @@ def main():
               "and 32 bytes read and 8 written; finding its cell 5 operations, one comparison and 24 bytes; counting it "
               "one addition and 28 bytes, all in the first two caches. "
               f"Square roots alone take {root:.2f} ns each here, counting alone {count:.2f} ns: {floor:.3f} s on one "
-              f"core, of which the chain takes {one_core / floor:.1f} times as long.", "",
-              "## Cost", "", "| against | measured, one thread | exponent |", "|---|---|---|",
+              f"core, of which the chain takes {one_cpu / floor:.1f} times as long.", "",
+              "## Cost", "", "| against | CPU on one thread (threads: wall) | exponent |", "|---|---|---|",
               curve(best, "cells", [(n, chain(n, 100000, 1, 1)) for n in (125, 250, 500, 1000, 2000)]),
               curve(best, "samples", [(n, chain(1000, n, 1, 1)) for n in (12500, 25000, 50000, 100000, 200000)]),
               curve(best, "different legs", [(n, chain(250, 25000, n, 1)) for n in (3, 6, 12)]),
