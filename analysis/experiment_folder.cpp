@@ -43,6 +43,7 @@ std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const Simul
   const dynamics::TrialOptions trial{.first_landing_leg = setting.first_landing_leg,
                                      .max_collisions = options.collisions,
                                      .ramp_length = setting.ramp_length,
+                                     .rest_rule = options.rest_rule,
                                      .seed = options.seed};
   std::vector<dynamics::Trial> trials(static_cast<std::size_t>(options.trials));
   markov::parallel_for(trials.size(), options.threads, [&](std::size_t t) {

@@ -17,6 +17,7 @@ struct SimulationOptions {
   std::uint64_t seed = 1;
   int threads = 0;          ///< the same bits on any number
   std::uint64_t first = 0;  ///< index of the first trial: conditions of one experiment take different ones
+  bool rest_rule = true;    ///< false: never rest, x' < 0 is set to 0 (dynamics::TrialOptions)
 };
 
 /// Trials first .. first+trials-1 under `setting`. @throws std::invalid_argument naming the option and its range

@@ -14,6 +14,7 @@
 #include "reports/option_values.h"
 #include "reports/setting_options.h"
 #include "reports/simulate_command.h"
+#include "reports/study_command.h"
 
 namespace metastable::reports {
 namespace {
@@ -232,6 +233,26 @@ std::vector<Command> experiment_commands() {
          request.options.threads = static_cast<int>(o.whole("threads", 0, 1024));
          request.command = line;
          run_describe(request);
+       }},
+      {"study", "The paper's study: its simulated figures, its claims one by one and its hypotheses, under each law",
+       [](Options& o) {
+         o.add("data", "DIR", "", "Experiment folder of its three experiments (default: a simulated stand-in)");
+         o.add("trials", "N", "1000", "Trials of each simulated profile, 20..1000000");
+         o.add("samples", "N", "8192", "Samples behind the variance shares, 32..1048576");
+         o.add("seed", "SEED", "1", "Seed of the random numbers");
+         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add("out", "DIR", "study", "Folder for tables, figures and index.html");
+       },
+       [](const Options& o, const std::string& line) {
+         StudyRequest request;
+         request.data = o.text("data");
+         request.out = o.text("out");
+         request.options.trials = static_cast<int>(o.whole("trials", 20, 1000000));
+         request.options.samples = o.whole("samples", 32, 1048576);
+         request.options.seed = o.whole("seed", 0, UINT64_MAX);
+         request.options.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.command = line;
+         run_study(request);
        }},
   };
 }

@@ -34,10 +34,11 @@ figure svg { display: block; width: 100%; max-width: 44rem; height: auto; }
 figcaption { font-size: .95rem; max-width: 46rem; }
 figure.table figcaption { font-weight: 600; margin-bottom: .4rem; }
 .scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .92rem; font-variant-numeric: tabular-nums; border-top: 2px solid var(--ink); border-bottom: 2px solid var(--ink); }
+table { width: max-content; border-collapse: collapse; font-size: .92rem; font-variant-numeric: tabular-nums; border-top: 2px solid var(--ink); border-bottom: 2px solid var(--ink); }
 th, td { padding: .3rem .8rem; text-align: right; white-space: nowrap; vertical-align: bottom; }
 th { white-space: normal; max-width: 11rem; border-bottom: 1px solid var(--ink); font-weight: 600; }
 th.text, td.text { text-align: left; }
+td.text { white-space: normal; max-width: 20rem; vertical-align: top; }
 tbody tr:nth-child(even) { background: #f5f7f9; }
 .unit { font-weight: 400; color: var(--soft); }
 .note, .files, dl { font-size: .88rem; color: var(--soft); }

@@ -11,6 +11,7 @@
 #include "analysis/collision_finder.h"
 #include "analysis/description.h"
 #include "analysis/metastability.h"
+#include "analysis/paper_study.h"
 #include "analysis/propagation.h"
 #include "analysis/reality.h"
 #include "analysis/setting.h"
@@ -111,6 +112,14 @@ struct DescribeRequest {
   analysis::DescriptionOptions options;
   std::vector<dynamics::Law> against;  ///< laws to compare with
   int trials = 2000;                   ///< simulated trials of that comparison
+  std::string command;
+};
+
+/// metastable study
+struct StudyRequest {
+  std::string data;  ///< experiment folder; "": the simulated stand-in
+  std::string out = "study";
+  analysis::PaperStudyOptions options;
   std::string command;
 };
 

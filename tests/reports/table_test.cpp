@@ -51,7 +51,7 @@ TEST(Table, CsvNumbersReadBackExactly) {
 TEST(Table, CsvQuotesWhatCouldBeMisread) {
   Table table{
       .id = "t", .title = "two\nlines", .columns = {{"a,b"}}, .rows = {{"# no comment"}, {"line\nbreak"}, {""}}};
-  EXPECT_EQ(to_csv(table), "# two\n# lines\n# seed: 0\n\"a,b\"\n\"# no comment\"\n\"line\nbreak\"\n\n");
+  EXPECT_EQ(to_csv(table), "# two\n# lines\n\"a,b\"\n\"# no comment\"\n\"line\nbreak\"\n\n");
 }
 
 TEST(Table, Markdown) {

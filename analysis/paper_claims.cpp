@@ -1,0 +1,398 @@
+#include "analysis/paper_claims.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <utility>
+
+namespace metastable::analysis {
+namespace {
+
+using Grid = std::array<std::array<StudiedProfile, 3>, 4>;
+
+std::string p_words(double p) { return p < 1e-6 ? "P < 1e-6" : fmt::format("P = {:.2g}", p); }
+
+// Smallest of P times how many there are: the level of the family (Bonferroni).
+template <typename Rows>
+std::pair<double, int> least(const Rows& rows, std::size_t first, std::size_t last) {
+  double p = 1;
+  int count = 0;
+  for (std::size_t j = first; j <= last; ++j)
+    for (const double one : rows[j]) p = std::min(p, one), ++count;
+  return {p, count};
+}
+
+bool any_steady(const Grid& grid) {
+  for (const auto& row : grid)
+    for (const StudiedProfile& profile : row)
+      if (profile.steady.size() >= 20) return true;
+  return false;
+}
+
+Finding nothing_left() { return {Verdict::not_applicable, "hardly a trial gets past the 12th collision"}; }
+
+// Range of `of` over the restitution means at one friction of Fig. 9.
+double range(const std::array<StudiedProfile, 3>& row, double (StudiedProfile::*of)() const) {
+  const double a = (row[0].*of)(), b = (row[1].*of)(), c = (row[2].*of)();
+  return std::max({a, b, c}) - std::min({a, b, c});
+}
+
+Finding convergence(const ConditionComparison& c) {
+  if (!c.trial_means) return nothing_left();
+  const double p = c.trial_means->welch.p;
+  const bool met = c.meet && *c.meet <= steady_collision;
+  return {p > 0.05 && met ? Verdict::reproduced
+          : p > 0.05      ? Verdict::partly
+                          : Verdict::not_reproduced,
+          fmt::format("{} beyond the 12th; not told apart from collision {}", p_words(p),
+                      c.meet ? fmt::format("{}", *c.meet) : "(never)")};
+}
+
+Finding error_bars(const std::vector<SpeedSummary>& fast, const std::vector<SpeedSummary>& slow) {
+  const auto ratio = [](const std::vector<SpeedSummary>& profile) {
+    double late = 0;
+    int count = 0;
+    for (std::size_t n = steady_collision; n <= std::min<std::size_t>(16, profile.size()); ++n)
+      late += profile[n - 1].standard_error, ++count;
+    return count > 0 ? late / count / profile[0].standard_error : 0;
+  };
+  const double a = ratio(fast), b = ratio(slow);
+  if (a == 0 || b == 0) return nothing_left();
+  return {a < 1 && b < 1   ? Verdict::reproduced
+          : a < 1 || b < 1 ? Verdict::partly
+                           : Verdict::not_reproduced,
+          fmt::format("late over first standard error: fast {:.2f}, slow {:.2f}", a, b)};
+}
+
+Finding low_friction(const VariantStudy& s) {
+  if (!any_steady(s.fig6)) return nothing_left();
+  const auto [p, count] = least(s.fig6_p, 0, 1);
+  const bool alike = p * count > 0.05;
+  return {p > 0.9 ? Verdict::reproduced
+          : alike ? Verdict::partly
+                  : Verdict::not_reproduced,
+          fmt::format("smallest of {} {}{}", count, p_words(p),
+                      alike && p <= 0.9 ? ": not significant, but not > 0.9" : "")};
+}
+
+Finding high_friction(const VariantStudy& s) {
+  if (!any_steady(s.fig6)) return nothing_left();
+  const double low_fast = s.fig6_p[3][1], middle_fast = s.fig6_p[3][2];
+  return {low_fast < 0.001 && middle_fast < 0.001 ? Verdict::reproduced
+          : low_fast < 0.05 || middle_fast < 0.05 ? Verdict::partly
+                                                  : Verdict::not_reproduced,
+          fmt::format("μ = 0.55: k = 3 against 1 {}, against 2 {}; one value a trial {}, {}", p_words(low_fast),
+                      p_words(middle_fast), p_words(s.fig6_p_trials[3][1]), p_words(s.fig6_p_trials[3][2]))};
+}
+
+Finding variability_grows(const VariantStudy& s) {
+  if (!any_steady(s.fig6)) return nothing_left();
+  double slow = 0, fast = 0;
+  for (std::size_t k = 0; k < 3; ++k) slow += s.fig6[0][k].steady_sd() / 3, fast += s.fig6[3][k].steady_sd() / 3;
+  double k1 = 0, k3 = 0;
+  for (std::size_t j = 0; j < 4; ++j) k1 += s.fig6[j][0].steady_sd() / 4, k3 += s.fig6[j][2].steady_sd() / 4;
+  const bool friction = fast > 1.05 * slow, launch = k3 > 1.05 * k1;
+  return {friction && launch   ? Verdict::reproduced
+          : friction || launch ? Verdict::partly
+                               : Verdict::not_reproduced,
+          fmt::format("sd {:.3f} to {:.3f} rad/s from μ = 0.40 to 0.55; {:.3f} to {:.3f} from k = 1 to 3", slow, fast,
+                      k1, k3)};
+}
+
+Finding leg_lengths(const VariantStudy& s) {
+  if (!any_steady(s.fig6)) return nothing_left();
+  const auto [p, count] = least(s.legs_p, 0, 3);
+  const auto [q, same] = least(s.legs_p_trials, 0, 3);
+  double most = 0;
+  for (std::size_t j = 0; j < 4; ++j)
+    for (std::size_t k = 0; k < 3; ++k)
+      if (s.fig6[j][k].trial_means.size() >= 20 && s.equal_legs[j][k].trial_means.size() >= 20)
+        most = std::max(
+            most, std::abs(summarize(s.fig6[j][k].trial_means).mean - summarize(s.equal_legs[j][k].trial_means).mean));
+  return {
+      p > 0.1           ? Verdict::reproduced
+      : q * same > 0.05 ? Verdict::partly
+                        : Verdict::not_reproduced,
+      fmt::format("smallest of {} {}, one value a trial {}{}; means differ by at most {:.3f} rad/s", count, p_words(p),
+                  p_words(q), p <= 0.1 && q * same > 0.05 ? " (no more than chance among so many)" : "", most)};
+}
+
+// Main effects of rows and columns on |t|, as ranges of their means.
+Finding spread_of_friction(const VariantStudy& s) {
+  std::array<double, 4> friction{};
+  std::array<double, 3> restitution{};
+  for (std::size_t j = 0; j < 4; ++j)
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!s.fig7_test[j][k]) return nothing_left();
+      friction[j] += std::abs(s.fig7_test[j][k]->t) / 3;
+      restitution[k] += std::abs(s.fig7_test[j][k]->t) / 4;
+    }
+  const auto spread = [](const auto& values) {
+    return *std::max_element(values.begin(), values.end()) - *std::min_element(values.begin(), values.end());
+  };
+  const double of_friction = spread(friction), of_restitution = spread(restitution);
+  return {of_friction > 2 * of_restitution ? Verdict::reproduced
+          : of_friction > of_restitution   ? Verdict::partly
+                                           : Verdict::not_reproduced,
+          fmt::format("|t| against the experiment changes by {:.1f} over the sds of μ, by {:.1f} over those of η",
+                      of_friction, of_restitution)};
+}
+
+Finding tangential_loss(const VariantStudy& s) {
+  const MeanSpread &a = s.fig8[0].tangential_net, &b = s.fig8[3].tangential_net;
+  const bool rises = b.mean > a.mean && b.sd > a.sd;
+  const auto near = [](double ours, double paper) { return ours > paper / 1.5 && ours < paper * 1.5; };
+  const bool close = near(a.mean, 0.05) && near(a.sd, 0.03) && near(b.mean, 0.11) && near(b.sd, 0.19);
+  return {rises && close ? Verdict::reproduced
+          : rises        ? Verdict::partly
+                         : Verdict::not_reproduced,
+          fmt::format("N({:.3f}, {:.3f}²) to N({:.3f}, {:.3f}²) J", a.mean, a.sd, b.mean, b.sd)};
+}
+
+Finding normal_loss(const VariantStudy& s) {
+  const MeanSpread &a = s.fig8[0].normal, &b = s.fig8[3].normal;
+  bool steady = true;
+  for (const EnergyLosses& losses : s.fig8) steady = steady && std::abs(losses.normal.mean / 0.17 - 1) < 0.25;
+  const bool rises = b.sd > a.sd;
+  return {rises && steady ? Verdict::reproduced
+          : rises         ? Verdict::partly
+                          : Verdict::not_reproduced,
+          fmt::format("sd {:.3f} to {:.3f} J, mean {:.3f} to {:.3f} J", a.sd, b.sd, a.mean, b.mean)};
+}
+
+Finding transient_influence(const VariantStudy& s) {
+  const double transient = range(s.fig9[0], &StudiedProfile::transient_sd);
+  const double steady = range(s.fig9[0], &StudiedProfile::steady_sd);
+  if (!any_steady(s.fig9)) return nothing_left();
+  return {transient > steady ? Verdict::reproduced : Verdict::not_reproduced,
+          fmt::format("μ mean 0.2: sd differs by {:.3f} rad/s at collisions 2-6, by {:.3f} beyond the 12th", transient,
+                      steady)};
+}
+
+std::pair<double, double> steady_ranges(const VariantStudy& s) {
+  return {range(s.fig9[0], &StudiedProfile::steady_sd), range(s.fig9[3], &StudiedProfile::steady_sd)};
+}
+
+Finding influence_grows(const VariantStudy& s) {
+  if (!any_steady(s.fig9)) return nothing_left();
+  const auto [low, high] = steady_ranges(s);
+  return {high > low ? Verdict::reproduced : Verdict::not_reproduced,
+          fmt::format("steady sd differs by {:.3f} rad/s over η at μ mean 0.2, by {:.3f} at 0.5", low, high)};
+}
+
+Finding restitution_raises(const VariantStudy& s) {
+  if (!any_steady(s.fig9)) return nothing_left();
+  int rises = 0;
+  double low = 0, high = 0;
+  for (const auto& row : s.fig9) {
+    rises += row[2].steady_sd() > row[0].steady_sd();
+    low += row[0].steady_sd() / 4, high += row[2].steady_sd() / 4;
+  }
+  return {rises == 4  ? Verdict::reproduced
+          : rises > 0 ? Verdict::partly
+                      : Verdict::not_reproduced,
+          fmt::format("steady sd {:.3f} to {:.3f} rad/s from η mean 0.3 to 0.7; up at {} of 4 μ", low, high, rises)};
+}
+
+Finding influence_shrinks(const VariantStudy& s) {
+  if (!any_steady(s.fig9)) return nothing_left();
+  const auto [low, high] = steady_ranges(s);
+  return {high < low ? Verdict::reproduced : Verdict::not_reproduced,
+          fmt::format("steady sd differs by {:.3f} rad/s over η at μ mean 0.2, by {:.3f} at 0.5", low, high)};
+}
+
+Finding failures(const VariantStudy& s) {
+  if (s.variant.reading == RestReading::goes_on) return {Verdict::not_applicable, "no trial can rest"};
+  const double share = s.fig7[1][1].rest_share;  // both sds 0.1
+  return {share > 0.02 && share < 0.9 ? Verdict::reproduced : Verdict::not_reproduced,
+          fmt::format("{:.1f} % of the trials rest within 16 collisions at 7.02 deg (sds of 0.1)", 100 * share)};
+}
+
+// The largest total index of a source over the frictions, and where.
+struct Influence {
+  double steady = 0, steps = 0;
+  bool steps_vary = false;
+  double friction = 0;
+};
+Influence largest(const VariantStudy& s, std::initializer_list<std::size_t> sources) {
+  Influence share;
+  for (std::size_t f = 0; f < s.variance.size(); ++f) {
+    const auto sum = [&](const SobolResult& result) {
+      double total = 0;
+      for (const std::size_t source : sources)
+        if (!result.group.empty()) total = std::max(total, result.group[source].total.value);
+      return total;
+    };
+    const double steady = sum(s.variance[f].steady_speed);
+    if (steady > share.steady) share.steady = steady, share.friction = variance_friction[f];
+    share.steps = std::max(share.steps, sum(s.variance[f].steps));
+    share.steps_vary = share.steps_vary || !s.variance[f].steps.group.empty();
+  }
+  return share;
+}
+
+std::string share_words(const Influence& share) {
+  return fmt::format("largest total index: steady speed {:.3f}{}, steps {}", share.steady,
+                     share.steady > 0.01 ? fmt::format(" (μ mean {})", share.friction) : "",
+                     share.steps_vary ? fmt::format("{:.3f}", share.steps) : "do not vary");
+}
+
+}  // namespace
+
+std::string verdict_text(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::reproduced:
+      return "reproduced";
+    case Verdict::partly:
+      return "partly";
+    case Verdict::not_reproduced:
+      return "not reproduced";
+    case Verdict::not_applicable:
+      return "says nothing";
+  }
+  return "";
+}
+
+std::vector<Claim> paper_claims(const std::vector<VariantStudy>& studies, const PaperExperiments& experiments) {
+  std::vector<Claim> claims;
+  const auto add = [&](Claim claim, const std::function<Finding(const VariantStudy&)>& of) -> Claim& {
+    for (const VariantStudy& study : studies) claim.findings.push_back(of(study));
+    return claims.emplace_back(std::move(claim));
+  };
+  add({"Fig. 4",
+       "fast and slow start at 9.59 deg meet beyond the 12th collision",
+       "P > 0.07",
+       "Welch's test of trial means from collision 13 on, P > 0.05; no collision from the 13th on told apart",
+       {},
+       {}},
+      [](const VariantStudy& s) { return convergence(s.fig4_comparison); })
+      .experiment = convergence(compare_conditions(experiments.fast_959, experiments.slow_959));
+  add({"Fig. 4",
+       "error bars shrink along the profiles, yet do not vanish",
+       "figure only",
+       "mean standard error at collisions 13 to 16 below that at the first, for both starts",
+       {},
+       {}},
+      [](const VariantStudy& s) { return error_bars(s.fig4[0].profile, s.fig4[1].profile); })
+      .experiment = error_bars(speed_profile(experiments.fast_959), speed_profile(experiments.slow_959));
+  add({"Fig. 6",
+       "μ < 0.5: launch speed leaves no trace in the steady state",
+       "P > 0.9, all pairs",
+       "pooled t-test of all collisions from the 13th on at μ = 0.40 and 0.45; “partly”: none significant at 0.05 over "
+       "the "
+       "family. P > 0.9 for each of several pairs is itself improbable where nothing differs (P is then uniform)",
+       {},
+       {}},
+      low_friction);
+  add({"Fig. 6",
+       "μ > 0.5: the fastest launch (k = 3) ends in another steady state",
+       "P < 0.001 against both",
+       "pooled t-test of all collisions from the 13th on at μ = 0.55",
+       {},
+       {}},
+      high_friction);
+  add({"Fig. 6",
+       "steady variability grows with μ and with launch speed",
+       "figure only",
+       "mean sd at collisions 13 to 16, by more than 5 %; the text's “variability of μ” is read as its value, μ being "
+       "constant here",
+       {},
+       {}},
+      variability_grows);
+  add({"Sec. IV-A",
+       "uneven legs do not matter (H2)",
+       "P > 0.1, all launches and μ",
+       "the measured legs against eight of mean length, pooled t-test of all collisions, P > 0.1 for all 12; “partly”: "
+       "one "
+       "value a trial, none significant at 0.05 over the family. Collisions 13 to 16 land on legs 4 to 7 only, whose "
+       "mean is "
+       "not that of all",
+       {},
+       {}},
+      leg_lengths);
+  add({"Fig. 7",
+       "agreement with the experiment depends on the spread of μ, not on that of η",
+       "figure only",
+       "range of |t| (simulated against measured steady speeds at 7.02 deg) over the sds of μ more than twice that "
+       "over "
+       "those of η",
+       {},
+       {}},
+      spread_of_friction);
+  add({"Fig. 8",
+       "more spread of μ raises mean and variance of the tangential net loss",
+       "N(0.05, 0.03²) to N(0.11, 0.19²) J",
+       "both rise, all four within a factor of 1.5; “partly”: both rise",
+       {},
+       {}},
+      tangential_loss);
+  add({"Fig. 8",
+       "more spread of η widens the normal loss, whose mean stays",
+       "sd 0.06 to 0.1 J, mean about 0.17 J",
+       "sd rises, means within 25 % of 0.17 J; “partly”: sd rises",
+       {},
+       {}},
+      normal_loss);
+  add({"Fig. 9",
+       "low μ (< 0.3): mean η acts on the transient variability, less on the steady one",
+       "figure only",
+       "range over mean η of the sd at collisions 2 to 6 exceeds that at 13 to 16, at μ mean 0.2",
+       {},
+       {}},
+      transient_influence);
+  add({"Fig. 9",
+       "the influence of mean η on the steady variability grows with μ",
+       "figure only",
+       "range over mean η of the sd at collisions 13 to 16, μ mean 0.5 against 0.2; the text says the opposite three "
+       "sentences later (next but one row)",
+       {},
+       {}},
+      influence_grows);
+  add({"Fig. 9",
+       "mean η raises the steady variability in general",
+       "figure only",
+       "sd at collisions 13 to 16 at η mean 0.7 above that at 0.3, for all μ",
+       {},
+       {}},
+      restitution_raises);
+  add({"Fig. 9", "this effect shrinks with μ", "figure only", "as two rows above, the other way round", {}, {}},
+      influence_shrinks);
+  Claim& metastable = add({"Sec. III",
+                           "intermittent failures on the 7.02 deg ramp",
+                           "observed, not counted",
+                           "between 2 and 90 % of the trials rest within 16 collisions, at η, μ ~ N(0.4, 0.1²)",
+                           {},
+                           {}},
+                          failures);
+  if (experiments.rest_share_702)
+    metastable.experiment = {*experiments.rest_share_702 > 0.02 && *experiments.rest_share_702 < 0.9
+                                 ? Verdict::reproduced
+                                 : Verdict::not_reproduced,
+                             fmt::format("{:.1f} % of the trials rest", 100 * *experiments.rest_share_702)};
+  return claims;
+}
+
+std::vector<Hypothesis> paper_hypotheses(const std::vector<VariantStudy>& studies) {
+  constexpr double matters = 0.1;
+  std::vector<Hypothesis> all{{"H1", "variability depends on the launch speed's distribution", {}},
+                              {"H2", "variability depends on the uneven leg lengths", {}},
+                              {"H3", "variability depends on the distributions of restitution and friction", {}}};
+  for (const VariantStudy& s : studies) {
+    const auto judge = [&](const Influence& share) {
+      const bool steady = share.steady > matters, steps = share.steps_vary && share.steps > matters;
+      return Finding{steady  ? Verdict::reproduced
+                     : steps ? Verdict::partly
+                             : Verdict::not_reproduced,
+                     share_words(share)};
+    };
+    all[0].findings.push_back(judge(largest(s, {0})));
+    all[1].findings.push_back(judge(largest(s, {1})));
+    all[2].findings.push_back(judge(largest(s, {2, 3})));
+  }
+  return all;
+}
+
+}  // namespace metastable::analysis
