@@ -21,8 +21,8 @@ std::string id_of(const std::string& text) {
 constexpr int black = 6;  // of the palette (figure.cpp)
 
 void add_experiment(Figure& figure, const analysis::PaperExperiments& experiments) {
-  add_profile(figure, analysis::speed_profile(experiments.fast_702), experiments.stand_in ? "stand-in" : "experiment",
-              black);
+  add_profile(figure, analysis::speed_profile(experiments.fast_702),
+              experiments.stand_in ? "stand-in (simulated)" : "experiment", black);
   // The first 16 collisions are the paper's.
   figure.x.low = 0;
   figure.x.high = 16.5;
