@@ -393,7 +393,10 @@ class WheelTransitions::Filter {
       start(reported);
       return {least_log_density, -8, 0.1};
     }
-    const double rate = seen / *plus;  // d omega+ / d next omega-
+    // d omega+ / d next omega-: without torques seen / plus, which they change.
+    const double step = 1e-4 * seen;
+    const auto faster = wheel.back(context, seen + step), slower = wheel.back(context, seen - step);
+    const double rate = faster && slower ? (*faster - *slower) / (2 * step) : seen / *plus;
     const Out out =
         transition(wheel, context, *plus, rate, std::sqrt(noise2_ * rate * rate + square(*plus / mean_) * variance_));
     update(out, seen);

@@ -37,6 +37,15 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
     leg.before = stance_inertia(stated, model_.law, first) * extension.inertia_ratio;
     leg.inertia = stance_inertia(stated, model_.law, second) * extension.inertia_ratio;
     leg.eccentric_phase = -static_cast<double>(k) * wheel.leg_angle();
+    const double offset2 = extension.hub_forward * extension.hub_forward + extension.hub_aside * extension.hub_aside;
+    if (offset2 > 0) {
+      // A centre of mass nearer to the foot or farther from it: parallel axes.
+      const auto along = [&](double phase) {  // of the offset, towards the leg
+        return extension.hub_forward * std::cos(phase) - extension.hub_aside * std::sin(phase);
+      };
+      leg.inertia += model_.mass * (offset2 - 2 * second * along(leg.eccentric_phase));
+      leg.before += model_.mass * (offset2 - 2 * first * along(leg.eccentric_phase + wheel.leg_angle()));
+    }
     geometry_.push_back(leg);
   }
   drag_ = extension.viscous != 0 || extension.rolling != 0 || extension.air != 0;
@@ -153,6 +162,11 @@ Collision ExtendedWheel::collision(const StepContext& context, double omega) con
   c.landing_length = leg.length;
   c.contact_x = leg.triangle.contact_x;
   c.contact_y = leg.triangle.hub_height;
+  if (extension_.hub_forward != 0 || extension_.hub_aside != 0) {  // the impulse acts about the centre of mass
+    const double at = leg.triangle.beta_second - leg.eccentric_phase;
+    c.contact_x -= extension_.hub_forward * std::cos(at) + extension_.hub_aside * std::sin(at);
+    c.contact_y += extension_.hub_aside * std::cos(at) - extension_.hub_forward * std::sin(at);
+  }
   c.chord = leg.triangle.chord;
   c.normal_speed = leg.triangle.chord * omega;
   c.slope = local_slope(context.position - leg.triangle.chord / 2);

@@ -1,0 +1,79 @@
+// The diagnosis' model and the laboratory share no formula: each effect that the laboratory puts in must be found
+// there, at its size, by maximum likelihood with the true contact known.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "analysis/effect_power.h"
+#include "analysis/model_fit.h"
+#include "analysis/stand_in.h"
+#include "analysis/wheel_transitions.h"
+
+namespace metastable::analysis::test {
+namespace {
+
+void expect_found(const std::string& text, const std::vector<std::string>& dropped) {
+  const Setting base = stand_in_setting();
+  std::vector<RealityCondition> conditions = stand_in_conditions(base);
+  for (RealityCondition& c : conditions) c.trials = 25;
+  const dynamics::NominalValues contact{0.54, 0.045, 0.352, 0.043, base.wheel.leg_length};
+  const dynamics::Effect effect = dynamics::effect_from_text(text, contact);
+  const RealityOptions reality{.effects = {effect}, .sensor_noise = 0.008, .flight = false, .seed = 5};
+  const dynamics::LaboratorySetup setup = laboratory_setup(conditions, reality);
+  const RealityFiles made = reality_files(conditions, setup, run_laboratory(setup, 0), {.dropped = dropped});
+  const auto model = wheel_transitions(parse_experiment(
+      {"laboratory", made.files.experiment_toml, made.files.collisions_csv, made.files.trials_csv, std::nullopt}));
+  FittedForm form = fitted_form(effect, base.wheel.leg_length, 3.66);
+  for (const Candidate& known : model->candidates())
+    if (known.id == effect.id) form.candidate.parameters = known.parameters;
+  const Fit found =
+      fit(*model, true_nuisances(*model, contact), {{&form.candidate, form.candidate.variants.front(), form.values}},
+          {.count = {}, .refit_nuisances = false});
+  const std::vector<double>& values = found.terms.front().values;
+  const auto count = static_cast<Eigen::Index>(values.size());
+  const Eigen::MatrixXd covariance = found.information.bottomRightCorner(count, count).inverse();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const double error = std::sqrt(covariance(i, i)), truth = form.values[static_cast<std::size_t>(i)];
+    EXPECT_NEAR(values[static_cast<std::size_t>(i)], truth, 4.5 * error) << text << ", value " << i;
+    EXPECT_GT(error, 0) << text;
+  }
+}
+
+TEST(LaboratoryAgreement, EveryEffectIsFoundAtItsSize) {
+  for (const char* text : {"initial_speed:mean_rad_s=0.2,sd_rad_s=0.1",
+                           "leg_contact:leg=3,friction_ratio=1.15",
+                           "leg_lengths:leg_lengths_m=0.1525;0.1528;0.1510;0.1514;0.1518;0.1504;0.1524;0.1530",
+                           "hub_eccentricity:offset_m=0.0005,phase_rad=1",
+                           "inertia:ratio=1.03",
+                           "slope_offset:offset_deg=0.15",
+                           "slope_profile:sag_m=0.004,to_m=1.83",
+                           "axle_drag_viscous:n_m_s=0.002",
+                           "rolling_resistance:torque_n_m=0.01",
+                           "air_drag:n_m_s2=0.0005",
+                           "speed_dependent_restitution:exponent=0.3",
+                           "speed_dependent_friction:amplitude=0.3,speed_rad_s=4",
+                           "contact_memory:correlation=0.3",
+                           "friction_patch:from_m=0.5,to_m=1.0,friction_ratio=1.1",
+                           "trial_drift:relative_change=0.15",
+                           "trial_spread:friction_sd=0.02",
+                           "contact_outliers:share=0.02,friction_ratio=1.8",
+                           "sensor_noise:sd_rad_s=0.02",
+                           "sensor_bias:bias_rad_s=0.03",
+                           "bounce:rebound_lost=0.2",
+                           "ramp_vibration:amplitude=0.05,frequency_hz=12"})
+    expect_found(text, {});
+}
+
+// One density then covers collision and stance: its Jacobian once forgot the torques, and negative drags paid.
+TEST(LaboratoryAgreement, AlsoWhereTheSpeedAfterACollisionIsNotTold) {
+  for (const char* text :
+       {"axle_drag_viscous:n_m_s=0.004", "rolling_resistance:torque_n_m=0.02", "air_drag:n_m_s2=0.0008",
+        "hub_eccentricity:offset_m=0.002,phase_rad=-2", "slope_offset:offset_deg=0.3"})
+    expect_found(text, {"omega_plus_rad_s"});
+}
+
+}  // namespace
+}  // namespace metastable::analysis::test
