@@ -52,22 +52,25 @@ std::string csv_text(const std::string& text) {
 }
 
 struct Files {
-  std::string collisions = "condition,trial,collision,leg,time_s,omega_minus_rad_s,omega_plus_rad_s\n";
+  std::string collisions = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
   std::string details =
       "condition,trial,collision,peak_time_s,omega_peak_rad_s,time_fit_s,omega_minus_fit_rad_s,omega_plus_fit_rad_s,"
       "fit_residual_rad,apex_time_s,omega_apex_rad_s,bounces\n";
 };
 
 Files write_files(const analysis::Experiment& experiment, const std::vector<analysis::MeasuredAngle>& angles,
-                  const std::vector<FoundTrial>& found, bool peak) {
+                  const std::vector<FoundTrial>& found, const std::vector<dynamics::WheelMap>& maps, bool peak) {
   Files files;
   for (std::size_t t = 0; t < angles.size(); ++t) {
     const analysis::Condition& condition = experiment.conditions[angles[t].condition];
+    const dynamics::WheelMap& map = maps[angles[t].condition];
+    double position = 0;  // chord by chord
     for (const FoundCollision& c : found[t].collisions) {
       const std::string key = fmt::format("{},{},{}", csv_text(condition.id), angles[t].number, c.number);
-      fmt::format_to(std::back_inserter(files.collisions), "{},{},{:.6f},{:.6g},{}\n", key,
-                     (condition.first_landing_leg + c.number - 1) % experiment.legs(), time_of(c), omega_minus(c, peak),
-                     c.fit ? fmt::format("{:.6g}", c.fit->omega_plus) : "");
+      const int leg = (condition.first_landing_leg + c.number - 1) % experiment.legs();
+      fmt::format_to(std::back_inserter(files.collisions), "{},{},{:.6f},{:.6f},{:.6g},{}\n", key, leg, time_of(c),
+                     position, omega_minus(c, peak), c.fit ? fmt::format("{:.6g}", c.fit->omega_plus) : "");
+      position += map.advance(leg % map.phases());
       const std::string fit = c.fit ? fmt::format("{:.6f},{:.6g},{:.6g},{:.3g}", c.fit->time, c.fit->omega_minus,
                                                   c.fit->omega_plus, c.fit->residual_sd)
                                     : ",,,";
@@ -113,6 +116,37 @@ void print_comparison(const analysis::Experiment& known, const std::vector<analy
   fmt::print("  omega_plus, stance fit:  {}\n", after.text());
 }
 
+// Trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two files
+// would put the rest too early.
+void print_cut_rests(const analysis::ExperimentSource& source, const std::string& collisions,
+                     const std::vector<analysis::MeasuredAngle>& angles, const std::vector<char>& cut,
+                     std::size_t limit) {
+  if (!source.trials_csv) return;
+  analysis::ExperimentSource written = source;
+  written.collisions_csv = collisions;
+  analysis::Experiment experiment;
+  try {
+    experiment = analysis::parse_experiment(written);
+  } catch (const analysis::InputError& error) {
+    fmt::print("trials.csv does not go with these collisions: {}\n", error.lines().front());
+    return;
+  }
+  std::map<int, dynamics::Outcome> outcomes;
+  for (const analysis::MeasuredTrial& trial : experiment.trials)
+    if (trial.outcome) outcomes[trial.number] = *trial.outcome;
+  std::vector<int> early;
+  for (std::size_t t = 0; t < angles.size(); ++t) {
+    const auto outcome = outcomes.find(angles[t].number);
+    if (cut[t] && outcome != outcomes.end() && outcome->second == dynamics::Outcome::rest)
+      early.push_back(angles[t].number);
+  }
+  if (early.empty()) return;
+  fmt::print(
+      "{} trials that trials.csv lists as rest roll on after collision {}, where they are cut (the first is trial {}): "
+      "raise --collisions, or list them as max_collisions\n",
+      early.size(), limit, early.front());
+}
+
 }  // namespace
 
 void run_collisions(const CollisionsRequest& request) {
@@ -145,19 +179,25 @@ void run_collisions(const CollisionsRequest& request) {
     setting.first_landing_leg = condition.first_landing_leg;
     maps.push_back(setting.map());
   }
+  // One more than asked for tells a trial that ends there from one that is cut.
+  analysis::FinderOptions finder = request.finder;
+  const auto limit = static_cast<std::size_t>(finder.collisions++);
   std::vector<FoundTrial> found(angles.size());
+  std::vector<char> cut(angles.size());
   markov::parallel_for(angles.size(), request.threads, [&](std::size_t t) {
     const auto& [number, condition, recording] = angles[t];
     try {
       found[t] = analysis::find_collisions(recording, maps[condition],
-                                           experiment.conditions[condition].first_landing_leg, request.finder);
+                                           experiment.conditions[condition].first_landing_leg, finder);
+      cut[t] = found[t].collisions.size() > limit;
+      if (cut[t]) found[t].collisions.resize(limit);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument(
           fmt::format("{}: trial {}: {}", (folder / "angle.csv").string(), number, error.what()));
     }
   });
 
-  const Files files = write_files(experiment, angles, found, request.peak);
+  const Files files = write_files(experiment, angles, found, maps, request.peak);
   collisions_file.stream() << files.collisions;
   if (details_file) {
     details_file->stream() << files.details;
@@ -186,6 +226,7 @@ void run_collisions(const CollisionsRequest& request) {
         "empty\n",
         unfitted);
   for (const auto& [why, trials] : stopped) fmt::print("{} trials without a collision: {}\n", trials, why);
+  print_cut_rests(source, files.collisions, angles, cut, limit);
   if (known) print_comparison(*known, angles, found, request);
 }
 

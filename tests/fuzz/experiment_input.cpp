@@ -3,7 +3,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <string_view>
+#include <vector>
 
+#include "analysis/angle_file.h"
 #include "analysis/experiment.h"
 #include "analysis/input_error.h"
 
@@ -53,18 +55,40 @@ void check_experiment(const analysis::Experiment& experiment) {
   }
 }
 
+void check_angles(const std::vector<analysis::MeasuredAngle>& angles) {
+  int last = -1;
+  for (const analysis::MeasuredAngle& trial : angles) {
+    require(trial.number > last);
+    last = trial.number;
+    const std::vector<double>&time = trial.recording.time, &angle = trial.recording.angle;
+    require(time.size() >= 2 && time.size() == angle.size());
+    for (std::size_t k = 0; k < time.size(); ++k) {
+      require(std::isfinite(time[k]) && std::isfinite(angle[k]));
+      require(k == 0 || time[k] > time[k - 1]);
+    }
+  }
+}
+
+// Whether it was taken; a refusal must say why.
+template <typename Read>
+bool taken(const Read& read) {
+  try {
+    read();
+    return true;
+  } catch (const analysis::InputError& error) {
+    require(!error.lines().empty());
+    return false;
+  }
+}
+
 }  // namespace
 
 bool read_experiment_input(const std::uint8_t* data, std::size_t size) {
   const ExperimentSource source = split({reinterpret_cast<const char*>(data), size});
-  bool good = true;
-  try {
-    check_experiment(analysis::parse_experiment(source));
-  } catch (const analysis::InputError& error) {
-    require(!error.lines().empty());
-    good = false;
-  }
-  return good;
+  const bool good = taken([&] { check_experiment(analysis::parse_experiment(source)); });
+  const bool angles = !source.angle_csv ||
+                      taken([&] { check_angles(analysis::parse_angles(source, analysis::parse_description(source))); });
+  return good && angles;
 }
 
 }  // namespace metastable::fuzz

@@ -35,8 +35,9 @@ class CollisionsCommandTest : public testing::Test {
     run_simulate(request);
     testing::internal::GetCapturedStdout();
   }
-  std::string run(bool peak = false) const {
+  std::string run(bool peak = false, int collisions = 16) const {
     CollisionsRequest request;
+    request.finder.collisions = collisions;
     request.folder = folder_.string();
     request.peak = peak;
     testing::internal::CaptureStdout();
@@ -76,8 +77,24 @@ TEST_F(CollisionsCommandTest, MakesAFolderThatCanBeReadInFull) {
   const analysis::Experiment found = analysis::read_experiment(folder_);
   EXPECT_EQ(found.collisions(), known.collisions());
   EXPECT_EQ(found.columns.leg, analysis::Presence::all);
-  EXPECT_EQ(found.columns.position, analysis::Presence::none);
+  EXPECT_EQ(found.columns.position, analysis::Presence::all);
+  for (std::size_t t = 0; t < found.trials.size(); ++t)
+    EXPECT_NEAR(*found.trials[t].collisions.back().position, *known.trials[t].collisions.back().position, 2e-6);
   EXPECT_LT(found.trials[0].collisions[0].omega_minus, known.trials[0].collisions[0].omega_minus - 0.1);  // the peak
+}
+
+// Trials of the default contact rest after a few collisions: cut before, they would seem to rest too early.
+TEST_F(CollisionsCommandTest, SaysWhereACutHidesThatATrialRollsOn) {
+  simulate();
+  EXPECT_EQ(run().find("roll on"), std::string::npos);
+  const analysis::Experiment known = analysis::read_experiment(folder_);
+  std::size_t longer = 0;
+  for (const analysis::MeasuredTrial& trial : known.trials) longer += trial.collisions.size() > 2;
+  ASSERT_GT(longer, 0u);
+  fs::remove(folder_ / "collisions.csv");
+  EXPECT_NE(
+      run(false, 2).find(std::to_string(longer) + " trials that trials.csv lists as rest roll on after collision 2"),
+      std::string::npos);
 }
 
 TEST_F(CollisionsCommandTest, LeavesNothingBehindWhenTheInputIsBad) {
