@@ -239,6 +239,55 @@ TEST_F(CommandLine, SimulateWritesAnExperimentOnce) {
 }
 
 // The whole report, twice, on one thread and on two: the same bytes in every file.
+TEST_F(CommandLine, RealityLeavesNothingBehindWhenItIsMisunderstood) {
+  const auto refused = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "simulate");
+    words.insert(words.end(), {"--out", path("lab")});
+    const Ran ran = metastable(words);
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1);
+    return ran.err;
+  };
+  EXPECT_EQ(refused({"--effect", "bounce"}), "metastable: --effect: needs --reality\n");
+  EXPECT_EQ(refused({"--reality", "--effect", "inertia:ratio=9"}),
+            "metastable: effect inertia: ratio: 9 is outside [0.5, 2]\n");
+  EXPECT_EQ(refused({"--reality", "--outside", "planks"}),
+            "metastable: --outside: 'planks' is not of the form ID:SIZE\n");
+  EXPECT_EQ(refused({"--reality", "--outside", "planks:7"}), "metastable: effect planks: size 7 is outside [0, 0.9]\n");
+  EXPECT_TRUE(left_behind().empty());
+  const std::vector<std::string> fine{"simulate",          "--reality", "--effect",
+                                      "inertia:ratio=1.1", "--effect",  "leg_contact:leg=3,friction_ratio=1.4",
+                                      "--trials",          "3",         "--out"};
+  std::vector<std::string> one = fine, two = fine;
+  one.push_back(path("one")), two.push_back(path("two"));
+  two.insert(two.end(), {"--threads", "2"});
+  EXPECT_EQ(metastable(one).code, 0);
+  EXPECT_EQ(metastable(two).code, 0);
+  EXPECT_EQ(content(folder_ / "one" / "collisions.csv"), content(folder_ / "two" / "collisions.csv"));
+}
+
+TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
+  std::string log;
+  double time = 0, square = 900;
+  for (int k = 0; k < 700; ++k) {
+    log += std::to_string(static_cast<long>(time * 1e6)) + ",1," + std::to_string(k) + ",1," + std::to_string(k) + "\n";
+    time += 6.283185307 / std::sqrt(square);
+    square -= 0.2 + 0.002 * square;
+  }
+  const std::string free = file("free.csv", log);
+  EXPECT_EQ(metastable({"coast-down", free, "--out", path("a")}).code, 0);
+  EXPECT_EQ(metastable({"coast-down", free, "--nominal", path("a"), "--out", path("b")}).code, 0);
+  const std::string a = content(folder_ / "a" / "experiment.toml"), b = content(folder_ / "b" / "experiment.toml");
+  EXPECT_EQ(a.substr(a.find("[loss]")), b.substr(b.find("[loss]")));
+  EXPECT_EQ(metastable({"coast-down", free, free, "--out", path("c")}).err,
+            "metastable: " + free + ": a log named so was there before\n");
+  EXPECT_EQ(metastable({"coast-down", path("none.csv"), "--out", path("c")}).err,
+            "metastable: " + path("none.csv") + ": cannot be read\n");
+  EXPECT_FALSE(std::filesystem::exists(path("c")));
+  EXPECT_EQ(metastable({"blind", "shut", path("run")}).err,
+            "metastable: ACTION: 'shut' is none of 'make', 'answer', 'open'\n");
+}
+
 TEST_F(CommandLine, ReportIsTheSameBytesOnAnyNumberOfThreads) {
   const auto report = [&](const std::string& name, const std::string& threads) {
     return metastable(with({"report", "--out", path(name), "--threads", threads, "--energy-trials", "20"}, quick));
