@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "analysis/chain_summary.h"
 #include "analysis/rest_reachability.h"
@@ -17,6 +18,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t first_panels = 1;
+constexpr double least_gain = 0.1;  // of one refinement over the last, however fast the changes fall
 constexpr double rounding = 1e-13;  // of the solvers: no error is claimed to be smaller
 
 struct Level {
@@ -51,6 +53,17 @@ std::optional<Level> solve(const Problem& problem, markov::NodeSpace space, int 
 }
 
 double change(double fine, double coarse) { return std::max(rounding, std::abs(std::log(fine) - std::log(coarse))); }
+
+// The error that is left after a change that followed `before` (0: none): what one more such step would change.
+double remaining(double change, double before) {
+  return before > change ? change * std::max(least_gain, change / before) : change;
+}
+
+// 1, 2, 3, 4, 6, 8, 12, 16, ...
+std::size_t more(std::size_t panels) {
+  const bool power = (panels & (panels - 1)) == 0;
+  return panels == 1 ? 2 : power ? panels + panels / 2 : panels / 3 * 4;
+}
 
 Estimate estimate(double value, double error) { return {value, value * std::exp(-error), value * std::exp(error)}; }
 
@@ -134,7 +147,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   const std::size_t given = (options.cells + markov::NodeSpace::order - 1) / markov::NodeSpace::order;
   std::size_t panels = free ? first_panels : std::max<std::size_t>(1, given / 2);
   std::optional<Level> coarse, fine;
-  double done = 0.02, error = 0, rate_error = 0;
+  double done = 0.02, steps_change = 0, rate_change = 0, error = 0, rate_error = 0;
   for (;;) {
     const std::size_t nodes = panels * markov::NodeSpace::order;
     tell(done, fmt::format("{} nodes", nodes));
@@ -143,14 +156,16 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
     done += 0.5 * (0.95 - done);
     bool met = false;
     if (coarse && fine) {
-      error = change(fine->from_start, coarse->from_start);
-      rate_error = change(fine->failure_rate, coarse->failure_rate);
-      met = std::max(error, rate_error) <= options.tolerance;
+      const double steps_before = std::exchange(steps_change, change(fine->from_start, coarse->from_start));
+      const double rate_before = std::exchange(rate_change, change(fine->failure_rate, coarse->failure_rate));
+      error = std::max(rounding, remaining(steps_change, steps_before));
+      rate_error = std::max(rounding, remaining(rate_change, rate_before));
+      met = steps_before > 0 && std::max(error, rate_error) <= options.tolerance;
     }
-    const bool last = free ? met || 2 * panels > std::max(most, 2 * first_panels)
+    const bool last = free ? met || more(panels) > std::max<std::size_t>(most, 4)
                            : panels >= given && (given == 1 || coarse || !fine);
     if (last) break;
-    panels = free ? 2 * panels : std::max(given, panels + 1);
+    panels = free ? more(panels) : std::max(given, panels + 1);
   }
   if (!fine || !coarse)
     throw markov::ConvergenceError("integrated rows", 1,
@@ -168,9 +183,8 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   if (result.discretization_error > options.tolerance) {
     result.status = free ? Status::tolerance_not_met : Status::fixed_resolution;
     if (free)
-      result.message =
-          fmt::format("tolerance {} not met: the last doubling of nodes changed the result by {:.2g} at {} nodes",
-                      options.tolerance, result.discretization_error, result.cells);
+      result.message = fmt::format("tolerance {} not met: the error left is {:.2g} at {} nodes", options.tolerance,
+                                   result.discretization_error, result.cells);
   }
   tell(0.96, "summary");
   describe(problem, *fine, options, result);

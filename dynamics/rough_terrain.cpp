@@ -85,8 +85,8 @@ std::optional<double> RoughTerrainWheel::rest_probability(double state, int) con
          normal_cdf((options_.mean_slope - joined.best - reach) / options_.sd_slope);
 }
 
-void RoughTerrainWheel::landing_density(double state, int, std::span<const double> next,
-                                        std::span<double> density) const {
+double RoughTerrainWheel::landing_density(double state, int phase, std::span<const double> next,
+                                          std::span<double> density) const {
   const double sd = options_.sd_slope;
   if (sd == 0)
     throw std::invalid_argument("method integrated: a constant slope leaves no density; use the sampled method");
@@ -100,6 +100,7 @@ void RoughTerrainWheel::landing_density(double state, int, std::span<const doubl
     for (const double slope : {joined.best - angle, joined.best + angle})
       density[k] += normal_density((slope - options_.mean_slope) / sd) / (sd * speed);
   }
+  return *rest_probability(state, phase);
 }
 
 std::pair<double, double> RoughTerrainWheel::landing_range(double state, int) const {

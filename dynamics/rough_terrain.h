@@ -34,9 +34,9 @@ class RoughTerrainWheel {
   std::optional<double> landing(double state, int phase, std::span<const double> score) const;
   /// From the error function at the slope where x' = 0: full relative accuracy.
   std::optional<double> rest_probability(double state, int phase) const;
-  /// Density of x' at each of the next states, from the (at most two) slopes that lead there.
-  /// @throws std::invalid_argument for sd_slope = 0
-  void landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const;
+  /// Density of x' at each of the next states, from the (at most two) slopes that lead there; returns the probability
+  /// of rest. @throws std::invalid_argument for sd_slope = 0
+  double landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const;
   std::pair<double, double> landing_range(double state, int phase) const;
 
  private:

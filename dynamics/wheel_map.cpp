@@ -12,6 +12,7 @@
 
 #include "dynamics/landing_density.h"
 #include "dynamics/landing_range.h"
+#include "dynamics/published_density.h"
 #include "dynamics/rest_probability.h"
 
 #ifdef METASTABLE_AVX2
@@ -83,6 +84,9 @@ WheelMap::WheelMap(Wheel wheel, double slope, Law law, ContactNoise noise, doubl
     triangle_.push_back(dynamics::triangle(leg(p + count - 1), leg(p), wheel_.leg_angle()));
   for (std::size_t p = 0; p < count; ++p)
     stance_.push_back(make_stance(wheel_, law, leg(p), triangle_[p], triangle_[(p + 1) % count], slope));
+  std::vector<PublishedDensity> density;
+  for (int p = 0; p < phases() && PublishedDensity::covers(*this); ++p) density.emplace_back(*this, p);
+  density_ = std::make_shared<const std::vector<PublishedDensity>>(std::move(density));
 }
 
 Collision WheelMap::collision(int phase, double omega) const {
@@ -135,9 +139,12 @@ std::optional<double> WheelMap::rest_probability(double state, int phase) const 
   return dynamics::rest_probability(*this, state, phase);
 }
 
-void WheelMap::landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const {
+double WheelMap::landing_density(double state, int phase, std::span<const double> next,
+                                 std::span<double> density) const {
+  if (!density_->empty()) return (*density_)[static_cast<std::size_t>(phase)](state, next, density);
   const LandingDensity at(*this, state, phase);
   std::transform(next.begin(), next.end(), density.begin(), at);
+  return dynamics::rest_probability(*this, state, phase);
 }
 
 std::pair<double, double> WheelMap::landing_range(double state, int phase) const {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +15,8 @@
 #include "dynamics/wheel.h"
 
 namespace metastable::dynamics {
+
+class PublishedDensity;
 
 /// The stance on one leg, from the collision in which it lands to the next.
 struct Stance {
@@ -68,9 +71,10 @@ class WheelMap {
   /// Exact, by quadrature over eta and the distribution function of mu in closed form (independent eta, mu, or a list);
   /// nothing for a correlated pair.
   std::optional<double> rest_probability(double state, int phase) const;
-  /// Density of the landing at each of the next states [1/(rad^2/s^2)]: density[k] belongs to next[k] (LandingDensity).
+  /// Density of the landing at each of the next states [1/(rad^2/s^2)]: density[k] belongs to next[k] (PublishedDensity
+  /// where it covers the map, else LandingDensity); returns the probability of rest.
   /// @throws std::invalid_argument where the noise leaves none in closed form (names the reason and the sampled method)
-  void landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const;
+  double landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const;
   /// Infimum and supremum of the landing over the support of (eta, mu); -infinity stands for rest.
   std::pair<double, double> landing_range(double state, int phase) const;
   /// Time of the stance that begins at `phase` and ends at next_state [s], closed form (Carlson's R_F, the elliptic
@@ -103,8 +107,9 @@ class WheelMap {
   double slope_;
   ContactNoise noise_;
   ContactModel model_;
-  std::vector<Triangle> triangle_;  // of the collision in which leg p lands
-  std::vector<Stance> stance_;      // on leg p after it
+  std::vector<Triangle> triangle_;                                // of the collision in which leg p lands
+  std::vector<Stance> stance_;                                    // on leg p after it
+  std::shared_ptr<const std::vector<PublishedDensity>> density_;  // by phase; empty where it does not cover the map
 };
 
 /// Angular speed above which the foot lifts just before the collision at `phase` [rad/s]: omega^2 L1 = g sin(beta1 -

@@ -15,11 +15,11 @@ namespace {
 
 // Trapezoidal rule over the launch's score: exact to rounding for densities wider than a third of the launch's spread.
 constexpr double score_step = 0.5;
-constexpr int score_steps = 17;  // on each side
-constexpr std::size_t pilot_cells = 96;
-constexpr std::size_t pilot_samples = 4096;
+constexpr int score_steps = 17;         // on each side
+constexpr double most_above = 1e-13;    // survivors beyond the upper edge
+constexpr double most_launched = 1e-9;  // landings of the launch beyond it
+constexpr std::size_t most_pilot_panels = 64;
 constexpr double least_scaled = 1e-6;  // survivors of a row whose total is worth correcting
-constexpr double spare = 0.2;          // of the range, beyond where the pilot ends
 
 struct Row {
   std::vector<double> landing;  // on the nodes of the next phase
@@ -32,8 +32,8 @@ Row make_row(const AnyReturnMap& map, const NodeSpace& space, double state, int 
   const auto weights = space.weights(next);
   Row row;
   row.landing.resize(space.nodes());
-  const auto rest = map.rest_probability(state, phase);
-  if (!rest || !map.landing_density(state, phase, space.nodes(next), row.landing))
+  const std::optional<double> rest = map.landing_density(state, phase, space.nodes(next), row.landing);
+  if (!rest)
     throw std::invalid_argument(
         "method integrated: the map does not tell its landing's density; use the sampled method");
   row.rest = *rest;
@@ -83,9 +83,12 @@ NodeSpace::NodeSpace(std::vector<std::pair<double, double>> range, std::size_t p
   for (const auto& [lower, upper] : range_) {
     if (!(lower < upper) || !std::isfinite(lower) || !std::isfinite(upper))
       throw std::invalid_argument("nodes: a range is not a finite interval");
-    const double half = 0.5 * (upper - lower) / static_cast<double>(panels);
+    const auto edge = [&, from = lower, length = upper - lower](std::size_t p) {
+      const double share = static_cast<double>(p) / static_cast<double>(panels);
+      return from + length * share * share;
+    };
     for (std::size_t p = 0; p < panels; ++p) {
-      const double middle = lower + half * static_cast<double>(2 * p + 1);
+      const double half = 0.5 * (edge(p + 1) - edge(p)), middle = 0.5 * (edge(p + 1) + edge(p));
       for (std::size_t k = 0; k < order; ++k) {  // Boost holds the upper half of an even rule, ascending
         const bool below = k < order / 2;
         const std::size_t at = below ? order / 2 - 1 - k : k - order / 2;
@@ -158,35 +161,55 @@ Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double st
 }
 
 std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads) {
-  const double first_reach = 1.2;
-  double tail = 1e-30;
-  for (double reach = first_reach;;) {
-    const StateSpace space = covering_space(map, launch, pilot_cells, 1, reach);
-    Discretization options{.draws = {.count = pilot_samples}, .threads = threads};
-    options.draws.tail = tail;
-    const SampledChain sampled = discretize(map, space, launch, options);
-    const Reachability reachable = classify(sampled.chain);
-    if (std::find(reachable.must_rest.begin(), reachable.must_rest.end(), 0) != reachable.must_rest.end()) {
-      if (tail <= 1e-300) return {};
-      tail = std::max(1e-300, tail * tail * tail);
+  double lower = 0, highest = 0;
+  for (int p = 0; p < map.phases(); ++p) {
+    const auto [least, most] = map.state_interval(p);
+    lower = p == 0 ? least : std::min(lower, least);
+    highest = std::max(highest, most);
+  }
+  // One upper edge for all phases: what the launch leaves high up at one phase comes by at the next.
+  const auto ranges = [&](double upper) {
+    std::vector<std::pair<double, double>> all;
+    for (int p = 0; p < map.phases(); ++p) all.emplace_back(map.state_interval(p).first, upper);
+    return all;
+  };
+  const double launched = launch.state(3), length = std::max({launched - lower, 0.1 * std::abs(launched), 1e-3});
+  double upper = std::min(highest, lower + 1.2 * length);
+  for (std::size_t panels = map.phases() > 1 ? 1 : 2;;) {
+    const NodeSpace space(ranges(upper), panels);
+    const IntegratedChain pilot = integrate(map, space, launch, threads);
+    const Reachability reachable = classify(pilot.chain.chain);
+    const bool rests =
+        std::find(reachable.must_rest.begin(), reachable.must_rest.end(), 0) == reachable.must_rest.end();
+    if ((!rests || pilot.row_error > 0.5) && panels < most_pilot_panels) {
+      panels *= 2;
       continue;
     }
-    const QuasiStationary quasi = quasi_stationary(ChainSolver(sampled.chain));
-    if (top_share(space, quasi.distribution) >= 1e-10 && reach < 1e6) {
-      reach *= reach > 3 ? 10 : 1.5;
+    if (!rests) return {};
+    const std::vector<double> quasi = quasi_stationary(ChainSolver(pilot.chain.chain)).distribution;
+    // The lowest node that has at most the shares wanted at it and above it, at every phase.
+    std::size_t first = 0;
+    for (int p = 0; p < space.phases(); ++p) {
+      const std::size_t base = static_cast<std::size_t>(p) * space.nodes();
+      double above = 0, after = 0;
+      std::size_t k = space.nodes();
+      while (k > 0 && above + quasi[base + k - 1] <= most_above &&
+             after + pilot.chain.launch.after[base + k - 1] <= most_launched) {
+        --k;
+        above += quasi[base + k];
+        after += pilot.chain.launch.after[base + k];
+      }
+      first = std::max(first, k);
+    }
+    if (first == space.nodes() && upper < highest) {
+      upper = std::min(highest, lower + 1.5 * (upper - lower));
+      if (!std::isfinite(upper)) throw std::invalid_argument("method integrated: states grow without limit");
       continue;
     }
-    const StateSpace graded =
-        graded_space(space, quasi.distribution, quasi.survival_weight, sampled.launch.after, pilot_cells);
-    // One upper edge for all phases: what the launch leaves high up at one phase comes by at the next.
-    double upper = rest_landing;
-    for (int p = 0; p < graded.phases(); ++p) upper = std::max(upper, graded.grid(p).edges().back());
-    std::vector<std::pair<double, double>> ranges;
-    for (int p = 0; p < graded.phases(); ++p) {
-      const double lower = graded.grid(p).edges().front();
-      ranges.emplace_back(lower, upper + spare * (upper - lower));
-    }
-    return ranges;
+    if (first < space.nodes())
+      upper =
+          std::max(space.node(first), space.node(first + static_cast<std::size_t>(space.phases() - 1) * space.nodes()));
+    return ranges(upper);
   }
 }
 

@@ -12,7 +12,8 @@
 
 namespace metastable::markov {
 
-/// Gauss-Legendre nodes on equal panels of an interval per phase; states are numbered phase by phase, ascending.
+/// Gauss-Legendre nodes on panels of an interval per phase; states are numbered phase by phase, ascending. Panel edges
+/// lie at the squares of equal steps: close together near the lower edge, where survivors and rest meet.
 class NodeSpace {
  public:
   static constexpr std::size_t order = 16;  ///< nodes a panel
@@ -62,7 +63,8 @@ IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const
 Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase);
 
 /// Ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings, found
-/// on a sampled pilot chain of 96 cells; nothing if no draw comes to rest. @param threads as in discretize()
+/// on a coarse chain of exact rows; nothing if no state comes to rest with a probability that a double can hold.
+/// @throws std::invalid_argument as integrate()
 std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads);
 
 }  // namespace metastable::markov

@@ -75,9 +75,10 @@ class AnyReturnMap {
     return self_->landing_range(state, phase);
   }
   /// Density of the landing from `state` at each of the next states: density[k] belongs to next[k] (equal sizes), with
-  /// relative accuracy, tails included; over all next states it integrates to 1 - rest_probability. False, and nothing
-  /// written, if the map does not tell. May throw std::invalid_argument where this map's noise has no density.
-  bool landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const {
+  /// relative accuracy, tails included; over all next states it integrates to 1 - rest probability, which is returned.
+  /// Nothing, and nothing written, if the map does not tell. May throw std::invalid_argument where this map's noise has
+  /// no density.
+  std::optional<double> landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const {
     return self_->landing_density(state, phase, next, density);
   }
   /// Draws prepared for repeated use; noise is row-major, one row of noise_dimension() scores a draw.
@@ -104,7 +105,7 @@ class AnyReturnMap {
     virtual std::optional<double> landing(double, int, std::span<const double>) const = 0;
     virtual std::optional<double> rest_probability(double, int) const = 0;
     virtual std::optional<std::pair<double, double>> landing_range(double, int) const = 0;
-    virtual bool landing_density(double, int, std::span<const double>, std::span<double>) const = 0;
+    virtual std::optional<double> landing_density(double, int, std::span<const double>, std::span<double>) const = 0;
     virtual std::unique_ptr<NoiseTable> tabulate(int, std::span<const double>) const = 0;
     virtual std::optional<double> duration(double, int) const = 0;
     virtual std::optional<double> advance(int) const = 0;
@@ -170,14 +171,12 @@ class AnyReturnMap {
       else
         return std::nullopt;
     }
-    bool landing_density(double state, int phase, std::span<const double> next,
-                         std::span<double> density) const override {
-      if constexpr (requires { map.landing_density(state, phase, next, density); }) {
-        map.landing_density(state, phase, next, density);
-        return true;
-      } else {
-        return false;
-      }
+    std::optional<double> landing_density(double state, int phase, std::span<const double> next,
+                                          std::span<double> density) const override {
+      if constexpr (requires { map.landing_density(state, phase, next, density); })
+        return map.landing_density(state, phase, next, density);
+      else
+        return std::nullopt;
     }
     std::unique_ptr<NoiseTable> tabulate(int phase, std::span<const double> noise) const override {
       if constexpr (requires { map.tabulate(phase, noise); })

@@ -29,11 +29,12 @@ struct Linear {
 };
 
 struct LinearWithDensity : Linear {
-  void landing_density(double state, int, std::span<const double> next, std::span<double> density) const {
+  double landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const {
     for (std::size_t k = 0; k < next.size(); ++k) {
       const double z = (next[k] - state / 2 - 1) / sd;
       density[k] = std::exp(-0.5 * z * z) / (sd * std::sqrt(2 * std::numbers::pi));
     }
+    return *rest_probability(state, phase);
   }
 };
 

@@ -1,0 +1,47 @@
+#pragma once
+// Where the published law leaves the wheel: densities of the landing for many next states at once.
+
+#include <span>
+#include <vector>
+
+#include "dynamics/wheel_map.h"
+
+namespace metastable::dynamics {
+
+/// Density of the landing x' under `published` for independent eta and mu, both with spreads.
+///
+/// The loss is v0^2/2 g(eta, mu), g = (1 - eta^2)/A + (1 + eta)^2 mu B/A^2 + kappa (1 + eta) s(eta) mu B/A
+/// (physics: (19), (21), (33), (34)), A = 1/m_- and B = mu/n_- linear in mu, s = sqrt(pi^2 + ln^2 eta). The density is
+/// the integral of f(eta) f(mu) / |grad g| along the curve g = level. Above mu_c (B = 0 there) g rises with mu and the
+/// curve is a function of eta; below, g falls with eta and the curve is a function of mu: neither part has a fold, and
+/// their common end is known in closed form. Each part is a Gauss-Legendre sum over the window that holds all but 1e-9
+/// of it, for many landings at once.
+///
+/// One thing is not exact: where mu < mu_c, s is taken at sqrt(eta^2 + rounding()^2), rounding() about 0.01. That moves
+/// landings by about 1e-4 of their size, with the probability of those mu and of an eta below a few rounding().
+class PublishedDensity {
+ public:
+  PublishedDensity(const WheelMap& map, int phase);
+
+  /// density[k] [1/(rad^2/s^2)] at next[k], for the collision at `phase` with x = state [rad^2/s^2], > 0.
+  /// @return the probability of rest, from the distribution functions with relative accuracy in their tails
+  /// @throws std::invalid_argument for spans of different sizes
+  double operator()(double state, std::span<const double> next, std::span<double> density) const;
+
+  double rounding() const { return rounding_; }
+
+  /// Whether `map` has this form of the density.
+  static bool covers(const WheelMap& map);
+
+ private:
+  const TruncatedNormal restitution_, friction_;
+  double lowest_, gain_, inertia_, before_;  // of the landing; I2, I1
+  double energy_, kappa_;                    // at 1 rad/s
+  double a0_, a1_, t0_, t1_;                 // A = a0 - a1 mu, B = t1 mu - t0
+  double lower_ = 0;                         // of eta
+  double rounding_ = 0;
+  std::vector<double> grid_, duration_;          // eta about one sd apart, s there
+  std::vector<double> tail_, tail_restitution_;  // -ln eta where eta may be close to 0, eta there
+};
+
+}  // namespace metastable::dynamics
