@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "analysis/cause_ranking.h"
+#include "analysis/gap_map.h"
 #include "analysis/gap_shrinkage.h"
 #include "analysis/visibility.h"
 #include "dynamics/truncated_normal.h"

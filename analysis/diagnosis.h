@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/gap_map.h"
+#include "analysis/gap_cell.h"
 #include "analysis/transition_model.h"
 
 namespace metastable::analysis {

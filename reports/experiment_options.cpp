@@ -11,6 +11,8 @@
 #include "reports/collisions_command.h"
 #include "reports/command.h"
 #include "reports/describe_command.h"
+#include "reports/diagnose_command.h"
+#include "reports/effects_command.h"
 #include "reports/option_values.h"
 #include "reports/setting_options.h"
 #include "reports/simulate_command.h"
@@ -254,6 +256,31 @@ std::vector<Command> experiment_commands() {
          request.command = line;
          run_study(request);
        }},
+      {"diagnose",
+       "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
+       [](Options& o) {
+         o.add_place("DIR", "Experiment folder");
+         o.add("catalogue", "FILE|ID,ID,...", "",
+               "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects')");
+         o.add("seed", "SEED", "1", "Seed of the random numbers");
+         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add("json", "FILE|-", "", "Write the results as JSON");
+         o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
+       },
+       [](const Options& o, const std::string& line) {
+         DiagnoseRequest request;
+         request.folder = o.text("DIR");
+         if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
+         request.options.seed = o.whole("seed", 0, UINT64_MAX);
+         request.options.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.json = o.text("json");
+         request.out = o.text("out");
+         request.command = line;
+         run_diagnose(request);
+       }},
+      {"effects", "The catalogue of effects a model may lack: parameters, units, ranges, meaning",
+       [](Options& o) { o.add("json", "FILE|-", "", "Write the catalogue as JSON"); },
+       [](const Options& o, const std::string&) { run_effects({o.text("json")}); }},
   };
 }
 

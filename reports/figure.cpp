@@ -130,12 +130,17 @@ std::string plot_element(const Series& series, std::size_t index) {
   return fmt::format("$data{} {} {}", index, style, title);
 }
 
-std::string tics(const std::vector<double>& values) {
+std::string tics(const std::vector<std::string>& names) {
   std::string list;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    list += fmt::format("{}{} {}", i == 0 ? "" : ", ", quote(format_number(values[i], NumberFormat::general, 6)), i);
-  }
+  for (std::size_t i = 0; i < names.size(); ++i) list += fmt::format("{}{} {}", i == 0 ? "" : ", ", quote(names[i]), i);
   return list;
+}
+
+std::string tics(const std::vector<double>& values, const std::vector<std::string>& names) {
+  if (!names.empty()) return tics(names);
+  std::vector<std::string> texts;
+  for (const double value : values) texts.push_back(format_number(value, NumberFormat::general, 6));
+  return tics(texts);
 }
 
 void check_heat_map(const Figure& figure, const HeatMap& map) {
@@ -143,6 +148,8 @@ void check_heat_map(const Figure& figure, const HeatMap& map) {
     throw std::invalid_argument(fmt::format("figure '{}', heat map: {}", figure.id, reason));
   };
   if (map.x.empty() || map.y.empty()) fail("no cells");
+  if (!map.x_names.empty() && map.x_names.size() != map.x.size()) fail("x and x_names differ in length");
+  if (!map.y_names.empty() && map.y_names.size() != map.y.size()) fail("y and y_names differ in length");
   if (map.value.size() != map.y.size()) fail(fmt::format("{} rows for {} values of y", map.value.size(), map.y.size()));
   for (const auto& row : map.value) {
     if (row.size() != map.x.size()) fail(fmt::format("{} cells in a row for {} values of x", row.size(), map.x.size()));
@@ -152,8 +159,8 @@ void check_heat_map(const Figure& figure, const HeatMap& map) {
   }
 }
 
-std::string cell_label(double value, int digits) {
-  return std::isinf(value) ? "∞" : format_number(value, NumberFormat::significant, digits);
+std::string cell_label(double value, NumberFormat format, int digits) {
+  return std::isinf(value) ? "∞" : format_number(value, format, digits);
 }
 
 /// Characters, not bytes, of UTF-8.
@@ -168,14 +175,17 @@ struct LabelFit {
 
 /// The most digits, at most map.digits, with which every label fits its cell in a font one can read.
 LabelFit fit_labels(const HeatMap& map, int width, int height) {
-  constexpr double margins = 190, glyph_width = 0.6;  // beside the cells [px]; of a digit, by the font's size
+  constexpr double glyph_width = 0.6;  // of a digit, by the font's size
+  std::size_t longest_name = 6;
+  for (const std::string& name : map.y_names) longest_name = std::max(longest_name, length(name));
+  const double margins = 148 + 7 * static_cast<double>(longest_name);  // beside the cells [px]
   const double cell_width = (width - margins) / static_cast<double>(map.x.size());
   const double cell_height = (height - 90) / static_cast<double>(map.y.size());
   for (int digits = map.digits; digits >= 1; --digits) {
     std::size_t longest = 1;
     for (const auto& row : map.value) {
       for (const double value : row) {
-        if (!std::isnan(value)) longest = std::max(longest, length(cell_label(value, digits)));
+        if (!std::isnan(value)) longest = std::max(longest, length(cell_label(value, map.format, digits)));
       }
     }
     const double font =
@@ -202,6 +212,10 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
     return high > low ? (scale(value) - scale(low)) / (scale(high) - scale(low)) : 0.5;
   };
   if (high == low) high = low == 0 ? 1 : low + std::abs(low) * 1e-6;
+  // A light label belongs on a dark cell: the lower part of the one scale, both ends of the other.
+  const auto is_dark = [&](double value) {
+    return map.limit > 0 ? std::abs(value) > 0.7 * map.limit : shade(value) < 0.55;
+  };
 
   std::string finite = "$finite << END\n";
   std::string infinite_cells;
@@ -211,13 +225,14 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
     for (std::size_t i = 0; i < map.x.size(); ++i) {
       const double value = map.value[j][i];
       if (std::isnan(value)) continue;
-      const std::string label = fmt::format("{} {} \"{}\"\n", i, j, cell_label(value, std::max(fit.digits, 1)));
+      const std::string label =
+          fmt::format("{} {} \"{}\"\n", i, j, cell_label(value, map.format, std::max(fit.digits, 1)));
       if (std::isinf(value)) {
         infinite_cells += fmt::format("{} {}\n", i, j);
         dark += label;
       } else {
         finite += fmt::format("{} {} {}\n", i, j, value);
-        (shade(value) < 0.55 ? light : dark) += label;
+        (is_dark(value) ? light : dark) += label;
       }
     }
   }
@@ -227,9 +242,14 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
   const double right = static_cast<double>(map.x.size()) - 0.5;
   const double top = static_cast<double>(map.y.size()) - 0.5;
   script += fmt::format("set xrange [-0.5:{}]\nset yrange [-0.5:{}]\n", right, top);
-  script += fmt::format("set xtics ({}) nomirror scale 0\nset ytics ({}) nomirror scale 0\n", tics(map.x), tics(map.y));
+  script +=
+      fmt::format("set xtics ({}) nomirror scale 0 noenhanced{}\nset ytics ({}) nomirror scale 0 noenhanced\n",
+                  tics(map.x, map.x_names), map.x_names.empty() ? "" : " rotate by 25 right", tics(map.y, map.y_names));
   script += "unset grid\nset key off\nset style fill solid 1 border rgb 'white'\n";
-  script += "set palette defined (0 '#440154', 0.25 '#3b528b', 0.5 '#21918c', 0.75 '#5ec962', 1 '#fde725')\n";
+  script += map.limit > 0
+                ? "set palette defined (0 '#2166ac', 0.25 '#92c5de', 0.5 '#f7f7f7', 0.75 '#f4a582', 1 '#b2182b')\n"
+                : "set palette defined (0 '#440154', 0.25 '#3b528b', 0.5 '#21918c', 0.75 '#5ec962', 1 '#fde725')\n";
+  if (map.limit > 0) low = -map.limit, high = map.limit;
   script += fmt::format("set cblabel {} noenhanced\nset cbrange [{}:{}]\n", quote(map.label), low, high);
   if (map.logarithmic && high / low >= 100) {
     script += "set logscale cb\nset format cb '10^{%T}'\n";
@@ -238,7 +258,7 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
     constexpr int ticks = 5;  // evenly on the logarithmic scale, its ends included
     for (int t = 0; t < ticks; ++t) {
       const double at = low * std::pow(high / low, static_cast<double>(t) / (ticks - 1));
-      script += fmt::format("{}\"{}\" {}", t == 0 ? "" : ", ", cell_label(at, 2), at);
+      script += fmt::format("{}\"{}\" {}", t == 0 ? "" : ", ", cell_label(at, NumberFormat::significant, 2), at);
     }
     script += ")\n";
   }
@@ -255,6 +275,51 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
         fit.font);
   }
   script += '\n';
+}
+
+void check_bars(const Figure& figure, const BarChart& bars) {
+  const std::size_t n = bars.name.size();
+  const auto fits = [n](std::size_t size) { return size == 0 || size == n; };
+  if (n > 0 && bars.value.size() == n && fits(bars.lower.size()) && fits(bars.upper.size()) && fits(bars.colour.size()))
+    return;
+  throw std::invalid_argument(
+      fmt::format("figure '{}', bars: {} names, {} values, {} and {} ends of intervals, {} colours", figure.id, n,
+                  bars.value.size(), bars.lower.size(), bars.upper.size(), bars.colour.size()));
+}
+
+void append_bars(std::string& script, const BarChart& bars, const Axis& x, const std::string& ends) {
+  const std::size_t n = bars.name.size();
+  std::string boxes = "$bars << END\n", labels = "$labels << END\n", whiskers;
+  double least = 0, most = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double value = bars.value[i];
+    if (!std::isfinite(value)) continue;
+    const std::string_view colour =
+        palette[bars.colour.empty() ? 0 : static_cast<std::size_t>(bars.colour[i]) % palette.size()];
+    boxes += fmt::format("{} {} {} {} 0x{}\n", std::min(value, 0.0), i, std::max(value, 0.0), i, colour.substr(1));
+    double from = value, to = value;
+    if (!bars.lower.empty() && std::isfinite(bars.lower[i]) && std::isfinite(bars.upper[i])) {
+      from = std::min(from, bars.lower[i]), to = std::max(to, bars.upper[i]);
+      whiskers += fmt::format("{} {} {} {}\n", value, i, bars.lower[i], bars.upper[i]);
+    }
+    least = std::min(least, from), most = std::max(most, to);
+    labels += fmt::format("{} {} \"{}\"\n", std::max(to, 0.0), i,
+                          format_number(value, NumberFormat::significant, bars.digits));
+  }
+  script += boxes + "END\n" + labels + "END\n";
+  if (!whiskers.empty()) script += "$whiskers << END\n" + whiskers + "END\n";
+  // Room for the number behind the longest bar.
+  const double room = 0.15 * (most > least ? most - least : 1);
+  script += x.low || x.high ? fmt::format("set xrange {}\n", ends)
+                            : fmt::format("set xrange [{}:{}]\n", least < 0 ? least - 0.3 * room : 0, most + room);
+  script += fmt::format("set yrange [{}:-0.6]\nset ytics ({}) nomirror scale 0 noenhanced\n",
+                        static_cast<double>(n) - 0.4, tics(bars.name));
+  script +=
+      "unset grid\nset grid xtics lt 1 lc rgb '#e4e4e4' lw 0.7\nset key off\nset style fill solid 0.85 noborder\n";
+  script += "plot $bars using (0.5*($1+$3)):2:1:3:($2-0.32):($2+0.32):5 with boxxyerror lc rgb variable";
+  if (!whiskers.empty()) script += ", \\\n     $whiskers using 1:2:3:4 with xerrorbars pt 0 lw 1.5 lc rgb '#222222'";
+  script +=
+      ", \\\n     $labels using 1:2:3 with labels noenhanced left offset character 0.6,0 textcolor rgb '#222222'\n";
 }
 
 std::string range(const Axis& axis) {
@@ -342,8 +407,9 @@ std::string gnuplot_script(const Figure& figure) {
     return script;
   }
 
-  if (figure.series.empty()) throw std::invalid_argument(fmt::format("figure '{}' has no series", figure.id));
-  script += fmt::format("set xrange {}\nset yrange {}\n", range(figure.x), range(figure.y));
+  if (figure.series.empty() && !figure.bars)
+    throw std::invalid_argument(fmt::format("figure '{}' has no series", figure.id));
+  if (!figure.bars) script += fmt::format("set xrange {}\nset yrange {}\n", range(figure.x), range(figure.y));
   if (figure.x.logarithmic) script += "set logscale x\nset format x '10^{%T}'\n";
   if (figure.y.logarithmic) script += "set logscale y\nset format y '10^{%T}'\n";
   // Labels of vertical lines stand above the frame, where no legend or curve is.
@@ -360,6 +426,11 @@ std::string gnuplot_script(const Figure& figure) {
     script += fmt::format("set label {} noenhanced front textcolor rgb '#555555' font ',12' ", quote(line.label));
     script += line.vertical ? fmt::format("at {}, graph 1 center offset character 0, 0.7\n", at)
                             : fmt::format("at graph 0.99, first {} right offset character 0, 0.6\n", at);
+  }
+  if (figure.bars) {
+    check_bars(figure, *figure.bars);
+    append_bars(script, *figure.bars, figure.x, range(figure.x));
+    return script;
   }
   for (std::size_t i = 0; i < figure.series.size(); ++i) {
     check_lengths(figure, figure.series[i], i);

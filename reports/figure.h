@@ -58,6 +58,20 @@ struct HeatMap {
   std::string label;         ///< of the colour scale, unit included
   bool logarithmic = false;  ///< colour by the logarithm; values must then be > 0
   int digits = 3;            ///< significant digits of the labels at most: fewer, or no labels, where cells are small
+  NumberFormat format = NumberFormat::significant;  ///< of the labels; fixed: `digits` decimals
+  std::vector<std::string> x_names = {};            ///< shown instead of x, one a column; empty: the numbers
+  std::vector<std::string> y_names = {};            ///< likewise, one a row
+  /// Not 0: colours from blue over white to red, white at 0 and full at -limit and +limit; beyond, the full colour.
+  double limit = 0;
+};
+
+/// Named horizontal bars from zero, the first on top, each with its value at the end.
+struct BarChart {
+  std::vector<std::string> name;
+  std::vector<double> value;
+  std::vector<double> lower = {}, upper = {};  ///< intervals as whiskers; empty: none. NaN: none at this bar
+  std::vector<int> colour = {};                ///< of the palette, one a bar; empty: all alike
+  int digits = 2;                              ///< significant digits of the values shown
 };
 
 enum class Legend { top_right, top_left, bottom_right, bottom_left, below, none };
@@ -71,6 +85,7 @@ struct Figure {
   std::vector<ReferenceLine> reference_lines = {};
   Diagonal diagonal = Diagonal::no;
   std::optional<HeatMap> heat_map = {};  ///< instead of series
+  std::optional<BarChart> bars = {};     ///< instead of series; vertical reference lines are drawn
   Legend legend = Legend::top_right;     ///< drawn only if a series has a label
   int width = 640;                       ///< [px]; text is sized for 640 across a column or half a page
   int height = 420;                      ///< [px]

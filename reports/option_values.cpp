@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 
 #include "analysis/sweep.h"
+#include "dynamics/effect_catalogue.h"
 #include "dynamics/wheel.h"
 
 namespace metastable::reports {
@@ -138,6 +141,32 @@ std::vector<dynamics::Contact> contact_list(std::string_view name, const std::st
   }
   if (pairs.empty()) throw std::invalid_argument(fmt::format("{}: holds no pair", file));
   return pairs;
+}
+
+std::vector<std::string> catalogue_value(std::string_view name, const std::string& text) {
+  std::vector<std::string> ids;
+  const auto take = [&ids](std::string_view word, const std::string& where) {
+    const std::string id(trimmed(word));
+    try {
+      dynamics::effect_info(id);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: {}", where, error.what()));
+    }
+    if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
+  };
+  if (std::filesystem::is_regular_file(text)) {
+    std::ifstream in(text);
+    if (!in) throw std::invalid_argument(fmt::format("--{}: {}: cannot be read", name, text));
+    std::string line;
+    for (int number = 1; std::getline(in, line); ++number) {
+      const std::string_view word = trimmed(std::string_view(line).substr(0, line.find('#')));
+      if (!word.empty()) take(word, fmt::format("{}:{}", text, number));
+    }
+    if (ids.empty()) throw std::invalid_argument(fmt::format("{}: holds no effect", text));
+    return ids;
+  }
+  for (const std::string_view word : split(text, ',')) take(word, fmt::format("--{}", name));
+  return ids;
 }
 
 }  // namespace metastable::reports

@@ -26,4 +26,8 @@ std::vector<double> legs_value(std::string_view name, std::string_view text, int
 /// Pairs from a CSV file with the header "restitution,friction"; errors name file, line and column.
 std::vector<dynamics::Contact> contact_list(std::string_view name, const std::string& file);
 
+/// Ids of effects from a comma list, or from a file with one a line (# starts a comment); each once, in that order.
+/// Errors name the id and the known ones, in a file the line too.
+std::vector<std::string> catalogue_value(std::string_view name, const std::string& text);
+
 }  // namespace metastable::reports

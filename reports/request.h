@@ -10,6 +10,7 @@
 #include "analysis/coast_down.h"
 #include "analysis/collision_finder.h"
 #include "analysis/description.h"
+#include "analysis/diagnosis.h"
 #include "analysis/metastability.h"
 #include "analysis/paper_study.h"
 #include "analysis/propagation.h"
@@ -121,6 +122,20 @@ struct StudyRequest {
   std::string out = "study";
   analysis::PaperStudyOptions options;
   std::string command;
+};
+
+/// metastable diagnose
+struct DiagnoseRequest {
+  std::string folder;
+  std::string json;  ///< file, "-" for standard output, "" for none
+  std::string out;   ///< folder for page, figures and tables; "": none
+  analysis::DiagnosisOptions options;
+  std::string command;
+};
+
+/// metastable effects
+struct EffectsRequest {
+  std::string json;  ///< as of DiagnoseRequest
 };
 
 /// metastable report
