@@ -171,7 +171,7 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   });
   const Named contact = named("contact_distribution", d.contact);
   json["contact"] = {{"parameters", contact.values}, {"interval_90", contact.intervals}};
-  json["shrinkage"] = d.shrinkage.empty() ? Json(nullptr) : shrinkage_json(d.shrinkage.front());
+  json["shrinkage"] = d.shrinkage.empty() ? Json::object() : shrinkage_json(d.shrinkage.front());
   json["shrinkage_by_measure"] = list_json(d.shrinkage, shrinkage_json);
   json["steps_before_failure"] = steps_json(d.steps);
   json["visibility"] = list_json(d.visible, visibility_json);
