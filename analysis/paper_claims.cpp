@@ -32,7 +32,7 @@ bool any_steady(const Grid& grid) {
   return false;
 }
 
-Finding nothing_left() { return {Verdict::not_applicable, "hardly a trial gets past the 12th collision"}; }
+Finding nothing_left() { return {ClaimVerdict::not_applicable, "hardly a trial gets past the 12th collision"}; }
 
 // Range of `of` over the restitution means at one friction of Fig. 9.
 double range(const std::array<StudiedProfile, 3>& row, double (StudiedProfile::*of)() const) {
@@ -44,9 +44,9 @@ Finding convergence(const ConditionComparison& c) {
   if (!c.trial_means) return nothing_left();
   const double p = c.trial_means->welch.p;
   const bool met = c.meet && *c.meet <= steady_collision;
-  return {p > 0.05 && met ? Verdict::reproduced
-          : p > 0.05      ? Verdict::partly
-                          : Verdict::not_reproduced,
+  return {p > 0.05 && met ? ClaimVerdict::reproduced
+          : p > 0.05      ? ClaimVerdict::partly
+                          : ClaimVerdict::not_reproduced,
           fmt::format("{} beyond the 12th; not told apart from collision {}", p_words(p),
                       c.meet ? fmt::format("{}", *c.meet) : "(never)")};
 }
@@ -61,9 +61,9 @@ Finding error_bars(const std::vector<SpeedSummary>& fast, const std::vector<Spee
   };
   const double a = ratio(fast), b = ratio(slow);
   if (a == 0 || b == 0) return nothing_left();
-  return {a < 1 && b < 1   ? Verdict::reproduced
-          : a < 1 || b < 1 ? Verdict::partly
-                           : Verdict::not_reproduced,
+  return {a < 1 && b < 1   ? ClaimVerdict::reproduced
+          : a < 1 || b < 1 ? ClaimVerdict::partly
+                           : ClaimVerdict::not_reproduced,
           fmt::format("late over first standard error: fast {:.2f}, slow {:.2f}", a, b)};
 }
 
@@ -71,9 +71,9 @@ Finding low_friction(const VariantStudy& s) {
   if (!any_steady(s.fig6)) return nothing_left();
   const auto [p, count] = least(s.fig6_p, 0, 1);
   const bool alike = p * count > 0.05;
-  return {p > 0.9 ? Verdict::reproduced
-          : alike ? Verdict::partly
-                  : Verdict::not_reproduced,
+  return {p > 0.9 ? ClaimVerdict::reproduced
+          : alike ? ClaimVerdict::partly
+                  : ClaimVerdict::not_reproduced,
           fmt::format("smallest of {} {}{}", count, p_words(p),
                       alike && p <= 0.9 ? ": not significant, but not > 0.9" : "")};
 }
@@ -81,9 +81,9 @@ Finding low_friction(const VariantStudy& s) {
 Finding high_friction(const VariantStudy& s) {
   if (!any_steady(s.fig6)) return nothing_left();
   const double low_fast = s.fig6_p[3][1], middle_fast = s.fig6_p[3][2];
-  return {low_fast < 0.001 && middle_fast < 0.001 ? Verdict::reproduced
-          : low_fast < 0.05 || middle_fast < 0.05 ? Verdict::partly
-                                                  : Verdict::not_reproduced,
+  return {low_fast < 0.001 && middle_fast < 0.001 ? ClaimVerdict::reproduced
+          : low_fast < 0.05 || middle_fast < 0.05 ? ClaimVerdict::partly
+                                                  : ClaimVerdict::not_reproduced,
           fmt::format("μ = 0.55: k = 3 against 1 {}, against 2 {}; one value a trial {}, {}", p_words(low_fast),
                       p_words(middle_fast), p_words(s.fig6_p_trials[3][1]), p_words(s.fig6_p_trials[3][2]))};
 }
@@ -95,9 +95,9 @@ Finding variability_grows(const VariantStudy& s) {
   double k1 = 0, k3 = 0;
   for (std::size_t j = 0; j < 4; ++j) k1 += s.fig6[j][0].steady_sd() / 4, k3 += s.fig6[j][2].steady_sd() / 4;
   const bool friction = fast > 1.05 * slow, launch = k3 > 1.05 * k1;
-  return {friction && launch   ? Verdict::reproduced
-          : friction || launch ? Verdict::partly
-                               : Verdict::not_reproduced,
+  return {friction && launch   ? ClaimVerdict::reproduced
+          : friction || launch ? ClaimVerdict::partly
+                               : ClaimVerdict::not_reproduced,
           fmt::format("sd {:.3f} to {:.3f} rad/s from μ = 0.40 to 0.55; {:.3f} to {:.3f} from k = 1 to 3", slow, fast,
                       k1, k3)};
 }
@@ -113,9 +113,9 @@ Finding leg_lengths(const VariantStudy& s) {
         most = std::max(
             most, std::abs(summarize(s.fig6[j][k].trial_means).mean - summarize(s.equal_legs[j][k].trial_means).mean));
   return {
-      p > 0.1           ? Verdict::reproduced
-      : q * same > 0.05 ? Verdict::partly
-                        : Verdict::not_reproduced,
+      p > 0.1           ? ClaimVerdict::reproduced
+      : q * same > 0.05 ? ClaimVerdict::partly
+                        : ClaimVerdict::not_reproduced,
       fmt::format("smallest of {} {}, one value a trial {}{}; means differ by at most {:.3f} rad/s", count, p_words(p),
                   p_words(q), p <= 0.1 && q * same > 0.05 ? " (no more than chance among so many)" : "", most)};
 }
@@ -134,9 +134,9 @@ Finding spread_of_friction(const VariantStudy& s) {
     return *std::max_element(values.begin(), values.end()) - *std::min_element(values.begin(), values.end());
   };
   const double of_friction = spread(friction), of_restitution = spread(restitution);
-  return {of_friction > 2 * of_restitution ? Verdict::reproduced
-          : of_friction > of_restitution   ? Verdict::partly
-                                           : Verdict::not_reproduced,
+  return {of_friction > 2 * of_restitution ? ClaimVerdict::reproduced
+          : of_friction > of_restitution   ? ClaimVerdict::partly
+                                           : ClaimVerdict::not_reproduced,
           fmt::format("|t| against the experiment changes by {:.1f} over the sds of μ, by {:.1f} over those of η",
                       of_friction, of_restitution)};
 }
@@ -146,9 +146,9 @@ Finding tangential_loss(const VariantStudy& s) {
   const bool rises = b.mean > a.mean && b.sd > a.sd;
   const auto near = [](double ours, double paper) { return ours > paper / 1.5 && ours < paper * 1.5; };
   const bool close = near(a.mean, 0.05) && near(a.sd, 0.03) && near(b.mean, 0.11) && near(b.sd, 0.19);
-  return {rises && close ? Verdict::reproduced
-          : rises        ? Verdict::partly
-                         : Verdict::not_reproduced,
+  return {rises && close ? ClaimVerdict::reproduced
+          : rises        ? ClaimVerdict::partly
+                         : ClaimVerdict::not_reproduced,
           fmt::format("N({:.3f}, {:.3f}²) to N({:.3f}, {:.3f}²) J", a.mean, a.sd, b.mean, b.sd)};
 }
 
@@ -157,9 +157,9 @@ Finding normal_loss(const VariantStudy& s) {
   bool steady = true;
   for (const EnergyLosses& losses : s.fig8) steady = steady && std::abs(losses.normal.mean / 0.17 - 1) < 0.25;
   const bool rises = b.sd > a.sd;
-  return {rises && steady ? Verdict::reproduced
-          : rises         ? Verdict::partly
-                          : Verdict::not_reproduced,
+  return {rises && steady ? ClaimVerdict::reproduced
+          : rises         ? ClaimVerdict::partly
+                          : ClaimVerdict::not_reproduced,
           fmt::format("sd {:.3f} to {:.3f} J, mean {:.3f} to {:.3f} J", a.sd, b.sd, a.mean, b.mean)};
 }
 
@@ -167,7 +167,7 @@ Finding transient_influence(const VariantStudy& s) {
   const double transient = range(s.fig9[0], &StudiedProfile::transient_sd);
   const double steady = range(s.fig9[0], &StudiedProfile::steady_sd);
   if (!any_steady(s.fig9)) return nothing_left();
-  return {transient > steady ? Verdict::reproduced : Verdict::not_reproduced,
+  return {transient > steady ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("μ mean 0.2: sd differs by {:.3f} rad/s at collisions 2-6, by {:.3f} beyond the 12th", transient,
                       steady)};
 }
@@ -179,7 +179,7 @@ std::pair<double, double> steady_ranges(const VariantStudy& s) {
 Finding influence_grows(const VariantStudy& s) {
   if (!any_steady(s.fig9)) return nothing_left();
   const auto [low, high] = steady_ranges(s);
-  return {high > low ? Verdict::reproduced : Verdict::not_reproduced,
+  return {high > low ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("steady sd differs by {:.3f} rad/s over η at μ mean 0.2, by {:.3f} at 0.5", low, high)};
 }
 
@@ -191,23 +191,23 @@ Finding restitution_raises(const VariantStudy& s) {
     rises += row[2].steady_sd() > row[0].steady_sd();
     low += row[0].steady_sd() / 4, high += row[2].steady_sd() / 4;
   }
-  return {rises == 4  ? Verdict::reproduced
-          : rises > 0 ? Verdict::partly
-                      : Verdict::not_reproduced,
+  return {rises == 4  ? ClaimVerdict::reproduced
+          : rises > 0 ? ClaimVerdict::partly
+                      : ClaimVerdict::not_reproduced,
           fmt::format("steady sd {:.3f} to {:.3f} rad/s from η mean 0.3 to 0.7; up at {} of 4 μ", low, high, rises)};
 }
 
 Finding influence_shrinks(const VariantStudy& s) {
   if (!any_steady(s.fig9)) return nothing_left();
   const auto [low, high] = steady_ranges(s);
-  return {high < low ? Verdict::reproduced : Verdict::not_reproduced,
+  return {high < low ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("steady sd differs by {:.3f} rad/s over η at μ mean 0.2, by {:.3f} at 0.5", low, high)};
 }
 
 Finding failures(const VariantStudy& s) {
-  if (s.variant.reading == RestReading::goes_on) return {Verdict::not_applicable, "no trial can rest"};
+  if (s.variant.reading == RestReading::goes_on) return {ClaimVerdict::not_applicable, "no trial can rest"};
   const double share = s.fig7[1][1].rest_share;  // both sds 0.1
-  return {share > 0.02 && share < 0.9 ? Verdict::reproduced : Verdict::not_reproduced,
+  return {share > 0.02 && share < 0.9 ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("{:.1f} % of the trials rest within 16 collisions at 7.02 deg (sds of 0.1)", 100 * share)};
 }
 
@@ -242,15 +242,15 @@ std::string share_words(const Influence& share) {
 
 }  // namespace
 
-std::string verdict_text(Verdict verdict) {
+std::string verdict_text(ClaimVerdict verdict) {
   switch (verdict) {
-    case Verdict::reproduced:
+    case ClaimVerdict::reproduced:
       return "reproduced";
-    case Verdict::partly:
+    case ClaimVerdict::partly:
       return "partly";
-    case Verdict::not_reproduced:
+    case ClaimVerdict::not_reproduced:
       return "not reproduced";
-    case Verdict::not_applicable:
+    case ClaimVerdict::not_applicable:
       return "says nothing";
   }
   return "";
@@ -369,8 +369,8 @@ std::vector<Claim> paper_claims(const std::vector<VariantStudy>& studies, const 
                           failures);
   if (experiments.rest_share_702)
     metastable.experiment = {*experiments.rest_share_702 > 0.02 && *experiments.rest_share_702 < 0.9
-                                 ? Verdict::reproduced
-                                 : Verdict::not_reproduced,
+                                 ? ClaimVerdict::reproduced
+                                 : ClaimVerdict::not_reproduced,
                              fmt::format("{:.1f} % of the trials rest", 100 * *experiments.rest_share_702)};
   return claims;
 }
@@ -383,9 +383,9 @@ std::vector<Hypothesis> paper_hypotheses(const std::vector<VariantStudy>& studie
   for (const VariantStudy& s : studies) {
     const auto judge = [&](const Influence& share) {
       const bool steady = share.steady > matters, steps = share.steps_vary && share.steps > matters;
-      return Finding{steady  ? Verdict::reproduced
-                     : steps ? Verdict::partly
-                             : Verdict::not_reproduced,
+      return Finding{steady  ? ClaimVerdict::reproduced
+                     : steps ? ClaimVerdict::partly
+                             : ClaimVerdict::not_reproduced,
                      share_words(share)};
     };
     all[0].findings.push_back(judge(largest(s, {0})));

@@ -8,12 +8,12 @@
 
 namespace metastable::analysis {
 
-enum class Verdict { reproduced, partly, not_reproduced, not_applicable };
+enum class ClaimVerdict { reproduced, partly, not_reproduced, not_applicable };
 /// "reproduced", "partly", "not reproduced", "says nothing".
-std::string verdict_text(Verdict verdict);
+std::string verdict_text(ClaimVerdict verdict);
 
 struct Finding {
-  Verdict verdict = Verdict::not_applicable;
+  ClaimVerdict verdict = ClaimVerdict::not_applicable;
   std::string ours;  ///< the numbers behind it
 };
 

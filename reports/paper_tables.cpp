@@ -91,9 +91,9 @@ Table hypotheses_table(const std::vector<analysis::Hypothesis>& hypotheses, cons
   for (const analysis::Hypothesis& h : hypotheses) {
     std::vector<Cell> row{h.name, h.text};
     for (const analysis::Finding& f : h.findings) {
-      const char* verdict = f.verdict == analysis::Verdict::reproduced ? "yes"
-                            : f.verdict == analysis::Verdict::partly   ? "for the steps only"
-                                                                       : "no";
+      const char* verdict = f.verdict == analysis::ClaimVerdict::reproduced ? "yes"
+                            : f.verdict == analysis::ClaimVerdict::partly   ? "for the steps only"
+                                                                            : "no";
       row.emplace_back(fmt::format("{}: {}", verdict, f.ours));
     }
     table.rows.push_back(std::move(row));

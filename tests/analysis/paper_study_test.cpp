@@ -60,14 +60,14 @@ TEST(PaperStudy, ReadingsAndLawsDiffer) {
 
   const std::vector<Claim> claims = paper_claims(studies, experiments);
   for (const Claim& claim : claims) EXPECT_EQ(claim.findings.size(), 3u) << claim.claim;
-  EXPECT_EQ(claims.front().experiment.verdict, Verdict::reproduced);
-  EXPECT_EQ(claims.back().findings[0].verdict, Verdict::not_applicable);
-  EXPECT_EQ(claims.back().findings[2].verdict, Verdict::not_reproduced);
+  EXPECT_EQ(claims.front().experiment.verdict, ClaimVerdict::reproduced);
+  EXPECT_EQ(claims.back().findings[0].verdict, ClaimVerdict::not_applicable);
+  EXPECT_EQ(claims.back().findings[2].verdict, ClaimVerdict::not_reproduced);
   const std::vector<Hypothesis> hypotheses = paper_hypotheses(studies);
   ASSERT_EQ(hypotheses.size(), 3u);
   for (std::size_t v = 0; v < 3; ++v) {
-    EXPECT_EQ(hypotheses[0].findings[v].verdict, Verdict::not_reproduced) << hypotheses[0].findings[v].ours;
-    EXPECT_EQ(hypotheses[2].findings[v].verdict, Verdict::reproduced) << hypotheses[2].findings[v].ours;
+    EXPECT_EQ(hypotheses[0].findings[v].verdict, ClaimVerdict::not_reproduced) << hypotheses[0].findings[v].ours;
+    EXPECT_EQ(hypotheses[2].findings[v].verdict, ClaimVerdict::reproduced) << hypotheses[2].findings[v].ours;
   }
 }
 

@@ -149,5 +149,34 @@ TEST(Figure, MissingGnuplotIsSaid) {
   EXPECT_EQ(message, "gnuplot, which draws the figures, was not found: install the package gnuplot-nox");
 }
 
+TEST(Figure, BarsAreNamedAndValuedTopDown) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  Figure figure{.id = "bars", .title = "", .x = {"p"}, .y = {""}};
+  figure.bars =
+      BarChart{.name = {"leg_contact", "none"}, .value = {0.5, -0.25}, .lower = {0.4, none}, .upper = {0.6, none}};
+  const std::string script = gnuplot_script(figure);
+  for (const char* part :
+       {"0 0 0.5 0 0x0072B2", "-0.25 1 0 1 0x0072B2", "0.5 0 0.4 0.6\nEND", "'leg_contact' 0, 'none' 1"})
+    EXPECT_NE(script.find(part), std::string::npos) << part << "\n" << script;
+  const std::string svg = render_svg(figure);
+  EXPECT_NE(svg.find("leg_contact"), std::string::npos);  // not taken for a subscript
+  figure.bars->value.pop_back();
+  EXPECT_THROW(gnuplot_script(figure), std::invalid_argument);
+}
+
+TEST(Figure, HeatMapTakesNamesAndAScaleAroundZero) {
+  Figure figure{.id = "named", .title = "", .x = {""}, .y = {""}};
+  HeatMap map{
+      .x = {0, 1}, .y = {0}, .value = {{-9, 0.25}}, .label = "score", .digits = 1, .format = NumberFormat::fixed};
+  map.x_names = {"mean", "spread_2"};
+  map.limit = 6;
+  figure.heat_map = map;
+  const std::string script = gnuplot_script(figure);
+  for (const char* part : {"set cbrange [-6:6]", "'mean' 0, 'spread_2' 1", "\"−9.0\"", "\"0.2\""})
+    EXPECT_NE(script.find(part), std::string::npos) << part << "\n" << script;
+  figure.heat_map->x_names.pop_back();
+  EXPECT_THROW(gnuplot_script(figure), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace metastable::reports
