@@ -17,7 +17,7 @@ struct Command {
 
 /// blind
 std::vector<Command> blind_commands();
-/// simulate, collisions, describe, study: the commands about experiments.
+/// simulate, collisions, describe, diagnose, effects, study and others: the commands about experiments.
 std::vector<Command> experiment_commands();
 
 }  // namespace metastable::reports

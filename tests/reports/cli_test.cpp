@@ -130,7 +130,7 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"sweep", "--slope", "5:12:0"}, "--slope: range 5:12:0"},
       {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")}, "slope: 25 deg"},
       {{"diagnose"}, "DIR"},
-      {{"diagnose", path("none")}, "none/experiment.toml"},
+      {{"diagnose", path("none")}, "none: there is no such folder"},
       {{"diagnose", path("none"), "--catalogue", "leg_contact,lag_contact"}, "--catalogue: "},
       {{"diagnose", path("none"), "--catalogue", file("ids.csv", "leg_contact\n# more\nlag_contact\n")}, "ids.csv:3: "},
       {{"effects", "--json", path("no/such/folder/x.json")}, "no/such/folder"},
@@ -368,7 +368,7 @@ TEST_F(CommandLine, StandardErrorsOfWhatDoesNotMatterAreRefused) {
 TEST_F(CommandLine, DiagnoseNamesTheKnownEffects) {
   const Ran ran = metastable({"diagnose", path("none"), "--catalogue", "lag_contact"});
   EXPECT_EQ(ran.code, 2);
-  for (const char* part : {"'lag_contact'", "leg_contact", "slip_reversal"})
+  for (const char* part : {"\"lag_contact\"", "leg_contact", "slip_reversal"})
     EXPECT_NE(ran.err.find(part), std::string::npos) << part << "\n" << ran.err;
 }
 

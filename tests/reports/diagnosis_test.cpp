@@ -48,21 +48,27 @@ analysis::Diagnosis sample() {
   for (analysis::GapMap* map : {&d.as_given, &d.recalibrated, &d.left})
     map->cells = {cell("mean", "leg 1, collision", 4, 0.02), cell("mean", "leg 3, collision", -8, 0.001),
                   cell("spread", "leg 3, collision", 3.9, 0.02), cell("mean", "leg 3, stance", 0.3, 0.9)};
-  analysis::Cause leg{.effects = {"leg_contact"}, .probability = 0.6, .gain = 80, .p_value = 1e-9, .evidence = 30};
+  analysis::Cause leg, both, bounce;
+  leg.effects = {"leg_contact"};
+  leg.probability = 0.6, leg.gain = 80, leg.p_value = 1e-9, leg.evidence = 30;
   leg.parameters = {{{"leg", 3, 3, 3, false}, {"friction_ratio", 1.6, 1.4, 1.9, true}}};
-  analysis::Cause both{.effects = {"leg_lengths", "slope_offset"}, .probability = 0.3};
+  both.effects = {"leg_lengths", "slope_offset"};
+  both.probability = 0.3;
   both.parameters = {{{"leg_lengths_m", 0.15, 0.149, 0.151, true}, {"leg_lengths_m", 0.16, 0.159, 0.161, true}},
                      {{"offset_deg", 0.2, 0.1, 0.3, true}}};
   d.causes = {leg, both};
-  d.not_decided = {{.effects = {"bounce"}, .not_decided = "the fit did not converge"}};
+  bounce.effects = {"bounce"};
+  bounce.not_decided = "the fit did not converge";
+  d.not_decided = {bounce};
   d.cause_set = {"leg_contact", "leg_lengths+slope_offset"};
   d.p_none = 0.08;
   d.p_recalibrate = 0.02;
   d.contact = {{"friction_mean", 0.35, 0.34, 0.36, true}};
-  analysis::Shrinkage score{.measure = "held-out log score per collision", .unit = "nats"};
+  analysis::Shrinkage score, open;
+  score.measure = "held-out log score per collision", score.unit = "nats";
   score.baseline = 0.41, score.recalibrated = 0.33, score.with_effect = 0.02;
   score.closed = 0.95, score.closed_lower = 0.88, score.closed_upper = 1.0;
-  analysis::Shrinkage open{.measure = "error of P(rest)", .unit = ""};
+  open.measure = "error of P(rest)";
   d.shrinkage = {score, open};
   d.steps = {.observed = infinity, .observed_lower = 40, .observed_upper = infinity, .baseline = 50, .with_effect = 70};
   d.visible = {{"leg_contact", "friction_ratio", 0.04, {{"leg_lengths", 0.7}}, ""},
