@@ -18,6 +18,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double least_sd = 0.005;         // finer spreads are below the likelihood's grid
 constexpr std::size_t thinned_size = 300;  // transitions behind the choice of a start
 
 std::vector<dynamics::WheelMap> maps_of(const Experiment& experiment, dynamics::Law law,
@@ -89,65 +90,69 @@ Point best_start(const Cost& function, const Experiment& experiment, dynamics::L
   return best.at;
 }
 
-// Second derivatives by central differences, at steps that change the cost by about a unit where that is possible.
-Eigen::Matrix4d curvature(const Cost& function, const Point& x, double value) {
-  std::array<double, 4> step{};
-  const auto at = [&](std::size_t i, double di, std::size_t j, double dj) {
+// Second derivatives in the free variables by central differences, at steps that change the cost by about a unit where
+// that is possible.
+Eigen::MatrixXd curvature(const Cost& function, const Point& x, double value, const std::vector<std::size_t>& free) {
+  const auto n = static_cast<Eigen::Index>(free.size());
+  std::vector<double> step(free.size());
+  const auto at = [&](std::size_t a, double da, std::size_t b, double db) {
     Point y = x;
-    y[i] += di;
-    y[j] += dj;
+    y[free[a]] += da;
+    y[free[b]] += db;
     return function(y);
   };
-  Eigen::Matrix4d hessian;
-  for (std::size_t i = 0; i < 4; ++i) {
-    step[i] = i % 2 == 0 ? 0.004 : 0.04;
+  Eigen::MatrixXd hessian(n, n);
+  for (std::size_t a = 0; a < free.size(); ++a) {
+    step[a] = free[a] % 2 == 0 ? 0.004 : 0.04;
     double rise = 0;
     for (int halving = 0; halving < 6; ++halving) {
-      rise = at(i, step[i], i, 0) + at(i, -step[i], i, 0) - 2 * value;
+      rise = at(a, step[a], a, 0) + at(a, -step[a], a, 0) - 2 * value;
       if (rise < 4) break;
-      step[i] /= 2;
+      step[a] /= 2;
     }
-    const auto e = static_cast<Eigen::Index>(i);
-    hessian(e, e) = rise / (step[i] * step[i]);
+    const auto e = static_cast<Eigen::Index>(a);
+    hessian(e, e) = rise / (step[a] * step[a]);
   }
-  for (std::size_t i = 0; i < 4; ++i)
-    for (std::size_t j = 0; j < i; ++j) {
-      const double hi = step[i], hj = step[j];
-      const double mixed =
-          (at(i, hi, j, hj) - at(i, hi, j, -hj) - at(i, -hi, j, hj) + at(i, -hi, j, -hj)) / (4 * hi * hj);
-      const auto a = static_cast<Eigen::Index>(i), b = static_cast<Eigen::Index>(j);
-      hessian(a, b) = hessian(b, a) = mixed;
+  for (std::size_t a = 0; a < free.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b) {
+      const double mixed = (at(a, step[a], b, step[b]) - at(a, step[a], b, -step[b]) - at(a, -step[a], b, step[b]) +
+                            at(a, -step[a], b, -step[b])) /
+                           (4 * step[a] * step[b]);
+      const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
+      hessian(i, j) = hessian(j, i) = mixed;
     }
   return hessian;
 }
 
-void describe_curvature(ContactFit& fit, const Eigen::Matrix4d& information) {
+void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, const std::vector<std::size_t>& free) {
+  fit.standard_error.fill(infinity);
   if (!information.allFinite()) {
     fit.status = ContactFit::Status::undetermined;
     fit.message =
         "the likelihood rises up to the edge of what eta and mu can be distributed as: no law of this form fits";
-    fit.standard_error.fill(infinity);
     return;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(information);
-  for (Eigen::Index k = 3; k >= 0; --k) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  for (Eigen::Index k = information.rows() - 1; k >= 0; --k) {
     FitDirection direction;
     direction.sd = eigen.eigenvalues()[k] > 0 ? 1 / std::sqrt(eigen.eigenvalues()[k]) : infinity;
-    for (Eigen::Index i = 0; i < 4; ++i) direction.weight[static_cast<std::size_t>(i)] = eigen.eigenvectors()(i, k);
+    for (std::size_t a = 0; a < free.size(); ++a)
+      direction.weight[free[a]] = eigen.eigenvectors()(static_cast<Eigen::Index>(a), k);
     fit.directions.push_back(direction);
   }
   if (!(eigen.eigenvalues()[0] > 0)) {
     fit.status = ContactFit::Status::undetermined;
     fit.message = "the likelihood does not fall off in every direction: the four numbers are one choice among many";
-    fit.standard_error.fill(infinity);
     return;
   }
-  const Eigen::Matrix4d covariance = information.inverse();
-  for (Eigen::Index i = 0; i < 4; ++i) {
-    fit.standard_error[static_cast<std::size_t>(i)] = std::sqrt(covariance(i, i));
-    for (Eigen::Index j = 0; j < 4; ++j)
-      fit.correlation[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] =
-          covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
+  const Eigen::MatrixXd covariance = information.inverse();
+  for (std::size_t a = 0; a < free.size(); ++a) {
+    const auto i = static_cast<Eigen::Index>(a);
+    fit.standard_error[free[a]] = std::sqrt(covariance(i, i));
+    for (std::size_t b = 0; b < free.size(); ++b) {
+      const auto j = static_cast<Eigen::Index>(b);
+      fit.correlation[free[a]][free[b]] = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
+    }
   }
 }
 
@@ -226,11 +231,27 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
     settled = minimum.value - again.value < 1e-3;
     minimum = std::move(again);
   }
-  const Eigen::Matrix4d hessian = curvature(function, minimum.at, minimum.value);
   fit.value = to_parameters(minimum.at);
   fit.log_likelihood = -minimum.value;
-  const Eigen::Vector4d jacobian(1, 1 / fit.value[1], 1, 1 / fit.value[3]);  // d point / d parameter
-  describe_curvature(fit, jacobian.asDiagonal() * hessian * jacobian.asDiagonal());
+  // A spread that the data do not show goes to its least value; the others then have their errors given that.
+  std::vector<std::size_t> free;
+  std::string bound;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (i % 2 == 0 || fit.value[i] > 1.3 * least_sd)
+      free.push_back(i);
+    else
+      bound += fmt::format("{}{}", bound.empty() ? "" : " and ", contact_parameter_names[i]);
+  }
+  Eigen::VectorXd jacobian(static_cast<Eigen::Index>(free.size()));  // d point / d parameter
+  for (std::size_t a = 0; a < free.size(); ++a)
+    jacobian[static_cast<Eigen::Index>(a)] = free[a] % 2 == 0 ? 1 : 1 / fit.value[free[a]];
+  describe_curvature(
+      fit, jacobian.asDiagonal() * curvature(function, minimum.at, minimum.value, free) * jacobian.asDiagonal(), free);
+  if (fit.status == ContactFit::Status::converged && !bound.empty())
+    fit.message = fmt::format(
+        "{} is at {}, the least value: likeliest is no such spread at all; the other errors hold given that, and are "
+        "too small if there is some",
+        bound, least_sd);
   if (fit.status == ContactFit::Status::converged && !settled && fit.message.empty())
     fit.message = "the search for the maximum did not settle: the likelihood is nearly flat along its ridge";
   if (fit.impossible > 0)
@@ -267,7 +288,7 @@ std::vector<std::string> ambiguities(const ContactFit& fit) {
         sentences.push_back(fmt::format("{} and {} can hardly be told apart: correlation {:.2f}.",
                                         contact_parameter_names[j], contact_parameter_names[i], fit.correlation[i][j]));
   for (const std::size_t i : {std::size_t{1}, std::size_t{3}})
-    if (fit.value[i] < 1.96 * fit.standard_error[i])
+    if (std::isfinite(fit.standard_error[i]) && fit.value[i] < 1.96 * fit.standard_error[i])
       sentences.push_back(fmt::format("{} is not told from 0.", contact_parameter_names[i]));
   return sentences;
 }

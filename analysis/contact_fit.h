@@ -48,7 +48,7 @@ struct ContactFit {
   std::size_t impossible = 0;   ///< left out: no eta in [0, 1] and mu >= 0 lead there under this law
   double log_likelihood = 0;    ///< of omega^2 [1/(rad^2/s^2)]
   ContactParameters value{};
-  ContactParameters standard_error{};  ///< from the observed information; infinite where undetermined
+  ContactParameters standard_error{};  ///< from the observed information; infinite where undetermined or at a bound
   std::array<std::array<double, 4>, 4> correlation{};
   std::vector<FitDirection> directions;  ///< eigenvectors of the observed information, best determined first
 };

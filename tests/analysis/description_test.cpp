@@ -63,10 +63,10 @@ TEST(Description, ATestWithoutTrialsIsNoMeeting) {
 // The law and the contact that made the trials predict them; another law does not.
 TEST(LawComparison, KnowsTheLawThatMadeTheTrials) {
   Experiment experiment = stand_in_folder();
-  std::erase_if(experiment.trials, [](const MeasuredTrial& t) { return t.condition == 0; });
+  std::erase_if(experiment.trials, [](const MeasuredTrial& t) { return t.condition != 2; });
   const LawComparison comparison =
-      compare_laws(experiment, {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::plastic}, 500, 2, 0);
-  ASSERT_EQ(comparison.rows.size(), 2u * 6);
+      compare_laws(experiment, {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::plastic}, 400, 2, 0);
+  ASSERT_EQ(comparison.rows.size(), 6u);
   for (const LawRow& row : comparison.rows) {
     if (row.source == "published, as given" || row.source == "published, fitted") {
       EXPECT_GT(*row.p_speed, 0.01) << row.condition << row.source;
@@ -76,9 +76,9 @@ TEST(LawComparison, KnowsTheLawThatMadeTheTrials) {
     } else if (row.source != "measured") {
       EXPECT_LT(*row.p_speed, 1e-6) << row.condition << row.source;
     }
-    if (row.condition == "fast-7.02" && row.source == "published, as given") {
-      EXPECT_LT(row.rest_share.lower, 0.066);  // 1 - P(steps > 16)
-      EXPECT_GT(row.rest_share.upper, 0.066);
+    // 1 - P(steps > 16) of `metastable steps --restitution 0.54,0.045 --friction 0.352,0.043 --json -`.
+    if (row.source == "published, as given") {
+      EXPECT_NEAR(row.rest_share.value, 0.06348, 4 * std::sqrt(0.06348 * 0.93652 / 400));
     }
   }
 }
