@@ -209,6 +209,11 @@ Table fits_table(const analysis::Description& description, const Provenance& pro
   for (const char* name : {"η mean", "η sd", "μ mean", "μ sd"})
     table.columns.push_back({name, "", NumberFormat::fixed, 3});
   table.columns.push_back({"log-likelihood", "", NumberFormat::fixed, 1});
+  const auto interval = [](std::size_t i, double value, double standard_error) {
+    Estimate e = with_error(value, standard_error);
+    if (i % 2 == 1) e.low = std::max(0.0, e.low);  // an sd
+    return e;
+  };
   for (const analysis::DescribedFit& f : description.fits) {
     std::vector<Cell> row{f.of, f.fit.transitions, f.fit.rests, f.fit.impossible};
     const bool fitted = f.fit.status != analysis::ContactFit::Status::impossible;
@@ -218,7 +223,7 @@ Table fits_table(const analysis::Description& description, const Provenance& pro
       else if (std::isinf(f.fit.standard_error[i]))
         row.emplace_back(f.fit.value[i]);
       else
-        row.emplace_back(with_error(f.fit.value[i], f.fit.standard_error[i]));
+        row.emplace_back(interval(i, f.fit.value[i], f.fit.standard_error[i]));
     }
     row.push_back(fitted ? Cell(f.fit.log_likelihood) : Cell(""));
     table.rows.push_back(std::move(row));
