@@ -40,6 +40,14 @@ TEST(IntegratedStudy, GivesTheKnownAnswersOfThePapersWheel) {
   EXPECT_NEAR(integrated(equal_legs(9.59, {0.4, 0.1}), 1e-3).from_start.value, 6.1746, 2e-4);
 }
 
+TEST(IntegratedStudy, GivesEightDigitsWithFewNodes) {
+  // LandingDensity, an adaptive integral for each pair of nodes, on 256 nodes of equal panels: 4.2584828629.
+  const Metastability result = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-8);
+  EXPECT_EQ(result.status, Status::converged);
+  EXPECT_LE(result.cells, 64u);
+  EXPECT_NEAR(result.from_start.value / 4.2584828629, 1, 1e-8);
+}
+
 TEST(IntegratedStudy, IsRightWhereFailuresAreRare) {
   // Sampled and extrapolated: 46577.7(50).
   EXPECT_NEAR(integrated(equal_legs(9.59, {0.3, 0.05}), 1e-3).from_start.value, 46577.7, 5);
