@@ -157,24 +157,27 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
     return accumulated(markov::reward_from_launch(solver, launch, pay),
                        markov::reward_quantiles(solver, quasi, launch, pay, Metastability::levels));
   };
-  if (!sampled.duration.empty()) result.seconds = reward(sampled.duration);
-  if (!sampled.advance.empty()) result.metres = reward(sampled.advance);
+  if (!options.brief && !sampled.duration.empty()) result.seconds = reward(sampled.duration);
+  if (!options.brief && !sampled.advance.empty()) result.metres = reward(sampled.advance);
   const std::size_t shown = std::max<std::size_t>(
       survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
   for (std::size_t n = 0; n < shown; ++n) result.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.reach_end = survival.at(*problem.last_event);
 
-  result.eigenvalue_moduli = moduli_per_step(problem, solver.revolution(), result.period, options.eigenvalues,
-                                             quasi.failure_rate, result.message);
-  result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
-  result.total_variation_steps = markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
+  if (!options.brief) {
+    result.eigenvalue_moduli = moduli_per_step(problem, solver.revolution(), result.period, options.eigenvalues,
+                                               quasi.failure_rate, result.message);
+    result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
+    result.total_variation_steps = markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
+  }
   describe_survivors(problem, space, quasi.distribution, result);
   if (dot(launch.after, launch.after) > 0) {  // otherwise no launch survives its first collision
     const MeanSd restarted = observe(problem, space, markov::stationary_with_restart(solver, launch.after));
     result.restart_mean = restarted.mean;
     result.restart_sd = restarted.sd;
   }
-  describe_violations(problem, space, quasi.distribution, solver.solve_left(launch.after), options, result);
+  if (!options.brief)
+    describe_violations(problem, space, quasi.distribution, solver.solve_left(launch.after), options, result);
 
   const markov::SparseSolver check(solver.revolution());
   const std::vector<double> ones(solver.revolution().size(), 1.0);

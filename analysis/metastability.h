@@ -38,8 +38,9 @@ struct StudyOptions {
   markov::Sequence sequence = markov::Sequence::sobol;
   markov::Weighting weighting = markov::Weighting::weighted;
   double tail = 1e-30;  ///< tail probability the weighted draws reach; deepened by itself where failures are that rare
-  double mixing_distance = 0.05;           ///< total variation distance that counts as mixed
-  int eigenvalues = 6;                     ///< how many moduli to report
+  double mixing_distance = 0.05;  ///< total variation distance that counts as mixed
+  int eigenvalues = 6;            ///< how many moduli to report
+  bool brief = false;             ///< leave out seconds, metres, spectrum, mixing and violated assumptions (sweeps do)
   std::size_t largest_cells = 1024;        ///< refinement stops here
   std::size_t largest_samples = 1u << 18;  ///< and here
   /// Called now and then with the work done so far in [0, 1] and what is being done; may throw to stop.

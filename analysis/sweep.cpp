@@ -48,6 +48,7 @@ void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin
   if (begin >= size) return;
   StudyOptions single = options;
   single.threads = 1;
+  single.brief = true;
   single.progress = nullptr;
   std::mutex mutex;
   std::map<std::size_t, SweepPoint> waiting;  // finished before an earlier point
