@@ -160,7 +160,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
       const double rate_before = std::exchange(rate_change, change(fine->failure_rate, coarse->failure_rate));
       error = std::max(rounding, remaining(steps_change, steps_before));
       rate_error = std::max(rounding, remaining(rate_change, rate_before));
-      met = steps_before > 0 && std::max(error, rate_error) <= options.tolerance;
+      met = std::max(error, rate_error) <= options.tolerance;
     }
     const bool last = free ? met || more(panels) > std::max<std::size_t>(most, 4)
                            : panels >= given && (given == 1 || coarse || !fine);
