@@ -154,8 +154,9 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   // Each column of `raw` sums to the statistic of one cell and aspect; its mean is zero without a gap.
   GapMap map;
   std::vector<std::vector<std::pair<std::size_t, double>>> raw;
+  std::vector<double> without_gap;  // variance of each sum under the model
   const auto add = [&](const Cell& cell, const char* aspect, std::string unit, double size,
-                       std::vector<std::pair<std::size_t, double>> column) {
+                       std::vector<std::pair<std::size_t, double>> column, double variance) {
     GapCell out;
     out.facet = cell.facet;
     out.aspect = aspect;
@@ -166,6 +167,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     out.stance = cell.stance;
     map.cells.push_back(std::move(out));
     raw.push_back(std::move(column));
+    without_gap.push_back(variance);
   };
   const double share_below = 2 * dynamics::normal_cdf(-tail_score);
   for (const Cell& cell : cells) {
@@ -182,16 +184,17 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
       squares += s * s;
       beyond += rare;
     }
-    add(cell, "mean", "rad/s", shift / n, std::move(mean));
-    add(cell, "spread", "of the model's", std::sqrt(squares / n) - 1, std::move(spread));
-    if (cell.facet == "phase") add(cell, "tail", "share", beyond / n - share_below, std::move(tail));
+    add(cell, "mean", "rad/s", shift / n, std::move(mean), n);
+    add(cell, "spread", "of the model's", std::sqrt(squares / n) - 1, std::move(spread), n);
+    if (cell.facet == "phase")
+      add(cell, "tail", "share", beyond / n - share_below, std::move(tail), n * share_below * (1 - share_below));
   }
   // Memory: successive scores of a trial, of each phase; and trials that differ as a whole.
   for (const bool stance : {false, true}) {
     std::vector<std::pair<std::size_t, double>> memory, whole;
     Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}, stance};
     Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance};
-    double sum = 0, between = 0;
+    double sum = 0, between = 0, sum_variance = 0, between_variance = 0;
     std::optional<std::size_t> previous;
     double partial = 0;
     for (std::size_t i = 0; i < events.size(); ++i) {
@@ -201,9 +204,11 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
         const double before = std::clamp(z[*previous], -6.0, 6.0);
         memory.emplace_back(i, s * before);
         sum += s * before;
+        sum_variance += before * before;
         cell.events.push_back(i);
         whole.emplace_back(i, s * partial);  // adds up to half of (sum^2 - sum of squares)
         between += s * partial;
+        between_variance += partial * partial;
         partial += s;
         trials.events.push_back(i);
       } else {
@@ -213,10 +218,10 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     }
     if (memory.size() < 20) continue;
     const double n = static_cast<double>(memory.size());
-    add(cell, "memory", "correlation", sum / n, std::move(memory));
+    add(cell, "memory", "correlation", sum / n, std::move(memory), sum_variance);
     const double pairs =
         n * (static_cast<double>(model.trials()) > 0 ? n / static_cast<double>(model.trials()) : 1) / 2;
-    add(trials, "spread", "correlation", between / std::max(1.0, pairs), std::move(whole));
+    add(trials, "spread", "correlation", between / std::max(1.0, pairs), std::move(whole), between_variance);
   }
   // Rests against what the model expects at the same speeds.
   std::map<std::size_t, Cell> outcomes;
@@ -230,15 +235,16 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   for (auto& [condition, cell] : outcomes) {
     if (cell.events.size() < 5) continue;
     std::vector<std::pair<std::size_t, double>> column;
-    double excess = 0;
+    double excess = 0, variance = 0;
     for (const std::size_t i : cell.events) {
       const bool rested = events[i].kind == EventKind::rest;
       const double given = std::exp(fit.evaluation.log_density[i]);
       const double expected = rested ? given : 1 - given;
       column.emplace_back(i, (rested ? 1 : 0) - expected);
       excess += column.back().second;
+      variance += expected * (1 - expected);
     }
-    add(cell, "mean", "share of trials", excess / static_cast<double>(cell.events.size()), std::move(column));
+    add(cell, "mean", "share of trials", excess / static_cast<double>(cell.events.size()), std::move(column), variance);
   }
 
   // Efficient: what the fitted parameters' scores explain is taken off, event by event.
@@ -246,6 +252,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(count, columns);
   for (Eigen::Index c = 0; c < columns; ++c)
     for (const auto& [i, value] : raw[static_cast<std::size_t>(c)]) dense(static_cast<Eigen::Index>(i), c) = value;
+  const Eigen::RowVectorXd whole_norm = dense.colwise().squaredNorm();
   if (fit.derivatives.slope.cols() > 0) {
     const Eigen::MatrixXd& held = fit.derivatives.slope;
     Eigen::MatrixXd gram = held.transpose() * held;
@@ -260,7 +267,11 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   for (Eigen::Index c = 0; c < columns; ++c) {
     // Event-wise variance: independent without a gap, and many more of them than trials.
     const double sum = by_trial.col(c).sum();
-    scale[c] = std::max({std::sqrt(dense.col(c).squaredNorm()), std::sqrt(by_trial.col(c).squaredNorm()), 1e-12});
+    // The model's own variance, less the share that the fitted parameters take off: where nothing rare happened (no
+    // rest, no far score) the events themselves show almost none.
+    const double kept = whole_norm[c] > 0 ? dense.col(c).squaredNorm() / whole_norm[c] : 1;
+    scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_trial.col(c).squaredNorm(),
+                                   kept * without_gap[static_cast<std::size_t>(c)], 1e-24}));
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
     cell.statistic = sum / scale[c];
     cell.p_value = std::min(1.0, 2 * dynamics::normal_cdf(-std::abs(cell.statistic)));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/effect_power.h"
+#include "analysis/gap_map.h"
 #include "analysis/model_fit.h"
 #include "analysis/stand_in.h"
 #include "analysis/wheel_transitions.h"
@@ -73,6 +74,31 @@ TEST(LaboratoryAgreement, AlsoWhereTheSpeedAfterACollisionIsNotTold) {
        {"axle_drag_viscous:n_m_s=0.004", "rolling_resistance:torque_n_m=0.02", "air_drag:n_m_s2=0.0008",
         "hub_eccentricity:offset_m=0.002,phase_rad=-2", "slope_offset:offset_deg=0.3"})
     expect_found(text, {"omega_plus_rad_s"});
+}
+
+// No trial rested and next to none should have: once that counted as a rest too few at -sqrt(trials) standard
+// deviations.
+TEST(LaboratoryAgreement, RestsThatDidNotHappenAreNoGap) {
+  Setting base = stand_in_setting();
+  base.slope_deg = 9.59;
+  base.initial_speed = {5.83, 0.28};
+  const std::vector<RealityCondition> conditions{{"fast", base, 40}};
+  const dynamics::LaboratorySetup setup =
+      laboratory_setup(conditions, {.sensor_noise = 0.008, .flight = false, .seed = 3});
+  const RealityFiles made =
+      reality_files(conditions, setup, run_laboratory(setup, 0), {.dropped = {"omega_plus_rad_s"}});
+  ASSERT_EQ(made.files.trials_csv.find("rest"), std::string::npos);
+  const auto model = wheel_transitions(parse_experiment(
+      {"laboratory", made.files.experiment_toml, made.files.collisions_csv, made.files.trials_csv, std::nullopt}));
+  const GapMap map = gap_map(*model, fit(*model, {0.54, std::log(0.045), 0.352, std::log(0.043), 0, 0}, {}), 300, 1);
+  int outcomes = 0;
+  for (const GapCell& cell : map.cells) {
+    EXPECT_LT(std::abs(cell.statistic), 4.5) << cell.facet << ' ' << cell.aspect << ' ' << cell.at;
+    if (cell.facet != "outcome") continue;
+    ++outcomes;
+    EXPECT_LT(std::abs(cell.statistic), 1.5);
+  }
+  EXPECT_EQ(outcomes, 1);
 }
 
 }  // namespace
