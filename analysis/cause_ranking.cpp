@@ -151,6 +151,11 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
       cause.fit =
           fit(model, recalibrated.nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = 12});
       cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
+      if (!cause.fit.converged && cause.gain > -200) {
+        cause.fit =
+            fit(model, cause.fit.nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = 60});
+        cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
+      }
       // Far below and hardly rising any more: decided against.
       if (!cause.fit.converged && cause.gain > -30) cause.not_decided = cause.fit.reason;
       cause.p_value = 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, cause.gain)));

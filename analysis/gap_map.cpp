@@ -173,19 +173,18 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   for (const Cell& cell : cells) {
     const auto n = static_cast<double>(cell.events.size());
     std::vector<std::pair<std::size_t, double>> mean, spread, tail;
-    double shift = 0, squares = 0, beyond = 0;
+    double unit = 0, beyond = 0;
     for (const std::size_t i : cell.events) {
       const double s = std::clamp(z[i], -6.0, 6.0);
       mean.emplace_back(i, s);
       spread.emplace_back(i, (s * s - 1) / std::numbers::sqrt2);
       const double rare = std::abs(s) > tail_score ? 1 : 0;
       tail.emplace_back(i, rare - share_below);
-      shift += z[i] * fit.evaluation.unit[i];
-      squares += s * s;
+      unit += fit.evaluation.unit[i];
       beyond += rare;
     }
-    add(cell, "mean", "rad/s", shift / n, std::move(mean), n);
-    add(cell, "spread", "of the model's", std::sqrt(squares / n) - 1, std::move(spread), n);
+    add(cell, "mean", "rad/s", unit / n, std::move(mean), n);  // of a score of one; the size follows below
+    add(cell, "spread", "of the model's", 0, std::move(spread), n);
     if (cell.facet == "phase")
       add(cell, "tail", "share", beyond / n - share_below, std::move(tail), n * share_below * (1 - share_below));
   }
@@ -269,11 +268,17 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     const double sum = by_trial.col(c).sum();
     // The model's own variance, less the share that the fitted parameters take off: where nothing rare happened (no
     // rest, no far score) the events themselves show almost none.
+    // Where nearly all of the column is explained there is nothing left to say: a tenth is kept as the least share.
     const double kept = whole_norm[c] > 0 ? dense.col(c).squaredNorm() / whole_norm[c] : 1;
-    scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_trial.col(c).squaredNorm(),
+    scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_trial.col(c).squaredNorm(), 0.1 * whole_norm[c],
                                    kept * without_gap[static_cast<std::size_t>(c)], 1e-24}));
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
     cell.statistic = sum / scale[c];
+    // Efficient size: the score by its information, so that size and statistic have one sign.
+    if (cell.aspect == "mean" && cell.facet != "outcome")
+      cell.size = sum / (scale[c] * scale[c]) * cell.size;
+    else if (cell.aspect == "spread" && cell.unit == "of the model's")
+      cell.size = sum / (scale[c] * scale[c]) / std::numbers::sqrt2;
     cell.p_value = std::min(1.0, 2 * dynamics::normal_cdf(-std::abs(cell.statistic)));
   }
   const Eigen::RowVectorXd mean = by_trial.colwise().mean();

@@ -73,6 +73,47 @@ double counted(const Evaluation& e, const Eigen::VectorXd& weights) {
   return Eigen::Map<const Eigen::VectorXd>(e.log_density.data(), weights.size()).dot(weights);
 }
 
+Eigen::VectorXd picked(const Eigen::VectorXd& all, const std::vector<Eigen::Index>& part) {
+  Eigen::VectorXd some(static_cast<Eigen::Index>(part.size()));
+  for (std::size_t a = 0; a < part.size(); ++a) some[static_cast<Eigen::Index>(a)] = all[part[a]];
+  return some;
+}
+
+Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::VectorXd& gradient,
+                             const std::vector<Eigen::Index>& part) {
+  const auto size = static_cast<Eigen::Index>(part.size());
+  Eigen::MatrixXd block(size, size);
+  for (Eigen::Index a = 0; a < size; ++a)
+    for (Eigen::Index b = 0; b < size; ++b)
+      block(a, b) = information(part[static_cast<std::size_t>(a)], part[static_cast<std::size_t>(b)]);
+  block.diagonal() *= 1 + 1e-9;
+  return block.ldlt().solve(picked(gradient, part));
+}
+
+// Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does.
+bool search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::VectorXd& step,
+            const Eigen::VectorXd& weights, double& best, Evaluation& evaluation) {
+  auto& slots = point.slots();
+  std::vector<double> before;
+  for (const Eigen::Index p : part) before.push_back(*slots[static_cast<std::size_t>(p)].value);
+  double share = 1;
+  for (int halving = 0; halving < 7; ++halving, share /= 2) {
+    for (std::size_t a = 0; a < part.size(); ++a) {
+      const Point::Slot& s = slots[static_cast<std::size_t>(part[a])];
+      *s.value = std::clamp(before[a] + share * step[static_cast<Eigen::Index>(a)], s.lower, s.upper);
+    }
+    Evaluation tried = point.evaluate();
+    const double value = counted(tried, weights) + point.log_prior();
+    if (value > best) {
+      best = value;
+      evaluation = std::move(tried);
+      return true;
+    }
+  }
+  for (std::size_t a = 0; a < part.size(); ++a) *slots[static_cast<std::size_t>(part[a])].value = before[a];
+  return false;
+}
+
 }  // namespace
 
 Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count) {
@@ -123,63 +164,49 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       }
     }
     // Parameters held at a bound by the gradient stay there.
-    std::vector<Eigen::Index> free;
+    std::vector<Eigen::Index> free, of_nuisances, of_terms;
     for (Eigen::Index p = 0; p < size; ++p) {
       const Point::Slot& s = slots[static_cast<std::size_t>(p)];
       const bool held = (*s.value <= s.lower && gradient[p] <= 0) || (*s.value >= s.upper && gradient[p] >= 0);
-      if (!held && result.information(p, p) > 0) free.push_back(p);
+      if (held || !(result.information(p, p) > 0)) continue;
+      free.push_back(p);
+      (s.prior_sd > 0 ? of_nuisances : of_terms).push_back(p);
     }
     if (free.empty()) {
       result.converged = true;
       break;
     }
-    Eigen::MatrixXd part(free.size(), free.size());
-    Eigen::VectorXd slope(free.size());
-    for (std::size_t a = 0; a < free.size(); ++a) {
-      slope[static_cast<Eigen::Index>(a)] = gradient[free[a]];
-      for (std::size_t b = 0; b < free.size(); ++b)
-        part(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = result.information(free[a], free[b]);
+    // All parameters together; where that fails, the effects' and the nuisances' by themselves.
+    const double before = best;
+    double promised = 0;
+    bool better = false;
+    for (const auto* part : {&free, &of_terms, &of_nuisances}) {
+      if (part->empty()) continue;
+      const Eigen::VectorXd step = gauss_newton(result.information, gradient, *part);
+      const double rise = 0.5 * step.dot(picked(gradient, *part));
+      if (part == &free) {
+        promised = rise;
+        if (!(promised > 0.003)) break;
+      }
+      if (rise > 0.003) better = search(point, *part, step, weights, best, result.evaluation);
+      if (better) break;
     }
-    part.diagonal() *= 1 + 1e-9;
-    const Eigen::VectorXd step = part.ldlt().solve(slope);
-    const double promised = 0.5 * slope.dot(step);
     result.promised = promised;
     if (!(promised > 0.003)) {
       result.converged = std::isfinite(promised);
       if (!result.converged) result.reason = "its information matrix is singular";
       break;
     }
-    const std::vector<double> before = [&] {
-      std::vector<double> v;
-      for (const auto& s : slots) v.push_back(*s.value);
-      return v;
-    }();
-    double share = 1;
-    bool better = false;
-    for (int halving = 0; halving < 8 && !better; ++halving, share /= 2) {
-      for (std::size_t a = 0; a < free.size(); ++a) {
-        const Point::Slot& s = slots[static_cast<std::size_t>(free[a])];
-        *s.value = std::clamp(before[static_cast<std::size_t>(free[a])] + share * step[static_cast<Eigen::Index>(a)],
-                              s.lower, s.upper);
-      }
-      Evaluation tried = point.evaluate();
-      const double value = counted(tried, weights) + point.log_prior();
-      if (value > best) {
-        better = true;
-        const double gained = value - best;
-        best = value;
-        result.evaluation = std::move(tried);
-        if (gained < 0.003) result.converged = true;
-      }
-    }
     if (!better) {
-      for (std::size_t p = 0; p < slots.size(); ++p) *slots[p].value = before[p];
-      // No step of the search direction improves: at the optimum up to the noise of the differences.
+      // At the optimum, up to what the differences resolve.
       result.converged = promised < 0.5 + 1e-4 * (best - start);
       if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
       break;
     }
-    if (result.converged) break;
+    if (best - before < 0.003) {
+      result.converged = true;
+      break;
+    }
   }
   if (!result.converged && result.reason.empty())
     result.reason = "the likelihood was still rising after " + std::to_string(options.most_iterations) + " steps";

@@ -30,6 +30,8 @@ using dynamics::StepContext;
 constexpr double degree = std::numbers::pi / 180;
 constexpr double log_sqrt_two_pi = 0.91893853320467274178;
 constexpr double least_log_density = -60;
+// Noise that a collision's density is blurred by [rad/s]; less than this is half a per cent of its variance.
+constexpr double least_blur = 0.012;
 
 struct Node {  // of Gauss-Hermite's rules for the standard normal
   double score, weight;
@@ -232,9 +234,8 @@ void WheelTransitions::complete_contexts() {
 
 void WheelTransitions::estimate_noise() {
   noise_stated_ = noise_ > 0;
-  constexpr double rounding = 1e-4;
   if (noise_stated_ || !speeds_after_) {
-    noise_ = std::max(noise_, rounding);
+    noise_ = std::max(noise_, 1e-4);
     return;
   }
   std::vector<double> residual;
@@ -256,7 +257,7 @@ void WheelTransitions::estimate_noise() {
   };
   const double middle = median(residual);
   for (double& r : residual) r = std::abs(r - middle);
-  noise_ = std::max(rounding, 1.4826 * median(residual) / 1.2);  // of the sum of two speeds' noise, one damped to 0.65
+  noise_ = std::max(1e-8, 1.4826 * median(residual) / 1.2);  // of the sum of two speeds' noise, one damped to 0.65
   notes_.push_back(fmt::format("no sensor noise is stated: {:.2g} rad/s taken from the stances", noise_));
 }
 
@@ -344,7 +345,10 @@ std::vector<ExtendedWheel> WheelTransitions::wheels(std::span<const double> nuis
 class WheelTransitions::Filter {
  public:
   Filter(const Extension& extension, const ScoreTilt& tilt, double noise)
-      : extension_(extension), tilt_(tilt), noise2_(noise * noise + extension.noise_sd * extension.noise_sd) {}
+      : extension_(extension),
+        tilt_(tilt),
+        noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
+        blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
 
   struct Out {
     double log_density = 0, score = 0, unit = 1;
@@ -428,8 +432,7 @@ class WheelTransitions::Filter {
       density += weight * d.density * std::exp(tilt_.log_density(d.below));
       below += weight * tilt_.below(d.below);
     };
-    // A blur of a percent of the collision's own variance changes nothing that shows.
-    if (blur < 0.02 * plus * 0.3) {
+    if (!blurred_) {
       add(plus, 1);
     } else {
       for (const Node& node : three_nodes) add(plus + node.score * blur, node.weight);
@@ -457,6 +460,7 @@ class WheelTransitions::Filter {
   const Extension& extension_;
   const ScoreTilt& tilt_;
   double noise2_;
+  bool blurred_;
   double mean_ = 0, variance_ = 0;
   std::optional<double> previous_;
 };

@@ -1,0 +1,149 @@
+#include "analysis/diagnosis.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "analysis/coast_down_transitions.h"
+#include "tests/analysis/diagnosed.h"
+
+namespace metastable::analysis {
+namespace {
+
+using test::nominal;
+using test::term;
+
+DiagnosisOptions quick() {
+  DiagnosisOptions options;
+  options.draws = 500;
+  return options;
+}
+
+std::unique_ptr<TransitionModel> data(
+    const std::vector<std::pair<std::string, std::pair<std::vector<double>, std::vector<double>>>>& effects,
+    std::uint64_t seed, std::vector<double> contact = {}) {
+  const auto design = wheel_transitions(test::wheel_design(100, 14));
+  std::vector<Term> terms;
+  for (const auto& [id, sizes] : effects) terms.push_back(term(*design, id, sizes.first, sizes.second));
+  if (contact.empty()) contact = nominal(*design);
+  return design->simulate(contact, terms, seed);
+}
+
+TEST(Diagnosis, FindsNoGapWhereThereIsNone) {
+  const Diagnosis d = diagnose(*data({}, 21), quick());
+  EXPECT_EQ(d.verdict, Verdict::no_gap);
+  EXPECT_TRUE(d.cause_set.empty());
+  EXPECT_FALSE(d.sentences.empty());
+  double sum = d.p_no_gap + d.p_recalibrate + d.p_none;
+  for (const Cause& cause : d.causes) sum += cause.probability;
+  EXPECT_NEAR(sum, 1, 1e-9);
+}
+
+TEST(Diagnosis, CallsOtherContactParametersRecalibration) {
+  const auto design = wheel_transitions(test::wheel_design(100, 14));
+  std::vector<double> contact = nominal(*design);
+  contact[2] += 0.05;  // friction's mean
+  const Diagnosis d = diagnose(*data({}, 22, contact), quick());
+  EXPECT_EQ(d.verdict, Verdict::recalibrate);
+  EXPECT_LT(d.p_recalibration, 1e-6);
+  // The loss tells one number of the two means: recalibrated and true model agree on the steps.
+  EXPECT_GT(d.shrinkage[0].baseline, 10 * std::abs(d.shrinkage[0].recalibrated));
+}
+
+TEST(Diagnosis, NamesTheCauseItsSizeAndWhatItCloses) {
+  const Diagnosis d = diagnose(*data({{"leg_contact", {{3}, {1.3}}}}, 23), quick());
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_EQ(d.cause_set, std::vector<std::string>{"leg_contact"});
+  ASSERT_FALSE(d.causes.empty());
+  const auto& parameters = d.causes[0].parameters[0];
+  EXPECT_EQ(parameters[0].value, 3);
+  EXPECT_LT(parameters[1].lower, 1.3);
+  EXPECT_GT(parameters[1].upper, 1.3);
+  ASSERT_TRUE(d.shrinkage[0].closed);
+  EXPECT_GT(*d.shrinkage[0].closed, 0.8);
+  EXPECT_LT(d.p_value, 1e-6);
+  // Where: leg 3 comes first.
+  const auto first = std::min_element(
+      d.recalibrated.cells.begin(), d.recalibrated.cells.end(),
+      [](const GapCell& a, const GapCell& b) { return std::abs(a.statistic) > std::abs(b.statistic); });
+  EXPECT_EQ(first->facet, "leg");
+  EXPECT_EQ(first->at.substr(0, 5), "leg 3");
+}
+
+TEST(Diagnosis, NamesBothOfTwoCauses) {
+  const Diagnosis d =
+      diagnose(*data({{"contact_memory", {{}, {0.4}}}, {"rolling_resistance", {{}, {0.003}}}}, 24), quick());
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  ASSERT_FALSE(d.causes.empty());
+  const std::string name = d.causes[0].name();
+  EXPECT_NE(name.find("contact_memory"), std::string::npos) << name;
+  EXPECT_EQ(d.causes[0].effects.size(), 2u) << name;
+}
+
+// Without the true effect in the catalogue the answer is that nothing explains it.
+TEST(Diagnosis, SaysUnexplainedWhenTheCatalogueLacksTheCause) {
+  DiagnosisOptions options = quick();
+  options.catalogue = {"initial_speed", "inertia", "trial_spread", "friction_patch", "air_drag"};
+  const Diagnosis d = diagnose(*data({{"leg_contact", {{3}, {1.5}}}}, 25), options);
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_TRUE(d.cause_set.empty());
+}
+
+TEST(Diagnosis, IsTheSameOnAnyNumberOfThreads) {
+  const auto experiment = data({{"trial_drift", {{}, {0.3}}}}, 26);
+  DiagnosisOptions one = quick(), two = quick();
+  one.threads = 1;
+  two.threads = 2;
+  const Diagnosis a = diagnose(*experiment, one), b = diagnose(*experiment, two);
+  ASSERT_EQ(a.causes.size(), b.causes.size());
+  for (std::size_t i = 0; i < a.causes.size(); ++i) {
+    EXPECT_EQ(a.causes[i].name(), b.causes[i].name());
+    EXPECT_EQ(a.causes[i].probability, b.causes[i].probability);
+  }
+  EXPECT_EQ(a.p_value, b.p_value);
+  EXPECT_EQ(a.shrinkage[0].with_effect, b.shrinkage[0].with_effect);
+}
+
+TEST(Diagnosis, RefusesOptionsOutOfRange) {
+  const auto experiment = data({}, 27);
+  DiagnosisOptions options;
+  options.folds = 1;
+  EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
+  options = {};
+  options.level = 0;
+  EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
+}
+
+// The second system: a rotor with a torque that its nominal losses lack.
+TEST(Diagnosis, NamesTheTorqueOnARotor) {
+  Experiment e;
+  e.system = System::coast_down;
+  e.loss = {0.15, 0, 0.00165, 0.02};
+  e.rotor_inertia = 1;
+  e.conditions = {{"runs", 0, 0, {}, 0}};
+  for (int t = 0; t < 16; ++t) {
+    MeasuredTrial trial;
+    trial.number = t + 1;
+    for (int k = 0; k < 40; ++k)
+      trial.collisions.push_back({.number = k + 1,
+                                  .leg = {},
+                                  .time = {},
+                                  .position = {},
+                                  .omega_minus = 28.0 - 5.0 * (t % 4),
+                                  .omega_plus = {}});
+    e.trials.push_back(trial);
+  }
+  const auto design = coast_down_transitions(e);
+  const auto dragged =
+      design->simulate(nominal(*design), std::vector{term(*design, "rolling_resistance", {}, {0.02})}, 5);
+  const Diagnosis d = diagnose(*dragged, quick());
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  ASSERT_FALSE(d.causes.empty());
+  EXPECT_EQ(d.causes[0].name(), "rolling_resistance");
+  EXPECT_NEAR(d.causes[0].parameters[0][0].value, 0.02, 0.002);
+  const Diagnosis none = diagnose(*design->simulate(nominal(*design), {}, 6), quick());
+  EXPECT_EQ(none.verdict, Verdict::no_gap);
+}
+
+}  // namespace
+}  // namespace metastable::analysis
