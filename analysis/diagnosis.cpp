@@ -398,7 +398,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   } else {
     d.verdict = Verdict::explained;
     for (const Cause& cause : d.causes) {
-      if (covered >= 0.95 * (given_gap / sum)) break;
+      // 95 % of what the effects share; one twenty times less likely than the first is not named for completeness.
+      if (covered >= 0.95 * (given_gap / sum) || cause.probability < 0.05 * d.causes.front().probability) break;
       d.cause_set.push_back(cause.name());
       covered += cause.probability;
     }

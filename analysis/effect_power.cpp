@@ -53,8 +53,9 @@ FittedForm fitted_form(const dynamics::Effect& effect, const std::vector<double>
   if (effect.id == "leg_lengths") {
     for (std::size_t i = 0; i < v.size(); ++i) form.values.push_back(v[i] - stated_legs.at(i));
   } else if (effect.id == "leg_contact") {
-    variant = {v[0]};
-    form.values = {v[1]};
+    const bool friction = v[1] != 1 || v[2] == 1;  // both at once have no fitted form: friction's is taken
+    variant = {v[0], friction ? 0.0 : 1.0};
+    form.values = {friction ? v[1] : v[2]};
   } else if (effect.id == "hub_eccentricity") {
     form.values = {v[0] * std::cos(v[1]), v[0] * std::sin(v[1])};
   } else if (effect.id == "slope_profile") {

@@ -65,18 +65,22 @@ WheelCandidate leg_lengths(const WheelDesign& design) {
   return c;
 }
 
+// Variants: {leg, 0: its friction or 1: its restitution}.
 WheelCandidate leg_contact(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "leg_contact";
-  c.candidate.parameters = {{1, 0.1, 5, 1e-3}};
+  c.candidate.parameters = {{1, 0.1, 3, 1e-3}};
   c.candidate.variants.clear();
-  for (int leg = 0; leg < design.legs; ++leg) c.candidate.variants.push_back({static_cast<double>(leg)});
+  for (const double what : {0.0, 1.0})
+    for (int leg = 0; leg < design.legs; ++leg) c.candidate.variants.push_back({static_cast<double>(leg), what});
   c.candidate.report = [](const Values& variant, const Values& v) {
-    return std::vector<Named>{{"leg", variant[0]}, {"friction_ratio", v[0]}, {"restitution_ratio", 1}};
+    const bool friction = variant[1] == 0;
+    return std::vector<Named>{
+        {"leg", variant[0]}, {"friction_ratio", friction ? v[0] : 1}, {"restitution_ratio", friction ? 1 : v[0]}};
   };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.leg = static_cast<int>(variant[0]);
-    e.leg_friction = v[0];
+    (variant[1] == 0 ? e.leg_friction : e.leg_restitution) = v[0];
   };
   if (!design.legs_known) c.candidate.undecidable = "which leg landed is not known";
   return c;

@@ -51,14 +51,15 @@ TEST(Diagnosis, CallsOtherContactParametersRecalibration) {
 }
 
 TEST(Diagnosis, NamesTheCauseItsSizeAndWhatItCloses) {
-  const Diagnosis d = diagnose(*data({{"leg_contact", {{3}, {1.3}}}}, 23), quick());
+  const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.3}}}}, 23), quick());
   EXPECT_EQ(d.verdict, Verdict::explained);
   EXPECT_EQ(d.cause_set, std::vector<std::string>{"leg_contact"});
   ASSERT_FALSE(d.causes.empty());
   const auto& parameters = d.causes[0].parameters[0];
   EXPECT_EQ(parameters[0].value, 3);
-  EXPECT_LT(parameters[1].lower, 1.3);
-  EXPECT_GT(parameters[1].upper, 1.3);
+  const double half = (parameters[1].upper - parameters[1].lower) / 2;
+  EXPECT_NEAR(parameters[1].value, 1.3, 2.5 * half);  // half: 1.64 standard errors
+  EXPECT_LT(half, 0.1);
   ASSERT_TRUE(d.shrinkage[0].closed);
   EXPECT_GT(*d.shrinkage[0].closed, 0.8);
   EXPECT_LT(d.p_value, 1e-6);
@@ -84,7 +85,7 @@ TEST(Diagnosis, NamesBothOfTwoCauses) {
 TEST(Diagnosis, SaysUnexplainedWhenTheCatalogueLacksTheCause) {
   DiagnosisOptions options = quick();
   options.catalogue = {"initial_speed", "inertia", "trial_spread", "friction_patch", "air_drag"};
-  const Diagnosis d = diagnose(*data({{"leg_contact", {{3}, {1.5}}}}, 25), options);
+  const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.5}}}}, 25), options);
   EXPECT_EQ(d.verdict, Verdict::unexplained);
   EXPECT_TRUE(d.cause_set.empty());
 }

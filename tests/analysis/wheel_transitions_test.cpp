@@ -91,7 +91,7 @@ TEST(WheelTransitions, FitsFindTheSizesOfEffects) {
     const char* id;
     std::vector<double> variant, values;
   };
-  const std::vector<Case> cases{{"leg_contact", {3}, {1.15}},
+  const std::vector<Case> cases{{"leg_contact", {3, 0}, {1.15}},
                                 {"rolling_resistance", {}, {0.004}},
                                 {"contact_memory", {}, {0.3}},
                                 {"trial_drift", {}, {0.2}},
