@@ -111,7 +111,7 @@ class WheelTransitions : public TransitionModel {
   std::vector<Condition> conditions_;
   std::vector<MeasuredRun> runs_;
   double noise_ = 0;  // stated sd of reported speeds [rad/s]
-  bool legs_known_ = true, noise_stated_ = true, speeds_after_ = false;
+  bool legs_known_ = true, noise_stated_ = true, speeds_after_ = false, exact_stances_ = false;
   std::vector<Event> events_;
   std::vector<Nuisance> nuisances_;
   std::vector<WheelCandidate> effects_;
@@ -257,7 +257,12 @@ void WheelTransitions::estimate_noise() {
   };
   const double middle = median(residual);
   for (double& r : residual) r = std::abs(r - middle);
-  noise_ = std::max(1e-8, 1.4826 * median(residual) / 1.2);  // of the sum of two speeds' noise, one damped to 0.65
+  noise_ = std::max(1e-4, 1.4826 * median(residual) / 1.2);  // of the sum of two speeds' noise, one damped to 0.65
+  exact_stances_ = std::abs(middle) < 1e-5 && median(residual) < 1e-5;
+  if (exact_stances_) {
+    notes_.push_back("the stances repeat the model to rounding, as simulated ones do: they are left out");
+    return;
+  }
   notes_.push_back(fmt::format("no sensor noise is stated: {:.2g} rad/s taken from the stances", noise_));
 }
 
@@ -287,7 +292,7 @@ void WheelTransitions::list_events() {
       if (after) add(EventKind::collision);
       if (!last) {
         if (after) event.speed = *m.after;
-        add(after ? EventKind::stance : EventKind::step);
+        if (!after || !exact_stances_) add(after ? EventKind::stance : EventKind::step);
       } else if (!after && run.outcome) {
         add(*run.outcome == dynamics::Outcome::rest ? EventKind::rest : EventKind::survival);
       }
@@ -525,7 +530,9 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
       if (after) add([&](Filter& f, double shift) { return f.collision(at, context(shift), *m.after); });
       if (!last) {
         const double next = run.collisions[k + 1].before;
-        if (after)
+        if (after && exact_stances_)
+          for (Filter& f : filters) f.start(next);
+        else if (after)
           add([&](Filter& f, double shift) { return f.stance(at, context(shift), next); });
         else
           add([&](Filter& f, double shift) { return f.step(at, context(shift), next); });
