@@ -22,7 +22,10 @@ namespace {
 
 constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes
 constexpr double recalibration_level = 0.02;
-constexpr double left_over_level = 0.002;
+constexpr double left_over_level = 0.001;
+constexpr double left_over_square = 18;   // of a cell's statistic, beyond the model error
+constexpr double least_left_over = 0.05;  // held-out gap that counts as one [nats a collision]
+constexpr double least_p_value = 1e-12;   // smaller ones are beyond what chance levels can say
 
 std::vector<double> nominal_values(const TransitionModel& model) {
   std::vector<double> values;
@@ -341,6 +344,9 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
          progress(0.15 + 0.5 * share, "which effect");
        }});
   d.p_effects = ranking.p_value;
+  d.p_effects = std::max(least_p_value, d.p_effects);
+  d.p_where = std::max(least_p_value, d.p_where);
+  d.p_recalibration = std::max(least_p_value, d.p_recalibration);
   d.p_value = std::min(1.0, std::min(d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects)));
   d.p_as_given = std::min(1.0, 2 * std::min(d.p_recalibration, d.p_value));
 
@@ -368,11 +374,24 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     const PhaseGain gained = phase_gain(model, *chosen, recalibrated);
     const double tolerated = model_error * model_error;
     const double beyond = d.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
-    if (d.left.p_value < left_over_level && beyond > 14) none = std::exp(std::min(300.0, 0.5 * (beyond - 14)));
+    if (d.left.p_value < left_over_level && beyond > left_over_square)
+      none = std::exp(std::min(300.0, 0.5 * (beyond - left_over_square)));
   } else {
     d.left = d.recalibrated;
     if (gap) none = 1e6;  // cells of the map stand out, and no effect does
   }
+  progress(0.7, "how far it shrinks");
+  std::vector<std::vector<Term>> rivals;
+  if (chosen != &recalibrated)
+    for (const RankedCause* cause : ordered) {
+      if (rivals.size() == 3 || cause->evidence < best->evidence - 4) break;
+      rivals.push_back(cause->terms);
+    }
+  d.shrinkage = gap_shrinkage(model, recalibrated, rivals, options.folds, options.threads, options.seed);
+  // Even a cause that closes nearly all of a huge gap may leave a large one.
+  if (chosen != &recalibrated &&
+      d.shrinkage[0].with_effect > least_left_over + model_error * model_error * 6 * d.shrinkage[0].baseline)
+    none = std::max(none, 1e6);
   // Probabilities over everything; the prior gives a gap even odds, shared by the effects.
   double top = best ? std::max(0.0, best->evidence) : 0, sum = 0;
   const double effects = std::max<double>(1, static_cast<double>(candidates.size()));
@@ -407,14 +426,6 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   if (d.verdict != Verdict::explained && d.verdict != Verdict::unexplained) chosen = &recalibrated;
   if (d.verdict == Verdict::recalibrate) d.cause_set = {"contact_distribution"};
 
-  progress(0.7, "how far it shrinks");
-  std::vector<std::vector<Term>> rivals;
-  if (chosen != &recalibrated)
-    for (const RankedCause* cause : ordered) {
-      if (rivals.size() == 3 || cause->evidence < best->evidence - 4) break;
-      rivals.push_back(cause->terms);
-    }
-  d.shrinkage = gap_shrinkage(model, recalibrated, rivals, options.folds, options.threads, options.seed);
   progress(0.88, "steps before failure");
   d.steps = steps_before_failure(model, nominal, recalibrated, *chosen, options.seed);
   d.profile = profiles(model, nominal, *chosen, options.seed);

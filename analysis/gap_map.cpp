@@ -275,10 +275,11 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
     cell.statistic = sum / scale[c];
     // Efficient size: the score by its information, so that size and statistic have one sign.
+    const double information = std::max(0.1, kept) * without_gap[static_cast<std::size_t>(c)];
     if (cell.aspect == "mean" && cell.facet != "outcome")
-      cell.size = sum / (scale[c] * scale[c]) * cell.size;
+      cell.size = sum / information * cell.size;
     else if (cell.aspect == "spread" && cell.unit == "of the model's")
-      cell.size = sum / (scale[c] * scale[c]) / std::numbers::sqrt2;
+      cell.size = sum / information / std::numbers::sqrt2;
     cell.p_value = std::min(1.0, 2 * dynamics::normal_cdf(-std::abs(cell.statistic)));
   }
   const Eigen::RowVectorXd mean = by_trial.colwise().mean();
