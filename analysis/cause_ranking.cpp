@@ -203,9 +203,29 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
     cause.gain = gain;
     cause.terms = cause.fit.terms;
   });
-  // A fit that did not settle is decided where all it could still rise leaves it far behind.
+  // Where a fit did not settle near the top: once more, from the nuisances that suit the leader.
+  const auto leader =
+      std::max_element(ranking.singles.begin(), ranking.singles.end(),
+                       [](const RankedCause& a, const RankedCause& b) { return a.evidence < b.evidence; });
+  markov::parallel_for(ranking.singles.size(), options.threads, [&](std::size_t i) {
+    RankedCause& cause = ranking.singles[i];
+    if (&cause == &*leader || cause.fit.converged || cause.fit.nuisance.empty() || leader->fit.nuisance.empty() ||
+        cause.evidence < top - 60)
+      return;
+    Fit again = fit(model, leader->fit.nuisance, cause.terms);
+    if (!(again.penalised > cause.fit.penalised)) return;
+    const double gain = 2 * (again.penalised - recalibrated.penalised);
+    cause.evidence += 0.5 * (gain - cause.gain);
+    cause.gain = gain;
+    cause.fit = std::move(again);
+    cause.terms = cause.fit.terms;
+    if (cause.fit.converged) cause.not_decided.clear();
+  });
+  // A fit that did not settle is decided where all it could still rise leaves it far behind, or is next to nothing.
   for (RankedCause& cause : ranking.singles)
-    if (!cause.candidate_undecided() && cause.evidence + 3 * cause.fit.promised < top - 12) cause.not_decided.clear();
+    if (!cause.candidate_undecided() && !cause.fit.nuisance.empty() &&
+        (cause.evidence + 3 * cause.fit.promised < top - 12 || cause.fit.promised < 2 + 1e-3 * cause.gain))
+      cause.not_decided.clear();
   progress(0.6);
   ranking.p_value = chance.look_elsewhere(least);
 
