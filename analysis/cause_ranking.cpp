@@ -204,15 +204,15 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
     cause.terms = cause.fit.terms;
   });
   // Where a fit did not settle near the top: once more, from the nuisances that suit the leader.
-  const auto leader =
+  const auto best_single =
       std::max_element(ranking.singles.begin(), ranking.singles.end(),
                        [](const RankedCause& a, const RankedCause& b) { return a.evidence < b.evidence; });
   markov::parallel_for(ranking.singles.size(), options.threads, [&](std::size_t i) {
     RankedCause& cause = ranking.singles[i];
-    if (&cause == &*leader || cause.fit.converged || cause.fit.nuisance.empty() || leader->fit.nuisance.empty() ||
-        cause.evidence < top - 60)
+    if (&cause == &*best_single || cause.fit.converged || cause.fit.nuisance.empty() ||
+        best_single->fit.nuisance.empty() || cause.evidence < top - 60)
       return;
-    Fit again = fit(model, leader->fit.nuisance, cause.terms);
+    Fit again = fit(model, best_single->fit.nuisance, cause.terms);
     if (!(again.penalised > cause.fit.penalised)) return;
     const double gain = 2 * (again.penalised - recalibrated.penalised);
     cause.evidence += 0.5 * (gain - cause.gain);
