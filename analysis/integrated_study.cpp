@@ -18,7 +18,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t first_panels = 1;
-constexpr double least_gain = 0.1;  // of one refinement over the last, however fast the changes fall
+constexpr double safety = 2;        // of the error over the changes it is told from
 constexpr double rounding = 1e-13;  // of the solvers: no error is claimed to be smaller
 
 struct Level {
@@ -52,12 +52,21 @@ std::optional<Level> solve(const Problem& problem, markov::NodeSpace space, int 
   return level;
 }
 
-double change(double fine, double coarse) { return std::max(rounding, std::abs(std::log(fine) - std::log(coarse))); }
+// The error left in one result after each refinement. Two levels may agree by chance, and the corner of the density
+// leaves an error that comes and goes with the nodes: so never less than the last change, and the one before has its
+// say.
+class ErrorLeft {
+ public:
+  void refine(double fine, double coarse) {
+    const double change = std::max(rounding, std::abs(std::log(fine) - std::log(coarse)));
+    error_ = safety * std::sqrt(change * std::max(change, before_));
+    before_ = change;
+  }
+  double error() const { return error_; }
 
-// The error that is left after a change that followed `before` (0: none): what one more such step would change.
-double remaining(double change, double before) {
-  return before > change ? change * std::max(least_gain, change / before) : change;
-}
+ private:
+  double before_ = 0, error_ = 0;
+};
 
 // 1, 2, 3, 4, 6, 8, 12, 16, ...
 std::size_t more(std::size_t panels) {
@@ -147,7 +156,8 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   const std::size_t given = (options.cells + markov::NodeSpace::order - 1) / markov::NodeSpace::order;
   std::size_t panels = free ? first_panels : std::max<std::size_t>(1, given / 2);
   std::optional<Level> coarse, fine;
-  double done = 0.02, steps_change = 0, rate_change = 0, error = 0, rate_error = 0;
+  ErrorLeft steps_error, rate_error, worst_error;
+  double done = 0.02, error = 0;
   for (;;) {
     const std::size_t nodes = panels * markov::NodeSpace::order;
     tell(done, fmt::format("{} nodes", nodes));
@@ -156,11 +166,11 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
     done += 0.5 * (0.95 - done);
     bool met = false;
     if (coarse && fine) {
-      const double steps_before = std::exchange(steps_change, change(fine->from_start, coarse->from_start));
-      const double rate_before = std::exchange(rate_change, change(fine->failure_rate, coarse->failure_rate));
-      error = std::max(rounding, remaining(steps_change, steps_before));
-      rate_error = std::max(rounding, remaining(rate_change, rate_before));
-      met = std::max(error, rate_error) <= options.tolerance;
+      steps_error.refine(fine->from_start, coarse->from_start);
+      rate_error.refine(fine->failure_rate, coarse->failure_rate);
+      worst_error.refine(fine->worst_start, coarse->worst_start);
+      error = std::max(steps_error.error(), rate_error.error());
+      met = error <= options.tolerance;
     }
     const bool last = free ? met || more(panels) > std::max<std::size_t>(most, 4)
                            : panels >= given && (given == 1 || coarse || !fine);
@@ -174,11 +184,11 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   Metastability result;
   result.method = Method::integrated;
   result.cells = fine->space.nodes();
-  result.from_start = estimate(fine->from_start, error);
-  result.failure_rate = estimate(fine->failure_rate, rate_error);
-  result.from_quasi_stationary = estimate(1 / fine->failure_rate, rate_error);
-  result.worst_start = estimate(fine->worst_start, change(fine->worst_start, coarse->worst_start));
-  result.discretization_error = std::max(error, rate_error);
+  result.from_start = estimate(fine->from_start, steps_error.error());
+  result.failure_rate = estimate(fine->failure_rate, rate_error.error());
+  result.from_quasi_stationary = estimate(1 / fine->failure_rate, rate_error.error());
+  result.worst_start = estimate(fine->worst_start, worst_error.error());
+  result.discretization_error = error;
   result.safe_state = reach.safe_state;
   if (result.discretization_error > options.tolerance) {
     result.status = free ? Status::tolerance_not_met : Status::fixed_resolution;

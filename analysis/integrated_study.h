@@ -7,12 +7,12 @@
 namespace metastable::analysis {
 
 /// Nodes are added (16, 32, 48, 64, 96, ... a phase) until the error of ln(expected steps) from the launch and of
-/// ln(failure rate) is below the tolerance; the finest nodes' values are reported. Their error is the last change times
-/// its ratio to the change before, and never less than a tenth of the last change. No sampling error; cells counts the
-/// nodes of a phase. Options that speak of draws do not matter, but for the shares of violated assumptions, which stay
-/// sampled. Where rest is uncertain there is no first passage to integrate: the sampled study answers then, and its
-/// `method` says so. Cost: the landing densities of every pair of nodes, 0.3 to 1 us each under `published`, 30 to 100
-/// us under `coulomb`.
+/// ln(failure rate) is below the tolerance; the finest nodes' values are reported. Their error is twice the geometric
+/// mean of the last change and the one before, and never less than twice the last change. No sampling error; cells
+/// counts the nodes of a phase. Options that speak of draws do not matter, but for the shares of violated assumptions,
+/// which stay sampled. Where rest is uncertain there is no first passage to integrate: the sampled study answers then,
+/// and its `method` says so. Cost: the landing densities of every pair of nodes, 0.3 to 1 us each under `published`, 30
+/// to 100 us under `coulomb`.
 /// @throws std::invalid_argument where the landing has no density (names the reason); ConvergenceError as study()
 Metastability integrated_study(const Problem& problem, const StudyOptions& options);
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -362,7 +363,7 @@ double rest(const Row& r, const TruncatedNormal& restitution, const TruncatedNor
           integrate<16>(range, [&](double mu) { return friction.density(mu) * restitution.cdf(restitution_of(mu)); });
     }
   }
-  return std::min(1.0, sum);
+  return std::min(sum, 1.0);
 }
 
 double normalisation(const TruncatedNormal& n) {  // density over exp(-z^2/2)
@@ -418,7 +419,10 @@ PublishedDensity::PublishedDensity(const WheelMap& map, int phase)
   }
 
   // The least rounding with which g falls with eta for every mu below mu_c, with room to spare, at the slowest speed.
-  const double sticking = std::max(0.0, t0_ / t1_), kappa = kappa_ / std::sqrt(map.state_interval(phase).first);
+  const double sticking = std::max(0.0, t0_ / t1_);
+  if (sticking == 0) return;
+  slowest_ = map.state_interval(phase).first;
+  const double kappa = kappa_ / std::sqrt(slowest_);
   const auto falls = [&](double rounding) {
     constexpr int count = 16;
     for (int i = 1; i < count; ++i)
@@ -434,8 +438,9 @@ PublishedDensity::PublishedDensity(const WheelMap& map, int phase)
   };
   for (const double eta : {0.005, 0.007, 0.01, 0.014, 0.02, 0.03, 0.04, 0.06, 0.1, 0.2, 0.5}) {
     rounding_ = eta;
-    if (sticking == 0 || falls(eta)) break;
+    if (falls(eta)) return;
   }
+  slowest_ = std::numeric_limits<double>::infinity();
 }
 
 double PublishedDensity::operator()(double state, std::span<const double> next, std::span<double> density) const {

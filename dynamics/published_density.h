@@ -24,11 +24,14 @@ class PublishedDensity {
   PublishedDensity(const WheelMap& map, int phase);
 
   /// density[k] [1/(rad^2/s^2)] at next[k], for the collision at `phase` with x = state [rad^2/s^2], > 0.
+  /// Below slowest() g may rise with eta, and a curve have a fold.
   /// @return the probability of rest, from the distribution functions with relative accuracy in their tails
   /// @throws std::invalid_argument for spans of different sizes
   double operator()(double state, std::span<const double> next, std::span<double> density) const;
 
   double rounding() const { return rounding_; }
+  /// The least state this form holds for: no survivor is slower, but a launch may be. Infinite if it holds for none.
+  double slowest() const { return slowest_; }
 
   /// Whether `map` has this form of the density.
   static bool covers(const WheelMap& map);
@@ -39,7 +42,7 @@ class PublishedDensity {
   double energy_, kappa_;                    // at 1 rad/s
   double a0_, a1_, t0_, t1_;                 // A = a0 - a1 mu, B = t1 mu - t0
   double lower_ = 0;                         // of eta
-  double rounding_ = 0;
+  double rounding_ = 0, slowest_ = 0;
   std::vector<double> grid_, duration_;          // eta about one sd apart, s there
   std::vector<double> tail_, tail_restitution_;  // -ln eta where eta may be close to 0, eta there
 };

@@ -141,7 +141,10 @@ std::optional<double> WheelMap::rest_probability(double state, int phase) const 
 
 double WheelMap::landing_density(double state, int phase, std::span<const double> next,
                                  std::span<double> density) const {
-  if (!density_->empty()) return (*density_)[static_cast<std::size_t>(phase)](state, next, density);
+  if (!density_->empty()) {
+    const PublishedDensity& fast = (*density_)[static_cast<std::size_t>(phase)];
+    if (state >= fast.slowest()) return fast(state, next, density);
+  }
   const LandingDensity at(*this, state, phase);
   std::transform(next.begin(), next.end(), density.begin(), at);
   return dynamics::rest_probability(*this, state, phase);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 
 #include "markov/parallel.h"
 #include "markov/quasi_stationary.h"
@@ -39,6 +40,9 @@ Row make_row(const AnyReturnMap& map, const NodeSpace& space, double state, int 
   row.rest = *rest;
   double sum = 0;
   for (std::size_t j = 0; j < row.landing.size(); ++j) sum += row.landing[j] *= weights[j];
+  if (!std::isfinite(sum))
+    throw ConvergenceError("integrated rows", sum,
+                           "a density of the landing from state " + std::to_string(state) + " is not finite");
   const double survivors = 1 - row.rest;
   row.error = std::abs(sum - survivors);
   if (survivors > least_scaled && sum > 0.1 * survivors)

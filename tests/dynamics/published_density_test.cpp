@@ -92,6 +92,24 @@ TEST(PublishedDensity, SumsToTheSurvivors) {
   EXPECT_NEAR(sum, 1, 2e-8);
 }
 
+// --slope 8.4 --friction 0.3,0.14: launches slower than any survivor, where the curve may have a fold.
+TEST(PublishedDensity, LeavesLaunchesSlowerThanAnySurvivorToTheAdaptiveIntegral) {
+  const WheelMap map = wheel_map(ContactNoise::normal(0.4, 0.1, 0.3, 0.14), 8.4);
+  const double lowest = map.state_interval(0).first, slowest = PublishedDensity(map, 0).slowest();
+  EXPECT_EQ(slowest, lowest);
+  std::vector<double> next, density(40);
+  for (int k = 0; k < 40; ++k) next.push_back(lowest + 0.4 * k);
+  for (const double state : {9.0, 11.9025, 12.96, 14.0625, 18.0}) {
+    ASSERT_LT(state, slowest);
+    EXPECT_EQ(map.landing_density(state, 0, next, density), rest_probability(map, state, 0));
+    const LandingDensity exact(map, state, 0);
+    for (std::size_t k = 0; k < next.size(); ++k) {
+      EXPECT_TRUE(std::isfinite(density[k])) << state << ' ' << next[k];
+      EXPECT_EQ(density[k], exact(next[k])) << state << ' ' << next[k];
+    }
+  }
+}
+
 TEST(PublishedDensity, CoversOnlyIndependentSpreads) {
   EXPECT_TRUE(PublishedDensity::covers(wheel_map(ContactNoise::normal(0.4, 0.1, 0.4, 0.1))));
   EXPECT_FALSE(PublishedDensity::covers(wheel_map(ContactNoise::normal(0.4, 0.1, 0.4, 0))));
