@@ -180,6 +180,21 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
       if (ranking.scan.effects[e].candidate == candidate) cause.p_value = chance.p_value(e, cause.gain);
     cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
   });
+  // Scores promise too much now and then: whoever would come near the fitted ones is fitted after all.
+  double fitted = 0;
+  for (const RankedCause& cause : ranking.singles)
+    if (!cause.fit.nuisance.empty()) fitted = std::max(fitted, cause.evidence);
+  markov::parallel_for(ranking.singles.size(), options.threads, [&](std::size_t i) {
+    RankedCause& cause = ranking.singles[i];
+    if (cause.candidate_undecided() || !cause.fit.nuisance.empty() || cause.evidence < std::max(0.0, fitted - 12))
+      return;
+    const ScannedEffect& scanned = *scanned_of(ranking.scan, candidates[i]);
+    cause = fit_cause(model, recalibrated, scanned);
+    cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
+    for (std::size_t e = 0; e < ranking.scan.effects.size(); ++e)
+      if (ranking.scan.effects[e].candidate == candidates[i]) cause.p_value = chance.p_value(e, cause.gain);
+    cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
+  });
   progress(0.5);
   double least = 1, top = 0;
   std::vector<std::size_t> strongest;

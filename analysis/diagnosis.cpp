@@ -367,7 +367,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const RankedCause* best = ordered.empty() ? nullptr : ordered.front();
   const Fit* chosen = &recalibrated;
   double none = 0;
-  if (gap && best && best->evidence > 0) {
+  if (gap && best && best->evidence > 0 && !best->fit.nuisance.empty()) {
     progress(0.68, "what is left");
     chosen = &best->fit;
     d.left = gap_map(model, *chosen, options.draws, options.seed + 1);

@@ -273,9 +273,9 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_trial.col(c).squaredNorm(), 0.1 * whole_norm[c],
                                    kept * without_gap[static_cast<std::size_t>(c)], 1e-24}));
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
-    cell.statistic = sum / scale[c];
+    cell.statistic = std::isfinite(sum) ? sum / scale[c] : 0;  // a fit far off may have no slopes to project on
     // Efficient size: the score by its information, so that size and statistic have one sign.
-    const double information = std::max(0.1, kept) * without_gap[static_cast<std::size_t>(c)];
+    const double information = std::max(1e-12, std::max(0.1, kept) * without_gap[static_cast<std::size_t>(c)]);
     if (cell.aspect == "mean" && cell.facet != "outcome")
       cell.size = sum / information * cell.size;
     else if (cell.aspect == "spread" && cell.unit == "of the model's")
@@ -285,8 +285,11 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   const Eigen::RowVectorXd mean = by_trial.colwise().mean();
   Eigen::MatrixXd centred = by_trial.rowwise() - mean;
   for (Eigen::Index c = 0; c < columns; ++c) {
-    const double norm = std::sqrt(centred.col(c).squaredNorm());
-    centred.col(c) /= norm > 0 ? norm : 1;
+    const double norm = centred.col(c).norm();
+    if (norm > 0 && std::isfinite(norm))
+      centred.col(c) /= norm;
+    else
+      centred.col(c).setZero();
   }
 
   // Step-down max-T (Westfall and Young): the largest statistic against the largest by chance, the next against the

@@ -542,8 +542,11 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
       }
     }
   }
-  for (std::size_t i = 0; i < events_.size(); ++i)
+  for (std::size_t i = 0; i < events_.size(); ++i) {
     if (events_[i].kind == EventKind::survival) result.score[i] = 0;
+    if (!std::isfinite(result.log_density[i])) result.log_density[i] = least_log_density;
+    if (!std::isfinite(result.score[i])) result.score[i] = -8;
+  }
   return result;
 }
 

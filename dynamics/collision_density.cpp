@@ -168,6 +168,7 @@ SpeedDensity CollisionDensity::coulomb(const Collision& c, double before, double
   // The loss at given mu: mass (1 - (1 - lost) eta^2) + rubbing (1 + eta)^2, in J per v0^2/2.
   const auto add = [&](double weight, double mass, double rubbing) {
     const double curvature = mass * (1 - change.rebound_lost) - rubbing;
+    if (!(curvature > 1e-9 * mass)) return;  // rubbing takes more than any restitution gives back
     const double discriminant = rubbing * rubbing + curvature * (mass + rubbing - loss);
     if (!(discriminant > 0)) return;  // every restitution loses less
     const double root = std::sqrt(discriminant);
