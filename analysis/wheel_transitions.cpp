@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "analysis/score_tilt.h"
+#include "analysis/speed_filter.h"
 #include "analysis/wheel_candidates.h"
 #include "dynamics/extended_wheel.h"
 #include "dynamics/truncated_normal.h"
@@ -24,29 +25,17 @@ using dynamics::ContactSpread;
 using dynamics::ExtendedWheel;
 using dynamics::Extension;
 using dynamics::normal_cdf;
-using dynamics::normal_density;
 using dynamics::StepContext;
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr double log_sqrt_two_pi = 0.91893853320467274178;
-constexpr double least_log_density = -60;
-// Noise that a collision's density is blurred by [rad/s]; less than this is half a per cent of its variance.
-constexpr double least_blur = 0.012;
-
 struct Node {  // of Gauss-Hermite's rules for the standard normal
   double score, weight;
 };
-constexpr std::array<Node, 3> three_nodes{
-    {{-1.7320508075688772, 1.0 / 6}, {0, 2.0 / 3}, {1.7320508075688772, 1.0 / 6}}};
 constexpr std::array<Node, 5> five_nodes{{{-2.856970013872806, 0.01125741132772069},
                                           {-1.355626179974266, 0.2220759220056126},
                                           {0, 0.5333333333333333},
                                           {1.355626179974266, 0.2220759220056126},
                                           {2.856970013872806, 0.01125741132772069}}};
-
-double score_of(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
-
-double log_normal(double z) { return -0.5 * z * z - log_sqrt_two_pi; }
 
 struct Measured {
   StepContext context;
@@ -93,7 +82,6 @@ class WheelTransitions : public TransitionModel {
   std::vector<Named> report_nuisances(std::span<const double> nuisance) const override;
 
  private:
-  class Filter;
   Extension extension(std::span<const Term> terms) const;
   std::vector<ExtendedWheel> wheels(std::span<const double> nuisance, const Extension& extension) const;
   void find_legs(bool column);
@@ -346,130 +334,6 @@ std::vector<ExtendedWheel> WheelTransitions::wheels(std::span<const double> nuis
   return all;
 }
 
-// The speed of one trial followed through its measurements: N(mean, variance) just before each collision.
-class WheelTransitions::Filter {
- public:
-  Filter(const Extension& extension, const ScoreTilt& tilt, double noise)
-      : extension_(extension),
-        tilt_(tilt),
-        noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
-        blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
-
-  struct Out {
-    double log_density = 0, score = 0, unit = 1;
-  };
-
-  Out launch(const Condition& condition, double reported) {
-    const double mean = condition.initial_speed->mean + extension_.launch_shift;
-    const double sd = std::max(0.01, condition.initial_speed->sd + extension_.launch_widening);
-    const double seen = reported - extension_.bias_before, total = std::sqrt(sd * sd + noise2_);
-    const double z = (seen - mean) / total, gain = sd * sd / (total * total);
-    mean_ = mean + gain * (seen - mean);
-    variance_ = gain * noise2_;
-    return {log_normal(z) - std::log(total), z, total};
-  }
-  void start(double reported) {
-    mean_ = reported - extension_.bias_before;
-    variance_ = noise2_;
-  }
-  // omega+ is seen: the collision.
-  Out collision(const ExtendedWheel& wheel, const StepContext& context, double reported) {
-    const double seen = std::max(1e-3, reported - extension_.bias_after);
-    const Out out = transition(wheel, context, seen, 1, std::sqrt(noise2_ + square(seen / mean_) * variance_));
-    update(out, seen);
-    return out;
-  }
-  // Then the next omega-: the stance.
-  Out stance(const ExtendedWheel& wheel, const StepContext& context, double reported) {
-    const double seen = reported - extension_.bias_before;
-    const auto next = wheel.next(context, mean_);
-    if (!next) {
-      start(reported);
-      return {least_log_density, -8, 0.1};
-    }
-    const double slope = mean_ / *next, predicted = slope * slope * variance_;
-    const double total = std::sqrt(predicted + noise2_), z = (seen - *next) / total;
-    const double gain = predicted / (predicted + noise2_);
-    mean_ = *next + gain * (seen - *next);
-    variance_ = (1 - gain) * predicted;
-    return {log_normal(z) - std::log(total), z, total};
-  }
-  // Only the next omega- is seen.
-  Out step(const ExtendedWheel& wheel, const StepContext& context, double reported) {
-    const double seen = std::max(1e-3, reported - extension_.bias_before);
-    const auto plus = wheel.back(context, seen);
-    if (!plus) {
-      start(reported);
-      return {least_log_density, -8, 0.1};
-    }
-    // d omega+ / d next omega-: without torques seen / plus, which they change.
-    const double step = 1e-4 * seen;
-    const auto faster = wheel.back(context, seen + step), slower = wheel.back(context, seen - step);
-    const double rate = faster && slower ? (*faster - *slower) / (2 * step) : seen / *plus;
-    const Out out =
-        transition(wheel, context, *plus, rate, std::sqrt(noise2_ * rate * rate + square(*plus / mean_) * variance_));
-    update(out, seen);
-    return out;
-  }
-  Out rest(const ExtendedWheel& wheel, const StepContext& context, bool rested) {
-    double below = tilt_.below(wheel.after_collision(context, mean_, wheel.barrier(context)).below);
-    const double given = conditional(below);
-    Out out;
-    out.log_density = std::max(least_log_density, rested ? std::log(given) : std::log1p(-given));
-    if (rested) out.score = score_of(given / 2);
-    out.unit = 0.3;
-    return out;
-  }
-
- private:
-  static double square(double v) { return v * v; }
-  // P of less than a score given the previous collision's.
-  double conditional(double below) const {
-    if (extension_.memory == 0 || !previous_) return std::clamp(below, 1e-300, 1.0);
-    const double rho = extension_.memory;
-    return std::max(1e-300, normal_cdf((score_of(below) - rho * *previous_) / std::sqrt(1 - rho * rho)));
-  }
-  Out transition(const ExtendedWheel& wheel, const StepContext& context, double plus, double rate, double blur) {
-    double density = 0, below = 0;
-    const auto add = [&](double at, double weight) {
-      if (at <= 0) return;
-      const dynamics::SpeedDensity d = wheel.after_collision(context, mean_, at);
-      density += weight * d.density * std::exp(tilt_.log_density(d.below));
-      below += weight * tilt_.below(d.below);
-    };
-    if (!blurred_) {
-      add(plus, 1);
-    } else {
-      for (const Node& node : three_nodes) add(plus + node.score * blur, node.weight);
-    }
-    Out out;
-    out.log_density = density > 0 ? std::max(least_log_density, std::log(density * rate)) : least_log_density;
-    const double z = score_of(below);
-    out.score = z;
-    out.unit = density > 0 ? std::clamp(normal_density(z) / (density * rate), 1e-4, 2.0) : 0.3;
-    if (const double rho = extension_.memory; rho != 0 && previous_) {
-      const double left = std::sqrt(1 - rho * rho);
-      out.score = (z - rho * *previous_) / left;
-      out.log_density += log_normal(out.score) - log_normal(z) - std::log(left);
-    }
-    previous_ = z;
-    return out;
-  }
-  // The prior that the transition gives, taken as normal around what was seen.
-  void update(const Out& out, double seen) {
-    const double prior = out.unit * out.unit, gain = noise2_ / (noise2_ + prior);
-    mean_ = std::max(1e-2, seen - gain * std::clamp(out.score, -4.0, 4.0) * out.unit);
-    variance_ = gain * prior;
-  }
-
-  const Extension& extension_;
-  const ScoreTilt& tilt_;
-  double noise2_;
-  bool blurred_;
-  double mean_ = 0, variance_ = 0;
-  std::optional<double> previous_;
-};
-
 Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::span<const Term> terms) const {
   const Extension e = extension(terms);
   const std::vector<ExtendedWheel> wheel = wheels(nuisance, e);
@@ -482,19 +346,19 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
   const bool spread = e.trial_friction_sd > 0;
   const std::size_t nodes = spread ? five_nodes.size() : 1;
   for (const MeasuredRun& run : runs_) {
-    std::vector<Filter> filters(nodes, Filter(e, tilt, noise_));
+    std::vector<SpeedFilter> filters(nodes, SpeedFilter(e, tilt, noise_));
     std::array<double, five_nodes.size()> log_weight{};
     for (std::size_t q = 0; q < nodes && spread; ++q) log_weight[q] = std::log(five_nodes[q].weight);
     const ExtendedWheel& at = wheel[run.condition];
     const auto add = [&](auto observe) {
       if (!spread) {
-        const Filter::Out out = observe(filters[0], 0.0);
+        const SpeedFilter::Out out = observe(filters[0], 0.0);
         result.log_density.push_back(out.log_density);
         result.score.push_back(out.score);
         result.unit.push_back(out.unit);
         return;
       }
-      std::array<Filter::Out, five_nodes.size()> out;
+      std::array<SpeedFilter::Out, five_nodes.size()> out;
       double largest = -std::numeric_limits<double>::infinity(), before = 0, now = 0, below = 0, unit = 0;
       for (std::size_t q = 0; q < nodes; ++q) {
         out[q] = observe(filters[q], five_nodes[q].score * e.trial_friction_sd);
@@ -509,7 +373,7 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
         log_weight[q] += out[q].log_density;
       }
       result.log_density.push_back(now > 0 ? std::max(least_log_density, std::log(now / before)) : least_log_density);
-      result.score.push_back(score_of(below / before));
+      result.score.push_back(score_of_probability(below / before));
       result.unit.push_back(unit / before);
     };
     for (std::size_t k = 0; k < run.collisions.size(); ++k) {
@@ -521,24 +385,24 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
       };
       if (k == 0) {
         if (conditions_[run.condition].initial_speed)
-          add([&](Filter& f, double) { return f.launch(conditions_[run.condition], m.before); });
+          add([&](SpeedFilter& f, double) { return f.launch(conditions_[run.condition], m.before); });
         else
-          for (Filter& f : filters) f.start(m.before);
+          for (SpeedFilter& f : filters) f.start(m.before);
       }
       const bool last = k + 1 == run.collisions.size();
       const bool after = m.after && *m.after > 0;
-      if (after) add([&](Filter& f, double shift) { return f.collision(at, context(shift), *m.after); });
+      if (after) add([&](SpeedFilter& f, double shift) { return f.collision(at, context(shift), *m.after); });
       if (!last) {
         const double next = run.collisions[k + 1].before;
         if (after && exact_stances_)
-          for (Filter& f : filters) f.start(next);
+          for (SpeedFilter& f : filters) f.start(next);
         else if (after)
-          add([&](Filter& f, double shift) { return f.stance(at, context(shift), next); });
+          add([&](SpeedFilter& f, double shift) { return f.stance(at, context(shift), next); });
         else
-          add([&](Filter& f, double shift) { return f.step(at, context(shift), next); });
+          add([&](SpeedFilter& f, double shift) { return f.step(at, context(shift), next); });
       } else if (!after && run.outcome) {
         const bool rested = *run.outcome == dynamics::Outcome::rest;
-        add([&](Filter& f, double shift) { return f.rest(at, context(shift), rested); });
+        add([&](SpeedFilter& f, double shift) { return f.rest(at, context(shift), rested); });
       }
     }
   }

@@ -1,0 +1,58 @@
+#pragma once
+// The speed of one trial, followed through its noisy measurements.
+
+#include <optional>
+
+#include "analysis/experiment.h"
+#include "analysis/score_tilt.h"
+#include "dynamics/extended_wheel.h"
+
+namespace metastable::analysis {
+
+/// Log density below which no event falls: values outside a model's reach stay finite.
+inline constexpr double least_log_density = -60;
+
+/// Normal score of a probability, held inside +-8.
+double score_of_probability(double below);
+
+/// The wheel's speed given all measurements so far: N(mean, variance) just before each collision, just after it where
+/// that is measured. Gaussian: exact while the sensor noise is small beside the spread of a collision. One object a
+/// trial.
+class SpeedFilter {
+ public:
+  /// What one measurement says: its log density, its normal score, and the speed that a unit of score is [rad/s].
+  struct Out {
+    double log_density = 0, score = 0, unit = 1;
+  };
+
+  /// @param noise  stated sd of reported speeds [rad/s]; both references must outlive the filter
+  SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise);
+
+  /// The first speed, against the stated launch.
+  Out launch(const Condition& condition, double reported);
+  /// The first speed (or one after a gap), with nothing to hold it against.
+  void start(double reported);
+  /// omega+ is seen: the collision.
+  Out collision(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
+  /// Then the next omega-: the stance.
+  Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
+  /// Only the next omega- is seen: collision and stance together.
+  Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
+  /// Coming to rest after the last measured speed, or not.
+  Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, bool rested);
+
+ private:
+  double conditional(double below) const;
+  Out transition(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus, double rate,
+                 double blur);
+  void update(const Out& out, double seen);
+
+  const dynamics::Extension& extension_;
+  const ScoreTilt& tilt_;
+  double noise2_;  // variance of a reported speed
+  bool blurred_;
+  double mean_ = 0, variance_ = 0;
+  std::optional<double> previous_;  // collision's score
+};
+
+}  // namespace metastable::analysis
