@@ -148,14 +148,16 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
       return;
     }
     if (candidate->parameters.empty()) {  // another law: nothing to scan
-      cause.fit =
-          fit(model, recalibrated.nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = 12});
+      // Contact parameters that suit one law mislead under the other: the nominal ones are a start, too.
+      const auto from = [&](const std::vector<double>& nuisance, int iterations) {
+        return fit(model, nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = iterations});
+      };
+      cause.fit = from(nominal_values(model), 12);
+      Fit other = from(recalibrated.nuisance, 12);
+      if (other.penalised > cause.fit.penalised) cause.fit = std::move(other);
+      if (!cause.fit.converged && cause.fit.penalised - recalibrated.penalised > -100)
+        cause.fit = from(cause.fit.nuisance, 60);
       cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
-      if (!cause.fit.converged && cause.gain > -200) {
-        cause.fit =
-            fit(model, cause.fit.nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = 60});
-        cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
-      }
       // Far below and hardly rising any more: decided against.
       if (!cause.fit.converged && cause.gain > -30) cause.not_decided = cause.fit.reason;
       cause.p_value = 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, cause.gain)));

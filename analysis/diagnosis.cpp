@@ -27,12 +27,6 @@ constexpr double left_over_square = 18;   // of a cell's statistic, beyond the m
 constexpr double least_left_over = 0.05;  // held-out gap that counts as one [nats a collision]
 constexpr double least_p_value = 1e-12;   // smaller ones are beyond what chance levels can say
 
-std::vector<double> nominal_values(const TransitionModel& model) {
-  std::vector<double> values;
-  for (const Nuisance& n : model.nuisances()) values.push_back(n.nominal);
-  return values;
-}
-
 // P of as large a quadratic form of the nuisances' scores by chance: the prior shrinks each direction of the
 // information.
 double recalibration_p_value(const TransitionModel& model, const Fit& as_given, double gain) {
@@ -381,11 +375,11 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     if (gap) none = 1e6;  // cells of the map stand out, and no effect does
   }
   progress(0.7, "how far it shrinks");
-  std::vector<std::vector<Term>> rivals;
+  std::vector<const Fit*> rivals;
   if (chosen != &recalibrated)
     for (const RankedCause* cause : ordered) {
       if (rivals.size() == 3 || cause->evidence < best->evidence - 4) break;
-      rivals.push_back(cause->terms);
+      if (!cause->fit.nuisance.empty()) rivals.push_back(&cause->fit);
     }
   d.shrinkage = gap_shrinkage(model, recalibrated, rivals, options.folds, options.threads, options.seed);
   // Even a cause that closes nearly all of a huge gap may leave a large one.

@@ -95,11 +95,10 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
 }  // namespace
 
 std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& recalibrated,
-                                     const std::vector<std::vector<Term>>& rivals, int folds, int threads,
+                                     const std::vector<const Fit*>& rivals, int folds, int threads,
                                      std::uint64_t seed) {
   const std::size_t trials = model.trials();
-  std::vector<double> nominal;
-  for (const Nuisance& n : model.nuisances()) nominal.push_back(n.nominal);
+  const std::vector<double> nominal = nominal_values(model);
   const Evaluation as_given = model.evaluate(nominal, {});
   const Eigen::MatrixXd cells = mean_columns(model);
   std::vector<HeldOut> held(trials);
@@ -119,11 +118,10 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& re
     const Fit plain = fit(model, recalibrated.nuisance, {}, options);
     Fit chosen = plain;
     double best = -1e300;
-    for (const auto& terms : rivals) {
-      if (terms.empty()) continue;
-      Fit tried = fit(model, recalibrated.nuisance, terms, options);
+    for (const Fit* rival : rivals) {
+      Fit tried = fit(model, rival->nuisance, rival->terms, options);
       std::size_t parameters = 0;
-      for (const Term& term : terms) parameters += term.values.size();
+      for (const Term& term : rival->terms) parameters += term.values.size();
       const double score = tried.penalised - 1.5 * static_cast<double>(parameters);
       if (score > best) {
         best = score;

@@ -15,7 +15,6 @@ namespace metastable::analysis {
 /// the gap map, cross-fitted), and CRPS of the next speed. The floor is the same measure on data of the chosen model
 /// itself.
 std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& recalibrated,
-                                     const std::vector<std::vector<Term>>& rivals, int folds, int threads,
-                                     std::uint64_t seed);
+                                     const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed);
 
 }  // namespace metastable::analysis

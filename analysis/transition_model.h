@@ -116,4 +116,11 @@ class TransitionModel {
   virtual std::vector<Named> report_nuisances(std::span<const double> nuisance) const = 0;
 };
 
+/// The nuisances as the experiment states them.
+inline std::vector<double> nominal_values(const TransitionModel& model) {
+  std::vector<double> values;
+  for (const Nuisance& n : model.nuisances()) values.push_back(n.nominal);
+  return values;
+}
+
 }  // namespace metastable::analysis
