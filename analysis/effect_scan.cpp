@@ -11,7 +11,8 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double largest_step = 0.1;  // of a difference, in standard errors
+constexpr double largest_step = 0.1;                               // of a difference, in standard errors
+constexpr std::size_t enough_trials = 40, enough_transitions = 4;  // of a trial, on average; false alarms soar below
 
 // Gain of the score `u` with information `info`; one parameter at its lower bound gains only upwards.
 double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,
@@ -97,6 +98,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
   for (Eigen::Index k = 0; k < events; ++k)
     scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
+  scan.trials_suffice = model.trials() >= enough_trials && model.events().size() >= enough_transitions * model.trials();
   // At the fit the nuisances' scores and their prior's balance: the plain sum of the slopes is efficient already.
   const Eigen::VectorXd total = all.slope.colwise().sum();
 
@@ -115,24 +117,28 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
 }
 
 ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) {
-  const auto trials = scan.by_trial.rows();
   // Around their mean, so that a gap does not count as chance.
   const Eigen::RowVectorXd mean = scan.by_trial.colwise().mean();
-  const Eigen::MatrixXd centred = scan.by_trial.rowwise() - mean;
+  Eigen::MatrixXd rows = scan.by_trial.rowwise() - mean;
+  if (!scan.trials_suffice) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> split(scan.information);
+    rows = split.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * split.eigenvectors().transpose();
+  }
+  const auto count_of_rows = rows.rows();
   sorted_.resize(scan.effects.size());
   for (const ScannedEffect& effect : scan.effects)
     degrees_.push_back(static_cast<double>(effect.candidate->parameters.size()));
   std::vector<std::vector<double>> gains(scan.effects.size());
-  Eigen::VectorXd multiplier(trials);
+  Eigen::VectorXd multiplier(count_of_rows);
   for (int draw = 0; draw < draws; ++draw) {
-    for (Eigen::Index t = 0; t < trials; t += 4) {
+    for (Eigen::Index t = 0; t < count_of_rows; t += 4) {
       const r123::Philox4x64::ctr_type counter{{static_cast<std::uint64_t>(draw), static_cast<std::uint64_t>(t), 1, 0}};
       const auto bits = r123::Philox4x64()(counter, {{seed, 0x6d756c74}});
-      for (Eigen::Index i = 0; i < 4 && t + i < trials; ++i)
+      for (Eigen::Index i = 0; i < 4 && t + i < count_of_rows; ++i)
         multiplier[t + i] =
             dynamics::normal_quantile((static_cast<double>(bits[static_cast<std::size_t>(i)] >> 12) + 0.5) * 0x1p-52);
     }
-    const Eigen::VectorXd score = centred.transpose() * multiplier;
+    const Eigen::VectorXd score = rows.transpose() * multiplier;
     for (std::size_t e = 0; e < scan.effects.size(); ++e) {
       const ScannedEffect& effect = scan.effects[e];
       const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());

@@ -23,6 +23,7 @@ struct EffectScan {
   std::vector<ScannedEffect> effects;
   Eigen::MatrixXd by_trial;     ///< [trials x columns] efficient scores, summed over a trial's events
   Eigen::MatrixXd information;  ///< [columns x columns] efficient
+  bool trials_suffice = true;   ///< to draw chance from them
 };
 
 /// @param fit  of nuisances, and possibly terms, whose derivatives are projected out
@@ -31,7 +32,8 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
                         int threads);
 
 /// How large the scan's gains get by chance alone, by signs and sizes of whole trials' scores drawn anew (multiplier
-/// bootstrap), and what that says of gains found.
+/// bootstrap), and what that says of gains found. Few trials, or trials of few transitions, have too few scores for
+/// that: chance has the covariance of the information then.
 class ChanceGains {
  public:
   ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed);

@@ -16,6 +16,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double tail_score = 2.2;
+constexpr std::size_t enough_trials = 40;
 
 // Members of one cell: the events that it holds.
 struct Cell {
@@ -246,31 +247,47 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     add(cell, "mean", "share of trials", excess / static_cast<double>(cell.events.size()), std::move(column), variance);
   }
 
-  // Efficient: what the fitted parameters' scores explain is taken off, event by event.
+  // Efficient: what the fitted parameters' scores explain is taken off, event by event. Nuisances move no further than
+  // their prior lets them.
   const auto columns = static_cast<Eigen::Index>(raw.size());
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(count, columns);
   for (Eigen::Index c = 0; c < columns; ++c)
     for (const auto& [i, value] : raw[static_cast<std::size_t>(c)]) dense(static_cast<Eigen::Index>(i), c) = value;
   const Eigen::RowVectorXd whole_norm = dense.colwise().squaredNorm();
+  Eigen::RowVectorXd sums = dense.colwise().sum();
   if (fit.derivatives.slope.cols() > 0) {
     const Eigen::MatrixXd& held = fit.derivatives.slope;
     Eigen::MatrixXd gram = held.transpose() * held;
+    Eigen::VectorXd left = held.colwise().sum();  // of the gradient at the fit: next to nothing, with the prior's pull
+    for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
+      const Nuisance& n = model.nuisances()[p];
+      const auto at = static_cast<Eigen::Index>(p);
+      gram(at, at) += 1 / (n.prior_sd * n.prior_sd);
+      left[at] -= (fit.nuisance[p] - n.nominal) / (n.prior_sd * n.prior_sd);
+      if (fit.nuisance[p] <= n.lower || fit.nuisance[p] >= n.upper) left[at] = 0;
+    }
     gram.diagonal() *= 1 + 1e-9;
     gram.diagonal().array() += 1e-12;
-    dense -= held * gram.ldlt().solve(held.transpose() * dense);
+    const Eigen::MatrixXd weights = gram.ldlt().solve(held.transpose() * dense);
+    dense -= held * weights;
+    sums -= left.transpose() * weights;
   }
-  Eigen::MatrixXd by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
+  // Trials are drawn anew as wholes; where they are few, transitions are.
+  const bool whole_trials = model.trials() >= enough_trials;
+  Eigen::MatrixXd by_unit =
+      Eigen::MatrixXd::Zero(whole_trials ? static_cast<Eigen::Index>(model.trials()) : count, columns);
   for (Eigen::Index i = 0; i < count; ++i)
-    by_trial.row(static_cast<Eigen::Index>(events[static_cast<std::size_t>(i)].trial)) += dense.row(i);
+    by_unit.row(whole_trials ? static_cast<Eigen::Index>(events[static_cast<std::size_t>(i)].trial) : i) +=
+        dense.row(i);
   Eigen::RowVectorXd scale(columns);
   for (Eigen::Index c = 0; c < columns; ++c) {
     // Event-wise variance: independent without a gap, and many more of them than trials.
-    const double sum = by_trial.col(c).sum();
+    const double sum = sums[c];
     // The model's own variance, less the share that the fitted parameters take off: where nothing rare happened (no
     // rest, no far score) the events themselves show almost none.
     // Where nearly all of the column is explained there is nothing left to say: a tenth is kept as the least share.
     const double kept = whole_norm[c] > 0 ? dense.col(c).squaredNorm() / whole_norm[c] : 1;
-    scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_trial.col(c).squaredNorm(), 0.1 * whole_norm[c],
+    scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_unit.col(c).squaredNorm(), 0.1 * whole_norm[c],
                                    kept * without_gap[static_cast<std::size_t>(c)], 1e-24}));
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
     cell.statistic = std::isfinite(sum) ? sum / scale[c] : 0;  // a fit far off may have no slopes to project on
@@ -282,8 +299,8 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
       cell.size = sum / information / std::numbers::sqrt2;
     cell.p_value = std::min(1.0, 2 * dynamics::normal_cdf(-std::abs(cell.statistic)));
   }
-  const Eigen::RowVectorXd mean = by_trial.colwise().mean();
-  Eigen::MatrixXd centred = by_trial.rowwise() - mean;
+  const Eigen::RowVectorXd mean = by_unit.colwise().mean();
+  Eigen::MatrixXd centred = by_unit.rowwise() - mean;
   for (Eigen::Index c = 0; c < columns; ++c) {
     const double norm = centred.col(c).norm();
     if (norm > 0 && std::isfinite(norm))
@@ -301,7 +318,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   });
   std::vector<int> exceeded(order.size());
   std::vector<double> largest_by_chance;
-  Eigen::VectorXd multiplier(by_trial.rows());
+  Eigen::VectorXd multiplier(by_unit.rows());
   for (int draw = 0; draw < draws; ++draw) {
     for (Eigen::Index t = 0; t < multiplier.size(); t += 4) {
       const r123::Philox4x64::ctr_type counter{{static_cast<std::uint64_t>(draw), static_cast<std::uint64_t>(t), 2, 0}};
