@@ -47,7 +47,8 @@ class Point {
   std::vector<Slot> slots_;
 };
 
-Derivatives differences(Point& point, const Evaluation& here) {
+// `steps`: what was gone in each parameter.
+Derivatives differences(Point& point, const Evaluation& here, std::vector<double>& steps) {
   const auto events = static_cast<Eigen::Index>(here.score.size());
   auto& slots = point.slots();
   Derivatives d{Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())),
@@ -56,6 +57,7 @@ Derivatives differences(Point& point, const Evaluation& here) {
     const double value = *slots[p].value;
     const double step = value + slots[p].step <= slots[p].upper ? slots[p].step : -slots[p].step;
     *slots[p].value = value + step;
+    steps[p] = step;
     const Evaluation moved = point.evaluate();
     *slots[p].value = value;
     for (Eigen::Index i = 0; i < events; ++i) {
@@ -134,7 +136,8 @@ Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, 
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
                         const std::vector<Term>& terms, const Evaluation& here, bool with_nuisances) {
   Point point(model, nuisance, terms, with_nuisances);
-  return differences(point, here);
+  std::vector<double> steps(point.slots().size());
+  return differences(point, here, steps);
 }
 
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
@@ -143,19 +146,23 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   auto& slots = point.slots();
   const auto size = static_cast<Eigen::Index>(slots.size());
   const Eigen::VectorXd weights = event_weights(model, options.count);
+  std::vector<double> steps(slots.size());
   Fit result;
   result.evaluation = point.evaluate();
   double best = counted(result.evaluation, weights) + point.log_prior();
   const double start = best;
   result.converged = slots.empty();
   for (int iteration = 0; iteration < options.most_iterations && !slots.empty(); ++iteration) {
-    result.derivatives = differences(point, result.evaluation);
+    result.derivatives = differences(point, result.evaluation, steps);
     result.information = information(result.derivatives, result.evaluation, weights);
     for (Eigen::Index p = 0; p < size; ++p) {  // differences over a small share of what the data resolve
       Point::Slot& s = slots[static_cast<std::size_t>(p)];
       if (result.information(p, p) > 0) s.step = std::min(s.largest_step, 0.05 / std::sqrt(result.information(p, p)));
     }
     Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
+    // A forward difference is the slope half a step on: taken back by the curvature, which matters along ridges.
+    for (Eigen::Index p = 0; p < size; ++p)
+      gradient[p] += 0.5 * steps[static_cast<std::size_t>(p)] * result.information(p, p);
     for (Eigen::Index p = 0; p < size; ++p) {
       const Point::Slot& s = slots[static_cast<std::size_t>(p)];
       if (s.prior_sd > 0) {

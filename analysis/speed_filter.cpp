@@ -87,8 +87,12 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
   const double step = 1e-4 * seen;
   const auto faster = wheel.back(context, seen + step), slower = wheel.back(context, seen - step);
   const double rate = faster && slower ? (*faster - *slower) / (2 * step) : seen / *plus;
-  const Out out =
+  Out out =
       transition(wheel, context, *plus, rate, std::sqrt(noise2_ * rate * rate + square(*plus / mean_) * variance_));
+  // It did go on: omega+ was beyond the barrier, of which the noise of the reported speed tells only so much.
+  const double beyond = (*plus - wheel.barrier(context)) / std::max(1e-3, std::sqrt(noise2_) * rate);
+  if (beyond < 8)
+    out.log_density = std::max(least_log_density, out.log_density + std::log(std::max(1e-300, normal_cdf(beyond))));
   update(out, seen);
   return out;
 }

@@ -292,12 +292,12 @@ void WheelTransitions::set_up_parameters(const Experiment& experiment) {
   const NominalContact& c = experiment.contact;
   // Spreads are fitted by their logarithms.
   nuisances_ = {
-      {"restitution_mean", c.restitution.mean, 0.12, 1e-4, 0.02, 0.98},
-      {"log restitution_sd", std::log(std::max(0.01, c.restitution.sd)), 0.6, 1e-3, std::log(0.005), std::log(0.4)},
-      {"friction_mean", c.friction.mean, 0.12, 1e-4, 0.02, 1.5},
-      {"log friction_sd", std::log(std::max(0.01, c.friction.sd)), 0.6, 1e-3, std::log(0.005), std::log(0.5)},
-      {"skew", 0, 0.12, 1e-3, -0.5, 0.5},
-      {"tails", 0, 0.12, 1e-3, -0.4, 0.4}};
+      {"restitution_mean", c.restitution.mean, 0.08, 1e-4, 0.02, 0.98},
+      {"log restitution_sd", std::log(std::max(0.01, c.restitution.sd)), 0.4, 1e-3, std::log(0.005), std::log(0.4)},
+      {"friction_mean", c.friction.mean, 0.08, 1e-4, 0.02, 1.5},
+      {"log friction_sd", std::log(std::max(0.01, c.friction.sd)), 0.4, 1e-3, std::log(0.005), std::log(0.5)},
+      {"skew", 0, 0.06, 1e-3, -0.5, 0.5},
+      {"tails", 0, 0.06, 1e-3, -0.4, 0.4}};
   WheelDesign design;
   design.legs = wheel_.legs();
   design.legs_known = legs_known_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <boost/math/quadrature/gauss.hpp>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -98,46 +99,95 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
   const double time = std::sqrt(model_.contact_mass / model_.ramp_stiffness);
   const double pull = model_.gravity * std::sin(c.slope) / (v0 * r2);
   const Friction friction(contact_, change);
+  const bool usual = change.restitution_ratio == 1;
 
-  SpeedDensity result;
-  for (const Node& node : nodes_) {
-    const bool usual = change.restitution_ratio == 1;
-    const double eta = usual ? node.restitution : std::min(1.0, node.restitution * change.restitution_ratio);
-    const double alpha = 1 - eta * eta * (1 - change.rebound_lost), beta = (1 + eta) * (1 + eta);
-    const double delta = pull * (1 + eta) * time * (usual ? node.duration : contact_duration(eta));
+  // The loss as a function of mu at one restitution.
+  struct Curve {
+    double alpha, beta, delta, steady, q2, q1, q0, discriminant;
+  };
+  const auto curve = [&](double restitution, double duration) {
+    const double eta = usual ? restitution : std::min(1.0, restitution * change.restitution_ratio);
+    Curve k;
+    k.alpha = 1 - eta * eta * (1 - change.rebound_lost), k.beta = (1 + eta) * (1 + eta);
+    k.delta = pull * (1 + eta) * time * (usual ? duration : contact_duration(eta));
     // The term with delta is small and nearly constant: put into beta, it leaves a quadratic in mu.
-    const double steady = beta + delta * (a - b * friction.mean());
-    const double q2 = steady * cc - loss * b * b, q1 = b * (2 * loss * a - alpha - steady), q0 = a * (alpha - loss * a);
-    const double discriminant = q1 * q1 - 4 * q2 * q0;
-    if (!(discriminant > 0)) {  // every friction loses more
-      result.below += node.weight;
-      continue;
-    }
-    const double root = std::sqrt(discriminant);  // the slope of the quadratic at its roots
+    k.steady = k.beta + k.delta * (a - b * friction.mean());
+    k.q2 = k.steady * cc - loss * b * b, k.q1 = b * (2 * loss * a - k.alpha - k.steady);
+    k.q0 = a * (k.alpha - loss * a);
+    k.discriminant = k.q1 * k.q1 - 4 * k.q2 * k.q0;  // not positive: every friction loses more
+    return k;
+  };
+  const auto at_restitution = [&](const Curve& k) {
+    SpeedDensity one;
+    const double root = std::sqrt(k.discriminant);  // the slope of the quadratic at its roots
     const auto refine = [&](double mu, double side) {
       const auto slope = [&](double d) {
-        return -alpha * b + (beta + delta * d) * (2 * cc * mu - b) - delta * b * mu * (cc * mu - b) + 2 * loss * b * d;
+        return -k.alpha * b + (k.beta + k.delta * d) * (2 * cc * mu - b) - k.delta * b * mu * (cc * mu - b) +
+               2 * loss * b * d;
       };
       // One Newton step for what is left, no further than the quadratic's other side.
       const double d = a - b * mu;
-      const double left = (alpha * d + (beta + delta * d) * mu * (cc * mu - b) - loss * d * d) / slope(d);
-      if (std::abs(left) < root / std::abs(4 * q2)) mu -= left;
-      const double there = a - b * mu, steep = side * slope(there);
-      // Where the loss turns as a function of mu the density has an integrable singularity, which a sum must not meet.
-      const double blunt = 0.1 * steady * cc * friction.sd();
-      return std::pair{mu, steep > 0 ? there * there * steep / (steep * steep + blunt * blunt) : 0.0};
+      const double left = (k.alpha * d + (k.beta + k.delta * d) * mu * (cc * mu - b) - loss * d * d) / slope(d);
+      if (std::abs(left) < root / std::abs(4 * k.q2)) mu -= left;
+      const double there = a - b * mu, steep = std::max(side * slope(there), 0.5 * root);
+      return std::pair{mu, there * there / steep};
     };
-    const auto [upper, upper_rate] = refine(q1 <= 0 ? (root - q1) / (2 * q2) : -2 * q0 / (q1 + root), 1);
-    result.below += node.weight * friction.above(upper);
-    if (upper > 0) result.density += node.weight * friction.density(upper) * upper_rate * loss_rate;
-    if (q2 <= 0) continue;
-    const double start = q1 <= 0 ? 2 * q0 / (root - q1) : -(q1 + root) / (2 * q2);
-    if (start <= 0) continue;  // there is no lower branch: friction below which the loss rises again
+    const auto [upper, upper_rate] = refine(k.q1 <= 0 ? (root - k.q1) / (2 * k.q2) : -2 * k.q0 / (k.q1 + root), 1);
+    one.below = friction.above(upper);
+    if (upper > 0) one.density = friction.density(upper) * upper_rate * loss_rate;
+    if (k.q2 <= 0) return one;
+    const double start = k.q1 <= 0 ? 2 * k.q0 / (root - k.q1) : -(k.q1 + root) / (2 * k.q2);
+    if (start <= 0) return one;  // there is no lower branch: friction below which the loss rises again
     const auto [lower, lower_rate] = refine(start, -1);
-    if (!(lower > 0 && lower < upper)) continue;
-    result.below += node.weight * friction.below(lower);
-    result.density += node.weight * friction.density(lower) * lower_rate * loss_rate;
+    if (!(lower > 0 && lower < upper)) return one;
+    one.below += friction.below(lower);
+    one.density += friction.density(lower) * lower_rate * loss_rate;
+    return one;
+  };
+
+  SpeedDensity result;
+  double edge = -1;  // the largest restitution of a node that cannot lose so little
+  for (const Node& node : nodes_) {
+    const Curve k = curve(node.restitution, node.duration);
+    if (!(k.discriminant > 0)) {
+      result.below += node.weight;
+      edge = std::max(edge, node.restitution);
+      continue;
+    }
+    const SpeedDensity one = at_restitution(k);
+    result.below += node.weight * one.below;
+    result.density += node.weight * one.density;
   }
+  result.below = std::clamp(result.below, 0.0, 1.0);
+  if (edge < 0) return result;
+  const Node* next = nullptr;  // after the edge
+  for (const Node& node : nodes_)
+    if (node.restitution > edge && (!next || node.restitution < next->restitution)) next = &node;
+  if (!next || next->weight * at_restitution(curve(next->restitution, next->duration)).density < 1e-4 * result.density)
+    return result;
+  // Near the least restitution that can lose so little the density grows like an inverse square root.
+  std::uintmax_t iterations = 40;
+  const double low = boost::math::tools::toms748_solve(
+                         [&](double eta) { return curve(eta, contact_duration(eta)).discriminant; }, edge,
+                         next->restitution, boost::math::tools::eps_tolerance<double>(40), iterations)
+                         .second;
+  const double high =
+      std::max(next->restitution, std::min(1.0, contact_.restitution_mean + reach * contact_.restitution_sd));
+  using Rule = boost::math::quadrature::gauss<double, 30>;
+  const auto score = [&](double eta) { return (eta - contact_.restitution_mean) / contact_.restitution_sd; };
+  const double half = std::sqrt(high - low) / 2;
+  const double scale = 2 * half / (contact_.restitution_sd * restitution_mass_);
+  result = {0, (normal_cdf(score(low)) - normal_cdf(score(0))) / restitution_mass_};
+  for (std::size_t i = 0; i < Rule::abscissa().size(); ++i)
+    for (const double side : {1.0, -1.0}) {
+      const double t = half * (1 + side * Rule::abscissa()[i]), eta = low + t * t;
+      const Curve k = curve(eta, contact_duration(eta));
+      if (!(k.discriminant > 0)) continue;
+      const double weight = Rule::weights()[i] * t * scale * normal_density(score(eta));
+      const SpeedDensity one = at_restitution(k);
+      result.below += weight * one.below;
+      result.density += weight * one.density;
+    }
   result.below = std::clamp(result.below, 0.0, 1.0);
   return result;
 }
