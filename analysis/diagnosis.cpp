@@ -14,6 +14,7 @@
 #include "analysis/gap_map.h"
 #include "analysis/gap_shrinkage.h"
 #include "analysis/visibility.h"
+#include "dynamics/effect_catalogue.h"
 #include "dynamics/truncated_normal.h"
 #include "markov/parallel.h"
 
@@ -21,6 +22,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes
+constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide one another; hardly ever used up
 constexpr double recalibration_level = 0.02;
 constexpr double left_over_level = 0.001;
 constexpr double left_over_square = 18;   // of a cell's statistic, beyond the model error
@@ -47,6 +49,25 @@ double recalibration_p_value(const TransitionModel& model, const Fit& as_given, 
   // Satterthwaite: a chi-squared of the same mean and variance.
   const double scale = variance / (2 * mean), degrees = mean / scale;
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), std::max(0.0, gain) / scale));
+}
+
+// Two effects may hide one another from the scores of each alone: the best pair's gain, for all pairs there are.
+double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit& recalibrated) {
+  double least = 1;
+  if (!ranking.scan.trials_suffice) return least;
+  const double pairs = 0.5 * static_cast<double>(effects) * (static_cast<double>(effects) - 1);
+  for (const RankedCause& pair : ranking.pairs) {
+    if (!pair.fit.converged) continue;
+    double parameters = 0, looks = pairs;  // variants among them
+    for (const Term& term : pair.terms) {
+      parameters += static_cast<double>(term.values.size());
+      looks *= static_cast<double>(term.candidate->variants.size());
+    }
+    const double gain = std::max(0.0, pair.gain - 2 * recalibrated.promised);
+    least =
+        std::min(least, looks * boost::math::cdf(boost::math::complement(boost::math::chi_squared(parameters), gain)));
+  }
+  return least;
 }
 
 std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixXd& covariance, Eigen::Index first) {
@@ -295,6 +316,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
   if (!(options.level > 0 && options.level < 0.5))
     throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
+  for (const std::string& id : options.catalogue) dynamics::effect_info(id);  // throws for unknown ones
   std::vector<const Candidate*> candidates;
   for (const Candidate& candidate : model.candidates())
     if (options.catalogue.empty() ||
@@ -323,7 +345,6 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   given.log_likelihood = given.evaluation.total();
   d.as_given = gap_map(model, given, options.draws / 2, options.seed);
   const Fit recalibrated = fit(model, nominal, {});
-  if (!recalibrated.converged) d.notes.push_back("recalibration: " + recalibrated.reason);
   d.contact = contact_estimates(model, recalibrated);
   const double recalibration_gain = 2 * (recalibrated.penalised - given.log_likelihood);
   d.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
@@ -341,8 +362,18 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   d.p_effects = std::max(least_p_value, d.p_effects);
   d.p_where = std::max(least_p_value, d.p_where);
   d.p_recalibration = std::max(least_p_value, d.p_recalibration);
-  d.p_value = std::min(1.0, std::min(d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects)));
+  d.p_value = std::min({1.0, d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects),
+                        pairs_p_value(ranking, candidates.size(), recalibrated) / share_for_pairs});
   d.p_as_given = std::min(1.0, 2 * std::min(d.p_recalibration, d.p_value));
+
+  // Where the model is far off its likelihood is rough; what the fit missed is said where it is not next to nothing.
+  double largest_gain = recalibration_gain;
+  for (const RankedCause& cause : ranking.singles) largest_gain = std::max(largest_gain, cause.gain);
+  if (!recalibrated.converged && recalibrated.promised > 0.5 + 0.005 * largest_gain)
+    d.notes.push_back(
+        fmt::format("the recalibrated parameters did not settle ({}): by its slope the likelihood could rise by {:.2g} "
+                    "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
+                    recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
 
   // All hypotheses by falling evidence.
   std::vector<const RankedCause*> ordered;
@@ -387,20 +418,25 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
       d.shrinkage[0].with_effect > least_left_over + model_error * model_error * 6 * d.shrinkage[0].baseline)
     none = std::max(none, 1e6);
   // Probabilities over everything; the prior gives a gap even odds, shared by the effects.
-  double top = best ? std::max(0.0, best->evidence) : 0, sum = 0;
+  const double top = best ? std::max(0.0, best->evidence) : 0;
   const double effects = std::max<double>(1, static_cast<double>(candidates.size()));
   const double weight_null = std::exp(-top);
   double given_gap = 0;
   for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
-  const double weight_none = (none + 0.01) * given_gap;
-  sum = weight_null + given_gap + weight_none;
+  // The tests decide whether there is a gap, because their levels are calibrated and the evidence's are not: where both
+  // disagree, the odds of a gap go no further than even.
+  const double even = weight_null / (1.01 + none);
+  double share = 1;
+  if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
+  const double weight_none = (none + 0.01) * (given_gap > 0 ? share * given_gap : even);
+  const double sum = weight_null + share * given_gap + weight_none;
   d.p_none = weight_none / sum;
   const bool needs_recalibration = d.p_recalibration < recalibration_level;
   (needs_recalibration ? d.p_recalibrate : d.p_no_gap) = weight_null / sum;
   double covered = 0;
   for (const RankedCause* cause : ordered) {
     Cause one = describe(model, *cause);
-    one.probability = std::exp(cause->evidence - top) / effects / sum;
+    one.probability = share * std::exp(cause->evidence - top) / effects / sum;
     d.causes.push_back(std::move(one));
   }
 
@@ -412,7 +448,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     d.verdict = Verdict::explained;
     for (const Cause& cause : d.causes) {
       // 95 % of what the effects share; one twenty times less likely than the first is not named for completeness.
-      if (covered >= 0.95 * (given_gap / sum) || cause.probability < 0.05 * d.causes.front().probability) break;
+      if (covered >= 0.95 * (share * given_gap / sum) || cause.probability < 0.05 * d.causes.front().probability) break;
       d.cause_set.push_back(cause.name());
       covered += cause.probability;
     }

@@ -16,7 +16,7 @@ namespace metastable::analysis {
 struct DiagnosisOptions {
   std::uint64_t seed = 1;
   int threads = 0;                     ///< the same bits on any number
-  std::vector<std::string> catalogue;  ///< ids to consider; empty: all that the model has
+  std::vector<std::string> catalogue;  ///< ids to consider, those the model lacks left out; empty: all
   int draws = 2000;                    ///< of each bootstrap, >= 200
   double level = 0.04;                 ///< of the test for a gap after recalibration, in (0, 0.5)
   int folds = 5;                       ///< of the cross-validation by trial, >= 2
@@ -94,10 +94,11 @@ struct Diagnosis {
   GapMap as_given, recalibrated, left;  ///< maps under the nominal, the refitted, and the chosen model
   std::vector<Cause> causes;            ///< by falling probability; singles, then pairs that were tried among them
   std::vector<Cause> not_decided;
-  std::vector<std::string> cause_set;                  ///< names; empty if unexplained or no gap
-  double p_no_gap = 0, p_recalibrate = 0, p_none = 0;  ///< probabilities
-  std::vector<EstimatedParameter> contact;             ///< recalibrated
-  std::vector<Shrinkage> shrinkage;                    ///< log score first, then CRPS, then P(rest)
+  std::vector<std::string> cause_set;  ///< names; empty if unexplained or no gap
+  /// Probabilities. A gap has at least even odds where the tests find one, and at most even odds where they do not.
+  double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
+  std::vector<EstimatedParameter> contact;  ///< recalibrated
+  std::vector<Shrinkage> shrinkage;         ///< log score first, then CRPS, then P(rest)
   StepsBeforeFailure steps;
   std::vector<Visibility> visible;
   std::vector<NextExperiment> next;
