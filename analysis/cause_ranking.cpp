@@ -11,8 +11,9 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double expected_gain = 36;  // of an effect before its size is known
-constexpr double pair_prior = 0.05;   // odds of two effects to one
+constexpr double expected_gain = 36;        // of an effect before its size is known
+constexpr double pair_prior = 0.05;         // odds of two effects to one
+constexpr double least_pair_evidence = -4;  // promised beyond the first effect's, for a pair worth fitting
 
 // Log of the mean likelihood ratio over variants and sizes. `gain` is the fitted one of the best variant.
 double log_evidence(const ScannedEffect& scanned, double gain) {
@@ -267,8 +268,8 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
     const EffectScan scan = scan_effects(model, first.fit, others, options.threads);
     std::vector<std::pair<double, const ScannedEffect*>> promising;
     for (const ScannedEffect& effect : scan.effects) {
-      const double gain = effect.gain[effect.best];
-      if (gain > 7) promising.emplace_back(log_evidence(effect, gain), &effect);
+      const double promised = log_evidence(effect, effect.gain[effect.best]);
+      if (promised + prior > least_pair_evidence) promising.emplace_back(promised, &effect);
     }
     std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
     for (std::size_t k = 0; k < std::min<std::size_t>(3, promising.size()); ++k)

@@ -18,7 +18,7 @@ struct DiagnosisOptions {
   int threads = 0;                     ///< the same bits on any number
   std::vector<std::string> catalogue;  ///< ids to consider, those the model lacks left out; empty: all
   int draws = 2000;                    ///< of each bootstrap, >= 200
-  double level = 0.04;                 ///< of the test for a gap after recalibration, in (0, 0.5)
+  double level = 0.03;                 ///< of the test for a gap after recalibration, in (0, 0.5)
   int folds = 5;                       ///< of the cross-validation by trial, >= 2
   /// Called now and then with the share done, 0..1, and what is being done; may throw to stop.
   std::function<void(double, const std::string&)> progress;
