@@ -41,6 +41,9 @@ struct BlindTruth {
   int strength = 0;  ///< 1, 2, 4; 0 where it is not defined (none, outside)
   double power = 0;  ///< expected 2 Delta log likelihood, true contact known
   double left = 0;   ///< realised, after recalibration
+  /// Of a pair, by effect: realised, after recalibration with the other effect in the model. Not sealed, for it follows
+  /// from the rest and the case; empty where it was not worked out.
+  std::vector<double> left_by_effect = {};
   bool nominal_is_true = true;
   Spread restitution, friction;  ///< true
   double skewness = 0;

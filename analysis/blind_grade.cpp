@@ -10,9 +10,10 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double claim = 0.05;        // adjusted p-value of a claim of where
-constexpr double no_power_left = 9;   // 2 Delta log likelihood after recalibration: nobody finds that reliably
-constexpr double alike_share = 0.25;  // of the cause sets of an effect that another one must be in
+constexpr double claim = 0.05;          // adjusted p-value of a claim of where
+constexpr double no_power_left = 9;     // 2 Delta log likelihood after recalibration: nobody finds that reliably
+constexpr double pair_power_left = 16;  // of each of two effects beside the other: 1x
+constexpr double alike_share = 0.25;    // of the cause sets of an effect that another one must be in
 
 bool contains(const std::vector<std::string>& list, const std::string& one) {
   return std::find(list.begin(), list.end(), one) != list.end();
@@ -126,7 +127,7 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
 
   Proportion alarms, alarms_true, alarms_unlike, place_alarms, absorbed;
   std::map<int, Proportion> found, found_left, cause, holds, facet;
-  Proportion misnamed, unexplained, left_misnamed, left_right, both, no_third, interval, shrinkage;
+  Proportion misnamed, unexplained, left_misnamed, left_right, both, both_findable, no_third, interval, shrinkage;
   std::map<int, std::pair<double, int>> set_size;
   std::vector<std::pair<double, bool>> forecasts;
   for (std::size_t i = 0; i < truths.size(); ++i) {
@@ -181,7 +182,12 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
       }
       case BlindKind::pair: {
         const std::string &a = truth.effects[0].id, &b = truth.effects[1].id;
-        both.count(answer && (contains(answer->cause_set, joined(a, b)) || contains(answer->cause_set, joined(b, a))));
+        const bool named_both =
+            answer && (contains(answer->cause_set, joined(a, b)) || contains(answer->cause_set, joined(b, a)));
+        both.count(named_both);
+        if (!truth.left_by_effect.empty() && std::all_of(truth.left_by_effect.begin(), truth.left_by_effect.end(),
+                                                         [](double left) { return left >= pair_power_left; }))
+          both_findable.count(named_both);
         if (answer && answer->verdict == "explained" && !answer->cause_set.empty()) {
           const std::vector<std::string> named = members(answer->cause_set.front());
           no_third.count(
@@ -225,6 +231,7 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
   add("left-out effect confidently misnamed", left_misnamed, 0, 0.1);
   add("left-out effect unexplained, or of its ambiguity group", left_right, 0.7, 1);
   add("two effects: both named", both, 0.7, 1);
+  add("  each with power left beside the other", both_findable, 0.7, 1);
   add("two effects: no false third", no_third, 0.9, 1);
   add("where: claims in cases without a gap", place_alarms, 0, 0.1);
   for (const int strength : {2, 4}) add(fmt::format("where: right facet, {}x", strength), facet[strength], 0.9, 1);

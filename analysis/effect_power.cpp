@@ -121,11 +121,19 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
 }
 
 double power_left(const Experiment& experiment, const dynamics::NominalValues& truth,
-                  const std::vector<dynamics::Effect>& effects) {
+                  const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept) {
   const auto model = wheel_transitions(experiment);
   const std::vector<double> nuisance = true_nuisances(*model, contact_of(truth, effects));
   const double with = log_likelihood(*model, nuisance, forms_of(effects, experiment));
-  return 2 * (with - fit(*model, nuisance, {}).log_likelihood);
+  std::vector<Term> terms;
+  for (const dynamics::Effect& effect : kept)
+    for (const Candidate& candidate : model->candidates())
+      if (candidate.id == effect.id) {
+        const FittedForm form =
+            fitted_form(effect, experiment.wheel.leg_length, experiment.conditions.front().ramp_length);
+        terms.push_back({&candidate, form.candidate.variants.front(), form.values});
+      }
+  return 2 * (with - fit(*model, nuisance, terms).log_likelihood);
 }
 
 }  // namespace metastable::analysis

@@ -36,7 +36,8 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
 
 /// 2 log(likelihood of the truth / of the best recalibrated model without the effects) on one experiment: what is left
 /// to be found once the contact is refitted.
+/// @param kept  effects that the recalibrated model has, their sizes refitted too: what the others leave beside them
 double power_left(const Experiment& experiment, const dynamics::NominalValues& truth,
-                  const std::vector<dynamics::Effect>& effects);
+                  const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept = {});
 
 }  // namespace metastable::analysis

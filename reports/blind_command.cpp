@@ -206,7 +206,12 @@ void run_blind_answer(const BlindRequest& request) {
       words.push_back(trimmed(*catalogue));
     }
     const int code = run_program(words, errors);
-    check_interrupt();
+    try {
+      check_interrupt();
+    } catch (const Interrupted&) {
+      fs::remove(errors);
+      throw;
+    }
     const std::lock_guard lock(mutex);
     const std::optional<std::string> text = file_text(fresh);
     if (code != 0 || !text) {
@@ -259,11 +264,26 @@ void run_blind_open(const BlindRequest& request) {
   } else {
     write_file(places.marker, head);
   }
+  // Cases that were not reached are left out; one that the tool failed on is an answer, and a wrong one.
+  std::vector<analysis::BlindTruth> reached;
   std::vector<std::optional<analysis::BlindAnswer>> answers;
-  for (const int number : numbers)
-    answers.push_back(given.contains(number) ? std::optional(given.at(number)) : std::nullopt);
+  for (const analysis::BlindTruth& truth : truths) {
+    const bool answered = given.contains(truth.number);
+    if (!answered && !fs::exists(places.answer(truth.number).string() + ".err")) continue;
+    reached.push_back(truth);
+    answers.push_back(answered ? std::optional(given.at(truth.number)) : std::nullopt);
+  }
+  markov::parallel_for(reached.size(), request.threads, [&](std::size_t i) {
+    analysis::BlindTruth& truth = reached[i];
+    if (truth.kind != analysis::BlindKind::pair) return;
+    const analysis::Experiment experiment = analysis::read_experiment(places.case_folder(truth.number).string());
+    const dynamics::NominalValues contact{truth.restitution.mean, truth.restitution.sd, truth.friction.mean,
+                                          truth.friction.sd, experiment.wheel.leg_length};
+    for (std::size_t e = 0; e < truth.effects.size(); ++e)
+      truth.left_by_effect.push_back(analysis::power_left(experiment, contact, truth.effects, {truth.effects[1 - e]}));
+  });
 
-  const analysis::BlindGrades grades = analysis::grade(truths, answers);
+  const analysis::BlindGrades grades = analysis::grade(reached, answers);
   std::uint64_t seed = 0;
   std::sscanf(file_text(places.plan).value_or("seed 0").c_str(), "seed %lu", &seed);
   const Provenance provenance{
@@ -278,7 +298,7 @@ void run_blind_open(const BlindRequest& request) {
       "Cases from the virtual laboratory, which shares no formula with the models. Truths were sealed before "
       "the diagnosis saw the folders; seals and the record of answers were checked."};
   page.provenance = provenance;
-  const std::vector<Table> tables = blind_tables(grades, truths, answers, provenance);
+  const std::vector<Table> tables = blind_tables(grades, reached, answers, provenance);
   for (const Table& table : tables) {
     const fs::path stem = out / "tables" / table.id;
     write_file(stem.string() + ".csv", to_csv(table));

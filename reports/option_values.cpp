@@ -154,7 +154,8 @@ std::vector<std::string> catalogue_value(std::string_view name, const std::strin
     }
     if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
   };
-  if (std::filesystem::is_regular_file(text)) {
+  std::error_code too_long;  // a list of names need not be a possible path
+  if (std::filesystem::is_regular_file(text, too_long)) {
     std::ifstream in(text);
     if (!in) throw std::invalid_argument(fmt::format("--{}: {}: cannot be read", name, text));
     std::string line;
