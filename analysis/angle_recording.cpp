@@ -124,17 +124,17 @@ std::string angle_csv(const std::vector<SimulatedCondition>& conditions, const C
   options.validate();
   std::string text = "condition,trial,time_s,angle_rad\n";
   std::size_t before = 0;
-  for (const auto& [id, setting, trials] : conditions) {
-    const dynamics::WheelMap map = setting.map();
-    std::vector<std::string> rows(trials.size());
-    markov::parallel_for(trials.size(), options.threads, [&](std::size_t t) {
-      const AngleRecording recording = record_angle(map, trials[t], options, before + t);
+  for (const SimulatedCondition& condition : conditions) {
+    const dynamics::WheelMap map = condition.setting.map();
+    std::vector<std::string> rows(condition.trials.size());
+    markov::parallel_for(rows.size(), options.threads, [&](std::size_t t) {
+      const AngleRecording recording = record_angle(map, condition.trials[t], options, before + t);
       for (std::size_t k = 0; k < recording.time.size(); ++k)
-        fmt::format_to(std::back_inserter(rows[t]), "{},{},{:.6f},{:.{}f}\n", id, before + t + 1, recording.time[k],
-                       recording.angle[k], options.decimals);
+        fmt::format_to(std::back_inserter(rows[t]), "{},{},{:.6f},{:.{}f}\n", condition.id, before + t + 1,
+                       recording.time[k], recording.angle[k], options.decimals);
     });
     for (const std::string& part : rows) text += part;
-    before += trials.size();
+    before += rows.size();
   }
   return text;
 }

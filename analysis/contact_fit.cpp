@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "analysis/minimize.h"
+#include "analysis/profile_interval.h"
 #include "analysis/transitions.h"
 #include "dynamics/landing_density.h"
 #include "markov/parallel.h"
@@ -18,7 +19,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double least_sd = 0.005;         // finer spreads are below the likelihood's grid
+constexpr double least_sd = 0.01;          // finer spreads are below the likelihood's grid
 constexpr std::size_t thinned_size = 300;  // transitions behind the choice of a start
 
 std::vector<dynamics::WheelMap> maps_of(const Experiment& experiment, dynamics::Law law,
@@ -50,27 +51,42 @@ std::vector<MeasuredTransition> collect(const Experiment& experiment, const std:
   return all;
 }
 
-// The unbounded variables behind the parameters: sds by their logarithm.
+// The variables behind the parameters. An sd is sqrt(least_sd^2 + s^2): where the data show no spread, s = 0 is a
+// minimum like any other.
 using Point = std::vector<double>;
-Point to_point(const ContactParameters& p) { return {p[0], std::log(p[1]), p[2], std::log(p[3])}; }
-ContactParameters to_parameters(const Point& x) { return {x[0], std::exp(x[1]), x[2], std::exp(x[3])}; }
+Point to_point(const ContactParameters& p) {
+  const auto s = [](double sd) { return std::sqrt(std::max(sd * sd - least_sd * least_sd, 0.0)); };
+  return {p[0], s(p[1]), p[2], s(p[3])};
+}
+double to_sd(double s) { return std::hypot(least_sd, s); }
+ContactParameters to_parameters(const Point& x) { return {x[0], to_sd(x[1]), x[2], to_sd(x[3])}; }
 
-// Minus the log-likelihood; infinite where parameters make no sense or are finer than the likelihood's grid.
-double cost(const ContactLikelihood& likelihood, const Point& x) {
+// Ranges of the variables.
+constexpr ContactParameters lowest = {-0.5, 0, -0.5, 0}, highest = {1.5, 1, 2, 1};
+
+// Minus the log-likelihood and its gradient; infinite beyond the ranges (an sd's variable may change its sign).
+double cost(const ContactLikelihood& likelihood, const Point& x, Point& gradient) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double value = i % 2 == 0 ? x[i] : std::abs(x[i]);
+    if (!(value >= lowest[i] && value <= highest[i])) return infinity;
+  }
   const ContactParameters p = to_parameters(x);
-  const bool inside =
-      p[0] > -0.5 && p[0] < 1.5 && p[2] > -0.5 && p[2] < 2 && p[1] > 0.005 && p[1] < 1 && p[3] > 0.005 && p[3] < 1;
-  return inside ? -likelihood(p) : infinity;
+  constexpr double most = 30;  // sds between a mean and its range: beyond, the truncation leaves nothing
+  if (p[0] < -most * p[1] || p[0] > 1 + most * p[1] || p[2] < -most * p[3]) return infinity;
+  ContactParameters slope;
+  const double value = likelihood(p, &slope);
+  for (std::size_t i = 0; i < 4; ++i) gradient[i] = -slope[i] * (i % 2 == 0 ? 1 : x[i] / p[i]);
+  return -value;
 }
 
-using Cost = std::function<double(const Point&)>;
-
 // The best of a grid of starts and of the nominal contact, improved on every few-th transition.
-Point best_start(const Cost& function, const Experiment& experiment, dynamics::Law law) {
+Point best_start(const SmoothFunction& function, const Experiment& experiment, dynamics::Law law) {
   std::vector<std::pair<double, Point>> starts;
+  Point unused(4);
+  const auto value_of = [&](const Point& x) { return function(x, unused); };
   const auto add = [&](const ContactParameters& parameters) {
     const Point x = to_point(parameters);
-    const double value = function(x);
+    const double value = value_of(x);
     if (std::isfinite(value)) starts.emplace_back(value, x);
   };
   for (const double restitution : {0.2, 0.4, 0.6, 0.8})
@@ -84,44 +100,51 @@ Point best_start(const Cost& function, const Experiment& experiment, dynamics::L
   Minimum best;
   best.value = infinity;
   for (std::size_t s = 0; s < std::min<std::size_t>(3, starts.size()); ++s) {
-    Minimum one = nelder_mead(function, starts[s].second, {0.05, 0.3, 0.05, 0.3}, 0.05, 150);
+    Minimum one = nelder_mead(value_of, starts[s].second, {0.05, 0.03, 0.05, 0.03}, 0.05, 150);
     if (one.value < best.value) best = std::move(one);
   }
   return best.at;
 }
 
-// Second derivatives in the free variables by central differences, at steps that change the cost by about a unit where
-// that is possible.
-Eigen::MatrixXd curvature(const Cost& function, const Point& x, double value, const std::vector<std::size_t>& free) {
-  const auto n = static_cast<Eigen::Index>(free.size());
-  std::vector<double> step(free.size());
-  const auto at = [&](std::size_t a, double da, std::size_t b, double db) {
-    Point y = x;
-    y[free[a]] += da;
-    y[free[b]] += db;
-    return function(y);
-  };
+// Second derivatives, by central differences of the gradient.
+Eigen::MatrixXd curvature(const SmoothFunction& function, const Minimum& minimum) {
+  const std::size_t n = minimum.at.size();
+  constexpr double step = 2e-4;
   Eigen::MatrixXd hessian(n, n);
-  for (std::size_t a = 0; a < free.size(); ++a) {
-    step[a] = free[a] % 2 == 0 ? 0.004 : 0.04;
-    double rise = 0;
-    for (int halving = 0; halving < 6; ++halving) {
-      rise = at(a, step[a], a, 0) + at(a, -step[a], a, 0) - 2 * value;
-      if (rise < 4) break;
-      step[a] /= 2;
-    }
-    const auto e = static_cast<Eigen::Index>(a);
-    hessian(e, e) = rise / (step[a] * step[a]);
+  for (std::size_t a = 0; a < n; ++a) {
+    Point above = minimum.at, below = minimum.at, up(n), down(n);
+    above[a] += step;
+    below[a] -= step;
+    const bool inside = std::isfinite(function(above, up)) && std::isfinite(function(below, down));
+    for (std::size_t b = 0; b < n; ++b)
+      hessian(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) =
+          inside ? (up[b] - down[b]) / (2 * step) : infinity;
   }
-  for (std::size_t a = 0; a < free.size(); ++a)
-    for (std::size_t b = 0; b < a; ++b) {
-      const double mixed = (at(a, step[a], b, step[b]) - at(a, step[a], b, -step[b]) - at(a, -step[a], b, step[b]) +
-                            at(a, -step[a], b, -step[b])) /
-                           (4 * step[a] * step[b]);
-      const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
-      hessian(i, j) = hessian(j, i) = mixed;
-    }
-  return hessian;
+  return (hessian + hessian.transpose()) / 2;
+}
+
+// Down from a point, in variables that the curvature there makes alike.
+Minimum descend(const SmoothFunction& function, const Minimum& from) {
+  const Eigen::MatrixXd hessian = curvature(function, from);
+  const auto n = static_cast<Eigen::Index>(from.at.size());
+  const Eigen::MatrixXd axes =
+      hessian.allFinite() ? contour_axes(hessian) : Eigen::MatrixXd(0.01 * Eigen::MatrixXd::Identity(n, n));
+  const auto point = [&](const Point& z) {
+    const Eigen::VectorXd x =
+        Eigen::Map<const Eigen::VectorXd>(from.at.data(), n) + axes * Eigen::Map<const Eigen::VectorXd>(z.data(), n);
+    return Point(x.data(), x.data() + n);
+  };
+  const auto along_axes = [&](const Point& z, Point& gradient) {
+    Point slope(z.size());
+    const double value = function(point(z), slope);
+    Eigen::Map<Eigen::VectorXd>(gradient.data(), n) =
+        axes.transpose() * Eigen::Map<const Eigen::VectorXd>(slope.data(), n);
+    return value;
+  };
+  Minimum minimum = quasi_newton(along_axes, Point(from.at.size(), off_the_guess), 1e-5, 300);
+  minimum.at = point(minimum.at);
+  for (const std::size_t sd : {1, 3}) minimum.at[sd] = std::abs(minimum.at[sd]);
+  return minimum;
 }
 
 void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, const std::vector<std::size_t>& free) {
@@ -129,7 +152,9 @@ void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, con
   if (!information.allFinite()) {
     fit.status = ContactFit::Status::undetermined;
     fit.message =
-        "the likelihood rises up to the edge of what eta and mu can be distributed as: no law of this form fits";
+        fmt::format("the likelihood rises up to the end of the range searched ({} {} to {}, {} {} to {}, sds up to {})",
+                    contact_parameter_names[0], lowest[0], highest[0], contact_parameter_names[2], lowest[2],
+                    highest[2], highest[1]);
     return;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
@@ -212,28 +237,46 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
     return fit;
   }
   const auto costs = [&](const ContactLikelihood& of) {
-    return [&of, &options](const Point& x) {
+    return [&of, &options](const Point& x, Point& gradient) {
       if (options.progress) options.progress();
-      return cost(of, x);
+      return cost(of, x, gradient);
     };
   };
   std::vector<MeasuredTransition> thinned;
   for (std::size_t i = 0; i < all.size(); i += std::max<std::size_t>(1, all.size() / thinned_size))
     thinned.push_back(all[i]);
   const ContactLikelihood of_thinned(maps, thinned, options.threads);
-  const Cost function = costs(likelihood);
-  // A long narrow ridge (see ambiguities) makes a simplex collapse early: started anew until that gains nothing.
-  Minimum minimum =
-      nelder_mead(function, best_start(costs(of_thinned), experiment, options.law), {0.01, 0.1, 0.01, 0.1}, 1e-4, 1000);
+  const SmoothFunction function = costs(likelihood);
+  Minimum minimum;
+  Point unused(4);
+  minimum.at = best_start(costs(of_thinned), experiment, options.law);
+  minimum.value = function(minimum.at, unused);
+  if (!std::isfinite(minimum.value)) throw std::runtime_error("contact fit: no start with a finite likelihood");
+  // A long narrow ridge (see ambiguities) stops descents early: started anew until that gains nothing. A profile that
+  // finds a higher likelihood on its way starts it anew too.
   bool settled = false;
-  for (int restart = 0; restart < 8 && !settled; ++restart) {
-    Minimum again = nelder_mead(function, minimum.at, {0.03, 0.2, 0.01, 0.05}, 1e-4, 1000);
-    settled = minimum.value - again.value < 1e-3;
-    minimum = std::move(again);
+  Eigen::MatrixXd hessian;
+  std::vector<ProfileInterval> profiles(4);
+  for (int restart = 0; restart < 12 && !settled; ++restart) {
+    Minimum again = descend(function, minimum);
+    const double gain = minimum.value - again.value;
+    if (gain > 0) minimum = std::move(again);
+    if (gain > 1e-3) continue;
+    settled = true;
+    hessian = curvature(function, minimum);
+    if (!hessian.allFinite()) break;
+    profiles =
+        profile_intervals(function, minimum, hessian, {lowest.begin(), lowest.end()}, {highest.begin(), highest.end()});
+    for (const ProfileInterval& profile : profiles)
+      if (profile.better) {
+        minimum = *profile.better;
+        settled = false;
+      }
   }
+  if (!settled) hessian = curvature(function, minimum);
   fit.value = to_parameters(minimum.at);
   fit.log_likelihood = -minimum.value;
-  // A spread that the data do not show goes to its least value; the others then have their errors given that.
+  // A spread that the data do not show goes to its least value; the others then have their standard errors given that.
   std::vector<std::size_t> free;
   std::string bound;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -242,16 +285,24 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
     else
       bound += fmt::format("{}{}", bound.empty() ? "" : " and ", contact_parameter_names[i]);
   }
-  Eigen::VectorXd jacobian(static_cast<Eigen::Index>(free.size()));  // d point / d parameter
-  for (std::size_t a = 0; a < free.size(); ++a)
-    jacobian[static_cast<Eigen::Index>(a)] = free[a] % 2 == 0 ? 1 : 1 / fit.value[free[a]];
-  describe_curvature(
-      fit, jacobian.asDiagonal() * curvature(function, minimum.at, minimum.value, free) * jacobian.asDiagonal(), free);
+  const auto size = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd information(size, size);
+  const auto slope = [&](std::size_t i) { return i % 2 == 0 ? 1 : fit.value[i] / minimum.at[i]; };  // of the variable
+  for (Eigen::Index a = 0; a < size; ++a)
+    for (Eigen::Index b = 0; b < size; ++b) {
+      const std::size_t i = free[static_cast<std::size_t>(a)], j = free[static_cast<std::size_t>(b)];
+      information(a, b) = slope(i) * slope(j) * hessian(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  describe_curvature(fit, information, free);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const bool known = settled && hessian.allFinite(), sd = i % 2 == 1;
+    const double lower = sd ? to_sd(profiles[i].lower) : profiles[i].lower;
+    const double upper = sd ? to_sd(profiles[i].upper) : profiles[i].upper;
+    fit.lower_95[i] = known && profiles[i].bounded_below ? lower : sd ? 0 : -infinity;
+    fit.upper_95[i] = known && profiles[i].bounded_above ? upper : infinity;
+  }
   if (fit.status == ContactFit::Status::converged && !bound.empty())
-    fit.message = fmt::format(
-        "{} is at {}, the least value: likeliest is no such spread at all; the other errors hold given that, and are "
-        "too small if there is some",
-        bound, least_sd);
+    fit.message = fmt::format("{} is at {}, the least value: likeliest is no such spread at all", bound, least_sd);
   if (fit.status == ContactFit::Status::converged && !settled && fit.message.empty())
     fit.message = "the search for the maximum did not settle: the likelihood is nearly flat along its ridge";
   if (fit.impossible > 0)
@@ -288,8 +339,7 @@ std::vector<std::string> ambiguities(const ContactFit& fit) {
         sentences.push_back(fmt::format("{} and {} can hardly be told apart: correlation {:.2f}.",
                                         contact_parameter_names[j], contact_parameter_names[i], fit.correlation[i][j]));
   for (const std::size_t i : {std::size_t{1}, std::size_t{3}})
-    if (std::isfinite(fit.standard_error[i]) && fit.value[i] < 1.96 * fit.standard_error[i])
-      sentences.push_back(fmt::format("{} is not told from 0.", contact_parameter_names[i]));
+    if (fit.lower_95[i] == 0) sentences.push_back(fmt::format("{} is not told from 0.", contact_parameter_names[i]));
   return sentences;
 }
 

@@ -49,6 +49,9 @@ struct ContactFit {
   double log_likelihood = 0;    ///< of omega^2 [1/(rad^2/s^2)]
   ContactParameters value{};
   ContactParameters standard_error{};  ///< from the observed information; infinite where undetermined or at a bound
+  /// 95 %, by the profile of the likelihood: not symmetric, and with the other three free. Infinite ends, and 0 of an
+  /// sd, where the likelihood does not fall off far enough; both infinite if undetermined.
+  ContactParameters lower_95{}, upper_95{};
   std::array<std::array<double, 4>, 4> correlation{};
   std::vector<FitDirection> directions;  ///< eigenvectors of the observed information, best determined first
 };
@@ -59,9 +62,10 @@ std::vector<std::string> ambiguities(const ContactFit& fit);
 /// Fits all trials of the named conditions together, under the wheel of the experiment.
 ///
 /// The likelihood of every landing and, after a trial's last collision, of rest or of survival
-/// (contact_likelihood.h). Nelder-Mead from the best of a grid of starts, then Newton steps on differences; standard
-/// errors from the same second differences. Speeds are taken as exact: sensor noise goes into the spreads. Where legs
-/// are not known the wheel is taken with equal legs of its mean length.
+/// (contact_likelihood.h). Nelder-Mead on every few-th transition from the best of a grid of starts, then quasi-Newton
+/// descent on all; standard errors from second differences, intervals from the profile (profile_interval.h). Speeds are
+/// taken as exact: sensor noise goes into the spreads. Where legs are not known the wheel is taken with equal legs of
+/// its mean length.
 /// @throws std::invalid_argument for a coast-down, conditions out of range, no transition to fit, or
 ///         Transition::collision without omega_plus
 /// Cost: about 1.5 ms a transition

@@ -150,48 +150,85 @@ ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps
   }
 }
 
-double ContactLikelihood::density(const Term& term, const ContactParameters& p) {
-  double sum = 0;
+ContactLikelihood::Value ContactLikelihood::density(const Term& term, const ContactParameters& p) {
+  double sum = 0, u1 = 0, u2 = 0, v1 = 0, v2 = 0;  // moments along the curve
   const double a = 1 / p[1], b = 1 / p[3];
   for (const Piece& piece : term.pieces) {
     const double u = (piece.restitution - p[0]) * a, v = (piece.friction - p[2]) * b;
-    sum += piece.weight * std::exp(-0.5 * (u * u + v * v));
+    const double share = piece.weight * std::exp(-0.5 * (u * u + v * v));
+    sum += share;
+    u1 += share * u, u2 += share * u * u;
+    v1 += share * v, v2 += share * v * v;
   }
-  return sum;
+  return {a * b / (2 * std::numbers::pi) * sum, {a * u1 / sum, a * (u2 / sum - 1), b * v1 / sum, b * (v2 / sum - 1)}};
 }
 
-double ContactLikelihood::rest(const Term& term, const dynamics::TruncatedNormal& restitution,
-                               const dynamics::TruncatedNormal& friction) {
-  double sum = 0;
+ContactLikelihood::Value ContactLikelihood::rest(const Term& term, const dynamics::TruncatedNormal& restitution,
+                                                 const dynamics::TruncatedNormal& friction, const ContactParameters& p,
+                                                 const ContactParameters& truncation) {
+  Value rest;
   for (const Piece& piece : term.pieces) {
-    const double density = restitution.density(piece.restitution);
-    if (density > 0) sum += piece.weight * density * friction.between(piece.friction, piece.friction_to);
+    const double share = piece.weight * restitution.density(piece.restitution);
+    if (!(share > 0)) continue;
+    const double within = friction.between(piece.friction, piece.friction_to);
+    const double u = (piece.restitution - p[0]) / p[1];
+    rest.value += share * within;
+    rest.slope[0] += share * within * u / p[1];
+    rest.slope[1] += share * within * (u * u - 1) / p[1];
+    // The limits of mu move against its normal.
+    const double from = friction.density(piece.friction), v = (piece.friction - p[2]) / p[3];
+    rest.slope[2] += share * from;
+    rest.slope[3] += share * from * v;
+    if (std::isfinite(piece.friction_to)) {
+      const double to = friction.density(piece.friction_to);
+      rest.slope[2] -= share * to;
+      rest.slope[3] -= share * to * (piece.friction_to - p[2]) / p[3];
+    }
   }
-  return std::min(sum, 1.0);
+  for (std::size_t i = 0; i < 4; ++i) rest.slope[i] = rest.slope[i] / rest.value - truncation[i];
+  rest.value = std::min(rest.value, 1.0);
+  return rest;
 }
 
-double ContactLikelihood::operator()(const ContactParameters& p) const {
+double ContactLikelihood::operator()(const ContactParameters& p, ContactParameters* gradient) const {
   const dynamics::TruncatedNormal restitution(p[0], p[1], 0, 1), friction(p[2], p[3], 0);
-  // Of the untruncated normals: what the truncation leaves, once for all terms.
-  const double inside = (dynamics::normal_cdf((1 - p[0]) / p[1]) - dynamics::normal_cdf(-p[0] / p[1])) *
-                        dynamics::normal_cdf(p[2] / p[3]);
-  const double scale = 1 / (2 * std::numbers::pi * p[1] * p[3] * inside);
+  // What the truncation leaves of both normals, from the tails that do not cancel, and its logarithm's derivatives.
+  const double low = -p[0] / p[1], high = (1 - p[0]) / p[1];
+  const double of_restitution = p[0] < 0.5 ? dynamics::normal_cdf(-low) - dynamics::normal_cdf(-high)
+                                           : dynamics::normal_cdf(high) - dynamics::normal_cdf(low);
+  const double inside = of_restitution * dynamics::normal_cdf(p[2] / p[3]);
+  const double at_low = restitution.density(0), at_high = restitution.density(1), at_zero = friction.density(0);
+  const ContactParameters truncation = {at_low - at_high, at_low * low - at_high * high, at_zero,
+                                        -at_zero * p[2] / p[3]};
+  struct Sum {
+    double value = 0;
+    ContactParameters slope{};
+  };
   constexpr std::size_t block = 256;  // sums in an order that does not depend on the threads
-  std::vector<double> sums((terms_.size() + block - 1) / block, 0.0);
+  std::vector<Sum> sums((terms_.size() + block - 1) / block);
   markov::parallel_for(sums.size(), threads_, [&](std::size_t s) {
     for (std::size_t i = s * block; i < std::min(terms_.size(), (s + 1) * block); ++i) {
       const Term& term = terms_[i];
       if (term.landing) {
-        sums[s] += std::log(scale * density(term, p));
-      } else {
-        const double probability = rest(term, restitution, friction);
-        sums[s] += term.rested ? std::log(probability) : std::log1p(-probability);
+        const Value landing = density(term, p);
+        sums[s].value += std::log(landing.value / inside);
+        for (std::size_t k = 0; k < 4; ++k) sums[s].slope[k] += landing.slope[k] - truncation[k];
+      } else if (term.rested || !term.pieces.empty()) {
+        const Value stays = rest(term, restitution, friction, p, truncation);
+        sums[s].value += term.rested ? std::log(stays.value) : std::log1p(-stays.value);
+        if (stays.value == 0 && !term.rested) continue;
+        const double share = term.rested ? 1 : -stays.value / (1 - stays.value);
+        for (std::size_t k = 0; k < 4; ++k) sums[s].slope[k] += share * stays.slope[k];
       }
     }
   });
-  double sum = 0;
-  for (const double one : sums) sum += one;
-  return std::isnan(sum) ? -infinity : sum;
+  Sum sum;
+  for (const Sum& one : sums) {
+    sum.value += one.value;
+    for (std::size_t k = 0; k < 4; ++k) sum.slope[k] += one.slope[k];
+  }
+  if (gradient) *gradient = sum.slope;
+  return std::isnan(sum.value) ? -infinity : sum.value;
 }
 
 }  // namespace metastable::analysis

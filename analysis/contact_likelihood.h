@@ -27,8 +27,8 @@ class ContactLikelihood {
                     int threads);
 
   /// Sum of ln density of the landings [1/(rad^2/s^2)] and ln probability of rest or survival. -infinity where one of
-  /// them vanishes.
-  double operator()(const ContactParameters& parameters) const;
+  /// them vanishes. Fills `gradient`, if given, with the derivatives by the parameters (NaN where it is infinite).
+  double operator()(const ContactParameters& parameters, ContactParameters* gradient = nullptr) const;
 
   /// Transitions that some eta and mu can lead to, and how many others there are.
   std::size_t possible() const { return terms_.size(); }
@@ -44,9 +44,16 @@ class ContactLikelihood {
     bool landing, rested;
     std::vector<Piece> pieces;
   };
-  static double density(const Term& term, const ContactParameters& parameters);
-  static double rest(const Term& term, const dynamics::TruncatedNormal& restitution,
-                     const dynamics::TruncatedNormal& friction);
+  // A probability or density, and its logarithm's derivatives.
+  struct Value {
+    double value = 0;
+    ContactParameters slope{};
+  };
+  // Of the untruncated normals.
+  static Value density(const Term& term, const ContactParameters& parameters);
+  static Value rest(const Term& term, const dynamics::TruncatedNormal& restitution,
+                    const dynamics::TruncatedNormal& friction, const ContactParameters& parameters,
+                    const ContactParameters& truncation);
 
   std::vector<Term> terms_;
   std::size_t rests_ = 0, impossible_ = 0;

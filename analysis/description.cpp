@@ -37,7 +37,7 @@ ConditionDescription describe_condition(const Experiment& experiment, std::size_
   c.profile = speed_profile(c.speeds);
   c.steady = summarize(steady_trial_means(c.speeds));
   c.steady_collisions = summarize(steady_speeds(c.speeds));
-  c.legs = steady_speed_per_leg(experiment, index);
+  c.legs = speed_per_leg(experiment, index, experiment.legs() + 1);
   c.line = return_map_line(c.speeds, 1);
   c.steady_line = return_map_line(c.speeds, steady_collision);
   c.survival = survival(experiment, index, seed);

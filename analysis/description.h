@@ -31,7 +31,7 @@ struct ConditionDescription {
   std::vector<SpeedSummary> profile;               ///< entry k: collision k + 1
   SpeedSummary steady;                             ///< of trial means from collision 13 on
   SpeedSummary steady_collisions;                  ///< of all collisions from there on; not independent of each other
-  std::optional<std::vector<SpeedSummary>> legs;   ///< steady state; nothing: legs unknown
+  std::optional<std::vector<SpeedSummary>> legs;   ///< from the second turn on; nothing: legs unknown
   std::optional<ReturnMapLine> line, steady_line;  ///< through all pairs; through those of the steady state
   std::optional<Survival> survival;                ///< nothing: outcomes unknown
 };

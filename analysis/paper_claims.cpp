@@ -11,28 +11,26 @@
 namespace metastable::analysis {
 namespace {
 
-using Grid = std::array<std::array<StudiedProfile, 3>, 4>;
-
 std::string p_words(double p) { return p < 1e-6 ? "P < 1e-6" : fmt::format("P = {:.2g}", p); }
 
-// Smallest of P times how many there are: the level of the family (Bonferroni).
-template <typename Rows>
-std::pair<double, int> least(const Rows& rows, std::size_t first, std::size_t last) {
+// Fewer trials that get past the 12th collision say nothing of a steady state.
+constexpr std::size_t least_trials = 20;
+bool lasts(const StudiedProfile& profile) { return profile.trial_means.size() >= least_trials; }
+bool all_last(const std::array<StudiedProfile, 3>& row) { return std::all_of(row.begin(), row.end(), lasts); }
+
+constexpr std::array<std::array<std::size_t, 2>, 3> launch_pairs{{{0, 1}, {0, 2}, {1, 2}}};  // of fig6_p
+
+// The smallest P, and of how many: times that it is the level of the family (Bonferroni).
+struct Family {
   double p = 1;
   int count = 0;
-  for (std::size_t j = first; j <= last; ++j)
-    for (const double one : rows[j]) p = std::min(p, one), ++count;
-  return {p, count};
-}
+  void add(double one) { p = std::min(p, one), ++count; }
+  double level() const { return p * count; }
+};
 
-bool any_steady(const Grid& grid) {
-  for (const auto& row : grid)
-    for (const StudiedProfile& profile : row)
-      if (profile.steady.size() >= 20) return true;
-  return false;
+Finding nothing_left() {
+  return {ClaimVerdict::not_applicable, "hardly a trial gets past the 12th collision where it counts"};
 }
-
-Finding nothing_left() { return {ClaimVerdict::not_applicable, "hardly a trial gets past the 12th collision"}; }
 
 // Range of `of` over the restitution means at one friction of Fig. 9.
 double range(const std::array<StudiedProfile, 3>& row, double (StudiedProfile::*of)() const) {
@@ -68,18 +66,21 @@ Finding error_bars(const std::vector<SpeedSummary>& fast, const std::vector<Spee
 }
 
 Finding low_friction(const VariantStudy& s) {
-  if (!any_steady(s.fig6)) return nothing_left();
-  const auto [p, count] = least(s.fig6_p, 0, 1);
-  const bool alike = p * count > 0.05;
-  return {p > 0.9 ? ClaimVerdict::reproduced
-          : alike ? ClaimVerdict::partly
-                  : ClaimVerdict::not_reproduced,
-          fmt::format("smallest of {} {}{}", count, p_words(p),
-                      alike && p <= 0.9 ? ": not significant, but not > 0.9" : "")};
+  Family family;
+  for (std::size_t j = 0; j < 2; ++j)
+    for (std::size_t i = 0; i < 3; ++i)
+      if (lasts(s.fig6[j][launch_pairs[i][0]]) && lasts(s.fig6[j][launch_pairs[i][1]])) family.add(s.fig6_p[j][i]);
+  if (family.count == 0) return nothing_left();
+  const bool alike = family.level() > 0.05;
+  return {family.p > 0.9 ? ClaimVerdict::reproduced
+          : alike        ? ClaimVerdict::partly
+                         : ClaimVerdict::not_reproduced,
+          fmt::format("smallest of {} {}{}", family.count, p_words(family.p),
+                      alike && family.p <= 0.9 ? ": not significant, but not > 0.9" : "")};
 }
 
 Finding high_friction(const VariantStudy& s) {
-  if (!any_steady(s.fig6)) return nothing_left();
+  if (!all_last(s.fig6[3])) return nothing_left();
   const double low_fast = s.fig6_p[3][1], middle_fast = s.fig6_p[3][2];
   return {low_fast < 0.001 && middle_fast < 0.001 ? ClaimVerdict::reproduced
           : low_fast < 0.05 || middle_fast < 0.05 ? ClaimVerdict::partly
@@ -89,7 +90,7 @@ Finding high_friction(const VariantStudy& s) {
 }
 
 Finding variability_grows(const VariantStudy& s) {
-  if (!any_steady(s.fig6)) return nothing_left();
+  if (!std::all_of(s.fig6.begin(), s.fig6.end(), all_last)) return nothing_left();
   double slow = 0, fast = 0;
   for (std::size_t k = 0; k < 3; ++k) slow += s.fig6[0][k].steady_sd() / 3, fast += s.fig6[3][k].steady_sd() / 3;
   double k1 = 0, k3 = 0;
@@ -103,21 +104,24 @@ Finding variability_grows(const VariantStudy& s) {
 }
 
 Finding leg_lengths(const VariantStudy& s) {
-  if (!any_steady(s.fig6)) return nothing_left();
-  const auto [p, count] = least(s.legs_p, 0, 3);
-  const auto [q, same] = least(s.legs_p_trials, 0, 3);
+  Family pooled, by_trial;
   double most = 0;
   for (std::size_t j = 0; j < 4; ++j)
-    for (std::size_t k = 0; k < 3; ++k)
-      if (s.fig6[j][k].trial_means.size() >= 20 && s.equal_legs[j][k].trial_means.size() >= 20)
-        most = std::max(
-            most, std::abs(summarize(s.fig6[j][k].trial_means).mean - summarize(s.equal_legs[j][k].trial_means).mean));
-  return {
-      p > 0.1           ? ClaimVerdict::reproduced
-      : q * same > 0.05 ? ClaimVerdict::partly
-                        : ClaimVerdict::not_reproduced,
-      fmt::format("smallest of {} {}, one value a trial {}{}; means differ by at most {:.3f} rad/s", count, p_words(p),
-                  p_words(q), p <= 0.1 && q * same > 0.05 ? " (no more than chance among so many)" : "", most)};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const StudiedProfile &measured = s.fig6[j][k], &equal = s.equal_legs[j][k];
+      if (!lasts(measured) || !lasts(equal)) continue;
+      pooled.add(s.legs_p[j][k]);
+      by_trial.add(s.legs_p_trials[j][k]);
+      most = std::max(most, std::abs(summarize(measured.trial_means).mean - summarize(equal.trial_means).mean));
+    }
+  if (pooled.count == 0) return nothing_left();
+  const bool chance = by_trial.level() > 0.05;
+  return {pooled.p > 0.1 ? ClaimVerdict::reproduced
+          : chance       ? ClaimVerdict::partly
+                         : ClaimVerdict::not_reproduced,
+          fmt::format("smallest of {} {}, one value a trial {}{}; means differ by at most {:.3f} rad/s", pooled.count,
+                      p_words(pooled.p), p_words(by_trial.p),
+                      pooled.p <= 0.1 && chance ? " (no more than chance among so many)" : "", most)};
 }
 
 // Main effects of rows and columns on |t|, as ranges of their means.
@@ -126,7 +130,7 @@ Finding spread_of_friction(const VariantStudy& s) {
   std::array<double, 3> restitution{};
   for (std::size_t j = 0; j < 4; ++j)
     for (std::size_t k = 0; k < 3; ++k) {
-      if (!s.fig7_test[j][k]) return nothing_left();
+      if (!s.fig7_test[j][k] || !lasts(s.fig7[j][k])) return nothing_left();
       friction[j] += std::abs(s.fig7_test[j][k]->t) / 3;
       restitution[k] += std::abs(s.fig7_test[j][k]->t) / 4;
     }
@@ -166,7 +170,7 @@ Finding normal_loss(const VariantStudy& s) {
 Finding transient_influence(const VariantStudy& s) {
   const double transient = range(s.fig9[0], &StudiedProfile::transient_sd);
   const double steady = range(s.fig9[0], &StudiedProfile::steady_sd);
-  if (!any_steady(s.fig9)) return nothing_left();
+  if (!all_last(s.fig9[0])) return nothing_left();
   return {transient > steady ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("μ mean 0.2: sd differs by {:.3f} rad/s at collisions 2-6, by {:.3f} beyond the 12th", transient,
                       steady)};
@@ -177,28 +181,31 @@ std::pair<double, double> steady_ranges(const VariantStudy& s) {
 }
 
 Finding influence_grows(const VariantStudy& s) {
-  if (!any_steady(s.fig9)) return nothing_left();
+  if (!all_last(s.fig9[0]) || !all_last(s.fig9[3])) return nothing_left();
   const auto [low, high] = steady_ranges(s);
   return {high > low ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("steady sd differs by {:.3f} rad/s over η at μ mean 0.2, by {:.3f} at 0.5", low, high)};
 }
 
 Finding restitution_raises(const VariantStudy& s) {
-  if (!any_steady(s.fig9)) return nothing_left();
-  int rises = 0;
+  int rises = 0, rows = 0;
   double low = 0, high = 0;
   for (const auto& row : s.fig9) {
+    if (!lasts(row[0]) || !lasts(row[2])) continue;
+    ++rows;
     rises += row[2].steady_sd() > row[0].steady_sd();
-    low += row[0].steady_sd() / 4, high += row[2].steady_sd() / 4;
+    low += row[0].steady_sd(), high += row[2].steady_sd();
   }
-  return {rises == 4  ? ClaimVerdict::reproduced
-          : rises > 0 ? ClaimVerdict::partly
-                      : ClaimVerdict::not_reproduced,
-          fmt::format("steady sd {:.3f} to {:.3f} rad/s from η mean 0.3 to 0.7; up at {} of 4 μ", low, high, rises)};
+  if (rows == 0) return nothing_left();
+  return {rises == rows ? ClaimVerdict::reproduced
+          : rises > 0   ? ClaimVerdict::partly
+                        : ClaimVerdict::not_reproduced,
+          fmt::format("steady sd {:.3f} to {:.3f} rad/s from η mean 0.3 to 0.7; up at {} of {} μ", low / rows,
+                      high / rows, rises, rows)};
 }
 
 Finding influence_shrinks(const VariantStudy& s) {
-  if (!any_steady(s.fig9)) return nothing_left();
+  if (!all_last(s.fig9[0]) || !all_last(s.fig9[3])) return nothing_left();
   const auto [low, high] = steady_ranges(s);
   return {high < low ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("steady sd differs by {:.3f} rad/s over η at μ mean 0.2, by {:.3f} at 0.5", low, high)};

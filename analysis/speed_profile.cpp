@@ -73,8 +73,7 @@ std::vector<double> steady_trial_means(const TrialSpeeds& trials, int from) {
   return means;
 }
 
-std::optional<std::vector<SpeedSummary>> steady_speed_per_leg(const Experiment& experiment, std::size_t condition,
-                                                              int from) {
+std::optional<std::vector<SpeedSummary>> speed_per_leg(const Experiment& experiment, std::size_t condition, int from) {
   std::vector<std::vector<double>> means(static_cast<std::size_t>(experiment.legs()));
   for (const MeasuredTrial& trial : experiment.trials) {
     if (trial.condition != condition) continue;

@@ -38,10 +38,9 @@ std::vector<SpeedSummary> speed_profile(const TrialSpeeds& trials);
 std::vector<double> steady_speeds(const TrialSpeeds& trials, int from = steady_collision);
 std::vector<double> steady_trial_means(const TrialSpeeds& trials, int from = steady_collision);
 
-/// Steady speed at each leg: the mean over trials of the trial's mean where that leg lands. Entry i is leg i; nothing
-/// if the legs of some collision are not known.
-std::optional<std::vector<SpeedSummary>> steady_speed_per_leg(const Experiment& experiment, std::size_t condition,
-                                                              int from = steady_collision);
+/// Speed at each leg from collision `from` on: the mean over trials of the trial's mean where that leg lands. Entry i
+/// is leg i; nothing if the legs of some collision are not known.
+std::optional<std::vector<SpeedSummary>> speed_per_leg(const Experiment& experiment, std::size_t condition, int from);
 
 /// Straight line through the pairs (omega_k, omega_k+1) from collision `from` on.
 struct ReturnMapLine {

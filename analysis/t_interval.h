@@ -1,6 +1,7 @@
 #pragma once
 // Mean and 95 % half-width of a small sample.
 
+#include <cstddef>
 #include <vector>
 
 namespace metastable::analysis {
@@ -9,6 +10,9 @@ struct TInterval {
   double mean = 0;
   double half_width = 0;  ///< of the 95 % interval of the mean, Student's t
 };
+
+/// Half-width of the 95 % interval of a mean of `count` values, at least 2 (std::invalid_argument otherwise).
+double t_half_width(double standard_error, std::size_t count);
 
 /// @param sample  independent, roughly normal values, at least 2 (std::invalid_argument otherwise)
 TInterval t_interval(const std::vector<double>& sample);

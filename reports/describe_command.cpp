@@ -22,9 +22,9 @@ void run_describe(const DescribeRequest& request) {
   if (!request.out.empty()) pages.emplace(request.out);
   const Provenance provenance{request.command, "experiment: " + experiment.title, request.options.seed, version()};
 
-  // A fit takes some 1500 to 3000 evaluations of its likelihood.
+  // A fit takes some 500 to 1000 evaluations of its likelihood.
   const std::size_t fits = experiment.conditions.size() + 1 + request.against.size();
-  std::optional<Progress> progress(std::in_place, "describe", 3000 * fits);
+  std::optional<Progress> progress(std::in_place, "describe", 1000 * fits);
   analysis::DescriptionOptions options = request.options;
   options.progress = [&] { progress->advance(); };
   const analysis::Description description = analysis::describe(experiment, options);

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "reports/describe_tables.h"
+
 namespace metastable::reports {
 
 Figure profile_figure(const std::string& id, const std::string& title, const Provenance& provenance) {
@@ -28,6 +32,7 @@ void add_profile(Figure& figure, const std::vector<analysis::SpeedSummary>& prof
     line.y.push_back(s.mean);
   }
   if (line.x.empty()) return;
+  if (line.x.size() == 1) line.style = Style::points;  // where all rest at the second collision
   figure.series.push_back(std::move(band));
   figure.series.push_back(std::move(line));
 }
@@ -91,7 +96,8 @@ Figure measured_map_figure(const analysis::ConditionDescription& condition, cons
 std::optional<Figure> legs_figure(const analysis::Description& description, const Provenance& provenance) {
   Figure figure;
   figure.id = "legs";
-  figure.title = "Steady speed before the collision of each leg (bars: 95 %)";
+  figure.title = "Speed before the collision of each leg (bars: 95 %)";
+  std::size_t legs = 0;
   figure.x = {"leg", ""};
   figure.y = {"ω before a collision", "rad/s"};
   figure.legend = Legend::below;
@@ -99,18 +105,25 @@ std::optional<Figure> legs_figure(const analysis::Description& description, cons
   for (std::size_t i = 0; i < description.conditions.size(); ++i) {
     const analysis::ConditionDescription& c = description.conditions[i];
     if (!c.legs) continue;
+    legs = std::max(legs, c.legs->size());
     Series series{c.id, Style::points, {}, {}, {}, {}, static_cast<int>(i)};
     for (std::size_t leg = 0; leg < c.legs->size(); ++leg) {
       const analysis::SpeedSummary& s = (*c.legs)[leg];
       if (s.count < 2) continue;
-      series.x.push_back(static_cast<double>(leg) + 0.12 * static_cast<double>(i));
-      series.y.push_back(s.mean);
-      series.lower.push_back(s.mean - 1.96 * s.standard_error);
-      series.upper.push_back(s.mean + 1.96 * s.standard_error);
+      // Conditions beside each other about the leg's place.
+      series.x.push_back(static_cast<double>(leg) +
+                         0.12 *
+                             (static_cast<double>(i) - 0.5 * static_cast<double>(description.conditions.size() - 1)));
+      const Estimate mean = mean_interval(s);
+      series.y.push_back(mean.value);
+      series.lower.push_back(mean.low);
+      series.upper.push_back(mean.high);
     }
     if (!series.x.empty()) figure.series.push_back(std::move(series));
   }
   if (figure.series.empty()) return std::nullopt;
+  figure.x.low = -0.5;
+  figure.x.high = static_cast<double>(legs) - 0.5;
   return figure;
 }
 

@@ -5,21 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/t_interval.h"
 #include "dynamics/contact_law.h"
 
 namespace metastable::reports {
 namespace {
 
-constexpr double z95 = 1.959963984540054;
-
-Estimate with_error(double value, double standard_error) {
-  return {value, value - z95 * standard_error, value + z95 * standard_error};
-}
-
 Cell mean_cell(const analysis::SpeedSummary& s) {
   if (s.count == 0) return "";
   if (s.count == 1) return s.mean;
-  return with_error(s.mean, s.standard_error);
+  return mean_interval(s);
 }
 
 Cell cell(const analysis::Estimate& e) {
@@ -33,6 +28,11 @@ Cell effect(const analysis::EffectSize& e) {
 }
 
 }  // namespace
+
+Estimate mean_interval(const analysis::SpeedSummary& s) {
+  const double half = analysis::t_half_width(s.standard_error, s.count);
+  return {s.mean, s.mean - half, s.mean + half};
+}
 
 std::string p_text(double p) { return p < 1e-6 ? "< 1e-6" : fmt::format("{:.2g}", p); }
 
@@ -108,7 +108,7 @@ Table profiles_table(const analysis::Description& description, const Provenance&
 Table legs_table(const analysis::Description& description, const Provenance& provenance) {
   Table table;
   table.id = "legs";
-  table.title = "Steady speed before the collision of each leg";
+  table.title = "Speed before the collision of each leg";
   table.provenance = provenance;
   table.columns = {{"leg"}};
   std::size_t legs = 0;
@@ -126,7 +126,8 @@ Table legs_table(const analysis::Description& description, const Provenance& pro
     table.rows.push_back(std::move(row));
   }
   table.notes = {
-      "From the 13th collision on, one mean a trial, with 95 % interval. Legs that are not listed do not land there."};
+      "From the wheel's second turn on, so that every leg counts; one mean a trial, with 95 % interval. The first of "
+      "them land before the 13th collision, from which speeds are taken as steady."};
   return table;
 }
 
@@ -209,30 +210,20 @@ Table fits_table(const analysis::Description& description, const Provenance& pro
   for (const char* name : {"η mean", "η sd", "μ mean", "μ sd"})
     table.columns.push_back({name, "", NumberFormat::fixed, 3});
   table.columns.push_back({"log-likelihood", "", NumberFormat::fixed, 1});
-  const auto interval = [](std::size_t i, double value, double standard_error) {
-    Estimate e = with_error(value, standard_error);
-    if (i % 2 == 1) e.low = std::max(0.0, e.low);  // an sd
-    return e;
-  };
   for (const analysis::DescribedFit& f : description.fits) {
     std::vector<Cell> row{f.of, f.fit.transitions, f.fit.rests, f.fit.impossible};
     const bool fitted = f.fit.status != analysis::ContactFit::Status::impossible;
-    for (std::size_t i = 0; i < 4; ++i) {
-      if (!fitted)
-        row.emplace_back("");
-      else if (std::isinf(f.fit.standard_error[i]))
-        row.emplace_back(f.fit.value[i]);
-      else
-        row.emplace_back(interval(i, f.fit.value[i], f.fit.standard_error[i]));
-    }
+    for (std::size_t i = 0; i < 4; ++i)
+      row.push_back(fitted ? Cell(Estimate{f.fit.value[i], f.fit.lower_95[i], f.fit.upper_95[i]}) : Cell(""));
     row.push_back(fitted ? Cell(f.fit.log_likelihood) : Cell(""));
     table.rows.push_back(std::move(row));
   }
-  table.notes = {fmt::format(
-      "η ~ N(mean, sd²) on [0, 1], μ ~ N(mean, sd²) on [0, ∞), from {}. Brackets: 95 %, from the curvature of the "
-      "likelihood; none where it is flat. Speeds are taken as exact, so that noise of the sensor counts as spread.",
-      description.transition == analysis::Transition::collision ? "each collision's ω− and ω+"
-                                                                : "each step's ω− and the next ω−")};
+  table.notes = {
+      fmt::format("η ~ N(mean, sd²) on [0, 1], μ ~ N(mean, sd²) on [0, ∞), from {}. Brackets: 95 %, where the "
+                  "likelihood with the other three at their best has fallen by 1.92; infinite where it does not. "
+                  "Speeds are taken as exact, so that noise of the sensor counts as spread.",
+                  description.transition == analysis::Transition::collision ? "each collision's ω− and ω+"
+                                                                            : "each step's ω− and the next ω−")};
   for (const analysis::DescribedFit& f : description.fits) {
     if (!f.fit.message.empty()) table.notes.push_back(fmt::format("{}: {}.", f.of, f.fit.message));
     std::string sentences;

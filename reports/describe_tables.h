@@ -14,7 +14,7 @@ namespace metastable::reports {
 Table conditions_table(const analysis::Description& description, const Provenance& provenance);
 /// Mean speed and standard error at each collision, all conditions side by side.
 Table profiles_table(const analysis::Description& description, const Provenance& provenance);
-/// Steady speed per landing leg.
+/// Speed per landing leg.
 Table legs_table(const analysis::Description& description, const Provenance& provenance);
 /// Every test on every pair of conditions.
 Table tests_table(const analysis::Description& description, const Provenance& provenance);
@@ -25,6 +25,8 @@ Table fits_table(const analysis::Description& description, const Provenance& pro
 /// Measured beside predicted: speeds, spread, share of trials that rest.
 Table laws_table(const analysis::LawComparison& comparison, const Provenance& provenance);
 
+/// Mean of two values or more with its t-interval.
+Estimate mean_interval(const analysis::SpeedSummary& s);
 /// One test as a table's rows do: "0.012", "< 1e-6".
 std::string p_text(double p);
 

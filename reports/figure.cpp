@@ -54,7 +54,7 @@ std::string legend_position(Legend legend) {
     case Legend::bottom_left:
       return "inside left bottom";
     case Legend::below:
-      return "below center horizontal";
+      return "below center horizontal height 0.8";
     case Legend::none:
       break;
   }
@@ -110,7 +110,7 @@ std::string plot_element(const Series& series, std::size_t index) {
           series.label.empty()
               ? ""
               : fmt::format(", \\\n     keyentry with points pt 7 ps 0.6 lc rgb '{}' {}", colour, title);
-      return fmt::format("$data{} using 1:2 with points pt 7 ps 0.2 lc rgb '#90{}' notitle{}", index, colour.substr(1),
+      return fmt::format("$data{} using 1:2 with points pt 7 ps 0.35 lc rgb '#70{}' notitle{}", index, colour.substr(1),
                          sample);
     }
     case Style::steps:

@@ -12,6 +12,9 @@ using Studies = std::vector<analysis::VariantStudy>;
 
 Table claims_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
                    const analysis::PaperExperiments& experiments, const Provenance& provenance);
+/// The main numbers, and the claims whose verdict differs between the variants (of paper_variants(), in order).
+Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
+                    const analysis::PaperExperiments& experiments, const Provenance& provenance);
 Table readings_table(const std::vector<analysis::Claim>& claims, const Provenance& provenance);
 Table hypotheses_table(const std::vector<analysis::Hypothesis>& hypotheses, const Studies& studies,
                        const Provenance& provenance);

@@ -121,14 +121,11 @@ Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Prov
   }
   for (std::size_t k = 0; k < losses.size(); ++k) {
     const analysis::EnergyLosses& loss = losses[k];
-    const auto with_error = [](const analysis::MeanSpread& spread) {
-      return Estimate{spread.mean, spread.mean - 1.96 * spread.standard_error,
-                      spread.mean + 1.96 * spread.standard_error};
-    };
+    const auto mean = [](const analysis::MeanSpread& spread) { return with_error(spread.mean, spread.standard_error); };
     const Printed paper = printed(k);
-    table.rows.push_back({0.05 * static_cast<double>(k + 1), with_error(loss.tangential_net), paper.tangential,
-                          loss.tangential_net.sd, paper.tangential_sd, with_error(loss.normal), paper.normal,
-                          loss.normal.sd, paper.normal_sd});
+    table.rows.push_back({0.05 * static_cast<double>(k + 1), mean(loss.tangential_net), paper.tangential,
+                          loss.tangential_net.sd, paper.tangential_sd, mean(loss.normal), paper.normal, loss.normal.sd,
+                          paper.normal_sd});
   }
   table.notes = {
       "Reading of Fig. 8: no rest rule, x′ < 0 is set to 0, all collisions of all trials. The tangential net loss is "

@@ -66,7 +66,8 @@ void run_study(const StudyRequest& request) {
   page.provenance = provenance;
   const std::vector<analysis::Claim> claims = analysis::paper_claims(studies, experiments);
   pages.section("claims", "Claim by claim", "Each cell gives the verdict first and then the numbers behind it.", {},
-                {claims_table(claims, studies, experiments, provenance), readings_table(claims, provenance)});
+                {claims_table(claims, studies, experiments, provenance),
+                 changes_table(claims, studies, experiments, provenance), readings_table(claims, provenance)});
   pages.section("hypotheses", "The three hypotheses",
                 "A source that matters takes a large share of the variance with it; the table below has all shares.",
                 {},

@@ -27,6 +27,11 @@ struct Estimate {
   double low = 0;
   double high = 0;
 };
+/// Normal 95 % interval.
+inline Estimate with_error(double value, double standard_error) {
+  constexpr double z = 1.959963984540054;
+  return {value, value - z * standard_error, value + z * standard_error};
+}
 /// Rendered as the word "infinite".
 struct Infinite {};
 

@@ -37,6 +37,17 @@ TEST(Minimize, FindsRosenbrocksValley) {
   EXPECT_TRUE(m.converged);
   EXPECT_NEAR(m.at[0], 1, 1e-5);
   EXPECT_NEAR(m.at[1], 1, 1e-5);
+  const Minimum smooth = quasi_newton(
+      [](const std::vector<double>& x, std::vector<double>& gradient) {
+        const double across = x[1] - x[0] * x[0], along = 1 - x[0];
+        gradient = {-400 * across * x[0] - 2 * along, 200 * across};
+        return 100 * across * across + along * along;
+      },
+      {-1.2, 1}, 1e-14, 500);
+  EXPECT_TRUE(smooth.converged);
+  EXPECT_LT(smooth.evaluations, m.evaluations / 2);
+  EXPECT_NEAR(smooth.at[0], 1, 1e-6);
+  EXPECT_NEAR(smooth.at[1], 1, 1e-6);
 }
 
 // The curves of the fast likelihood against the exact density of the landing and probability of rest.
@@ -62,6 +73,16 @@ TEST(ContactFit, FastLikelihoodAgreesWithTheExactDensity) {
         ASSERT_TRUE(std::isfinite(exact));
         EXPECT_NEAR(fast(p), exact,
                     1e-3 * static_cast<double>(transitions.size()) + 0.03 * static_cast<double>(fast.possible_rests()));
+        ContactParameters gradient;
+        fast(p, &gradient);
+        for (std::size_t i = 0; i < 4; ++i) {
+          constexpr double h = 1e-5;
+          ContactParameters above = p, below = p;
+          above[i] += h;
+          below[i] -= h;
+          const double difference = (fast(above) - fast(below)) / (2 * h);
+          EXPECT_NEAR(gradient[i], difference, 1e-5 * std::abs(difference) + 1e-3) << contact_parameter_names[i];
+        }
       }
     }
 }
@@ -100,6 +121,26 @@ TEST(ContactFit, RecoversWideSpreadsUnderCoulomb) {
   for (std::size_t i = 0; i < 4; ++i)
     EXPECT_NEAR(fit.value[i], (ContactParameters{0.4, 0.1, 0.4, 0.1}[i]), 3.5 * fit.standard_error[i])
         << contact_parameter_names[i];
+}
+
+// What 95 % says: intervals of experiments made alike hold the parameters that made them.
+TEST(ContactFit, IntervalsHoldTheParametersThatMadeTheTrials) {
+  const Setting setting = stand_in_setting();
+  const ContactParameters truth = {setting.restitution.mean, setting.restitution.sd, setting.friction.mean,
+                                   setting.friction.sd};
+  constexpr int experiments = 16;
+  std::array<int, 4> held{};
+  for (int seed = 0; seed < experiments; ++seed) {
+    const ContactFit fit = fit_contact(simulated(setting, 8, 100 + static_cast<std::uint64_t>(seed)), {0},
+                                       {.transition = Transition::collision});
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_LE(fit.lower_95[i], fit.value[i]);
+      EXPECT_GE(fit.upper_95[i], fit.value[i]);
+      held[i] += fit.lower_95[i] <= truth[i] && truth[i] <= fit.upper_95[i];
+    }
+  }
+  for (std::size_t i = 0; i < 4; ++i)  // 12 of 16 or fewer: a chance of 0.007 at 95 %
+    EXPECT_GE(held[i], 13) << contact_parameter_names[i];
 }
 
 TEST(ContactFit, SaysWhatALawCannotDo) {

@@ -41,7 +41,7 @@ TEST(SpeedProfile, ReturnMapLineOfALine) {
 
 TEST(SpeedProfile, LegsOfTheStandIn) {
   const Experiment experiment = read_experiment(std::filesystem::path(METASTABLE_TEST_DATA) / "stand-in");
-  const auto legs = steady_speed_per_leg(experiment, 2);
+  const auto legs = speed_per_leg(experiment, 2, steady_collision);
   ASSERT_TRUE(legs);
   ASSERT_EQ(legs->size(), 8u);
   EXPECT_EQ((*legs)[0].count, 0u);  // collisions 13 to 16 land on legs 4 to 7
@@ -49,7 +49,7 @@ TEST(SpeedProfile, LegsOfTheStandIn) {
   Experiment unknown = experiment;
   for (MeasuredTrial& trial : unknown.trials)
     for (MeasuredCollision& c : trial.collisions) c.leg.reset();
-  EXPECT_FALSE(steady_speed_per_leg(unknown, 2));
+  EXPECT_FALSE(speed_per_leg(unknown, 2, steady_collision));
 }
 
 }  // namespace
