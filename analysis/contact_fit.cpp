@@ -61,8 +61,8 @@ Point to_point(const ContactParameters& p) {
 double to_sd(double s) { return std::hypot(least_sd, s); }
 ContactParameters to_parameters(const Point& x) { return {x[0], to_sd(x[1]), x[2], to_sd(x[3])}; }
 
-// Ranges of the variables.
-constexpr ContactParameters lowest = {-0.5, 0, -0.5, 0}, highest = {1.5, 1, 2, 1};
+// Ranges of the variables. Means of mu end where the likelihood's grid is too coarse for a small spread.
+constexpr ContactParameters lowest = {-0.5, 0, -0.5, 0}, highest = {1.5, 1, 0.85, 1};
 
 // Minus the log-likelihood and its gradient; infinite beyond the ranges (an sd's variable may change its sign).
 double cost(const ContactLikelihood& likelihood, const Point& x, Point& gradient) {
@@ -77,33 +77,6 @@ double cost(const ContactLikelihood& likelihood, const Point& x, Point& gradient
   const double value = likelihood(p, &slope);
   for (std::size_t i = 0; i < 4; ++i) gradient[i] = -slope[i] * (i % 2 == 0 ? 1 : x[i] / p[i]);
   return -value;
-}
-
-// The best of a grid of starts and of the nominal contact, improved on every few-th transition.
-Point best_start(const SmoothFunction& function, const Experiment& experiment, dynamics::Law law) {
-  std::vector<std::pair<double, Point>> starts;
-  Point unused(4);
-  const auto value_of = [&](const Point& x) { return function(x, unused); };
-  const auto add = [&](const ContactParameters& parameters) {
-    const Point x = to_point(parameters);
-    const double value = value_of(x);
-    if (std::isfinite(value)) starts.emplace_back(value, x);
-  };
-  for (const double restitution : {0.2, 0.4, 0.6, 0.8})
-    for (const double friction : {0.1, 0.25, 0.4, 0.6}) add({restitution, 0.1, friction, 0.1});
-  const NominalContact& nominal = experiment.contact;
-  if (nominal.law == law)
-    add({nominal.restitution.mean, std::max(nominal.restitution.sd, 0.02), nominal.friction.mean,
-         std::max(nominal.friction.sd, 0.02)});
-  if (starts.empty()) throw std::runtime_error("contact fit: no start with a finite likelihood");
-  std::stable_sort(starts.begin(), starts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  Minimum best;
-  best.value = infinity;
-  for (std::size_t s = 0; s < std::min<std::size_t>(3, starts.size()); ++s) {
-    Minimum one = nelder_mead(value_of, starts[s].second, {0.05, 0.03, 0.05, 0.03}, 0.05, 150);
-    if (one.value < best.value) best = std::move(one);
-  }
-  return best.at;
 }
 
 // Second derivatives, by central differences of the gradient.
@@ -145,6 +118,49 @@ Minimum descend(const SmoothFunction& function, const Minimum& from) {
   minimum.at = point(minimum.at);
   for (const std::size_t sd : {1, 3}) minimum.at[sd] = std::abs(minimum.at[sd]);
   return minimum;
+}
+
+// A long narrow ridge (see ambiguities) stops descents early: started anew until that gains nothing.
+Minimum settle(const SmoothFunction& function, Minimum minimum) {
+  for (int restart = 0; restart < 8; ++restart) {
+    Minimum again = descend(function, minimum);
+    const double gain = minimum.value - again.value;
+    if (gain > 0) minimum = std::move(again);
+    if (gain < 1e-3) break;
+  }
+  return minimum;
+}
+
+bool same(const Point& a, const Point& b, double within) {
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (std::abs(a[i] - b[i]) > within) return false;
+  return true;
+}
+
+// Where descents from a grid of starts and from the nominal contact end on every few-th transition, the best first.
+std::vector<Point> best_starts(const SmoothFunction& function, const Experiment& experiment, dynamics::Law law) {
+  constexpr std::size_t most = 4;
+  constexpr double near = 4;  // of the best; the others' intervals would not count
+  std::vector<Minimum> minima;
+  Point unused(4);
+  const auto add = [&](const ContactParameters& parameters) {
+    const Point x = to_point(parameters);
+    const double value = function(x, unused);
+    if (std::isfinite(value)) minima.push_back(descend(function, {x, value}));
+  };
+  for (const double restitution : {0.2, 0.4, 0.6, 0.8})
+    for (const double friction : {0.1, 0.25, 0.4, 0.6}) add({restitution, 0.1, friction, 0.1});
+  const NominalContact& nominal = experiment.contact;
+  if (nominal.law == law)
+    add({nominal.restitution.mean, std::max(nominal.restitution.sd, 0.02), nominal.friction.mean,
+         std::max(nominal.friction.sd, 0.02)});
+  std::stable_sort(minima.begin(), minima.end(), [](const Minimum& a, const Minimum& b) { return a.value < b.value; });
+  std::vector<Point> points;
+  for (const Minimum& one : minima)
+    if (points.size() < most && one.value < minima.front().value + near &&
+        std::none_of(points.begin(), points.end(), [&](const Point& x) { return same(x, one.at, 0.02); }))
+      points.push_back(one.at);
+  return points;
 }
 
 void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, const std::vector<std::size_t>& free) {
@@ -247,33 +263,40 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
     thinned.push_back(all[i]);
   const ContactLikelihood of_thinned(maps, thinned, options.threads);
   const SmoothFunction function = costs(likelihood);
-  Minimum minimum;
-  Point unused(4);
-  minimum.at = best_start(costs(of_thinned), experiment, options.law);
-  minimum.value = function(minimum.at, unused);
-  if (!std::isfinite(minimum.value)) throw std::runtime_error("contact fit: no start with a finite likelihood");
-  // A long narrow ridge (see ambiguities) stops descents early: started anew until that gains nothing. A profile that
-  // finds a higher likelihood on its way starts it anew too.
+  std::vector<Mode> modes;
+  for (Point& start : best_starts(costs(of_thinned), experiment, options.law)) {
+    Point unused(4);
+    const double value = function(start, unused);
+    if (std::isfinite(value)) modes.push_back({settle(function, {std::move(start), value}), {}});
+  }
+  if (modes.empty()) throw std::runtime_error("contact fit: no start with a finite likelihood");
+  // A profile that finds a higher likelihood on its way starts the search anew from there.
   bool settled = false;
-  Eigen::MatrixXd hessian;
   std::vector<ProfileInterval> profiles(4);
-  for (int restart = 0; restart < 12 && !settled; ++restart) {
-    Minimum again = descend(function, minimum);
-    const double gain = minimum.value - again.value;
-    if (gain > 0) minimum = std::move(again);
-    if (gain > 1e-3) continue;
+  for (int restart = 0; restart < 8 && !settled; ++restart) {
+    std::stable_sort(modes.begin(), modes.end(),
+                     [](const Mode& a, const Mode& b) { return a.minimum.value < b.minimum.value; });
+    // Starts that came down to the same place are one mode.
+    for (std::size_t m = 1; m < modes.size();)
+      if (same(modes[m].minimum.at, modes[m - 1].minimum.at, 0.005))
+        modes.erase(modes.begin() + static_cast<std::ptrdiff_t>(m));
+      else
+        ++m;
+    for (Mode& mode : modes) mode.hessian = curvature(function, mode.minimum);
     settled = true;
-    hessian = curvature(function, minimum);
-    if (!hessian.allFinite()) break;
-    profiles =
-        profile_intervals(function, minimum, hessian, {lowest.begin(), lowest.end()}, {highest.begin(), highest.end()});
+    if (!options.intervals || !modes.front().hessian.allFinite()) break;
+    std::vector<Mode> inside;
+    for (const Mode& mode : modes)
+      if (mode.hessian.allFinite()) inside.push_back(mode);
+    profiles = profile_intervals(function, inside, {lowest.begin(), lowest.end()}, {highest.begin(), highest.end()});
     for (const ProfileInterval& profile : profiles)
       if (profile.better) {
-        minimum = *profile.better;
+        modes.push_back({settle(function, *profile.better), {}});
         settled = false;
       }
   }
-  if (!settled) hessian = curvature(function, minimum);
+  const Minimum& minimum = modes.front().minimum;
+  const Eigen::MatrixXd& hessian = modes.front().hessian;
   fit.value = to_parameters(minimum.at);
   fit.log_likelihood = -minimum.value;
   // A spread that the data do not show goes to its least value; the others then have their standard errors given that.
@@ -295,10 +318,10 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
     }
   describe_curvature(fit, information, free);
   for (std::size_t i = 0; i < 4; ++i) {
-    const bool known = settled && hessian.allFinite(), sd = i % 2 == 1;
+    const bool known = options.intervals && settled && hessian.allFinite(), sd = i % 2 == 1;
     const double lower = sd ? to_sd(profiles[i].lower) : profiles[i].lower;
     const double upper = sd ? to_sd(profiles[i].upper) : profiles[i].upper;
-    fit.lower_95[i] = known && profiles[i].bounded_below ? lower : sd ? 0 : -infinity;
+    fit.lower_95[i] = known && profiles[i].bounded_below ? lower : sd && options.intervals ? 0 : -infinity;
     fit.upper_95[i] = known && profiles[i].bounded_above ? upper : infinity;
   }
   if (fit.status == ContactFit::Status::converged && !bound.empty())

@@ -109,7 +109,7 @@ Description describe(const Experiment& experiment, const DescriptionOptions& opt
         "which the stance begins, and the contact fit uses the steps from omega_minus to the next omega_minus.");
   if (experiment.columns.omega_plus == Presence::some && description.transition == Transition::collision)
     description.notes.push_back("Collisions without omega_plus do not enter the contact fit.");
-  const ContactFitOptions fit{experiment.contact.law, description.transition, options.threads, options.progress};
+  const ContactFitOptions fit{experiment.contact.law, description.transition, options.threads, true, options.progress};
   std::vector<std::size_t> all;
   for (std::size_t i = 0; i < experiment.conditions.size(); ++i)
     if (description.conditions[i].trials > 0) all.push_back(i);

@@ -37,7 +37,7 @@ LawComparison compare_laws(const Experiment& experiment, const std::vector<dynam
     if (!speeds(experiment, i).empty()) all.push_back(i);
   for (const dynamics::Law law : laws)
     if (law != dynamics::Law::plastic)
-      result.fits.emplace_back(law, fit_contact(experiment, all, {law, Transition::step, threads, progress}));
+      result.fits.emplace_back(law, fit_contact(experiment, all, {law, Transition::step, threads, false, progress}));
   for (const std::size_t i : all) {
     const TrialSpeeds measured = speeds(experiment, i);
     LawRow data;

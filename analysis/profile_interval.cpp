@@ -18,11 +18,12 @@ constexpr double lower_by = 0.01;            // a better minimum, not rounding
 class Profile {
  public:
   /// @param visited  points at which all but one variable are at their best; grows
-  Profile(const SmoothFunction& cost, const Minimum& minimum, const Eigen::MatrixXd& hessian, std::size_t variable,
+  Profile(const SmoothFunction& cost, double least, const Mode& mode, std::size_t variable,
           std::vector<Eigen::VectorXd>& visited)
-      : cost_(cost), minimum_(minimum), variable_(static_cast<Eigen::Index>(variable)), visited_(visited) {
+      : cost_(cost), least_(least), variable_(static_cast<Eigen::Index>(variable)), visited_(visited) {
+    const Eigen::MatrixXd& hessian = mode.hessian;
     const Eigen::Index n = hessian.rows();
-    const Eigen::VectorXd at = Eigen::Map<const Eigen::VectorXd>(minimum.at.data(), n);
+    const Eigen::VectorXd at = Eigen::Map<const Eigen::VectorXd>(mode.minimum.at.data(), n);
     Eigen::MatrixXd others(n - 1, n - 1);
     Eigen::VectorXd mixed(n - 1);
     for (Eigen::Index i = 0; i < n - 1; ++i) {
@@ -60,11 +61,11 @@ class Profile {
     }
     if (!best) return std::numeric_limits<double>::infinity();
     path_.push_back(Eigen::Map<const Eigen::VectorXd>(best->at.data(), axes_.rows()));
-    if (best->value < minimum_.value - lower_by) {
+    if (best->value < least_ - lower_by) {
       better_ = std::move(best);
       return 0;
     }
-    return std::sqrt(2 * std::max(best->value - minimum_.value, 0.0));
+    return std::sqrt(2 * std::max(best->value - least_, 0.0));
   }
 
   void leave() { visited_.insert(visited_.end(), path_.begin() + 2, path_.end()); }
@@ -114,7 +115,7 @@ class Profile {
   }
 
   const SmoothFunction& cost_;
-  const Minimum& minimum_;
+  double least_;
   Eigen::Index variable_;
   Eigen::MatrixXd axes_;  // of the others, as columns
   double curvature_ = 0;  // of the profile
@@ -124,14 +125,16 @@ class Profile {
 };
 
 // The end on one side and whether it is bounded.
-std::pair<double, bool> end(Profile& profile, double from, double limit, double reach) {
-  double inner = from, inner_root = 0, outer = limit, outer_root = -1;  // -1: not known
-  double value = from + std::copysign(std::min(reach, std::abs(limit - from)), limit - from);
+std::pair<double, bool> end(Profile& profile, double from, double from_root, double limit) {
+  if (std::abs(limit - from) < 1e-9) return {limit, false};
+  double inner = from, inner_root = from_root, outer = limit, outer_root = -1;  // -1: not known
+  double value = from + std::copysign(std::min(profile.first_guess(), std::abs(limit - from)), limit - from);
   for (int i = 0; i < 40; ++i) {
     if (std::abs(limit - value) < 1e-9 && outer_root < 0) value = limit;
     const double root = profile(value);
     if (profile.better()) return {value, false};
-    if (std::abs(root - level) < close_enough) return {from + (value - from) * level / root, true};
+    if (std::abs(root - level) < close_enough)
+      return {value + (level - root) / (root - from_root) * (value - from), true};
     if (root < level) {
       if (value == limit) return {limit, false};
       inner = value, inner_root = root;
@@ -160,25 +163,29 @@ Eigen::MatrixXd contour_axes(const Eigen::MatrixXd& hessian) {
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(flattest).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-std::vector<ProfileInterval> profile_intervals(const SmoothFunction& cost, const Minimum& minimum,
-                                               const Eigen::MatrixXd& hessian, const std::vector<double>& low,
-                                               const std::vector<double>& high) {
-  std::vector<ProfileInterval> intervals(minimum.at.size());
+std::vector<ProfileInterval> profile_intervals(const SmoothFunction& cost, const std::vector<Mode>& modes,
+                                               const std::vector<double>& low, const std::vector<double>& high) {
+  std::vector<ProfileInterval> intervals(low.size());
+  const double least = modes.front().minimum.value;
   std::vector<Eigen::VectorXd> visited;
-  for (std::size_t i = 0; i < intervals.size(); ++i)
-    for (const bool up : {false, true}) {
-      Profile profile(cost, minimum, hessian, i, visited);
-      const double from = minimum.at[i], limit = up ? high[i] : low[i];
-      const auto [at, bounded] =
-          std::abs(limit - from) < 1e-9 ? std::pair{limit, false} : end(profile, from, limit, profile.first_guess());
-      (up ? intervals[i].upper : intervals[i].lower) = at;
-      (up ? intervals[i].bounded_above : intervals[i].bounded_below) = bounded;
-      if (profile.better()) {
-        intervals[i].better = profile.better();
-        return intervals;
+  for (const Mode& mode : modes) {
+    const double from_root = std::sqrt(2 * std::max(mode.minimum.value - least, 0.0));
+    if (from_root > level - close_enough) continue;
+    for (std::size_t i = 0; i < intervals.size(); ++i)
+      for (const bool up : {false, true}) {
+        Profile profile(cost, least, mode, i, visited);
+        const auto [at, bounded] = end(profile, mode.minimum.at[i], from_root, up ? high[i] : low[i]);
+        ProfileInterval& interval = intervals[i];
+        const bool first = &mode == &modes.front();
+        if (up && (first || at > interval.upper)) interval.upper = at, interval.bounded_above = bounded;
+        if (!up && (first || at < interval.lower)) interval.lower = at, interval.bounded_below = bounded;
+        if (profile.better()) {
+          interval.better = profile.better();
+          return intervals;
+        }
+        profile.leave();
       }
-      profile.leave();
-    }
+  }
   return intervals;
 }
 

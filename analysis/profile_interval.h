@@ -26,15 +26,20 @@ constexpr double off_the_guess = 0.3;
 /// 0.05.
 Eigen::MatrixXd contour_axes(const Eigen::MatrixXd& hessian);
 
+/// A local minimum and the Hessian there, finite.
+struct Mode {
+  Minimum minimum;
+  Eigen::MatrixXd hessian;
+};
+
 /// The profile of `cost` (minus ln likelihood) in each variable: the others at their best for each of its values,
-/// followed from the minimum outwards (quasi_newton), and from points that the profiles of the variables before it went
-/// through: where there are several branches, the lowest of those found. Right to 0.02 of the half-width where ends are
-/// found. Stops at the first better minimum.
-/// @param hessian   of the cost at `minimum`, finite
+/// followed from each mode outwards (quasi_newton), and from points that profiles before went through: where there are
+/// several branches, the lowest of those found. The interval spans those of all modes. Right to 0.02 of the half-width
+/// where ends are found. Stops at the first better minimum.
+/// @param modes     the lowest first
 /// @param low,high  ranges of the variables; the cost may be infinite beyond
-/// Cost: some 50 evaluations a variable
-std::vector<ProfileInterval> profile_intervals(const SmoothFunction& cost, const Minimum& minimum,
-                                               const Eigen::MatrixXd& hessian, const std::vector<double>& low,
-                                               const std::vector<double>& high);
+/// Cost: some 50 evaluations a variable and mode
+std::vector<ProfileInterval> profile_intervals(const SmoothFunction& cost, const std::vector<Mode>& modes,
+                                               const std::vector<double>& low, const std::vector<double>& high);
 
 }  // namespace metastable::analysis

@@ -69,7 +69,9 @@ std::vector<int> case_numbers(const Places& places) {
     for (const auto& entry : fs::directory_iterator(places.cases))
       if (fs::exists(entry.path() / "seal.txt")) numbers.push_back(std::stoi(entry.path().filename().string()));
   std::sort(numbers.begin(), numbers.end());
-  if (numbers.empty()) throw OutputError(places.cases, "holds no blind case; `blind make` writes them");
+  if (numbers.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: holds no blind case; `blind make` writes them", places.cases.string()));
   return numbers;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
@@ -63,6 +64,15 @@ TEST(PaperStudy, ReadingsAndLawsDiffer) {
   EXPECT_EQ(claims.front().experiment.verdict, ClaimVerdict::reproduced);
   EXPECT_EQ(claims.back().findings[0].verdict, ClaimVerdict::not_applicable);
   EXPECT_EQ(claims.back().findings[2].verdict, ClaimVerdict::not_reproduced);
+  // Under published with its rests none of the launches lasts at mu = 0.55: a claim about its steady state says
+  // nothing.
+  const auto fastest = std::find_if(claims.begin(), claims.end(), [](const Claim& claim) {
+    return claim.claim.find("the fastest launch") != std::string::npos;
+  });
+  ASSERT_NE(fastest, claims.end());
+  EXPECT_TRUE(rests.fig6[3][2].trial_means.empty());
+  EXPECT_EQ(fastest->findings[0].verdict, ClaimVerdict::not_reproduced);
+  EXPECT_EQ(fastest->findings[1].verdict, ClaimVerdict::not_applicable);
   const std::vector<Hypothesis> hypotheses = paper_hypotheses(studies);
   ASSERT_EQ(hypotheses.size(), 3u);
   for (std::size_t v = 0; v < 3; ++v) {

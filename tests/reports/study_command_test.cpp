@@ -33,15 +33,16 @@ TEST(StudyCommand, WritesThePageAndEveryTableTheSameTwice) {
     run_study(request);
     testing::internal::GetCapturedStdout();
   }
-  for (const char* file : {"index.html", "tables/claims.csv", "tables/readings.md", "tables/hypotheses.tex",
-                           "tables/variance.csv", "tables/fig4.csv", "tables/fig6.csv", "tables/equal-legs.csv",
-                           "tables/fig7.csv", "tables/fig8.csv", "tables/fig9.csv", "figures/fig4-experiment.svg",
-                           "figures/fig6-published-rests-0-55.svg", "figures/fig9-coulomb-0-2.svg"}) {
+  for (const char* file :
+       {"index.html", "tables/claims.csv", "tables/changes.csv", "tables/readings.md", "tables/hypotheses.tex",
+        "tables/variance.csv", "tables/fig4.csv", "tables/fig6.csv", "tables/equal-legs.csv", "tables/fig7.csv",
+        "tables/fig8.csv", "tables/fig9.csv", "figures/fig4-experiment.svg", "figures/fig6-published-rests-0-55.svg",
+        "figures/fig9-coulomb-0-2.svg"}) {
     EXPECT_FALSE(read(folder / "one" / file).empty()) << file;
     EXPECT_EQ(read(folder / "one" / file), read(folder / "two" / file)) << file;
   }
   // A simulation is never shown as a measurement.
-  for (const char* file : {"tables/claims.csv", "tables/fig4.csv", "tables/fig7.csv"})
+  for (const char* file : {"tables/claims.csv", "tables/changes.csv", "tables/fig4.csv", "tables/fig7.csv"})
     EXPECT_NE(read(folder / "one" / file).find("measurements are not public"), std::string::npos) << file;
   StudyRequest bad;
   bad.data = (folder / "nothing").string();
