@@ -66,8 +66,8 @@ std::vector<std::string> ambiguities(const ContactFit& fit);
 /// (contact_likelihood.h). Quasi-Newton descents from a grid of starts on every few-th transition, then on all from
 /// the places they end at; standard errors from second differences, intervals from the profile over all maxima found
 /// (profile_interval.h): of 12 simulated experiments like the stand-in's all held all four, of 16 with 10 trials under
-/// coulomb 14 to 15. Speeds are taken as exact: sensor noise goes into the spreads. Where legs are not known the wheel
-/// is taken with equal legs of its mean length.
+/// coulomb 14 or more. Speeds are taken as exact: sensor noise goes into the spreads. Where legs are not known the
+/// wheel is taken with equal legs of its mean length.
 /// @throws std::invalid_argument for a coast-down, conditions out of range, no transition to fit, or
 ///         Transition::collision without omega_plus
 /// Cost: about 5 ms a transition, 2 ms without intervals
