@@ -13,6 +13,8 @@
 #include "analysis/cause_ranking.h"
 #include "analysis/gap_map.h"
 #include "analysis/gap_shrinkage.h"
+#include "analysis/missing_columns.h"
+#include "analysis/too_few.h"
 #include "analysis/visibility.h"
 #include "dynamics/effect_catalogue.h"
 #include "dynamics/truncated_normal.h"
@@ -287,6 +289,24 @@ void say(Diagnosis& d) {
                     100 * *log_score.closed, 100 * *log_score.closed_lower, 100 * *log_score.closed_upper,
                     log_score.baseline, log_score.with_effect));
   }
+  const auto list = [](const std::vector<std::string>& names) {
+    std::string text;
+    for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+    return text;
+  };
+  for (const MissingColumn& missing : d.missing) {
+    std::vector<std::string> hidden;
+    for (const HiddenEffect& effect : missing.effects)
+      if (!effect.smallest) hidden.push_back(effect.effect);
+    if (!hidden.empty())
+      s.push_back(fmt::format("Without {}, {} cannot be told; what they do may show under other names.", missing.column,
+                              list(hidden)));
+  }
+  std::vector<std::string> too_few;
+  for (const NotPossible& n : d.not_possible)
+    if (n.of_the_gap)
+      too_few.push_back(n.trials ? fmt::format("{} ({} trials would do)", n.statement, *n.trials) : n.statement);
+  if (!too_few.empty()) s.push_back(fmt::format("Too few trials to say {}.", list(too_few)));
 }
 
 }  // namespace
@@ -332,9 +352,6 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   for (const Event& e : model.events()) d.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
   for (std::size_t c = 0; c < model.conditions(); ++c) d.condition_names.push_back(model.condition_name(c));
   d.notes = model.notes();
-  if (d.trials < 20)
-    d.notes.push_back(
-        fmt::format("{} trials: chance levels are rough below 20 trials, and held-out figures say little", d.trials));
 
   progress(0, "the model as given");
   const std::vector<double> nominal = nominal_values(model);
@@ -353,7 +370,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   d.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
   d.p_where = d.recalibrated.p_value;
 
-  const CauseRanking ranking = rank_causes(
+  CauseRanking ranking = rank_causes(
       model, recalibrated, candidates,
       {.threads = options.threads, .draws = options.draws, .seed = options.seed, .progress = [&](double share) {
          progress(0.15 + 0.5 * share, "which effect");
@@ -374,6 +391,20 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
         fmt::format("the recalibrated parameters did not settle ({}): by its slope the likelihood could rise by {:.2g} "
                     "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
                     recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
+
+  if (!ranking.scan.trials_suffice)
+    d.notes.push_back(fmt::format(
+        "{} {} of {:.2g} transitions: chance levels come from the model's information alone; from {} trials "
+        "of {} transitions on, from the trials' own scatter",
+        d.trials, d.trials == 1 ? "trial" : "trials",
+        static_cast<double>(d.events) / static_cast<double>(std::max<std::size_t>(1, d.trials)), enough_trials,
+        enough_transitions));
+
+  // What the data hold no information on is not decided, whatever its evidence.
+  d.visible = visibility(ranking.scan, candidates);
+  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
+    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && d.visible[i].smallest == 0)
+      ranking.singles[i].not_decided = d.visible[i].undecidable;
 
   // All hypotheses by falling evidence.
   std::vector<const RankedCause*> ordered;
@@ -412,9 +443,10 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
       if (rivals.size() == 3 || cause->evidence < best->evidence - 4) break;
       if (!cause->fit.nuisance.empty()) rivals.push_back(&cause->fit);
     }
-  d.shrinkage = gap_shrinkage(model, recalibrated, rivals, options.folds, options.threads, options.seed);
+  if (d.trials >= trials_for_folds(options.folds))
+    d.shrinkage = gap_shrinkage(model, recalibrated, rivals, options.folds, options.threads, options.seed);
   // Even a cause that closes nearly all of a huge gap may leave a large one.
-  if (chosen != &recalibrated &&
+  if (chosen != &recalibrated && !d.shrinkage.empty() &&
       d.shrinkage[0].with_effect > least_left_over + model_error * model_error * 6 * d.shrinkage[0].baseline)
     none = std::max(none, 1e6);
   // Probabilities over everything; the prior gives a gap even odds, shared by the effects.
@@ -460,7 +492,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   d.steps = steps_before_failure(model, nominal, recalibrated, *chosen, options.seed);
   d.profile = profiles(model, nominal, *chosen, options.seed);
   progress(0.93, "what could not be seen");
-  d.visible = visibility(ranking.scan, candidates);
+  d.missing = missing_columns(model, recalibrated, candidates, options.threads, options.seed);
+  d.not_possible = too_few(model, d, options);
   if (d.verdict == Verdict::explained && d.cause_set.size() > 1 && ordered.size() > 1)
     d.next = next_experiments(model, ordered[0]->fit, ordered[1]->terms, options.threads, options.seed);
   progress(1, "done");

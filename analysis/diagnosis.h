@@ -54,6 +54,27 @@ struct Visibility {
   std::vector<std::pair<std::string, double>>
       alike;  ///< other effects with the share of its information they imitate, > 0.5
   std::string undecidable;
+  double times_more = 0;  ///< data needed to see the effect at the end of its range, as a multiple of these
+};
+
+/// A statement that these data do not allow.
+struct NotPossible {
+  std::string statement, because;
+  std::optional<std::size_t>
+      trials;               ///< like these that would do; nothing: no number worth naming, or not their number
+  bool of_the_gap = false;  ///< one of the questions asked of the gap, not of one effect or of the rests
+};
+
+/// An effect that a missing column hides.
+struct HiddenEffect {
+  std::string effect, parameter;
+  std::optional<double> smallest;          ///< visible size without the column; nothing: it cannot be told at all
+  double smallest_with_it = 0;             ///< and with it
+  std::vector<std::string> not_told_from;  ///< effects that look alike for lack of it
+};
+struct MissingColumn {
+  std::string column;
+  std::vector<HiddenEffect> effects;  ///< empty: next to nothing is lost
 };
 
 /// A measure of the gap under the models compared, held out, and on data of the last model itself.
@@ -98,9 +119,11 @@ struct Diagnosis {
   /// Probabilities. A gap has at least even odds where the tests find one, and at most even odds where they do not.
   double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
   std::vector<EstimatedParameter> contact;  ///< recalibrated
-  std::vector<Shrinkage> shrinkage;         ///< log score first, then CRPS, then P(rest)
+  std::vector<Shrinkage> shrinkage;         ///< log score first, then CRPS; empty: too few trials
   StepsBeforeFailure steps;
   std::vector<Visibility> visible;
+  std::vector<MissingColumn> missing;
+  std::vector<NotPossible> not_possible;
   std::vector<NextExperiment> next;
   std::vector<ProfilePoint> profile;
   std::vector<std::string> condition_names;

@@ -11,8 +11,7 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double largest_step = 0.1;                               // of a difference, in standard errors
-constexpr std::size_t enough_trials = 40, enough_transitions = 4;  // of a trial, on average; false alarms soar below
+constexpr double largest_step = 0.1;  // of a difference, in standard errors
 
 // Gain of the score `u` with information `info`; one parameter at its lower bound gains only upwards.
 double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,

@@ -31,6 +31,10 @@ struct EffectScan {
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
                         int threads);
 
+/// Trials, and transitions of each on average, from which their scores tell how large chance is: below, false alarms
+/// soar.
+inline constexpr std::size_t enough_trials = 40, enough_transitions = 4;
+
 /// How large the scan's gains get by chance alone, by signs and sizes of whole trials' scores drawn anew (multiplier
 /// bootstrap), and what that says of gains found. Few trials, or trials of few transitions, have too few scores for
 /// that: chance has the covariance of the information then.

@@ -50,7 +50,7 @@ class Cutter {
       std::vector<std::size_t> members;
       for (std::size_t i = 0; i < events.size(); ++i)
         if (stance ? is_stance(events[i].kind) : is_collision(events[i].kind)) members.push_back(i);
-      if (members.size() < 20) continue;
+      if (members.size() < least_cell_events) continue;
       const std::size_t first = cells_.size();
       const std::string where = !two_phases ? "" : stance ? ", stance" : ", collision";
       ranges("speed", members, where, 5, "rad/s", [](const Event& e) { return std::optional(e.speed); });
@@ -100,7 +100,7 @@ class Cutter {
       }
     if (found.size() < 2) return;
     for (auto& [index, cell] : found)
-      if (cell.events.size() >= 20) cells_.push_back(std::move(cell));
+      if (cell.events.size() >= least_cell_events) cells_.push_back(std::move(cell));
   }
   template <class Value>
   void ranges(const char* facet, const std::vector<std::size_t>& members, const std::string& where, int parts,
@@ -108,7 +108,7 @@ class Cutter {
     std::vector<double> all;
     for (const std::size_t i : members)
       if (const auto v = value(model_.events()[i])) all.push_back(*v);
-    if (all.size() < 40) return;
+    if (all.size() < 2 * least_cell_events) return;
     const auto [least, most] = std::minmax_element(all.begin(), all.end());
     const double low = *least, high = *most;
     if (!(low < high)) return;

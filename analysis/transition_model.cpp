@@ -6,4 +6,9 @@ namespace metastable::analysis {
 
 double Evaluation::total() const { return std::accumulate(log_density.begin(), log_density.end(), 0.0); }
 
+std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> TransitionModel::completed(
+    std::span<const double>, std::uint64_t) const {
+  return {};
+}
+
 }  // namespace metastable::analysis

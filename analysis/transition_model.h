@@ -104,6 +104,10 @@ class TransitionModel {
   /// more columns, more trials.
   virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
       std::span<const double> nuisance, std::uint64_t seed) const = 0;
+  /// The same design with each column that was not measured, by the column's name, with data drawn from the model.
+  /// By default none.
+  virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(
+      std::span<const double> nuisance, std::uint64_t seed) const;
   /// Observed collisions at risk, and how many of them led to rest. Zero where outcomes are unknown.
   virtual std::pair<double, double> rests() const = 0;
   /// Expected steps before failure under the model, from its hazard along simulated trials as long as the measured

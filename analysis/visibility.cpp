@@ -54,6 +54,7 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
         v.smallest = std::abs(seen[k].second - neutral[k].second);
         break;
       }
+    v.times_more = std::pow(size / (p.upper - p.neutral), 2);
     if (p.neutral + size > p.upper) v.undecidable = "it would have to pass its range to be seen";
 
     // Along the direction in which it was found (or its first parameter): what others explain of it.

@@ -12,6 +12,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "analysis/missing_columns.h"
 #include "analysis/score_tilt.h"
 #include "analysis/speed_filter.h"
 #include "analysis/wheel_candidates.h"
@@ -76,6 +77,8 @@ class WheelTransitions : public TransitionModel {
                                             std::uint64_t seed) const override;
   std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
                                                                                      std::uint64_t seed) const override;
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(std::span<const double> nuisance,
+                                                                                  std::uint64_t seed) const override;
   std::pair<double, double> rests() const override;
   double expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
                         std::uint64_t seed) const override;
@@ -88,12 +91,14 @@ class WheelTransitions : public TransitionModel {
   void complete_contexts();
   void estimate_noise();
   void list_events();
-  void set_up_parameters(const Experiment& experiment);
+  void set_up_parameters();
+  void name_what_is_too_few();
   // One trial drawn from the model; `visit` sees each collision's speed, context and probability of rest.
   template <class Visit>
   MeasuredRun draw(const MeasuredRun& design, std::size_t index, const std::vector<ExtendedWheel>& wheels,
                    const Extension& extension, std::span<const double> nuisance, std::uint64_t seed, Visit visit) const;
 
+  Experiment experiment_;  // as it was read
   dynamics::Wheel wheel_;
   dynamics::Law law_ = dynamics::Law::published;
   std::vector<Condition> conditions_;
@@ -108,7 +113,10 @@ class WheelTransitions : public TransitionModel {
 };
 
 WheelTransitions::WheelTransitions(const Experiment& experiment)
-    : wheel_(experiment.wheel), law_(experiment.contact.law), conditions_(experiment.conditions) {
+    : experiment_(experiment),
+      wheel_(experiment.wheel),
+      law_(experiment.contact.law),
+      conditions_(experiment.conditions) {
   if (experiment.system != System::rimless_wheel)
     throw std::invalid_argument("wheel_transitions: the experiment is a coast-down");
   if (law_ == dynamics::Law::plastic)
@@ -148,9 +156,15 @@ WheelTransitions::WheelTransitions(const Experiment& experiment)
       }))
     throw std::invalid_argument(
         "collisions.csv: no trial has two collisions or omega_plus_rad_s: there is no transition");
-  set_up_parameters(experiment);
+  set_up_parameters();
+  name_what_is_too_few();
   if (experiment.columns.time == Presence::none)
-    notes_.push_back("time_s is missing: times between collisions are those of the model's stance");
+    notes_.push_back(
+        "time_s is missing: times between collisions are those of the model's stance; ramp_vibration rests on them");
+  if (experiment.columns.position == Presence::none)
+    notes_.push_back(
+        "position_m is missing: positions follow from the legs' lengths; slope_profile and friction_patch rest on "
+        "them");
   if (!speeds_after_) notes_.push_back("omega_plus_rad_s is missing: collision and stance cannot be told apart");
   if (!experiment.columns.outcomes) notes_.push_back("trials.csv is missing: whether trials came to rest is not known");
 }
@@ -288,8 +302,8 @@ void WheelTransitions::list_events() {
   }
 }
 
-void WheelTransitions::set_up_parameters(const Experiment& experiment) {
-  const NominalContact& c = experiment.contact;
+void WheelTransitions::set_up_parameters() {
+  const NominalContact& c = experiment_.contact;
   // Spreads are fitted by their logarithms.
   nuisances_ = {
       {"restitution_mean", c.restitution.mean, 0.08, 1e-4, 0.02, 0.98},
@@ -301,7 +315,7 @@ void WheelTransitions::set_up_parameters(const Experiment& experiment) {
   WheelDesign design;
   design.legs = wheel_.legs();
   design.legs_known = legs_known_;
-  design.times_known = experiment.columns.time != Presence::none;
+  design.times_known = experiment_.columns.time != Presence::none;
   design.speeds_after = speeds_after_;
   design.launches_stated = std::any_of(conditions_.begin(), conditions_.end(),
                                        [](const Condition& one) { return one.initial_speed.has_value(); });
@@ -316,6 +330,30 @@ void WheelTransitions::set_up_parameters(const Experiment& experiment) {
   for (const Condition& one : conditions_) design.ramp_length = std::max(design.ramp_length, one.ramp_length);
   effects_ = wheel_candidates(design);
   for (const WheelCandidate& effect : effects_) candidates_.push_back(effect.candidate);
+}
+
+// Effects between trials, launches or collisions need some of them, whatever their size.
+void WheelTransitions::name_what_is_too_few() {
+  std::size_t launches = 0, successive = 0, away = 0;
+  for (const Event& e : events_) {
+    launches += e.kind == EventKind::launch;
+    const bool contact = e.kind == EventKind::collision || e.kind == EventKind::step;
+    successive += contact && e.number > 1;
+    away += contact && e.position > 0;
+  }
+  const auto needs = [this](const char* effect, std::size_t least, std::size_t here, const char* of_what) {
+    for (Candidate& c : candidates_)
+      if (c.id == effect && c.undecidable.empty() && here < least)
+        c.undecidable = fmt::format("it needs {} {}, and there {} {}", least, of_what, here == 1 ? "is" : "are", here);
+  };
+  // A mean and a spread, or a trend, and as many again to judge them by.
+  needs("initial_speed", 5, launches, "launches where a launch speed is stated");
+  needs("trial_spread", 5, runs_.size(), "trials");
+  needs("trial_drift", 3, runs_.size(), "trials");
+  needs("contact_memory", 2, successive, "collisions with one before them in their trial");
+  needs("ramp_vibration", 2, successive, "collisions with one before them in their trial");
+  needs("slope_profile", 2, away, "collisions away from the start");
+  needs("friction_patch", 2, away, "collisions away from the start");
 }
 
 Extension WheelTransitions::extension(std::span<const Term> terms) const {
@@ -542,6 +580,15 @@ std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTrans
       run.collisions.resize(2 * count, run.collisions.back());
     }
   });
+  return all;
+}
+
+std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTransitions::completed(
+    std::span<const double> nuisance, std::uint64_t seed) const {
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
+  for (const auto& [column, experiment] : completed_experiments(experiment_))
+    if (!(column == "leg" && legs_known_))
+      all.emplace_back(column, WheelTransitions(experiment).simulate(nuisance, {}, seed));
   return all;
 }
 

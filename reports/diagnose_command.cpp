@@ -70,7 +70,7 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
   sections.add("not-seen", "What these data could not see",
                "An effect smaller than its smallest size would have gone unnoticed; an effect with one alike may have "
                "been named in its place.",
-               {}, {visibility_table(d)});
+               {}, {visibility_table(d), missing_table(d), not_possible_table(d)});
   sections.add("next", "The next experiment", "Changes of the experiment that tell the remaining causes apart best.",
                {}, {next_table(d)});
   sections.add("map", "The whole map", "Every cell, under every model.", {}, {map_table(d), data_table(d)});

@@ -175,6 +175,19 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   json["shrinkage_by_measure"] = list_json(d.shrinkage, shrinkage_json);
   json["steps_before_failure"] = steps_json(d.steps);
   json["visibility"] = list_json(d.visible, visibility_json);
+  json["missing_columns"] = list_json(d.missing, [](const analysis::MissingColumn& missing) {
+    return Json{{"column", missing.column}, {"effects", list_json(missing.effects, [](const auto& effect) {
+                                               return Json{{"effect", effect.effect},
+                                                           {"parameter", effect.parameter},
+                                                           {"smallest", number(effect.smallest)},
+                                                           {"smallest_with_it", number(effect.smallest_with_it)},
+                                                           {"not_told_from", effect.not_told_from}};
+                                             })}};
+  });
+  json["not_possible"] = list_json(d.not_possible, [](const analysis::NotPossible& n) {
+    return Json{
+        {"statement", n.statement}, {"because", n.because}, {"trials", n.trials ? Json(*n.trials) : Json(nullptr)}};
+  });
   json["next_experiment"] = list_json(d.next, [](const analysis::NextExperiment& next) {
     return Json{{"change", next.change}, {"separation", number(next.separation)}};
   });

@@ -266,6 +266,37 @@ Table visibility_table(const Diagnosis& d) {
   return table;
 }
 
+Table missing_table(const Diagnosis& d) {
+  Table table{
+      .id = "missing-columns",
+      .title = "What missing columns hide",
+      .notes = {"Smallest visible sizes by the design's own information, without the column and as if it had "
+                "been measured; empty: not at all. Not told from: effects that imitate more than nine tenths "
+                "of it without the column and less than eight with it."},
+      .columns = {
+          {"column"}, {"effect"}, {"parameter"}, {"smallest without"}, {"smallest with"}, {"unit"}, {"not told from"}}};
+  for (const analysis::MissingColumn& m : d.missing) {
+    if (m.effects.empty()) table.rows.push_back({m.column, "no effect is much harder to see", "", "", "", "", ""});
+    for (const analysis::HiddenEffect& e : m.effects) {
+      std::string others;
+      for (const std::string& other : e.not_told_from) others += (others.empty() ? "" : ", ") + other;
+      table.rows.push_back({m.column, e.effect, e.parameter, known(e.smallest), known(e.smallest_with_it),
+                            std::string(effect_unit(e.effect, e.parameter)), others});
+    }
+  }
+  return table;
+}
+
+Table not_possible_table(const Diagnosis& d) {
+  Table table{.id = "not-possible",
+              .title = "What these data cannot say",
+              .notes = {"Trials: of this kind that would do; empty where no number of them would."},
+              .columns = {{"statement"}, {"because"}, {"trials"}}};
+  for (const analysis::NotPossible& n : d.not_possible)
+    table.rows.push_back({n.statement, n.because, n.trials ? Cell(*n.trials) : Cell("")});
+  return table;
+}
+
 Table undecided_table(const Diagnosis& d) {
   Table table{.id = "not-decided", .title = "Not decided", .columns = {{"effect"}, {"because"}}};
   for (const Cause& cause : d.not_decided) table.rows.push_back({cause.name(), cause.not_decided});

@@ -30,6 +30,8 @@ Table shrinkage_table(const analysis::Diagnosis& diagnosis);
 Table steps_table(const analysis::Diagnosis& diagnosis);
 Table profile_table(const analysis::Diagnosis& diagnosis);
 Table visibility_table(const analysis::Diagnosis& diagnosis);
+Table missing_table(const analysis::Diagnosis& d);
+Table not_possible_table(const analysis::Diagnosis& d);
 Table undecided_table(const analysis::Diagnosis& diagnosis);
 Table next_table(const analysis::Diagnosis& diagnosis);
 

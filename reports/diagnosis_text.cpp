@@ -77,7 +77,9 @@ std::string diagnosis_text(const analysis::Diagnosis& d) {
   text += part(shrinkage_lines(d));
   text += part(steps_table(d));
   text += part(visibility_lines(d));
+  text += part(missing_table(d));
   text += part(undecided_table(d));
+  text += part(not_possible_table(d));
   text += part(next_table(d));
   return text + part(data_table(d));
 }

@@ -73,6 +73,8 @@ analysis::Diagnosis sample() {
   d.steps = {.observed = infinity, .observed_lower = 40, .observed_upper = infinity, .baseline = 50, .with_effect = 70};
   d.visible = {{"leg_contact", "friction_ratio", 0.04, {{"leg_lengths", 0.7}}, ""},
                {"sensor_noise", "sd_rad_s", 0, {}, "no noise is stated"}};
+  d.missing = {{"leg", {{"leg_contact", "friction_ratio", {}, 0.04, {"friction_patch"}}}}, {"position_m", {}}};
+  d.not_possible = {{"where the gap lies", "7 transitions of a speed; a cell of the map takes 20", 3, true}};
   d.next = {{"slope 8.5 deg", 21.5}};
   d.condition_names = {"fast"};
   for (int k = 1; k <= 3; ++k)
@@ -105,6 +107,9 @@ TEST(DiagnosisJson, HasTheKeysOfTheSchema) {
     EXPECT_TRUE(json.at("shrinkage").contains(key)) << key;
   EXPECT_EQ(json.at("shrinkage").at("closed_interval_90"), (std::vector<double>{0.88, 1.0}));
   EXPECT_EQ(json.at("not_decided").at(0).at("reason"), "the fit did not converge");
+  EXPECT_TRUE(json.at("missing_columns").at(0).at("effects").at(0).at("smallest").is_null());
+  EXPECT_EQ(json.at("missing_columns").at(0).at("effects").at(0).at("not_told_from").at(0), "friction_patch");
+  EXPECT_EQ(json.at("not_possible").at(0).at("trials"), 3);
   EXPECT_EQ(json.at("next_experiment").at(0).at("separation"), 21.5);
   EXPECT_EQ(json.at("visibility").at(0).at("alike").at("leg_lengths"), 0.7);
   EXPECT_EQ(json.at("provenance").at("seed"), 7);
@@ -174,8 +179,13 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
                            "What these data could have seen",
                            "70 % like leg_lengths",
                            "no noise is stated",
+                           "What missing columns hide",
+                           "friction_patch",
+                           "no effect is much harder to see",
                            "Not decided",
                            "the fit did not converge",
+                           "What these data cannot say",
+                           "where the gap lies",
                            "The next experiment",
                            "slope 8.5 deg",
                            "Data",
