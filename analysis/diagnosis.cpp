@@ -379,8 +379,9 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   d.p_effects = std::max(least_p_value, d.p_effects);
   d.p_where = std::max(least_p_value, d.p_where);
   d.p_recalibration = std::max(least_p_value, d.p_recalibration);
-  d.p_value = std::min({1.0, d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects),
-                        pairs_p_value(ranking, candidates.size(), recalibrated) / share_for_pairs});
+  d.p_value =
+      std::min({1.0, d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects),
+                std::max(least_p_value, pairs_p_value(ranking, candidates.size(), recalibrated)) / share_for_pairs});
   d.p_as_given = std::min(1.0, 2 * std::min(d.p_recalibration, d.p_value));
 
   // Where the model is far off its likelihood is rough; what the fit missed is said where it is not next to nothing.

@@ -13,6 +13,7 @@
 #include "reports/describe_command.h"
 #include "reports/diagnose_command.h"
 #include "reports/effects_command.h"
+#include "reports/lessons_command.h"
 #include "reports/option_values.h"
 #include "reports/setting_options.h"
 #include "reports/simulate_command.h"
@@ -277,6 +278,23 @@ std::vector<Command> experiment_commands() {
          request.out = o.text("out");
          request.command = line;
          run_diagnose(request);
+       }},
+      {"lessons",
+       "Worked examples of the diagnosis: the published law on a coulomb wheel, the paper's hypotheses, data",
+       [](Options& o) {
+         o.add("data", "DIR", "", "Repeatable: an experiment folder, diagnosed under published and coulomb");
+         o.add("seed", "SEED", "1", "Seed of the random numbers");
+         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add("out", "DIR", "lessons", "Folder for tables, figures and index.html");
+       },
+       [](const Options& o, const std::string& line) {
+         LessonsRequest request;
+         request.data = o.all("data");
+         request.out = o.text("out");
+         request.seed = o.whole("seed", 0, UINT64_MAX);
+         request.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.command = line;
+         run_lessons(request);
        }},
       {"effects", "The catalogue of effects a model may lack: parameters, units, ranges, meaning",
        [](Options& o) { o.add("json", "FILE|-", "", "Write the catalogue as JSON"); },

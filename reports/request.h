@@ -133,6 +133,15 @@ struct DiagnoseRequest {
   std::string command;
 };
 
+/// metastable lessons
+struct LessonsRequest {
+  std::vector<std::string> data;  ///< experiment folders to be diagnosed under each law
+  std::string out = "lessons";
+  std::uint64_t seed = 1;
+  int threads = 0;
+  std::string command;
+};
+
 /// metastable effects
 struct EffectsRequest {
   std::string json;  ///< as of DiagnoseRequest

@@ -131,6 +131,7 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")}, "slope: 25 deg"},
       {{"diagnose"}, "DIR"},
       {{"diagnose", path("none")}, "none: there is no such folder"},
+      {{"lessons", "--data", path("none"), "--out", path("lessons")}, "none: there is no such folder"},
       {{"diagnose", path("none"), "--catalogue", "leg_contact,lag_contact"}, "--catalogue: "},
       {{"diagnose", path("none"), "--catalogue", file("ids.csv", "leg_contact\n# more\nlag_contact\n")}, "ids.csv:3: "},
       {{"effects", "--json", path("no/such/folder/x.json")}, "no/such/folder"},

@@ -1,0 +1,72 @@
+#include "analysis/uncharged_sticking.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "markov/return_map.h"
+
+namespace metastable::analysis {
+
+UnchargedSticking::UnchargedSticking(dynamics::WheelMap map) : map_(std::move(map)) {
+  if (map_.law() != dynamics::Law::published)
+    throw std::invalid_argument("UnchargedSticking: only `published` charges collisions that stick");
+}
+
+double UnchargedSticking::sticking_friction(int phase) const {
+  const dynamics::Collision c = map_.collision(phase, 1);
+  return c.contact_x * c.contact_y / (c.landing_length * c.landing_length + c.contact_y * c.contact_y);
+}
+
+dynamics::StepCoefficients UnchargedSticking::coefficients(int phase, const dynamics::Contact& contact) const {
+  if (contact.friction < sticking_friction(phase)) return map_.coefficients(phase, contact);
+  const double normal = map_.loss(phase, 1, contact).normal();  // losses go with omega^2
+  return {1 - 2 * normal / map_.stance(phase).inertia, 0};
+}
+
+double UnchargedSticking::after_collision(double state, int phase, const dynamics::Contact& contact) const {
+  const dynamics::StepCoefficients c = coefficients(phase, contact);
+  return c.drag == 0 ? c.scale * state : c.scale * state - c.drag * std::sqrt(state);
+}
+
+std::optional<double> UnchargedSticking::landing(double state, int phase, std::span<const double> score) const {
+  const double after = after_collision(state, phase, map_.noise().draw(score));
+  const dynamics::Stance& stance = map_.stance(phase);
+  if (!(after >= stance.barrier)) return std::nullopt;
+  return after + stance.gain;
+}
+
+void UnchargedSticking::Table::land(double origin, double width, std::span<const double> offset, std::size_t first,
+                                    std::span<double> next) const {
+  for (std::size_t k = 0; k < next.size(); ++k) {
+    const double x = origin + width * offset[k];
+    const dynamics::StepCoefficients& c = draws_[first + k];
+    const double after = c.scale * x - c.drag * std::sqrt(x);
+    next[k] = after >= barrier_ ? after + gain_ : markov::rest_landing;
+  }
+}
+
+double UnchargedSticking::Table::lowest_survivor(std::size_t k) const {
+  const auto [scale, drag] = draws_[k];
+  if (!(scale > 0)) return std::numeric_limits<double>::infinity();
+  const double root = (drag + std::sqrt(drag * drag + 4 * scale * barrier_)) / (2 * scale);
+  return root > 0 ? root * root * (1 - 1e-12) : 0;
+}
+
+void UnchargedSticking::Table::reorder(std::span<const std::uint32_t> order) {
+  std::vector<dynamics::StepCoefficients> moved;
+  for (const std::uint32_t k : order) moved.push_back(draws_[k]);
+  draws_ = std::move(moved);
+}
+
+UnchargedSticking::Table UnchargedSticking::tabulate(int phase, std::span<const double> score) const {
+  Table table;
+  table.barrier_ = map_.stance(phase).barrier;
+  table.gain_ = map_.stance(phase).gain;
+  const auto dimension = static_cast<std::size_t>(noise_dimension());
+  for (std::size_t i = 0; i + dimension <= score.size(); i += dimension)
+    table.draws_.push_back(coefficients(phase, map_.noise().draw(score.subspan(i, dimension))));
+  return table;
+}
+
+}  // namespace metastable::analysis
