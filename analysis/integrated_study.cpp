@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "analysis/chain_summary.h"
+#include "analysis/exact_rows.h"
 #include "analysis/rest_reachability.h"
-#include "markov/integrated.h"
 #include "markov/solver.h"
 
 namespace metastable::analysis {
@@ -31,24 +31,30 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-// Nothing if the nodes are too few to lead to rest.
-std::optional<Level> solve(const Problem& problem, markov::NodeSpace space, int threads) {
-  Level level{std::move(space), {}};
-  level.integrated = markov::integrate(problem.map, level.space, problem.launch, threads);
+// Nothing if the nodes are too few to lead to rest, or so few that interpolation makes nonsense of it.
+std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::size_t panels) {
+  Level level{rows.space(panels), {}};
+  level.integrated = rows.chain(problem, level.space);
   const markov::SampledChain& sampled = level.integrated.chain;
   const markov::Reachability reach = markov::classify(sampled.chain);
   if (std::find(reach.must_rest.begin(), reach.must_rest.end(), 0) != reach.must_rest.end()) return std::nullopt;
-  const markov::ChainSolver solver(sampled.chain);
-  const std::vector<double> mean = markov::mean_first_passage(solver);
-  level.from_start = 1 + dot(sampled.launch.after, mean);
-  level.failure_rate = markov::quasi_stationary(solver).failure_rate;
-  int worst = 0;
-  for (int p = 1; p < level.space.phases(); ++p)
-    if (mean[static_cast<std::size_t>(p) * level.space.nodes()] <
-        mean[static_cast<std::size_t>(worst) * level.space.nodes()])
-      worst = p;
-  const double lowest = problem.map.state_interval(worst).first;
-  level.worst_start = 1 + dot(markov::integrated_row(problem.map, level.space, lowest, worst).after, mean);
+  try {
+    const markov::ChainSolver solver(sampled.chain);
+    const std::vector<double> mean = markov::mean_first_passage(solver);
+    level.from_start = 1 + dot(sampled.launch.after, mean);
+    level.failure_rate = markov::quasi_stationary(solver).failure_rate;
+    int worst = 0;
+    for (int p = 1; p < level.space.phases(); ++p)
+      if (mean[static_cast<std::size_t>(p) * level.space.nodes()] <
+          mean[static_cast<std::size_t>(worst) * level.space.nodes()])
+        worst = p;
+    const double lowest = problem.map.state_interval(worst).first;
+    level.worst_start = 1 + dot(rows.row(problem, level.space, lowest, worst).after, mean);
+  } catch (const markov::ConvergenceError&) {
+    if (rows.collocated()) return std::nullopt;
+    throw;
+  }
+  if (!(level.from_start >= 1 && level.worst_start >= 1 && level.failure_rate > 0)) return std::nullopt;
   return level;
 }
 
@@ -140,29 +146,21 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
     return study(problem, sampled);
   }
   tell(0, "pilot");
-  // Says at once, and clearly, when there is no density.
-  const double lowest = problem.map.state_interval(problem.launch.phase).first;
-  markov::integrated_row(
-      problem.map,
-      markov::NodeSpace(std::vector(static_cast<std::size_t>(problem.map.phases()), std::pair(lowest, lowest + 1)), 1),
-      problem.launch.state(0), problem.launch.phase);
-  const std::vector<std::pair<double, double>> ranges =
-      markov::node_ranges(problem.map, problem.launch, options.threads);
-  if (ranges.empty()) return unresolved(problem);
+  const ExactRows rows(problem, options.tolerance, options.threads);
+  if (rows.unresolved()) return unresolved(problem);
 
   const bool free = options.cells == 0;
   const std::size_t most =
-      (problem.map.phases() > 1 ? options.largest_cells / 2 : options.largest_cells) / markov::NodeSpace::order;
-  const std::size_t given = (options.cells + markov::NodeSpace::order - 1) / markov::NodeSpace::order;
+      (problem.map.phases() > 1 ? options.largest_cells / 2 : options.largest_cells) / rows.coarsest();
+  const std::size_t given = (options.cells + rows.coarsest() - 1) / rows.coarsest();
   std::size_t panels = free ? first_panels : std::max<std::size_t>(1, given / 2);
   std::optional<Level> coarse, fine;
   ErrorLeft steps_error, rate_error, worst_error;
   double done = 0.02, error = 0;
   for (;;) {
-    const std::size_t nodes = panels * markov::NodeSpace::order;
-    tell(done, fmt::format("{} nodes", nodes));
+    tell(done, fmt::format("{} nodes", panels * rows.coarsest()));
     coarse = std::move(fine);
-    fine = solve(problem, markov::NodeSpace(ranges, panels), options.threads);
+    fine = solve(problem, rows, panels);
     done += 0.5 * (0.95 - done);
     bool met = false;
     if (coarse && fine) {
@@ -179,7 +177,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   }
   if (!fine || !coarse)
     throw markov::ConvergenceError("integrated rows", 1,
-                                   fmt::format("{} nodes are too few to lead to rest", panels * 16));
+                                   fmt::format("{} nodes are too few to lead to rest", panels * rows.coarsest()));
 
   Metastability result;
   result.method = Method::integrated;

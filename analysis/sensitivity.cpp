@@ -6,11 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/exact_rows.h"
 #include "analysis/pathwise.h"
 #include "analysis/pilot.h"
 #include "analysis/t_interval.h"
 #include "markov/adjoint.h"
-#include "markov/integrated.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -99,8 +99,8 @@ std::vector<Sensitivity> by_paths(const Setting& setting, const Metastability& s
 // nodes that stood still would lose what lies between.
 class IntegratedRows {
  public:
-  IntegratedRows(const Setting& setting, std::vector<std::pair<double, double>> ranges, std::size_t panels, int threads)
-      : setting_(setting), ranges_(std::move(ranges)), panels_(panels), threads_(threads) {
+  IntegratedRows(const Setting& setting, const ExactRows& rows, std::size_t panels)
+      : setting_(setting), rows_(rows), panels_(panels) {
     const markov::SampledChain here = chain(setting);
     adjoint_ = markov::adjoint(markov::ChainSolver(here.chain), here.launch);
   }
@@ -115,30 +115,24 @@ class IntegratedRows {
   markov::SampledChain chain(const Setting& near) const {
     const Problem problem = near.problem();
     const dynamics::WheelMap here = setting_.map();
-    std::vector<std::pair<double, double>> ranges = ranges_;
-    for (std::size_t p = 0; p < ranges.size(); ++p) {
-      const int phase = static_cast<int>(p);
-      const double shift = problem.map.state_interval(phase).first - here.state_interval(phase).first;
-      ranges[p].first += shift;
-      ranges[p].second += shift;
-    }
-    return markov::integrate(problem.map, markov::NodeSpace(ranges, panels_), problem.launch, threads_).chain;
+    std::vector<double> shift;
+    for (int p = 0; p < problem.map.phases(); ++p)
+      shift.push_back(problem.map.state_interval(p).first - here.state_interval(p).first);
+    return rows_.chain(problem, rows_.space(panels_, shift)).chain;
   }
 
   const Setting& setting_;
-  std::vector<std::pair<double, double>> ranges_;
+  const ExactRows& rows_;
   std::size_t panels_;
-  int threads_;
   markov::Adjoint adjoint_;
 };
 
 std::vector<Sensitivity> by_rows(const Setting& setting, const Metastability& study, const StudyOptions& options) {
   const Problem problem = setting.problem();
-  const auto ranges = markov::node_ranges(problem.map, problem.launch, options.threads);
-  const std::size_t panels = std::max<std::size_t>(2, study.cells / markov::NodeSpace::order);
-  const IntegratedRows fine(setting, ranges, panels, options.threads),
-      coarse(setting, ranges, panels / 2, options.threads);
-  std::vector<Sensitivity> list = candidates(setting, false);
+  const ExactRows rows(problem, options.tolerance, options.threads);
+  const std::size_t panels = std::max<std::size_t>(2, study.cells / rows.coarsest());
+  const IntegratedRows fine(setting, rows, panels), coarse(setting, rows, panels / 2);
+  std::vector<Sensitivity> list = candidates(setting, !setting.wheel.equal_legs());
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (options.progress)
       options.progress(static_cast<double>(i) / static_cast<double>(list.size()), sensitivity_name(list[i]));

@@ -35,6 +35,11 @@ Place place(double lower, double upper, bool fold_below, bool fold_above, double
   return {lower + length * t, length};
 }
 
+const WheelMap& checked(const WheelMap& map) {
+  LandingDensity::check(map);
+  return map;
+}
+
 }  // namespace
 
 void LandingDensity::check(const WheelMap& map) {
@@ -57,37 +62,7 @@ void LandingDensity::check(const WheelMap& map) {
 }
 
 LandingDensity::LandingDensity(const WheelMap& map, double state, int phase)
-    : restitution_(map.noise().restitution()), friction_(map.noise().friction()) {
-  check(map);
-  const ContactModel& model = map.contact_model();
-  const Collision c = map.collision(phase, 1);
-  coulomb_ = model.law == Law::coulomb;
-  const double x = c.contact_x, y = c.contact_y;
-  const double r2 = coulomb_ ? std::max(model.radius_of_gyration * model.radius_of_gyration, 1e-16 * (x * x + y * y))
-                             : c.landing_length * c.landing_length;
-  const double scale = 1 / (model.mass * r2), coupling = (coulomb_ ? std::abs(x * y) : x * y) * scale;
-  normal_0_ = (r2 + x * x) * scale;
-  normal_1_ = coupling;
-  tangential_0_ = coupling;
-  tangential_1_ = (r2 + y * y) * scale;
-  const Stance& stance = map.stance(phase);
-  lowest_ = stance.barrier + stance.gain;
-  gain_ = stance.gain;
-  inertia_ = stance.inertia;
-  available_ = map.stance(phase > 0 ? phase - 1 : map.phases() - 1).inertia * state;
-  energy_ = c.chord * c.chord * state / 2;
-  if (coulomb_) {
-    kept_ = 1 - model.rebound_lost;
-  } else {
-    pull_ = model.mass * model.gravity * std::sin(c.slope) * c.chord * std::sqrt(state) / 2;
-    stretch_ = std::sqrt(model.contact_mass / model.ramp_stiffness);
-  }
-  end_ = std::max(friction_.lower(), friction_.mean()) + far_tail * friction_.sd();
-  if (coulomb_)
-    end_ = tangential_0_ / tangential_1_;
-  else if (normal_1_ > 0)
-    end_ = std::min(end_, normal_0_ / normal_1_);
-
+    : restitution_(map.noise().restitution()), friction_(map.noise().friction()), curve_(checked(map), state, phase) {
   if (restitution_.constant()) {
     lower_ = upper_ = restitution_.mean();
     return;
@@ -104,7 +79,7 @@ LandingDensity::LandingDensity(const WheelMap& map, double state, int phase)
   for (int i = 1; i <= steps; ++i) grid.push_back(i == steps ? upper_ : start + (upper_ - start) * i / steps);
   double guess = 0;
   const auto extreme_loss = [this, &guess](double eta) {
-    const Extreme found = extreme(at(eta), guess);
+    const LossCurve::Extreme found = curve_.extreme(curve_.at(eta), guess);
     guess = found.friction;
     return found.loss;
   };
@@ -124,112 +99,33 @@ LandingDensity::LandingDensity(const WheelMap& map, double state, int phase)
             [](const Point& p, const Point& q) { return p.restitution < q.restitution; });
 }
 
-LandingDensity::Coefficients LandingDensity::at(double restitution) const {
-  const double one_more = 1 + restitution;
-  Coefficients k{energy_ * (1 - kept_ * restitution * restitution), energy_ * one_more * one_more, 0};
-  if (coulomb_) {
-    k.b = -k.b;
-  } else {
-    const double log_eta = std::log(std::max(restitution, std::numeric_limits<double>::min()));
-    k.c = pull_ * one_more * stretch_ * std::sqrt(std::numbers::pi * std::numbers::pi + log_eta * log_eta);
-  }
-  return k;
-}
-
-double LandingDensity::loss(const Coefficients& k, double mu) const {
-  const double inverse = 1 / (normal_0_ - normal_1_ * mu), product = mu * (tangential_1_ * mu - tangential_0_);
-  return inverse * (k.a + product * (k.b * inverse + k.c));
-}
-
-double LandingDensity::slope(const Coefficients& k, double mu) const {
-  const double inverse = 1 / (normal_0_ - normal_1_ * mu);
-  return stationary_polynomial(k, mu) * inverse * inverse * inverse;
-}
-
-// d loss / d mu times A^3.
-double LandingDensity::stationary_polynomial(const Coefficients& k, double mu) const {
-  const double normal = normal_0_ - normal_1_ * mu, product = mu * (tangential_1_ * mu - tangential_0_),
-               rise = 2 * tangential_1_ * mu - tangential_0_;
-  return k.a * normal_1_ * normal + k.b * (rise * normal + 2 * product * normal_1_) +
-         k.c * normal * (rise * normal + product * normal_1_);
-}
-
-// The least loss over [0, end] (`coulomb`: the largest), by Newton's method within a bracket from near `guess`.
-LandingDensity::Extreme LandingDensity::extreme(const Coefficients& k, double guess) const {
-  const double sign = coulomb_ ? -1 : 1;
-  double low = 0, high = end_;
-  if (sign * stationary_polynomial(k, low) >= 0) return {low, loss(k, low)};
-  if (sign * stationary_polynomial(k, high) <= 0) return {high, loss(k, high)};
-  double mu = guess > low && guess < high ? guess : 0.5 * (low + high);
-  for (int i = 0; i < 100; ++i) {
-    const double normal = normal_0_ - normal_1_ * mu, product = mu * (tangential_1_ * mu - tangential_0_),
-                 rise = 2 * tangential_1_ * mu - tangential_0_, both = rise * normal + product * normal_1_;
-    const double value = k.a * normal_1_ * normal + k.b * (both + product * normal_1_) + k.c * normal * both;
-    const double derivative =
-        normal_1_ * (k.b * rise - k.a * normal_1_ - k.c * both) + 2 * tangential_1_ * normal * (k.b + k.c * normal);
-    if (value == 0) break;
-    (sign * value < 0 ? low : high) = mu;
-    double next = mu - value / derivative;
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    const double moved = std::abs(next - mu);
-    mu = next;
-    if (moved <= 1e-9 * mu || high - low <= 4e-16 * high) break;  // the next step would move it by less than rounding
-  }
-  return {mu, loss(k, mu)};
-}
-
-// The one mu in [from, to] with loss = level: Newton's method on (loss - level) A^2 within a bracket, from near
-// `guess`.
-double LandingDensity::root(const Coefficients& k, double level, double from, double to, bool rising,
-                            double guess) const {
-  const double sign = rising ? 1 : -1;
-  double low = from, high = to, mu = guess > low && guess < high ? guess : 0.5 * (low + high);
-  for (int i = 0; i < 100; ++i) {
-    const double normal = normal_0_ - normal_1_ * mu, product = mu * (tangential_1_ * mu - tangential_0_),
-                 rise = 2 * tangential_1_ * mu - tangential_0_;
-    const double value = (k.a - level * normal) * normal + product * (k.b + k.c * normal);
-    const double derivative = normal_1_ * (2 * level * normal - k.a - k.c * product) + rise * (k.b + k.c * normal);
-    if (value == 0) break;
-    (sign * value < 0 ? low : high) = mu;
-    double next = mu - value / derivative;
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    const double moved = std::abs(next - mu);
-    mu = next;
-    // An error e becomes e^2 / (2 times the distance to the other root's side).
-    const double apart = std::min(mu - from, to - mu);
-    if (moved * moved <= 1e-16 * mu * apart || high - low <= 2e-16 * high || moved <= 4e-16 * mu) break;
-  }
-  return mu;
-}
-
 double LandingDensity::given_restitution(double restitution, double level, Guess& guess) const {
-  const Coefficients k = at(restitution);
-  const Extreme turn = extreme(k, guess.extreme);
+  const LossCurve::Coefficients k = curve_.at(restitution);
+  const LossCurve::Extreme turn = curve_.extreme(k, guess.extreme);
   guess.extreme = turn.friction;
   double sum = 0;
   const auto add = [&](double from, double to, bool rising, double& near) {
-    const double mu = near = root(k, level, from, to, rising, near);
-    const double steepness = std::abs(slope(k, mu));
+    const double mu = near = curve_.root(k, level, from, to, rising, near);
+    const double steepness = std::abs(curve_.slope(k, mu));
     if (steepness > 0) sum += friction_.density(mu) / steepness;
   };
-  const double first = loss(k, 0), sign = coulomb_ ? -1 : 1;
+  const double first = curve_.loss(k, 0), sign = curve_.coulomb() ? -1 : 1;
   const double beyond = sign * (level - turn.loss);
   if (beyond <= 0) return 0;
-  if (turn.friction > 0 && sign * (first - level) > 0) add(0, turn.friction, coulomb_, guess.first);
-  const bool jams = !coulomb_ && normal_0_ - normal_1_ * end_ <= 1e-15 * normal_0_;
-  if (turn.friction < end_ && (jams || sign * (loss(k, end_) - level) > 0))
-    add(turn.friction, end_, !coulomb_, guess.second);
+  if (turn.friction > 0 && sign * (first - level) > 0) add(0, turn.friction, curve_.coulomb(), guess.first);
+  if (turn.friction < curve_.end() && (curve_.jams() || sign * (curve_.loss(k, curve_.end()) - level) > 0))
+    add(turn.friction, curve_.end(), !curve_.coulomb(), guess.second);
   return sum;
 }
 
 // The share that sticks: loss = a(eta) / A(mu_c) whatever mu is.
 double LandingDensity::sticking(double level) const {
-  const double share = friction_.complement(end_), normal = normal_0_ - normal_1_ * end_;
-  const double squared = (1 - level * normal / energy_) / kept_;
+  const double share = friction_.complement(curve_.end()), normal = curve_.normal(curve_.end());
+  const double squared = (1 - level * normal / curve_.energy()) / curve_.kept();
   if (share == 0 || !(squared > 0)) return 0;
   const double eta = std::sqrt(squared);
   if (eta < lower_ || eta > upper_) return 0;
-  return share * restitution_.density(eta) * normal / (2 * energy_ * kept_ * eta);
+  return share * restitution_.density(eta) * normal / (2 * curve_.energy() * curve_.kept() * eta);
 }
 
 std::vector<LandingDensity::Piece> LandingDensity::pieces(double level) const {
@@ -240,7 +136,7 @@ std::vector<LandingDensity::Piece> LandingDensity::pieces(double level) const {
   std::vector<Break> breaks{{lower_, false}};
   double guess = 0;
   const auto fold = [&](double eta) {
-    const Extreme found = extreme(at(eta), guess);
+    const LossCurve::Extreme found = curve_.extreme(curve_.at(eta), guess);
     guess = found.friction;
     return found.loss - level;
   };
@@ -255,17 +151,17 @@ std::vector<LandingDensity::Piece> LandingDensity::pieces(double level) const {
   }
   // A root of mu comes in at 0, and under `coulomb` at mu_c.
   const auto enters = [&](double normal) {
-    const double squared = (1 - level * normal / energy_) / kept_;
+    const double squared = (1 - level * normal / curve_.energy()) / curve_.kept();
     if (squared > lower_ * lower_ && squared < upper_ * upper_) breaks.push_back({std::sqrt(squared), false});
   };
-  enters(normal_0_);
-  if (coulomb_) enters(normal_0_ - normal_1_ * end_);
+  enters(curve_.normal(0));
+  if (curve_.coulomb()) enters(curve_.normal(curve_.end()));
   for (double eta : {1e-9, 1e-6, 1e-3, 0.02})
-    if (!coulomb_ && eta > lower_ && eta < upper_) breaks.push_back({eta, false});
+    if (!curve_.coulomb() && eta > lower_ && eta < upper_) breaks.push_back({eta, false});
   breaks.push_back({upper_, false});
   std::sort(breaks.begin(), breaks.end(), [](const Break& p, const Break& q) { return p.restitution < q.restitution; });
   std::vector<Piece> found;
-  const double sign = coulomb_ ? -1 : 1;
+  const double sign = curve_.coulomb() ? -1 : 1;
   for (std::size_t i = 1; i < breaks.size(); ++i) {
     const Break &l = breaks[i - 1], &r = breaks[i];
     if (!(r.restitution > l.restitution)) continue;
@@ -342,15 +238,15 @@ double LandingDensity::integrate(const std::vector<Piece>& all, double level) co
 }
 
 double LandingDensity::operator()(double next) const {
-  if (next < lowest_) return 0;
-  const double level = (available_ - inertia_ * (next - gain_)) / 2;
-  const double per_loss = inertia_ / 2;
+  if (next < curve_.lowest()) return 0;
+  const double level = curve_.level(next);
+  const double per_loss = curve_.inertia() / 2;
   if (restitution_.constant()) {
     Guess guess;
     return per_loss * given_restitution(lower_, level, guess);
   }
   double sum = integrate(pieces(level), level);
-  if (coulomb_) sum += sticking(level);
+  if (curve_.coulomb()) sum += sticking(level);
   return per_loss * sum;
 }
 

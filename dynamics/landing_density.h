@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "dynamics/loss_curve.h"
 #include "dynamics/wheel_map.h"
 
 namespace metastable::dynamics {
@@ -32,13 +33,6 @@ class LandingDensity {
   static void check(const WheelMap& map);
 
  private:
-  // The loss as a function of mu at one eta, times A^2 or A^3 where that makes polynomials.
-  struct Coefficients {
-    double a, b, c;
-  };
-  struct Extreme {
-    double friction, loss;
-  };
   struct Guess {  // where the last calls found them
     double extreme = 0, first = 0, second = 0;
   };
@@ -50,29 +44,15 @@ class LandingDensity {
     bool fold_below, fold_above;
   };
 
-  Coefficients at(double restitution) const;
-  double loss(const Coefficients& k, double friction) const;
-  double slope(const Coefficients& k, double friction) const;
-  double stationary_polynomial(const Coefficients& k, double friction) const;
-  Extreme extreme(const Coefficients& k, double guess) const;
-  double root(const Coefficients& k, double level, double from, double to, bool rising, double guess) const;
   double given_restitution(double restitution, double level, Guess& guess) const;
   double sticking(double level) const;
   std::vector<Piece> pieces(double level) const;
   double integrate(const std::vector<Piece>& pieces, double level) const;
 
   const TruncatedNormal restitution_, friction_;
-  bool coulomb_ = false;
-  double lowest_ = 0, gain_ = 0, inertia_ = 0, available_ = 0;  // I2, I1 x
-  double normal_0_ = 0, normal_1_ = 0;                          // A = normal_0 - normal_1 mu
-  double tangential_0_ = 0, tangential_1_ = 0;                  // B = tangential_1 mu - tangential_0
-  double energy_ = 0;                                           // c^2 x / 2
-  double pull_ = 0;                                             // M g sin(gamma) c omega / 2
-  double stretch_ = 0;                                          // sqrt(m_c / K_r)
-  double kept_ = 1;                                             // 1 - rebound_lost
-  double end_ = 0;                                              // mu beyond which nothing lands, or the foot sticks
-  double lower_ = 0, upper_ = 1;                                // eta
-  std::vector<Point> extremes_;                                 // over eta, its own extremes included
+  const LossCurve curve_;
+  double lower_ = 0, upper_ = 1;  // eta
+  std::vector<Point> extremes_;   // over eta, its own extremes included
 };
 
 }  // namespace metastable::dynamics

@@ -2,6 +2,7 @@
 // Normal distribution cut to an interval, exact in both tails.
 
 #include <limits>
+#include <optional>
 
 namespace metastable::dynamics {
 
@@ -35,7 +36,8 @@ class TruncatedNormal {
   /// Density at x, 0 outside [lower, upper]. @throws std::logic_error for a constant
   double density(double x) const;
   /// x whose cdf is Phi(score) and whose complement is Phi(-score): monotone, within rounding of x (or of the sd, if
-  /// larger) for |score| up to 37, as long as the untruncated normal's tail at x exceeds 1e-307.
+  /// larger) for |score| up to 37, as long as the untruncated normal's tail at x exceeds 1e-307; within 1e-4 sd of a
+  /// bound within rounding of the distance from it.
   double at_score(double score) const;
   /// Mean and sd of the truncated variable itself.
   double truncated_mean() const;
@@ -43,6 +45,7 @@ class TruncatedNormal {
 
  private:
   double untruncated(double from, double to) const;
+  std::optional<double> beyond_bound(double a, double probability) const;
 
   double mean_, sd_, lower_, upper_;
   double below_lower_ = 0, above_lower_ = 1;  // Phi, 1 - Phi at the lower bound

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "dynamics/landing_density.h"
+#include "dynamics/landing_quadrature.h"
 #include "dynamics/landing_range.h"
 #include "dynamics/published_density.h"
 #include "dynamics/rest_probability.h"
@@ -139,15 +140,23 @@ std::optional<double> WheelMap::rest_probability(double state, int phase) const 
   return dynamics::rest_probability(*this, state, phase);
 }
 
-double WheelMap::landing_density(double state, int phase, std::span<const double> next,
-                                 std::span<double> density) const {
-  if (!density_->empty()) {
-    const PublishedDensity& fast = (*density_)[static_cast<std::size_t>(phase)];
-    if (state >= fast.slowest()) return fast(state, next, density);
-  }
+std::optional<double> WheelMap::landing_density(double state, int phase, std::span<const double> next,
+                                                std::span<double> density) const {
+  if (density_->empty()) return std::nullopt;
+  const PublishedDensity& fast = (*density_)[static_cast<std::size_t>(phase)];
+  if (state >= fast.slowest()) return fast(state, next, density);
   const LandingDensity at(*this, state, phase);
   std::transform(next.begin(), next.end(), density.begin(), at);
   return dynamics::rest_probability(*this, state, phase);
+}
+
+double WheelMap::landing_points(double state, int phase, std::span<const double> breaks,
+                                std::vector<std::pair<double, double>>& points) const {
+  return dynamics::landing_points(*this, state, phase, breaks, points);
+}
+
+std::vector<double> WheelMap::states_of_extremes(int phase, std::span<const double> next) const {
+  return dynamics::states_of_extremes(*this, phase, next);
 }
 
 std::pair<double, double> WheelMap::landing_range(double state, int phase) const {

@@ -71,10 +71,15 @@ class WheelMap {
   /// Exact, by quadrature over eta and the distribution function of mu in closed form (independent eta, mu, or a list);
   /// nothing for a correlated pair.
   std::optional<double> rest_probability(double state, int phase) const;
-  /// Density of the landing at each of the next states [1/(rad^2/s^2)]: density[k] belongs to next[k] (PublishedDensity
-  /// where it covers the map, else LandingDensity); returns the probability of rest.
-  /// @throws std::invalid_argument where the noise leaves none in closed form (names the reason and the sampled method)
-  double landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const;
+  /// Density of the landing at each of the next states [1/(rad^2/s^2)]: density[k] belongs to next[k]
+  /// (PublishedDensity, and LandingDensity for states slower than any survivor); returns the probability of rest.
+  /// Nothing where PublishedDensity does not cover the map.
+  std::optional<double> landing_density(double state, int phase, std::span<const double> next,
+                                        std::span<double> density) const;
+  /// Points with weights for expectations over the landing; where those are not smooth (dynamics/landing_quadrature.h).
+  double landing_points(double state, int phase, std::span<const double> breaks,
+                        std::vector<std::pair<double, double>>& points) const;
+  std::vector<double> states_of_extremes(int phase, std::span<const double> next) const;
   /// Infimum and supremum of the landing over the support of (eta, mu); -infinity stands for rest.
   std::pair<double, double> landing_range(double state, int phase) const;
   /// Time of the stance that begins at `phase` and ends at next_state [s], closed form (Carlson's R_F, the elliptic

@@ -11,8 +11,8 @@ namespace {
 
 std::string row_name(std::size_t row) { return "chain row " + std::to_string(row); }
 
-void check_probability(double value, std::size_t row, const char* what) {
-  if (!std::isfinite(value) || value < 0) {
+void check_probability(double value, std::size_t row, const char* what, bool any_sign = false) {
+  if (!std::isfinite(value) || (value < 0 && !any_sign)) {
     std::ostringstream message;
     message << row_name(row) << ": " << what << " is " << value << ", not a finite number >= 0";
     throw std::invalid_argument(message.str());
@@ -49,7 +49,18 @@ ConvergenceError::ConvergenceError(std::string solver, double residual, const st
     : std::runtime_error(describe(solver, residual, detail)), solver_(std::move(solver)), residual_(residual) {}
 
 Chain::Chain(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column, std::vector<double> value,
-             std::vector<double> kill, double excess) {
+             std::vector<double> kill, double excess)
+    : Chain(std::move(row_start), std::move(column), std::move(value), std::move(kill), excess, false) {}
+
+Chain Chain::interpolated(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column,
+                          std::vector<double> value, std::vector<double> kill) {
+  constexpr double any = std::numeric_limits<double>::infinity();  // without its diagonal a row may sum to more than 1
+  return {std::move(row_start), std::move(column), std::move(value), std::move(kill), any, true};
+}
+
+Chain::Chain(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column, std::vector<double> value,
+             std::vector<double> kill, double excess, bool interpolated)
+    : interpolated_(interpolated) {
   const std::size_t n = kill.size();
   if (n > std::numeric_limits<std::uint32_t>::max()) throw std::invalid_argument("chain: too many states");
   if (row_start.size() != n + 1 || row_start.front() != 0 || row_start.back() != column.size() ||
@@ -59,10 +70,10 @@ Chain::Chain(std::vector<std::size_t> row_start, std::vector<std::uint32_t> colu
   std::size_t kept = 0;
   std::vector<std::size_t> start(n + 1, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    check_probability(kill[i], i, "the kill rate");
+    check_probability(kill[i], i, "the kill rate", interpolated);
     double sum = kill[i];
     for (std::size_t e = row_start[i]; e < row_start[i + 1]; ++e) {
-      check_probability(value[e], i, "an entry");
+      check_probability(value[e], i, "an entry", interpolated);
       if (column[e] >= n)
         throw std::invalid_argument(row_name(i) + ": column " + std::to_string(column[e]) + " of " + std::to_string(n) +
                                     " is out of range");
@@ -122,7 +133,8 @@ std::span<const double> Chain::values(std::size_t row) const {
 
 double Chain::stay(std::size_t row) const {
   const auto entries = values(row);
-  return std::max(0.0, 1 - std::accumulate(entries.begin(), entries.end(), kill_[row]));
+  const double stays = 1 - std::accumulate(entries.begin(), entries.end(), kill_[row]);
+  return interpolated_ ? stays : std::max(0.0, stays);
 }
 
 Chain Chain::restricted_to(std::span<const std::uint32_t> states) const {
@@ -135,6 +147,7 @@ Chain Chain::restricted_to(std::span<const std::uint32_t> states) const {
     index[states[i]] = static_cast<std::uint32_t>(i);
   }
   Chain part;
+  part.interpolated_ = interpolated_;
   for (const std::uint32_t state : states) {
     double exits = kill_[state];
     const auto to = columns(state);

@@ -42,17 +42,26 @@ class Chain {
   Chain(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column, std::vector<double> value,
         std::vector<double> kill, double excess = 1e-9);
 
+  /// A chain on the nodes of an interpolation: its entries are weights of node values, some of them negative; row sums
+  /// and kill rates are probabilities all the same. Solvers take right sides of any sign then, and keep relative
+  /// accuracy as long as the negative weights are few (Elimination says when they are not).
+  /// @throws std::invalid_argument as the constructor does, but for negative entries
+  static Chain interpolated(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column,
+                            std::vector<double> value, std::vector<double> kill);
+
   /// From a dense row-major n x n matrix (its diagonal is ignored) and kill rates. Zeros are dropped.
   /// @throws std::invalid_argument as the constructor does, and when the sizes are not n * n and n.
   static Chain from_dense(std::size_t n, std::span<const double> matrix, std::span<const double> kill);
 
   std::size_t size() const { return kill_.size(); }
+  bool interpolated() const { return interpolated_; }
   std::size_t entries() const { return value_.size(); }
   std::span<const std::uint32_t> columns(std::size_t row) const;
   std::span<const double> values(std::size_t row) const;
   double kill(std::size_t row) const { return kill_[row]; }
   std::span<const double> kill() const { return kill_; }
-  /// Probability of staying in `row` [1], max(0, 1 - row sum - kill): rounded, for solvers that need it.
+  /// Probability of staying in `row` [1], max(0, 1 - row sum - kill) (of any sign if interpolated): rounded, for
+  /// solvers that need it.
   double stay(std::size_t row) const;
 
   /// The chain on `states` (strictly ascending) only; what leaves them is added to the kill rates. O(entries).
@@ -60,6 +69,10 @@ class Chain {
   Chain restricted_to(std::span<const std::uint32_t> states) const;
 
  private:
+  Chain(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column, std::vector<double> value,
+        std::vector<double> kill, double excess, bool interpolated);
+
+  bool interpolated_ = false;
   std::vector<std::size_t> row_start_{0};
   std::vector<std::uint32_t> column_;
   std::vector<double> value_;

@@ -106,13 +106,14 @@ std::vector<Complex> sorted_values(const Eigen::VectorXcd& values, Eigen::Index 
   return others;
 }
 
-std::vector<double> positive_vector(const Eigen::VectorXcd& vector) {
+std::vector<double> leading_vector(const Eigen::VectorXcd& vector, bool any_sign) {
   // An eigenvector is known up to a complex factor; the leading one is real and of one sign after this.
   Eigen::Index largest = 0;
   vector.cwiseAbs().maxCoeff(&largest);
   const Complex turn = std::abs(vector[largest]) / vector[largest];
   std::vector<double> left;
-  for (const Complex entry : vector) left.push_back(std::max(0.0, (entry * turn).real()));
+  for (const Complex entry : vector)
+    left.push_back(any_sign ? (entry * turn).real() : std::max(0.0, (entry * turn).real()));
   const double sum = std::accumulate(left.begin(), left.end(), 0.0);
   for (double& entry : left) entry /= sum;
   return left;
@@ -130,7 +131,7 @@ Eigenpairs leading_eigenpairs(const Chain& chain, int count) {
   pairs.values = sorted_values(raw.values, leading);
   const auto wanted = static_cast<std::size_t>(count);
   if (pairs.values.size() > wanted) pairs.values.resize(wanted + (pairs.values[wanted - 1].imag() > 0 ? 1 : 0));
-  pairs.left = positive_vector(raw.vectors.col(leading));
+  pairs.left = leading_vector(raw.vectors.col(leading), chain.interpolated());
   const std::vector<double> image = apply_left(chain, pairs.left);
   for (std::size_t i = 0; i < image.size(); ++i) {
     pairs.residual = std::max(pairs.residual, std::abs(image[i] - pairs.values[0].real() * pairs.left[i]));

@@ -1,9 +1,11 @@
 #include "markov/elimination.h"
 
 #include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -39,13 +41,15 @@ double sum(const double* row, std::size_t from, std::size_t to) {
 /// Row i holds, left of the diagonal, the probabilities at which the chain watched on states 0 .. i leaves i, and,
 /// right of it, the expected visits to j > i before the chain is back among 0 .. i (the entries of U). What is stored
 /// on the diagonal is never read.
-struct Elimination::Factors {
+struct Elimination::Factors final : Elimination::Solver {
   Factors(const Chain& chain, int threads);
+  std::size_t size() const override { return kill.size(); }
+  std::vector<double> solve(std::span<const double> rhs) const override;
+  std::vector<double> solve_left(std::span<const double> rhs) const override;
 
   /// Row i, to be indexed by column low[i] .. high[i] (offset[i] >= i >= low[i]: no row is shorter than its diagonal).
   double* row(std::size_t i) { return entries.data() + offset[i] - low[i]; }
   const double* row(std::size_t i) const { return entries.data() + offset[i] - low[i]; }
-  std::size_t size() const { return kill.size(); }
   void check_right_side(std::span<const double> rhs) const;
 
   std::vector<std::size_t> low, high;  ///< row i occupies columns low[i] .. high[i], i among them
@@ -195,6 +199,74 @@ void Elimination::Factors::check_right_side(std::span<const double> rhs) const {
   }
 }
 
+/// (I - Q) x = b with x = c + w, w = 0 at one state: (I - Q) 1 is the kill rates, so they take that state's column, and
+/// the rest is far from singular however rare rest is.
+struct Elimination::Bordered final : Elimination::Solver {
+  explicit Bordered(const Chain& chain);
+  std::size_t size() const override { return order.size(); }
+  std::vector<double> solve(std::span<const double> rhs) const override;
+  std::vector<double> solve_left(std::span<const double> rhs) const override;
+
+  std::vector<std::size_t> order;  ///< of the states; the last one's column holds the kill rates
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu;
+};
+
+Elimination::Bordered::Bordered(const Chain& chain) {
+  const std::size_t n = chain.size();
+  // Where survivors are: small entries of the left solution then come from small entries, not from differences.
+  constexpr int steps = 20;
+  std::vector<double> survivors(n, 1.0);
+  for (int step = 0; step < steps; ++step) {
+    std::vector<double> next(n, 0.0);
+    for (std::size_t i = 0; i < n; ++i) {
+      next[i] += chain.stay(i) * survivors[i];
+      for (std::size_t e = 0; e < chain.columns(i).size(); ++e)
+        next[chain.columns(i)[e]] += chain.values(i)[e] * survivors[i];
+    }
+    const double largest = *std::max_element(next.begin(), next.end());
+    for (std::size_t i = 0; i < n; ++i) survivors[i] = std::max(0.0, next[i] / largest);
+  }
+  order.resize(n);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return survivors[a] < survivors[b]; });
+  std::vector<std::size_t> place(n);
+  for (std::size_t i = 0; i < n; ++i) place[order[i]] = i;
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(static_cast<Index>(n), static_cast<Index>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto row = static_cast<Index>(place[i]);
+    matrix(row, row) = 1 - chain.stay(i);
+    for (std::size_t e = 0; e < chain.columns(i).size(); ++e)
+      matrix(row, static_cast<Index>(place[chain.columns(i)[e]])) = -chain.values(i)[e];
+    matrix(row, static_cast<Index>(n - 1)) = chain.kill(i);
+  }
+  lu.compute(matrix);
+}
+
+std::vector<double> Elimination::Bordered::solve(std::span<const double> rhs) const {
+  const std::size_t n = size();
+  if (rhs.size() != n) throw std::invalid_argument("elimination: right side of another size than the chain");
+  Eigen::VectorXd b(static_cast<Index>(n));
+  for (std::size_t i = 0; i < n; ++i) b[static_cast<Index>(i)] = rhs[order[i]];
+  const Eigen::VectorXd z = lu.solve(b);
+  const double constant = z[static_cast<Index>(n - 1)];
+  std::vector<double> x(n, constant);
+  for (std::size_t i = 0; i + 1 < n; ++i) x[order[i]] += z[static_cast<Index>(i)];
+  return x;
+}
+
+std::vector<double> Elimination::Bordered::solve_left(std::span<const double> rhs) const {
+  const std::size_t n = size();
+  if (rhs.size() != n) throw std::invalid_argument("elimination: right side of another size than the chain");
+  Eigen::VectorXd b(static_cast<Index>(n));
+  for (std::size_t i = 0; i < n; ++i) b[static_cast<Index>(i)] = rhs[order[i]];
+  b[static_cast<Index>(n - 1)] = std::accumulate(rhs.begin(), rhs.end(), 0.0);
+  const Eigen::VectorXd z = lu.transpose().solve(b);
+  std::vector<double> y(n);
+  for (std::size_t i = 0; i < n; ++i) y[order[i]] = z[static_cast<Index>(i)];
+  return y;
+}
+
 namespace {
 
 std::vector<double> checked(std::vector<double> solution) {
@@ -215,17 +287,24 @@ Elimination::Elimination(const Chain& chain, int threads) {
     throw std::domain_error("elimination: rest cannot be reached from state " +
                             std::to_string(stuck - can_rest.begin()));
   }
-  factors_ = std::make_unique<Factors>(chain, threads);
+  if (chain.interpolated())
+    solver_ = std::make_unique<Bordered>(chain);
+  else
+    solver_ = std::make_unique<Factors>(chain, threads);
 }
 
 Elimination::~Elimination() = default;
 Elimination::Elimination(Elimination&&) noexcept = default;
 Elimination& Elimination::operator=(Elimination&&) noexcept = default;
 
-std::size_t Elimination::size() const { return factors_->size(); }
+std::size_t Elimination::size() const { return solver_->size(); }
+std::vector<double> Elimination::solve(std::span<const double> rhs) const { return checked(solver_->solve(rhs)); }
+std::vector<double> Elimination::solve_left(std::span<const double> rhs) const {
+  return checked(solver_->solve_left(rhs));
+}
 
-std::vector<double> Elimination::solve(std::span<const double> rhs) const {
-  const Factors& f = *factors_;
+std::vector<double> Elimination::Factors::solve(std::span<const double> rhs) const {
+  const Factors& f = *this;
   f.check_right_side(rhs);
   std::vector<double> x(rhs.begin(), rhs.end());
   const auto dot = [&x](const double* row, std::size_t from, std::size_t to) {
@@ -234,11 +313,11 @@ std::vector<double> Elimination::solve(std::span<const double> rhs) const {
   };
   for (std::size_t i = x.size(); i-- > 0;) x[i] += dot(f.row(i), i + 1, f.high[i] + 1);
   for (std::size_t i = 0; i < x.size(); ++i) x[i] = (x[i] + dot(f.row(i), f.low[i], i)) / f.exit[i];
-  return checked(std::move(x));
+  return x;
 }
 
-std::vector<double> Elimination::solve_left(std::span<const double> rhs) const {
-  const Factors& f = *factors_;
+std::vector<double> Elimination::Factors::solve_left(std::span<const double> rhs) const {
+  const Factors& f = *this;
   f.check_right_side(rhs);
   std::vector<double> y(rhs.begin(), rhs.end());
   for (std::size_t i = y.size(); i-- > 0;) {
@@ -246,7 +325,7 @@ std::vector<double> Elimination::solve_left(std::span<const double> rhs) const {
     add_multiple(y.data(), y[i], f.row(i), f.low[i], i);
   }
   for (std::size_t i = 0; i < y.size(); ++i) add_multiple(y.data(), y[i], f.row(i), i + 1, f.high[i] + 1);
-  return checked(std::move(y));
+  return y;
 }
 
 }  // namespace metastable::markov

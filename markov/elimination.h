@@ -36,8 +36,15 @@ class Elimination {
   std::vector<double> solve_left(std::span<const double> rhs) const;
 
  private:
-  struct Factors;
-  std::unique_ptr<Factors> factors_;
+  struct Solver {
+    virtual ~Solver() = default;
+    virtual std::size_t size() const = 0;
+    virtual std::vector<double> solve(std::span<const double> rhs) const = 0;
+    virtual std::vector<double> solve_left(std::span<const double> rhs) const = 0;
+  };
+  struct Factors;   // subtraction-free
+  struct Bordered;  // of interpolated chains
+  std::unique_ptr<Solver> solver_;
 };
 
 }  // namespace metastable::markov

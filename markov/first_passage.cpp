@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kRoundedStay = 1e-12;  // probabilities of staying below this are the rounding of a row sum
 constexpr double kSumTolerance = 1e-9;
+constexpr double kMeanTolerance = 1e-6;
 constexpr double kConstantHazard = 1e-12;  // relative change of the log survival over a period
 constexpr double kNormalReach = 9;         // standard deviations beyond which a normal has no mass
 constexpr double kSameAsSpectrum = 1e-8;   // agreement wanted with the failure rate of the chain
@@ -43,7 +44,7 @@ void check_launch(const Launch& launch, std::size_t states) {
   double sum = launch.rest;
   bool negative = !(launch.rest >= 0);
   for (const double probability : launch.after) {
-    negative = negative || !(probability >= 0);
+    negative = negative || !(launch.interpolated || probability >= 0);
     sum += probability;
   }
   if (negative || !(std::abs(sum - 1) <= kSumTolerance)) {
@@ -67,7 +68,12 @@ Moments moments(double mean, double square) { return {mean, std::sqrt(std::max(0
 
 std::vector<double> mean_first_passage(const ChainSolver& solver) {
   std::vector<double> mean = solver.solve(std::vector<double>(solver.chain().size(), 1.0));
-  for (double& steps : mean) steps = std::max(1.0, steps);  // rounding of a row sum may take it an ulp below
+  for (double& steps : mean) {
+    if (!(steps >= 1 - kMeanTolerance))
+      throw ConvergenceError("first passage", steps,
+                             "expected steps below one: the nodes are too few for interpolation");
+    steps = std::max(1.0, steps);  // rounding of a row sum may take it an ulp below
+  }
   return mean;
 }
 

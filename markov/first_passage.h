@@ -14,6 +14,7 @@ namespace metastable::markov {
 struct Launch {
   std::vector<double> after;  ///< size n
   double rest = 0;            ///< sum(after) + rest = 1 up to rounding
+  bool interpolated = false;  ///< `after` holds weights of node values, of any sign (Chain::interpolated)
 };
 
 /// Mean first-passage time to rest from every state [steps]: (I - Q) m = 1. Size n, every entry >= 1. One solve.

@@ -29,7 +29,7 @@ inline constexpr double rest_landing = -std::numeric_limits<double>::infinity();
 ///   landing(state, phase, noise)   the next state, or nothing when the system comes to rest
 ///
 /// Members used when present (see AnyReturnMap for their meaning): rest_probability, landing_range,
-/// landing_density, tabulate, duration, advance, assumptions, violates.
+/// landing_density, landing_points, states_of_extremes, tabulate, duration, advance, assumptions, violates.
 template <class M>
 concept ReturnMap = requires(const M& map, double state, int phase, std::span<const double> noise) {
   { map.state_interval(phase) } -> std::convertible_to<std::pair<double, double>>;
@@ -78,8 +78,21 @@ class AnyReturnMap {
   /// relative accuracy, tails included; over all next states it integrates to 1 - rest probability, which is returned.
   /// Nothing, and nothing written, if the map does not tell. May throw std::invalid_argument where this map's noise has
   /// no density.
-  std::optional<double> landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const {
+  std::optional<double> landing_density(double state, int phase, std::span<const double> next,
+                                        std::span<double> density) const {
     return self_->landing_density(state, phase, next, density);
+  }
+  /// Points {next state, weight} such that the sum of weight * f(next) is E[f(landing)] over the survivors, for f that
+  /// is smooth between `breaks` (ascending); returns the probability of rest. Nothing if the map does not tell. May
+  /// throw std::invalid_argument where this map's noise has no such points.
+  std::optional<double> landing_points(double state, int phase, std::span<const double> breaks,
+                                       std::vector<std::pair<double, double>>& points) const {
+    return self_->landing_points(state, phase, breaks, points);
+  }
+  /// States at `phase`, ascending, from which an extreme landing is one of `next`: expectations of a function that is
+  /// not smooth at `next` are not smooth there. Empty if the map does not tell.
+  std::vector<double> states_of_extremes(int phase, std::span<const double> next) const {
+    return self_->states_of_extremes(phase, next);
   }
   /// Draws prepared for repeated use; noise is row-major, one row of noise_dimension() scores a draw.
   std::unique_ptr<NoiseTable> tabulate(int phase, std::span<const double> noise) const {
@@ -106,6 +119,9 @@ class AnyReturnMap {
     virtual std::optional<double> rest_probability(double, int) const = 0;
     virtual std::optional<std::pair<double, double>> landing_range(double, int) const = 0;
     virtual std::optional<double> landing_density(double, int, std::span<const double>, std::span<double>) const = 0;
+    virtual std::optional<double> landing_points(double, int, std::span<const double>,
+                                                 std::vector<std::pair<double, double>>&) const = 0;
+    virtual std::vector<double> states_of_extremes(int, std::span<const double>) const = 0;
     virtual std::unique_ptr<NoiseTable> tabulate(int, std::span<const double>) const = 0;
     virtual std::optional<double> duration(double, int) const = 0;
     virtual std::optional<double> advance(int) const = 0;
@@ -177,6 +193,19 @@ class AnyReturnMap {
         return map.landing_density(state, phase, next, density);
       else
         return std::nullopt;
+    }
+    std::optional<double> landing_points(double state, int phase, std::span<const double> breaks,
+                                         std::vector<std::pair<double, double>>& points) const override {
+      if constexpr (requires { map.landing_points(state, phase, breaks, points); })
+        return map.landing_points(state, phase, breaks, points);
+      else
+        return std::nullopt;
+    }
+    std::vector<double> states_of_extremes(int phase, std::span<const double> next) const override {
+      if constexpr (requires { map.states_of_extremes(phase, next); })
+        return map.states_of_extremes(phase, next);
+      else
+        return {};
     }
     std::unique_ptr<NoiseTable> tabulate(int phase, std::span<const double> noise) const override {
       if constexpr (requires { map.tabulate(phase, noise); })

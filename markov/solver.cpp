@@ -28,7 +28,7 @@ void check_size(const Chain& chain, std::span<const double> vector) {
 void check_right_side(const Chain& chain, std::span<const double> rhs) {
   check_size(chain, rhs);
   for (std::size_t i = 0; i < rhs.size(); ++i) {
-    if (!(rhs[i] >= 0) || std::isinf(rhs[i])) {
+    if (!(chain.interpolated() || rhs[i] >= 0) || !std::isfinite(rhs[i])) {
       throw std::invalid_argument("right side: entry " + std::to_string(i) + " is " + std::to_string(rhs[i]) +
                                   ", not a finite number >= 0");
     }
@@ -157,6 +157,8 @@ Chain revolution_chain(const Chain& chain, const Period& period) {
       start.push_back(column.size());
     }
   }
+  if (chain.interpolated())
+    return Chain::interpolated(std::move(start), std::move(column), std::move(value), revolution_kill(chain, period));
   return Chain(std::move(start), std::move(column), std::move(value), revolution_kill(chain, period),
                kRowExcess * period.period);
 }

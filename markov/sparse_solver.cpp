@@ -39,7 +39,8 @@ void SparseSolver::Factors::assemble(const Chain& chain, double sigma) {
     const auto to = chain.columns(i);
     const auto probability = chain.values(i);
     // 1 - stay, from the sum itself: one rounding less.
-    const double leaves = std::min(1.0, std::accumulate(probability.begin(), probability.end(), chain.kill(i)));
+    const double sum = std::accumulate(probability.begin(), probability.end(), chain.kill(i));
+    const double leaves = chain.interpolated() ? sum : std::min(1.0, sum);
     const auto diagonal = static_cast<SuiteSparse_long>(i);
     bool placed = false;
     const auto place_diagonal = [&] {

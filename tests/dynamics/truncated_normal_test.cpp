@@ -50,6 +50,20 @@ TEST(TruncatedNormal, AtScoreAgreesWithFiftyDigits) {
   }
 }
 
+// Draws that round to the bound itself once made failures of 1e-17 a step 2 % too frequent: eta = 0 lasts for ever.
+TEST(TruncatedNormal, AtScoreKeepsTheDistanceFromABound) {
+  for (const Case& c : {Case{0.4, 0.1, 0, 1}, {0.4, 0.2, 0, infinity}, {-0.5, 0.1, 0, 1}}) {
+    const TruncatedNormal normal(c.mean, c.sd, c.lower, c.upper);
+    double before = 0;
+    for (double score = -37; score < -2; score += 0.01) {
+      const double x = normal.at_score(score);
+      EXPECT_GT(x, before);
+      EXPECT_NEAR(normal.cdf(x) / normal_cdf(score), 1, 1e-10) << score;
+      before = x;
+    }
+  }
+}
+
 TEST(TruncatedNormal, TailsAgreeWithFiftyDigits) {
   for (const Case& c : cases) {
     const TruncatedNormal normal(c.mean, c.sd, c.lower, c.upper);

@@ -1,0 +1,39 @@
+#pragma once
+// Which exact rows a problem gets: densities on nodes, or collocation.
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "analysis/problem.h"
+#include "markov/node_rows.h"
+
+namespace metastable::analysis {
+
+/// Densities of the landing (markov/integrated.h) are fast, but `published` alone has smooth ones, and theirs hold
+/// about seven digits where rest is rare. Every other noise, and tolerances below 1e-6, get collocation
+/// (markov/collocation.h).
+class ExactRows {
+ public:
+  /// @throws std::invalid_argument where the map tells neither (names the sampled method)
+  ExactRows(const Problem& problem, double tolerance, int threads);
+
+  bool collocated() const { return collocated_; }
+  /// Is rest out of the reach of doubles?
+  bool unresolved() const { return ranges_.empty(); }
+  /// Nodes of the coarsest space, per phase.
+  std::size_t coarsest() const;
+  /// coarsest() times `panels` nodes a phase; phase p moved by shift[p], if given.
+  markov::NodeSpace space(std::size_t panels, const std::vector<double>& shift = {}) const;
+  markov::IntegratedChain chain(const Problem& problem, const markov::NodeSpace& space) const;
+  /// Where one event from `state` at `phase` leads.
+  markov::Launch row(const Problem& problem, const markov::NodeSpace& space, double state, int phase) const;
+
+ private:
+  bool collocated_ = false;
+  int threads_ = 1;
+  std::vector<std::pair<double, double>> ranges_;
+  std::vector<std::vector<double>> edges_;  // if collocated
+};
+
+}  // namespace metastable::analysis
