@@ -7,7 +7,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double density_tolerance = 1e-6;
-constexpr int generations = 2;  // of edges: what is left beyond is smooth enough
+constexpr int few_generations = 2, many_generations = 8;  // of edges
 
 // One value tells.
 bool has_density(const Problem& problem) {
@@ -27,7 +27,9 @@ ExactRows::ExactRows(const Problem& problem, double tolerance, int threads)
     : collocated_(!has_density(problem) || (tolerance < density_tolerance && has_points(problem))), threads_(threads) {
   ranges_ = collocated_ ? markov::collocation_ranges(problem.map, problem.launch, threads)
                         : markov::node_ranges(problem.map, problem.launch, threads);
-  if (collocated_ && !ranges_.empty()) edges_ = markov::collocation_edges(problem.map, ranges_, generations);
+  if (collocated_ && !ranges_.empty())
+    edges_ = markov::collocation_edges(problem.map, ranges_,
+                                       tolerance < density_tolerance ? many_generations : few_generations);
 }
 
 std::size_t ExactRows::coarsest() const {

@@ -136,6 +136,11 @@ class Quadrature {
         std::uintmax_t iterations = 60;
         const auto [u, turn] = boost::math::tools::brent_find_minima([&](double t) { return sign * f(t); }, at[i - 1],
                                                                      at[i + 1], 30, iterations);
+        // Beside a level, the loss has roots close to it: in the plane if not on the line.
+        for (double d = 0.3; friction_.constant() && d > 1e-8; d /= 8)
+          for (const double cut : {u - d, u + d})
+            if (cut > from && cut < to) cuts.push_back(cut);
+        if (friction_.constant()) cuts.push_back(u);
         const std::size_t place = i + (u > at[i] ? 1 : 0);
         at.insert(at.begin() + static_cast<std::ptrdiff_t>(place), u);
         value.insert(value.begin() + static_cast<std::ptrdiff_t>(place), sign * turn);
@@ -221,6 +226,24 @@ class Quadrature {
   double turn_guess_ = 0, rest_ = 0, usual_ = 0;  // exponent of the likeliest eta
 };
 
+// Between lower and upper, omega+^2 as a function of eta has its least (sign 1) or largest (-1) value nearby.
+struct Turn {
+  double lower, upper, sign;
+};
+std::vector<Turn> turns(const WheelMap& map, int phase, double friction) {
+  const double state = map.state_interval(phase).first;
+  std::vector<double> grid;
+  for (double eta = 1e-16; eta < 0.005; eta *= 3) grid.push_back(eta);
+  for (int i = 1; i <= 200; ++i) grid.push_back(0.005 * i);
+  std::vector<Turn> found;
+  const auto after = [&](double eta) { return map.after_collision(state, phase, {eta, friction}); };
+  for (std::size_t i = 1; i + 1 < grid.size(); ++i) {
+    const double before = after(grid[i]) - after(grid[i - 1]), behind = after(grid[i + 1]) - after(grid[i]);
+    if (before * behind < 0) found.push_back({grid[i - 1], grid[i + 1], before < 0 ? 1.0 : -1.0});
+  }
+  return found;
+}
+
 }  // namespace
 
 double landing_points(const WheelMap& map, double state, int phase, std::span<const double> breaks,
@@ -282,15 +305,21 @@ std::vector<double> states_of_extremes(const WheelMap& map, int phase, std::span
       if (friction.constant()) {
         const double mu = map.law() == Law::coulomb ? std::min(friction.mean(), sticks) : friction.mean();
         for (const double eta : etas) add(landing, [&](double) { return Contact{eta, mu}; });
-        if (!restitution.constant())
+        const bool at_rest = landing <= (stance.barrier + stance.gain) * (1 + 1e-12);
+        if (map.law() == Law::published && at_rest && !restitution.constant() && reach(restitution, depth).lower == 0)
+          for (const double eta : {1e-1, 1e-2, 1e-4, 1e-8, 1e-16})
+            add(landing, [&](double) { return Contact{eta, mu}; });
+        if (restitution.constant()) continue;
+        // Where the loss turns over eta: brackets from a grid at the lowest state, refined at each.
+        for (const Turn& turn : turns(map, phase, mu))
           add(landing, [&](double state) {
-            std::uintmax_t iterations = 60;
-            const auto most = boost::math::tools::brent_find_minima(
+            std::uintmax_t iterations = 100;
+            const auto found = boost::math::tools::brent_find_minima(
                 [&](double eta) {
-                  return map.after_collision(state, phase, {eta, mu});
+                  return turn.sign * map.after_collision(state, phase, {eta, mu});
                 },
-                restitution.lower(), restitution.upper(), 50, iterations);
-            return Contact{most.first, mu};
+                turn.lower, turn.upper, 50, iterations);
+            return Contact{found.first, mu};
           });
         continue;
       }

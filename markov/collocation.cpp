@@ -14,11 +14,14 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double least_scaled = 1e-6;   // survivors of a row whose total is worth correcting
-constexpr double least_panel = 1e-7;    // between two edges, of the range
-constexpr double most_above = 1e-13;    // survivors beyond the upper edge
-constexpr double most_launched = 1e-9;  // landings of the launch beyond it
-constexpr std::size_t cells = 64;       // of a phase, to find it
+constexpr double least_scaled = 1e-6;     // survivors of a row whose total is worth correcting
+constexpr double least_panel = 1e-7;      // between two edges, of the range
+constexpr double most_above = 1e-13;      // survivors beyond the upper edge
+constexpr double most_launched = 1e-9;    // landings of the launch beyond it
+constexpr std::size_t cells = 64;         // of a phase, to find it
+constexpr std::size_t few_points = 4000;  // of a row
+constexpr std::size_t few_edges = 12, many_edges = 24;
+constexpr int most_generations = 8;
 constexpr const char* no_points =
     "method integrated: the map does not tell its landing's distribution; use the sampled method";
 
@@ -62,6 +65,13 @@ NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, 
   return row;
 }
 
+// Are rows made of so few points that many of them do not matter?
+bool cheap(const AnyReturnMap& map) {
+  std::vector<std::pair<double, double>> points;
+  map.landing_points(map.state_interval(0).first + 1, 0, {}, points);
+  return points.size() < few_points;
+}
+
 MakeNodeRow rows(const AnyReturnMap& map, const NodeSpace& space) {
   return [&](double state, int phase) { return make_row(map, space, state, phase); };
 }
@@ -69,7 +79,11 @@ MakeNodeRow rows(const AnyReturnMap& map, const NodeSpace& space) {
 }  // namespace
 
 IntegratedChain collocate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads) {
-  return chain_of_rows(map, space, launch, rows(map, space), true, threads);
+  const int next = (launch.phase + 1) % space.phases();
+  const std::span<const double> met = space.edges(next);
+  const std::vector<double> kinks =
+      map.states_of_extremes(launch.phase, cheap(map) ? met.first(met.size() - 1) : met.first(1));
+  return chain_of_rows(map, space, launch, rows(map, space), true, kinks, threads);
 }
 
 Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
@@ -81,34 +95,38 @@ Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double st
 std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
                                                    const std::vector<std::pair<double, double>>& ranges,
                                                    int generations) {
-  const auto phases = static_cast<int>(ranges.size());
-  std::vector<std::vector<double>> found(ranges.size()), last(ranges.size()), edges;
-  for (int p = 0; p < phases; ++p) last[static_cast<std::size_t>(p)] = {ranges[static_cast<std::size_t>(p)].first};
+  const bool all = cheap(map);
+  const std::size_t most = all ? many_edges : few_edges;
+  if (all) generations = most_generations;
+  const std::size_t phases = ranges.size();
+  std::vector<std::vector<double>> edges, last;
+  for (const auto& [lower, upper] : ranges) {
+    edges.push_back({lower, upper});
+    last.push_back({lower});
+  }
   for (int generation = 0; generation < generations; ++generation) {
-    std::vector<std::vector<double>> before(ranges.size());
-    for (int p = 0; p < phases; ++p) {
-      const auto at = static_cast<std::size_t>(p), after = static_cast<std::size_t>((p + 1) % phases);
-      const auto& [lower, upper] = ranges[at];
-      for (const double state : map.states_of_extremes(p, last[after]))
-        if (state > lower && state < upper) before[at].push_back(state);
-      found[at].insert(found[at].end(), before[at].begin(), before[at].end());
+    std::vector<std::vector<double>> more = edges, before(phases);
+    std::size_t largest = 0;
+    for (std::size_t p = 0; p < phases; ++p) {
+      const auto& [lower, upper] = ranges[p];
+      const double apart = least_panel * (upper - lower);
+      for (const double state : map.states_of_extremes(static_cast<int>(p), last[(p + 1) % phases])) {
+        const auto above = std::lower_bound(more[p].begin(), more[p].end(), state);
+        if (above == more[p].begin() || above == more[p].end()) continue;
+        if (*above - state < apart || state - *(above - 1) < apart) continue;
+        more[p].insert(above, state);
+        before[p].push_back(state);
+      }
+      largest = std::max(largest, more[p].size());
     }
+    if (generation > 0 && largest > most) break;
+    edges = std::move(more);
     last = std::move(before);
   }
-  std::size_t most = 0;
-  for (std::size_t p = 0; p < ranges.size(); ++p) {
-    const auto& [lower, upper] = ranges[p];
-    std::vector<double> of_phase{lower};
-    std::sort(found[p].begin(), found[p].end());
-    for (const double state : found[p])
-      if (state > of_phase.back() + least_panel * (upper - lower) && state < upper - least_panel * (upper - lower))
-        of_phase.push_back(state);
-    of_phase.push_back(upper);
-    most = std::max(most, of_phase.size());
-    edges.push_back(std::move(of_phase));
-  }
+  std::size_t largest = 0;
+  for (const std::vector<double>& of_phase : edges) largest = std::max(largest, of_phase.size());
   for (std::vector<double>& of_phase : edges)
-    while (of_phase.size() < most) {
+    while (of_phase.size() < largest) {
       std::size_t widest = 1;
       for (std::size_t e = 1; e < of_phase.size(); ++e)
         if (of_phase[e] - of_phase[e - 1] > of_phase[widest] - of_phase[widest - 1]) widest = e;

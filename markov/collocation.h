@@ -25,7 +25,8 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
                                                           int threads);
 
 /// Edges for NodeSpace: the states within `ranges` from which extreme landings just come to rest, and, `generations` -
-/// 1 times, those from which extreme landings meet such a state. As many for every phase (wide panels are halved).
+/// 1 times, those from which extreme landings meet such a state; no generation that takes a phase beyond `most` edges,
+/// but for the first. As many for every phase (wide panels are halved).
 std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
                                                    const std::vector<std::pair<double, double>>& ranges,
                                                    int generations);

@@ -45,7 +45,7 @@ MakeNodeRow rows(const AnyReturnMap& map, const NodeSpace& space) {
 }  // namespace
 
 IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads) {
-  return chain_of_rows(map, space, launch, rows(map, space), false, threads);
+  return chain_of_rows(map, space, launch, rows(map, space), false, {}, threads);
 }
 
 Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {

@@ -28,8 +28,10 @@ struct IntegratedChain {
 };
 
 /// @param interpolated  entries may have any sign (Chain::interpolated)
+/// @param kinks  states of the launch at which rows have kinks
 IntegratedChain chain_of_rows(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch,
-                              const MakeNodeRow& make_row, bool interpolated, int threads);
+                              const MakeNodeRow& make_row, bool interpolated, std::span<const double> kinks,
+                              int threads);
 
 struct LaunchPoint {
   double score, weight;

@@ -70,7 +70,7 @@ void add_course(Options& options) {
 
 void add_study(Options& options) {
   options.add("method", "sampled|integrated", "sampled",
-              "How rows are made: by sampling eta and mu per cell, or by quadrature of the landing's density");
+              "How rows are made: by sampling eta and mu per cell, or by quadrature over them (independent eta, mu)");
   options.add("cells", "N", "", "Cells per landing leg, 8..4096 (default: refined until the tolerance is met)");
   options.add("samples", "S", "", "Draws per cell and replicate (default: raised until the tolerance is met)");
   options.add("tolerance", "REL", "0.01", "Half-width of the 95 % interval of the expected steps, relative");

@@ -101,7 +101,7 @@ TEST(IntegratedStudy, IntervalsHoldTheValueOfATighterTolerance) {
                         {11, {0.36, 0.1}}}) {
     Setting setting = equal_legs(7.02, c.friction);
     setting.slope_deg = c.slope_deg;
-    const Metastability fine = integrated(setting, 1e-7);
+    const Metastability fine = integrated(setting, 1e-6);
     for (const double tolerance : {1e-3, 1e-4, 1e-5}) {
       const Metastability coarse = integrated(setting, tolerance);
       EXPECT_EQ(coarse.status, Status::converged);
@@ -120,7 +120,7 @@ TEST(IntegratedStudy, TakesLaunchesSlowerThanAnySurvivor) {
   for (const double friction : {0.3, 0.36}) {
     Setting setting = equal_legs(8.4, {friction, 0.14});
     setting.initial_speed = {6, 0.3};  // some 8 sds below the mean, slower than the slowest landing
-    const Metastability fine = integrated(setting, 1e-7);
+    const Metastability fine = integrated(setting, 1e-6);
     EXPECT_EQ(fine.status, Status::converged);
     StudyOptions sampled;
     sampled.tolerance = 0.01;
@@ -143,7 +143,7 @@ TEST(IntegratedStudy, TakesCoulomb) {
   EXPECT_LT(result.solver_disagreement, 1e-12);
 }
 
-// Constant friction (the paper's Fig. 6), constant restitution, spreads that reach their bounds.
+// Constant friction, constant restitution, spreads that reach their bounds.
 TEST(IntegratedStudy, TakesAnyNoise) {
   struct Case {
     dynamics::Law law;
@@ -151,8 +151,7 @@ TEST(IntegratedStudy, TakesAnyNoise) {
     Spread restitution, friction, speed;
   };
   using enum dynamics::Law;
-  for (const Case& c : {Case{published, 7.02, {0.4, 0.2}, {0.5, 0}, {7.35, 0.19}},
-                        {published, 7.02, {0.4, 0}, {0.4, 0.1}, {7.35, 0.19}},
+  for (const Case& c : {Case{published, 7.02, {0.4, 0}, {0.4, 0.1}, {7.35, 0.19}},
                         {published, 9.59, {0.4, 0.2}, {0.4, 0.2}, {5.83, 0.28}},
                         {coulomb, 3, {0.4, 0.2}, {0.4, 0}, {4.5, 0.2}},
                         {coulomb, 3, {0.4, 0.2}, {0.4, 0.2}, {4.5, 0.2}}}) {
@@ -164,12 +163,16 @@ TEST(IntegratedStudy, TakesAnyNoise) {
     EXPECT_EQ(fine.status, Status::converged) << law_name(c.law) << ' ' << c.restitution.sd << ' ' << c.friction.sd;
     EXPECT_LE(coarse.from_start.lower, fine.from_start.value);
     EXPECT_GE(coarse.from_start.upper, fine.from_start.value);
-    StudyOptions sampled;
-    sampled.tolerance = 0.01;
-    const Estimate drawn = study(setting.problem(), sampled).from_start;
-    EXPECT_NEAR(fine.from_start.value / drawn.value, 1, 0.02)
-        << law_name(c.law) << ' ' << c.restitution.sd << ' ' << c.friction.sd;
   }
+}
+
+// metastable steps --restitution 0.4,0.2 --friction 0.45,0 --legs 0.1519 --tolerance 0.001: 3.33529 (3.33441
+// to 3.33617).
+// The paper's Fig. 6.
+TEST(IntegratedStudy, OfConstantFrictionAgreesWithSampling) {
+  Setting setting = equal_legs(7.02, {0.45, 0});
+  setting.restitution = {0.4, 0.2};
+  EXPECT_NEAR(integrated(setting, 1e-3).from_start.value, 3.33529, 9e-4);
 }
 
 // Densities and collocation share the law's formula and nothing else.

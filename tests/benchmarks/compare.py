@@ -169,6 +169,9 @@ def main():
              f"{one_cpu:.3f} | {theirs_cpu:.2f} | {theirs_cpu / one_cpu:.0f} |",
              f"| first passage, 2000 states, full (LU's relative error at 1e9 steps: {lu_error:.0e}) | {dense:.3f} | "
              f"{lu:.3f} | {lu / dense:.2f} | {dense_cpu:.3f} | {lu_cpu:.3f} | {lu_cpu / dense_cpu:.2f} |"]
+    steps_cpu = milliseconds(best["expected_steps"], "cpu_time") / 1e3
+    lines.append(f"| expected steps of the paper's wheel, 8 digits (NumPy's sampled chain: 2 digits) | | | | {steps_cpu:.4f} "
+                 f"| {theirs_cpu:.2f} | {theirs_cpu / steps_cpu:.0f} |")
     for name in ("integrated_study/digits:4/legs:1/threads:1", "integrated_study/digits:8/legs:1/threads:1"):
         lines.append(f"| {name.split('/')[1].split(':')[1]} digits of the paper's wheel, integrated study | | | | "
                      f"{milliseconds(best[name], 'cpu_time') / 1e3:.3f} | | |")
