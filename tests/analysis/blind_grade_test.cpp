@@ -92,16 +92,19 @@ TEST(BlindGrade, EffectsFoundAndNamed) {
 }
 
 TEST(BlindGrade, PairsOutsideAndLeftOut) {
-  const BlindTruth pair = truth(BlindKind::pair, {"inertia", "trial_drift"}, 2);
+  BlindTruth pair = truth(BlindKind::pair, {"inertia", "trial_drift"}, 2), hidden = pair;
+  pair.left_by_effect = {30, 40};
+  hidden.left_by_effect = {1, 60};  // recalibration takes up the first
   const BlindTruth outside = truth(BlindKind::outside, {}, 0), left = truth(BlindKind::left_out, {"leg_contact"}, 2);
   const BlindTruth full = truth(BlindKind::effect, {"leg_contact"}, 2);
   const BlindGrades g =
-      grade({pair, pair, pair, outside, outside, outside, left, left, left, full},
+      grade({pair, pair, hidden, outside, outside, outside, left, left, left, full},
             {said("explained", {"trial_drift+inertia"}), said("explained", {"inertia"}),
              said("explained", {"inertia+bounce"}), said("unexplained"), said("explained", {"bounce"}),
              said("explained", {"bounce", "inertia"}), said("unexplained"), said("explained", {"leg_lengths"}),
              said("explained", {"bounce"}), said("explained", {"leg_contact", "leg_lengths"})});
   expect(g, "two effects: both named", 1, 3);
+  expect(g, "  each with power left beside the other", 1, 2);
   expect(g, "two effects: no false third", 2, 3);
   expect(g, "effect outside the catalogue confidently misnamed", 1, 3);
   expect(g, "effect outside the catalogue called unexplained", 1, 3);
