@@ -120,8 +120,13 @@ ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) 
   const Eigen::RowVectorXd mean = scan.by_trial.colwise().mean();
   Eigen::MatrixXd rows = scan.by_trial.rowwise() - mean;
   if (!scan.trials_suffice) {
+    // Trials that scatter more than their transitions would by themselves widen it.
+    const double trials = static_cast<double>(rows.rows());
+    const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
+    const Eigen::ArrayXd own = scan.information.diagonal().array().max(1e-300);
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> split(scan.information);
-    rows = split.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * split.eigenvectors().transpose();
+    rows = split.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * split.eigenvectors().transpose() *
+           (scatter / own).max(1).sqrt().matrix().asDiagonal();
   }
   const auto count_of_rows = rows.rows();
   sorted_.resize(scan.effects.size());

@@ -279,6 +279,15 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   for (Eigen::Index i = 0; i < count; ++i)
     by_unit.row(whole_trials ? static_cast<Eigen::Index>(events[static_cast<std::size_t>(i)].trial) : i) +=
         dense.row(i);
+  // Few trials that scatter more than their transitions would by themselves widen the scale all the same.
+  Eigen::RowVectorXd scatter = Eigen::RowVectorXd::Zero(columns);
+  if (const double trials = static_cast<double>(model.trials()); !whole_trials && trials > 1) {
+    Eigen::MatrixXd by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
+    for (Eigen::Index i = 0; i < count; ++i)
+      by_trial.row(static_cast<Eigen::Index>(events[static_cast<std::size_t>(i)].trial)) += dense.row(i);
+    const Eigen::RowVectorXd middle = by_trial.colwise().mean();
+    scatter = (by_trial.rowwise() - middle).colwise().squaredNorm() * (trials / (trials - 1));
+  }
   Eigen::RowVectorXd scale(columns);
   for (Eigen::Index c = 0; c < columns; ++c) {
     // Event-wise variance: independent without a gap, and many more of them than trials.
@@ -287,8 +296,8 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     // rest, no far score) the events themselves show almost none.
     // Where nearly all of the column is explained there is nothing left to say: a tenth is kept as the least share.
     const double kept = whole_norm[c] > 0 ? dense.col(c).squaredNorm() / whole_norm[c] : 1;
-    scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_unit.col(c).squaredNorm(), 0.1 * whole_norm[c],
-                                   kept * without_gap[static_cast<std::size_t>(c)], 1e-24}));
+    scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_unit.col(c).squaredNorm(), scatter[c],
+                                   0.1 * whole_norm[c], kept * without_gap[static_cast<std::size_t>(c)], 1e-24}));
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
     cell.statistic = std::isfinite(sum) ? sum / scale[c] : 0;  // a fit far off may have no slopes to project on
     // Efficient size: the score by its information, so that size and statistic have one sign.

@@ -314,12 +314,12 @@ std::vector<double> states_of_extremes(const WheelMap& map, int phase, std::span
         for (const Turn& turn : turns(map, phase, mu))
           add(landing, [&](double state) {
             std::uintmax_t iterations = 100;
-            const auto found = boost::math::tools::brent_find_minima(
+            const auto turning = boost::math::tools::brent_find_minima(
                 [&](double eta) {
                   return turn.sign * map.after_collision(state, phase, {eta, mu});
                 },
                 turn.lower, turn.upper, 50, iterations);
-            return Contact{found.first, mu};
+            return Contact{turning.first, mu};
           });
         continue;
       }
