@@ -301,7 +301,16 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
     cell.statistic = std::isfinite(sum) ? sum / scale[c] : 0;  // a fit far off may have no slopes to project on
     // Efficient size: the score by its information, so that size and statistic have one sign.
-    const double information = std::max(1e-12, std::max(0.1, kept) * without_gap[static_cast<std::size_t>(c)]);
+    double left_over = kept;
+    if (cell.aspect == "mean" && cell.facet != "outcome" && fit.derivatives.change.cols() > 0) {
+      // How much of a shift of the cell the fitted parameters take up, by the slopes of its scores: where the gap is
+      // large the events' own products say too much.
+      Eigen::VectorXd follows = Eigen::VectorXd::Zero(fit.derivatives.change.cols());
+      for (const auto& [i, value] : raw[static_cast<std::size_t>(c)])
+        follows += fit.derivatives.change.row(static_cast<Eigen::Index>(i)).transpose();
+      left_over = 1 - follows.dot(fit.information.ldlt().solve(follows)) / without_gap[static_cast<std::size_t>(c)];
+    }
+    const double information = std::max(1e-12, std::max(0.1, left_over) * without_gap[static_cast<std::size_t>(c)]);
     if (cell.aspect == "mean" && cell.facet != "outcome")
       cell.size = sum / information * cell.size;
     else if (cell.aspect == "spread" && cell.unit == "of the model's")

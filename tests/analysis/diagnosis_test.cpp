@@ -92,6 +92,20 @@ TEST(Diagnosis, NamesTheCauseItsSizeAndWhatItCloses) {
   EXPECT_EQ(first->at.substr(0, 5), "leg 3");
 }
 
+// What the refitted contact takes up of a shift is given back in its size: it is the one under the true contact.
+TEST(Diagnosis, SizesOnTheMapAreThoseBeforeRecalibration) {
+  const auto model = data({{"leg_contact", {{3, 0}, {1.3}}}}, 23);
+  const Diagnosis d = diagnose(*model, quick());
+  const auto size = [](const GapMap& map) {
+    for (const GapCell& cell : map.cells)
+      if (cell.facet == "leg" && cell.aspect == "mean" && cell.at.starts_with("leg 3")) return cell.size;
+    ADD_FAILURE() << "no cell of leg 3";
+    return 0.0;
+  };
+  EXPECT_LT(size(d.as_given), -0.2);
+  EXPECT_NEAR(size(d.recalibrated) / size(d.as_given), 1, 0.3);
+}
+
 TEST(Diagnosis, NamesBothOfTwoCauses) {
   const Diagnosis d =
       diagnose(*data({{"contact_memory", {{}, {0.4}}}, {"rolling_resistance", {{}, {0.003}}}}, 24), quick());
