@@ -250,6 +250,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   // Efficient: what the fitted parameters' scores explain is taken off, event by event. Nuisances move no further than
   // their prior lets them.
   const auto columns = static_cast<Eigen::Index>(raw.size());
+  if (columns == 0) return map;  // too few transitions for a single cell
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(count, columns);
   for (Eigen::Index c = 0; c < columns; ++c)
     for (const auto& [i, value] : raw[static_cast<std::size_t>(c)]) dense(static_cast<Eigen::Index>(i), c) = value;
