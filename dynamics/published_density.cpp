@@ -28,6 +28,7 @@ constexpr double depth = 22;             // windows end where the integrand is e
 constexpr double far_tail = 37;          // [sd]
 constexpr double split = 0.02;           // eta below which ln eta is the variable
 constexpr double longest = 690;          // -ln eta
+constexpr std::size_t most_forms = 4;    // speeds down to sqrt(1/8) of the slowest survivor's
 constexpr double pi2 = std::numbers::pi * std::numbers::pi;
 
 struct Nodes {  // Gauss-Legendre on [0, 1]
@@ -418,16 +419,14 @@ PublishedDensity::PublishedDensity(const WheelMap& map, int phase)
     duration_.push_back(stretched(grid_.back(), 0));
   }
 
-  // The least rounding with which g falls with eta for every mu below mu_c, with room to spare, at the slowest speed.
-  const double sticking = std::max(0.0, t0_ / t1_);
-  if (sticking == 0) return;
-  slowest_ = map.state_interval(phase).first;
-  const double kappa = kappa_ / std::sqrt(slowest_);
-  const auto falls = [&](double rounding) {
+  // The least rounding with which g falls with eta for every mu below mu_c, with room to spare; the slower, the more.
+  sticking_ = std::max(0.0, t0_ / t1_);
+  if (sticking_ == 0) return;
+  const auto falls = [&](double rounding, double kappa) {
     constexpr int count = 16;
     for (int i = 1; i < count; ++i)
       for (int k = 0; k <= 2 * count; ++k) {
-        const double mu = sticking * i / count;
+        const double mu = sticking_ * i / count;
         const double eta = k < count ? 4 * rounding * k / count : static_cast<double>(k - count) / count;
         const double normal = a0_ - a1_ * mu, ratio = mu * (t1_ * mu - t0_) / normal;
         const double s = stretched(eta, rounding), far2 = eta * eta + rounding * rounding;
@@ -436,11 +435,17 @@ PublishedDensity::PublishedDensity(const WheelMap& map, int phase)
       }
     return true;
   };
-  for (const double eta : {0.005, 0.007, 0.01, 0.014, 0.02, 0.03, 0.04, 0.06, 0.1, 0.2, 0.5}) {
-    rounding_ = eta;
-    if (falls(eta)) return;
+  constexpr std::array roundings{0.005, 0.007, 0.01, 0.014, 0.02, 0.03, 0.04, 0.06, 0.1, 0.2, 0.5};
+  double state = map.state_interval(phase).first;
+  for (auto rounding = roundings.begin(); forms_.size() < most_forms; state /= 2) {
+    while (rounding != roundings.end() && !falls(*rounding, kappa_ / std::sqrt(state))) ++rounding;
+    if (rounding == roundings.end()) break;
+    forms_.push_back({state, *rounding});
   }
-  slowest_ = std::numeric_limits<double>::infinity();
+}
+
+double PublishedDensity::slowest() const {
+  return sticking_ == 0 ? 0 : forms_.empty() ? std::numeric_limits<double>::infinity() : forms_.back().slowest;
 }
 
 double PublishedDensity::operator()(double state, std::span<const double> next, std::span<double> density) const {
@@ -451,8 +456,9 @@ double PublishedDensity::operator()(double state, std::span<const double> next, 
   r.t0 = t0_;
   r.t1 = t1_;
   r.kappa = kappa_ / std::sqrt(state);
-  r.rounding = rounding_;
-  r.sticking = std::max(0.0, t0_ / t1_);
+  const auto form = std::find_if(forms_.begin(), forms_.end(), [&](const Form& f) { return state >= f.slowest; });
+  r.rounding = form == forms_.end() ? rounding() : form->rounding;
+  r.sticking = sticking_;
   r.normal_sticking = a0_ - a1_ * r.sticking;
   r.restitution = restitution_.mean();
   r.restitution_rate = 1 / restitution_.sd();
@@ -462,7 +468,7 @@ double PublishedDensity::operator()(double state, std::span<const double> next, 
   if (a1_ > 0) r.friction_middle = std::min(r.friction_middle, 0.5 * a0_ / a1_);
   const double normal_middle = a0_ - a1_ * r.friction_middle;
   r.s_usual = stretched(std::clamp(r.restitution, 0.1, 1.0), 0);
-  r.potential_zero = r.kappa * stretched(rounding_, 0);
+  r.potential_zero = r.kappa * stretched(r.rounding, 0);
   r.lower = lower_;
   r.upper = grid_.back();
   r.points = grid_.size();

@@ -19,6 +19,7 @@ namespace metastable::dynamics {
 ///
 /// One thing is not exact: where mu < mu_c, s is taken at sqrt(eta^2 + rounding()^2), rounding() about 0.01. That moves
 /// landings by about 1e-4 of their size, with the probability of those mu and of an eta below a few rounding().
+/// Launches slower than any survivor take a larger one.
 class PublishedDensity {
  public:
   PublishedDensity(const WheelMap& map, int phase);
@@ -29,9 +30,9 @@ class PublishedDensity {
   /// @throws std::invalid_argument for spans of different sizes
   double operator()(double state, std::span<const double> next, std::span<double> density) const;
 
-  double rounding() const { return rounding_; }
-  /// The least state this form holds for: no survivor is slower, but a launch may be. Infinite if it holds for none.
-  double slowest() const { return slowest_; }
+  double rounding() const { return forms_.empty() ? 0 : forms_.front().rounding; }  ///< for survivors
+  /// The least state this form holds for. Infinite if it holds for none.
+  double slowest() const;
 
   /// Whether `map` has this form of the density.
   static bool covers(const WheelMap& map);
@@ -41,8 +42,12 @@ class PublishedDensity {
   double lowest_, gain_, inertia_, before_;  // of the landing; I2, I1
   double energy_, kappa_;                    // at 1 rad/s
   double a0_, a1_, t0_, t1_;                 // A = a0 - a1 mu, B = t1 mu - t0
+  double sticking_ = 0;                      // mu_c, or 0
   double lower_ = 0;                         // of eta
-  double rounding_ = 0, slowest_ = 0;
+  struct Form {
+    double slowest, rounding;  // from which state on the rounding is enough
+  };
+  std::vector<Form> forms_;                      // by falling states; none where mu_c is 0
   std::vector<double> grid_, duration_;          // eta about one sd apart, s there
   std::vector<double> tail_, tail_restitution_;  // -ln eta where eta may be close to 0, eta there
 };
