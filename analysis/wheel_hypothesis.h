@@ -1,0 +1,16 @@
+#pragma once
+// What is supposed of a wheel whose trials were measured: its contact and the effects added to it.
+
+#include "analysis/score_tilt.h"
+#include "dynamics/collision_density.h"
+#include "dynamics/extended_wheel.h"
+
+namespace metastable::analysis {
+
+struct WheelHypothesis {
+  dynamics::ContactSpread contact;
+  ScoreTilt tilt;  ///< change of shape of what a collision's spread gives
+  dynamics::Extension extension;
+};
+
+}  // namespace metastable::analysis

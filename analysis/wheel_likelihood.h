@@ -1,0 +1,16 @@
+#pragma once
+// How likely a wheel's measured trials are under a hypothesis.
+
+#include "analysis/transition_model.h"
+#include "analysis/wheel_hypothesis.h"
+#include "analysis/wheel_runs.h"
+
+namespace metastable::analysis {
+
+/// Log density and normal score of each of wheel_events(measured). The speed follows a SpeedFilter; a friction of each
+/// trial's own is integrated by five Gauss-Hermite nodes.
+/// @throws std::invalid_argument as dynamics::ExtendedWheel
+Evaluation wheel_likelihood(const WheelRuns& measured, const std::vector<Event>& events,
+                            const WheelHypothesis& hypothesis);
+
+}  // namespace metastable::analysis
