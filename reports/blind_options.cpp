@@ -21,7 +21,7 @@ std::vector<Command> blind_commands() {
              o.add("left-out", "N", "3", "make: cases of each effect with a catalogue that lacks it");
              o.add("tool", "PROGRAM", "",
                    "answer: run 'PROGRAM diagnose CASE --json FILE ...' (default: this program)");
-             o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+             o.add_threads();
              o.add("out", "DIR", "", "open: folder of tables and page (default: report in the run's folder)");
            },
            [](const Options& o, const std::string& line) {
@@ -29,14 +29,14 @@ std::vector<Command> blind_commands() {
              request.folder = o.text("DIR");
              while (request.folder.size() > 1 && request.folder.ends_with('/')) request.folder.pop_back();
              request.sealed = o.text("sealed");
-             if (o.given("seed")) request.seed = o.whole("seed", 0, UINT64_MAX);
-             request.size.per_effect_and_strength = static_cast<int>(o.whole("per-effect", 0, 1000));
-             request.size.none = static_cast<int>(o.whole("none", 0, 5000));
-             request.size.pairs = static_cast<int>(o.whole("pairs", 0, 5000));
-             request.size.outside = static_cast<int>(o.whole("outside", 0, 5000));
-             request.size.left_out_per_effect = static_cast<int>(o.whole("left-out", 0, 1000));
+             if (o.given("seed")) request.seed = o.seed();
+             request.size.per_effect_and_strength = o.count("per-effect", 0, 1000);
+             request.size.none = o.count("none", 0, 5000);
+             request.size.pairs = o.count("pairs", 0, 5000);
+             request.size.outside = o.count("outside", 0, 5000);
+             request.size.left_out_per_effect = o.count("left-out", 0, 1000);
              request.tool = o.text("tool");
-             request.threads = static_cast<int>(o.whole("threads", 0, 1024));
+             request.threads = o.threads();
              request.out = o.text("out");
              request.command = line;
              const std::string action = o.text("ACTION");

@@ -57,8 +57,8 @@ std::vector<Command> commands() {
          o.add("json", "FILE|-", "", "Write the results as JSON");
        },
        [](const Options& o, const std::string& line) {
-         CompareRequest request{several_settings(o, 2), study_options(o),
-                                static_cast<int>(o.whole("collisions", 1, 63)), o.text("json"), line};
+         CompareRequest request{several_settings(o, 2), study_options(o), o.count("collisions", 1, 63), o.text("json"),
+                                line};
          request.standard_errors = standard_errors(o, request.settings.front());
          run_compare(request);
        }},
@@ -112,20 +112,20 @@ std::vector<Command> commands() {
          o.add("out", "DIR", "report", "Folder for the files");
        },
        [](const Options& o, const std::string& line) {
-         run_report({several_settings(o, 1), study_options(o), static_cast<int>(o.whole("energy-trials", 2, 1000000)),
-                     o.text("out"), line});
+         run_report(
+             {several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000), o.text("out"), line});
        }},
       {"verify", "How accurate the program is: known values, doubling of nodes, three solvers side by side",
        [](Options& o) {
          o.add("seeds", "N", "0", "Sampled studies a benchmark, to count how often their interval is right; 0: none");
          o.add("nodes", "N", "512", "Nodes a landing leg at which doubling stops, 128..4096");
-         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add_threads();
          o.add("out", "DIR", "", "Folder for the tables (CSV, Markdown, LaTeX)");
          o.add("export", "DIR", "", "Folder for the default wheel's chain (PRISM .tra, .lab, .srew; MatrixMarket)");
        },
        [](const Options& o, const std::string& line) {
-         run_verify({static_cast<int>(o.whole("seeds", 0, 1000)), o.whole("nodes", 128, 4096),
-                     static_cast<int>(o.whole("threads", 0, 1024)), o.text("out"), o.text("export"), line});
+         run_verify({o.count("seeds", 0, 1000), o.whole("nodes", 128, 4096), o.threads(), o.text("out"),
+                     o.text("export"), line});
        }},
   };
   const std::vector<Command> experiments = experiment_commands();

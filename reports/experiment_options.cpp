@@ -106,18 +106,18 @@ std::vector<Command> experiment_commands() {
                "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
          o.add("angle-noise", "RAD", "", "White noise of the angle (default 0.0002; needs --angle-rate)");
          add_reality(o);
-         o.add("seed", "SEED", "1", "Seed of the random numbers");
-         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add_seed();
+         o.add_threads();
          o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
        },
        [](const Options& o, const std::string& line) {
          if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
          const bool stand_in = o.flag("stand-in");
          SimulateRequest request{stand_in ? stand_in_base(o) : one_setting(o),
-                                 static_cast<int>(o.whole("trials", 1, 1000000)),
-                                 static_cast<int>(o.whole("collisions", 1, 100000)),
-                                 o.whole("seed", 0, UINT64_MAX),
-                                 static_cast<int>(o.whole("threads", 0, 1024)),
+                                 o.count("trials", 1, 1000000),
+                                 o.count("collisions", 1, 100000),
+                                 o.seed(),
+                                 o.threads(),
                                  o.text("out"),
                                  line};
          if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
@@ -158,7 +158,7 @@ std::vector<Command> experiment_commands() {
          CoastDownRequest request;
          request.logs = o.all("LOG");
          request.options.stop = o.number("stop");
-         request.options.block = static_cast<int>(o.whole("block", 10, 100000));
+         request.options.block = o.count("block", 10, 100000);
          request.options.validate();
          request.blocks = o.text("blocks");
          if (request.blocks != "all" && request.blocks != "odd" && request.blocks != "even")
@@ -188,14 +188,14 @@ std::vector<Command> experiment_commands() {
          o.add("omega-minus", "fit|peak", "fit",
                "Stance motion extrapolated to the collision, or the smoothed speed's peak");
          o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision");
-         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add_threads();
          o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
        },
        [](const Options& o, const std::string&) {
          CollisionsRequest request;
          request.folder = o.text("DIR");
-         if (o.given("window")) request.finder.window = static_cast<int>(o.whole("window", 5, 10001));
-         request.finder.collisions = static_cast<int>(o.whole("collisions", 1, 100000));
+         if (o.given("window")) request.finder.window = o.count("window", 5, 10001);
+         request.finder.collisions = o.count("collisions", 1, 100000);
          request.finder.rise = o.number("rise");
          request.finder.fit_span = o.number("fit-span");
          request.finder.validate();
@@ -203,7 +203,7 @@ std::vector<Command> experiment_commands() {
          if (speed != "fit" && speed != "peak")
            throw std::invalid_argument(fmt::format("--omega-minus: '{}' is neither 'fit' nor 'peak'", speed));
          request.peak = speed == "peak";
-         request.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.threads = o.threads();
          request.out = o.text("out");
          run_collisions(request);
        }},
@@ -214,8 +214,8 @@ std::vector<Command> experiment_commands() {
                "Restitution and friction from omega_minus to omega_plus, or to the next omega_minus");
          o.add("against", "LAW,LAW,...", "", "Compare with simulated trials under published, coulomb, plastic");
          o.add("trials", "N", "2000", "Simulated trials of that comparison, 2..1000000");
-         o.add("seed", "SEED", "1", "Seed of the random numbers");
-         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add_seed();
+         o.add_threads();
          o.add("out", "DIR", "", "Folder for tables, figures and index.html (default: tables on the terminal)");
        },
        [](const Options& o, const std::string& line) {
@@ -231,9 +231,9 @@ std::vector<Command> experiment_commands() {
                fmt::format("--transition: '{}' is none of 'auto', 'collision' and 'step'", transition));
          std::istringstream laws(o.text("against"));
          for (std::string law; std::getline(laws, law, ',');) request.against.push_back(dynamics::law_from_name(law));
-         request.trials = static_cast<int>(o.whole("trials", 2, 1000000));
-         request.options.seed = o.whole("seed", 0, UINT64_MAX);
-         request.options.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.trials = o.count("trials", 2, 1000000);
+         request.options.seed = o.seed();
+         request.options.threads = o.threads();
          request.command = line;
          run_describe(request);
        }},
@@ -242,18 +242,18 @@ std::vector<Command> experiment_commands() {
          o.add("data", "DIR", "", "Experiment folder of its three experiments (default: a simulated stand-in)");
          o.add("trials", "N", "1000", "Trials of each simulated profile, 20..1000000");
          o.add("samples", "N", "8192", "Samples behind the variance shares, 32..1048576");
-         o.add("seed", "SEED", "1", "Seed of the random numbers");
-         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add_seed();
+         o.add_threads();
          o.add("out", "DIR", "study", "Folder for tables, figures and index.html");
        },
        [](const Options& o, const std::string& line) {
          StudyRequest request;
          request.data = o.text("data");
          request.out = o.text("out");
-         request.options.trials = static_cast<int>(o.whole("trials", 20, 1000000));
+         request.options.trials = o.count("trials", 20, 1000000);
          request.options.samples = o.whole("samples", 32, 1048576);
-         request.options.seed = o.whole("seed", 0, UINT64_MAX);
-         request.options.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.options.seed = o.seed();
+         request.options.threads = o.threads();
          request.command = line;
          run_study(request);
        }},
@@ -263,8 +263,8 @@ std::vector<Command> experiment_commands() {
          o.add_place("DIR", "Experiment folder");
          o.add("catalogue", "FILE|ID,ID,...", "",
                "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects')");
-         o.add("seed", "SEED", "1", "Seed of the random numbers");
-         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add_seed();
+         o.add_threads();
          o.add("json", "FILE|-", "", "Write the results as JSON");
          o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
        },
@@ -272,8 +272,8 @@ std::vector<Command> experiment_commands() {
          DiagnoseRequest request;
          request.folder = o.text("DIR");
          if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
-         request.options.seed = o.whole("seed", 0, UINT64_MAX);
-         request.options.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.options.seed = o.seed();
+         request.options.threads = o.threads();
          request.json = o.text("json");
          request.out = o.text("out");
          request.command = line;
@@ -283,16 +283,16 @@ std::vector<Command> experiment_commands() {
        "Worked examples of the diagnosis: the published law on a coulomb wheel, the paper's hypotheses, data",
        [](Options& o) {
          o.add("data", "DIR", "", "Repeatable: an experiment folder, diagnosed under published and coulomb");
-         o.add("seed", "SEED", "1", "Seed of the random numbers");
-         o.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+         o.add_seed();
+         o.add_threads();
          o.add("out", "DIR", "lessons", "Folder for tables, figures and index.html");
        },
        [](const Options& o, const std::string& line) {
          LessonsRequest request;
          request.data = o.all("data");
          request.out = o.text("out");
-         request.seed = o.whole("seed", 0, UINT64_MAX);
-         request.threads = static_cast<int>(o.whole("threads", 0, 1024));
+         request.seed = o.seed();
+         request.threads = o.threads();
          request.command = line;
          run_lessons(request);
        }},

@@ -63,9 +63,21 @@ bool Options::flag(const std::string& name) const {
 
 double Options::number(const std::string& name) const { return number_value(name, text(name)); }
 
+void Options::add_seed() { add("seed", "SEED", "1", "Seed of the random numbers"); }
+
+void Options::add_threads() { add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it"); }
+
 std::uint64_t Options::whole(const std::string& name, std::uint64_t least, std::uint64_t most) const {
   return whole_value(name, text(name), least, most);
 }
+
+int Options::count(const std::string& name, int least, int most) const {
+  return static_cast<int>(whole(name, static_cast<std::uint64_t>(least), static_cast<std::uint64_t>(most)));
+}
+
+std::uint64_t Options::seed() const { return whole("seed", 0, UINT64_MAX); }
+
+int Options::threads() const { return count("threads", 0, 1024); }
 
 analysis::Spread Options::spread(const std::string& name) const { return spread_value(name, text(name)); }
 

@@ -23,6 +23,9 @@ class Options {
   void add(const std::string& name, const std::string& value, const std::string& fallback, const std::string& help);
   /// An option without a value; `true` or `false` in a file.
   void add_flag(const std::string& name, const std::string& help);
+  /// The options of what draws random numbers (default 1) and of what runs in parallel (default 0: all cores).
+  void add_seed();
+  void add_threads();
   /// What the command is about, given by its place on the command line; required.
   void add_place(const std::string& name, const std::string& help);
   /// One or more of those.
@@ -37,6 +40,10 @@ class Options {
   bool flag(const std::string& name) const;
   double number(const std::string& name) const;
   std::uint64_t whole(const std::string& name, std::uint64_t least, std::uint64_t most) const;
+  /// A whole number that is an int; 0 <= least, most <= INT_MAX.
+  int count(const std::string& name, int least, int most) const;
+  std::uint64_t seed() const;
+  int threads() const;
   analysis::Spread spread(const std::string& name) const;
 
  private:

@@ -14,7 +14,7 @@ namespace {
 
 dynamics::Wheel wheel(const Options& options) {
   dynamics::Wheel wheel;
-  wheel.leg_length = legs_value("legs", options.text("legs"), static_cast<int>(options.whole("leg-count", 3, 1000)));
+  wheel.leg_length = legs_value("legs", options.text("legs"), options.count("leg-count", 3, 1000));
   wheel.hub_mass = options.number("mass");
   if (options.given("inertia")) wheel.inertia = options.number("inertia");
   if (options.given("radius-of-gyration")) wheel.radius_of_gyration = options.number("radius-of-gyration");
@@ -80,8 +80,8 @@ void add_study(Options& options) {
   options.add("replicates", "R", "8", "Independent randomisations behind the interval, 2..64");
   options.add("mixing-distance", "D", "0.05", "Total variation distance that counts as mixed");
   options.add("eigenvalues", "K", "6", "How many eigenvalue moduli to report");
-  options.add("seed", "SEED", "1", "Seed of the random numbers");
-  options.add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it");
+  options.add_seed();
+  options.add_threads();
 }
 
 // All but slope and launch speed.
@@ -101,8 +101,7 @@ analysis::Setting common_setting(const Options& options) {
     setting.pairs = contact_list("contact-list", options.text("contact-list"));
   }
   setting.ramp_length = options.number("ramp-length");
-  setting.first_landing_leg =
-      static_cast<int>(options.whole("first-leg", 0, static_cast<std::uint64_t>(setting.wheel.legs() - 1)));
+  setting.first_landing_leg = options.count("first-leg", 0, setting.wheel.legs() - 1);
   return setting;
 }
 
@@ -162,11 +161,11 @@ analysis::StudyOptions study_options(const Options& options) {
   study.sequence = sequence == "sobol" ? markov::Sequence::sobol : markov::Sequence::random;
   study.weighting = draws == "weighted" ? markov::Weighting::weighted : markov::Weighting::plain;
   study.tail = options.number("tail");
-  study.replicates = static_cast<int>(options.whole("replicates", 2, 64));
+  study.replicates = options.count("replicates", 2, 64);
   study.mixing_distance = options.number("mixing-distance");
-  study.eigenvalues = static_cast<int>(options.whole("eigenvalues", 1, 64));
-  study.seed = options.whole("seed", 0, UINT64_MAX);
-  study.threads = static_cast<int>(options.whole("threads", 0, 1024));
+  study.eigenvalues = options.count("eigenvalues", 1, 64);
+  study.seed = options.seed();
+  study.threads = options.threads();
   study.validate();
   return study;
 }
