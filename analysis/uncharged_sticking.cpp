@@ -1,10 +1,7 @@
 #include "analysis/uncharged_sticking.h"
 
 #include <cmath>
-#include <limits>
 #include <stdexcept>
-
-#include "markov/return_map.h"
 
 namespace metastable::analysis {
 
@@ -36,36 +33,11 @@ std::optional<double> UnchargedSticking::landing(double state, int phase, std::s
   return after + stance.gain;
 }
 
-void UnchargedSticking::Table::land(double origin, double width, std::span<const double> offset, std::size_t first,
-                                    std::span<double> next) const {
-  for (std::size_t k = 0; k < next.size(); ++k) {
-    const double x = origin + width * offset[k];
-    const dynamics::StepCoefficients& c = draws_[first + k];
-    const double after = c.scale * x - c.drag * std::sqrt(x);
-    next[k] = after >= barrier_ ? after + gain_ : markov::rest_landing;
-  }
-}
-
-double UnchargedSticking::Table::lowest_survivor(std::size_t k) const {
-  const auto [scale, drag] = draws_[k];
-  if (!(scale > 0)) return std::numeric_limits<double>::infinity();
-  const double root = (drag + std::sqrt(drag * drag + 4 * scale * barrier_)) / (2 * scale);
-  return root > 0 ? root * root * (1 - 1e-12) : 0;
-}
-
-void UnchargedSticking::Table::reorder(std::span<const std::uint32_t> order) {
-  std::vector<dynamics::StepCoefficients> moved;
-  for (const std::uint32_t k : order) moved.push_back(draws_[k]);
-  draws_ = std::move(moved);
-}
-
 UnchargedSticking::Table UnchargedSticking::tabulate(int phase, std::span<const double> score) const {
-  Table table;
-  table.barrier_ = map_.stance(phase).barrier;
-  table.gain_ = map_.stance(phase).gain;
+  Table table(map_.stance(phase));
   const auto dimension = static_cast<std::size_t>(noise_dimension());
   for (std::size_t i = 0; i + dimension <= score.size(); i += dimension)
-    table.draws_.push_back(coefficients(phase, map_.noise().draw(score.subspan(i, dimension))));
+    table.add(coefficients(phase, map_.noise().draw(score.subspan(i, dimension))));
   return table;
 }
 

@@ -1,11 +1,9 @@
 #pragma once
 // The published law without its charge on collisions that would stick.
 
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "dynamics/wheel_map.h"
 
@@ -29,19 +27,8 @@ class UnchargedSticking {
   /// mu_c of the collision in which this leg lands.
   double sticking_friction(int phase) const;
 
-  /// Many draws of one phase as arrays of coefficients.
-  class Table {
-   public:
-    void land(double origin, double width, std::span<const double> offset, std::size_t first,
-              std::span<double> next) const;
-    double lowest_survivor(std::size_t k) const;
-    void reorder(std::span<const std::uint32_t> order);
-
-   private:
-    friend class UnchargedSticking;
-    std::vector<dynamics::StepCoefficients> draws_;
-    double barrier_ = 0, gain_ = 0;
-  };
+  using Table = dynamics::WheelMap::Table;
+  /// Many draws of one phase.
   Table tabulate(int phase, std::span<const double> score) const;
 
  private:

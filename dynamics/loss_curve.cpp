@@ -10,6 +10,17 @@ namespace {
 
 constexpr double far_tail = 38;  // [sd]: beyond it probabilities underflow
 
+// Newton's step from mu, halving the bracket where it leaves it; sign * value rises through the root.
+[[gnu::always_inline]] inline double newton_step(double sign, double value, double derivative, double& low,
+                                                 double& high, double& mu) {
+  (sign * value < 0 ? low : high) = mu;
+  double next = mu - value / derivative;
+  if (!(next > low && next < high)) next = 0.5 * (low + high);
+  const double moved = std::abs(next - mu);
+  mu = next;
+  return moved;
+}
+
 }  // namespace
 
 LossCurve::LossCurve(const WheelMap& map, double state, int phase) {
@@ -88,11 +99,7 @@ LossCurve::Extreme LossCurve::extreme(const Coefficients& k, double guess) const
     const double derivative =
         normal_1_ * (k.b * rise - k.a * normal_1_ - k.c * both) + 2 * tangential_1_ * normal * (k.b + k.c * normal);
     if (value == 0) break;
-    (sign * value < 0 ? low : high) = mu;
-    double next = mu - value / derivative;
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    const double moved = std::abs(next - mu);
-    mu = next;
+    const double moved = newton_step(sign, value, derivative, low, high, mu);
     if (moved <= 1e-9 * mu || high - low <= 4e-16 * high) break;  // the next step would move it by less than rounding
   }
   return {mu, loss(k, mu)};
@@ -108,11 +115,7 @@ double LossCurve::root(const Coefficients& k, double level, double from, double 
     const double value = (k.a - level * normal) * normal + product * (k.b + k.c * normal);
     const double derivative = normal_1_ * (2 * level * normal - k.a - k.c * product) + rise * (k.b + k.c * normal);
     if (value == 0) break;
-    (sign * value < 0 ? low : high) = mu;
-    double next = mu - value / derivative;
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    const double moved = std::abs(next - mu);
-    mu = next;
+    const double moved = newton_step(sign, value, derivative, low, high, mu);
     // An error e becomes e^2 / (2 times the distance to the other root's side).
     const double apart = std::min(mu - from, to - mu);
     if (moved * moved <= 1e-16 * mu * apart || high - low <= 2e-16 * high || moved <= 4e-16 * mu) break;

@@ -200,6 +200,11 @@ bool WheelMap::violates(int which, double state, int phase, std::span<const doub
   throw std::invalid_argument(fmt::format("assumption: {} is outside [0, 2]", which));
 }
 
+void WheelMap::Table::add(const StepCoefficients& draw) {
+  scale_.push_back(draw.scale);
+  drag_.push_back(draw.drag);
+}
+
 void WheelMap::Table::land(double origin, double width, std::span<const double> offset, std::size_t first,
                            std::span<double> next) const {
   land_all({origin, width, barrier_, gain_}, offset.data(), scale_.data() + first, drag_.data() + first, next);
@@ -227,14 +232,9 @@ WheelMap::Table WheelMap::tabulate(int phase, std::span<const double> score) con
   const auto dimension = static_cast<std::size_t>(noise_dimension());
   if (score.size() % dimension != 0)
     throw std::invalid_argument(fmt::format("score: {} numbers are not a multiple of {}", score.size(), dimension));
-  Table table;
-  table.barrier_ = stance(phase).barrier;
-  table.gain_ = stance(phase).gain;
-  for (std::size_t i = 0; i < score.size(); i += dimension) {
-    const StepCoefficients c = coefficients(phase, noise_.draw(score.subspan(i, dimension)));
-    table.scale_.push_back(c.scale);
-    table.drag_.push_back(c.drag);
-  }
+  Table table(stance(phase));
+  for (std::size_t i = 0; i < score.size(); i += dimension)
+    table.add(coefficients(phase, noise_.draw(score.subspan(i, dimension))));
   return table;
 }
 

@@ -95,13 +95,14 @@ class WheelMap {
   /// Many draws of one phase as arrays of coefficients.
   class Table {
    public:
+    explicit Table(const Stance& landed) : barrier_(landed.barrier), gain_(landed.gain) {}
+    void add(const StepCoefficients& draw);
     void land(double origin, double width, std::span<const double> offset, std::size_t first,
               std::span<double> next) const;
     double lowest_survivor(std::size_t k) const;
     void reorder(std::span<const std::uint32_t> order);
 
    private:
-    friend class WheelMap;
     std::vector<double> scale_, drag_;
     double barrier_ = 0, gain_ = 0;
   };

@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <numbers>
+#include <span>
+#include <vector>
 
 #include "analysis/setting.h"
 #include "analysis/step_balance.h"
@@ -34,6 +36,22 @@ TEST(UnchargedSticking, IsThePublishedLawBelowTheCriticalFriction) {
     EXPECT_GT(loss.tangential(), 0);
     EXPECT_NEAR(uncharged.after_collision(x, 0, {0.4, 0.4}) - map.after_collision(x, 0, {0.4, 0.4}),
                 2 * (loss.tangential() - loss.potential) / map.stance(0).inertia, 1e-9 * x);
+  }
+}
+
+TEST(UnchargedSticking, TableLandsLikeTheMap) {
+  const UnchargedSticking uncharged(equal_legs().map());
+  std::vector<double> score, next(9);
+  for (int k = 0; k < 9; ++k) score.insert(score.end(), {0.7 * (k % 3 - 1), 0.9 * (k / 3 - 2)});
+  UnchargedSticking::Table table = uncharged.tabulate(0, score);
+  const std::vector<double> offset(9, 0.5);
+  table.land(20, 10, offset, 0, next);
+  for (std::size_t k = 0; k < 9; ++k) {
+    const auto landed = uncharged.landing(25, 0, std::span(score).subspan(2 * k, 2));
+    ASSERT_EQ(std::isfinite(next[k]), landed.has_value());
+    if (landed) {
+      EXPECT_NEAR(next[k], *landed, 1e-13 * *landed);
+    }
   }
 }
 

@@ -8,17 +8,10 @@
 
 #include "dynamics/rest_probability.h"
 #include "dynamics/rough_terrain.h"
+#include "support.h"
 
-namespace metastable::dynamics {
+namespace metastable::dynamics::test {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
-
-WheelMap wheel_map(Law law, double slope_deg, const ContactNoise& noise, double rebound_lost = 0) {
-  Wheel wheel;
-  wheel.leg_length.assign(8, 0.1519);
-  return WheelMap(wheel, slope_deg * degree, law, noise, rebound_lost);
-}
 
 /// Integral of the density over all survivors, on `panels` equal panels.
 double total(const WheelMap& map, double state, double upper, int panels) {
@@ -83,4 +76,4 @@ TEST(LandingDensity, IsRefusedWhereThereIsNone) {
 }
 
 }  // namespace
-}  // namespace metastable::dynamics
+}  // namespace metastable::dynamics::test

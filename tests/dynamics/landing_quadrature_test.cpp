@@ -15,14 +15,6 @@
 namespace metastable::dynamics::test {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
-
-WheelMap wheel_map(Law law, double slope_deg, const ContactNoise& noise, double rebound_lost = 0) {
-  Wheel wheel;
-  wheel.leg_length.assign(8, 0.1519);
-  return WheelMap(wheel, slope_deg * degree, law, noise, rebound_lost);
-}
-
 double expectation(const WheelMap& map, double state, const std::vector<double>& breaks,
                    const std::function<double(double)>& f) {
   std::vector<std::pair<double, double>> points;

@@ -29,6 +29,11 @@ inline Wheel even_wheel() {
   return wheel;
 }
 
+/// Its return map.
+inline WheelMap wheel_map(Law law, double slope_deg, const ContactNoise& noise, double rebound_lost = 0) {
+  return WheelMap(even_wheel(), slope_deg * degree, law, noise, rebound_lost);
+}
+
 /// A collision between two legs at v0 = c omega and u0.
 inline Collision make_collision(double first, double second, double omega, double tangential,
                                 double slope = 7.02 * degree, double angle = std::numbers::pi / 4) {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "linear_map.h"
 #include "markov/integrated.h"
 #include "markov/quasi_stationary.h"
 #include "markov/solver.h"
@@ -15,27 +16,13 @@
 namespace metastable::markov {
 namespace {
 
+using testing::linear_launch;
+using testing::steps;
+
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// x' = x / 2 + 1 + sd z, rest where x' <= 0; as many phases as wanted, all alike.
-struct Linear {
-  double sd = 0.3;
-  int count = 1;
-  std::pair<double, double> state_interval(int) const { return {0, infinity}; }
-  int phases() const { return count; }
-  int noise_dimension() const { return 1; }
-  std::optional<double> landing(double state, int, std::span<const double> score) const {
-    const double next = state / 2 + 1 + sd * score[0];
-    return next > 0 ? std::optional(next) : std::nullopt;
-  }
-  double landing_density(double state, int, std::span<const double> next, std::span<double> density) const {
-    for (std::size_t k = 0; k < next.size(); ++k) {
-      const double z = (next[k] - state / 2 - 1) / sd;
-      density[k] = std::exp(-0.5 * z * z) / (sd * std::sqrt(2 * std::numbers::pi));
-    }
-    return 0.5 * std::erfc((state / 2 + 1) / sd / std::numbers::sqrt2);
-  }
-  double landing_points(double state, int, std::span<const double>,
+struct LinearWithPoints : testing::LinearWithDensity {
+  double landing_points(double state, int phase, std::span<const double>,
                         std::vector<std::pair<double, double>>& points) const {
     const double middle = state / 2 + 1, from = std::max(0.0, middle - 16 * sd), to = middle + 16 * sd;
     constexpr int panels = 24;
@@ -47,7 +34,7 @@ struct Linear {
         points.emplace_back(next, 0.5 * Rule::weights()[k / 2] * (to - from) / panels * std::exp(-0.5 * z * z) /
                                       (sd * std::sqrt(2 * std::numbers::pi)));
       }
-    return 0.5 * std::erfc(middle / sd / std::numbers::sqrt2);
+    return *rest_probability(state, phase);
   }
 };
 
@@ -75,16 +62,6 @@ struct Coin {
   }
 };
 
-LaunchState launch() {
-  return {[](double score) { return 2 + 0.1 * score; }, 0};
-}
-
-double steps(const IntegratedChain& rows) {
-  const ChainSolver solver(rows.chain.chain);
-  const std::vector<double> mean = mean_first_passage(solver);
-  return 1 + std::inner_product(mean.begin(), mean.end(), rows.chain.launch.after.begin(), 0.0);
-}
-
 TEST(NodeSpace, FindsThePlaceOfEveryNode) {
   const NodeSpace space = NodeSpace::between({{1, 2, 4}, {0, 3, 3.5}}, 3);
   ASSERT_EQ(space.nodes(), 96u);
@@ -109,10 +86,11 @@ TEST(NodeSpace, RefusesEdgesThatDoNotAscend) {
 
 TEST(Collocate, AgreesWithDensitiesHoweverRareRestIs) {
   for (const double sd : {0.6, 0.3, 0.2}) {  // 5e2, 4e8, 4e17 steps
-    const Linear map{.sd = sd};
-    const auto edges = collocation_edges(map, collocation_ranges(map, launch(), 1), 1);
-    const IntegratedChain by_points = collocate(map, NodeSpace::between(edges, 8), launch());
-    const IntegratedChain by_density = integrate(map, NodeSpace(node_ranges(map, launch(), 1), 16), launch());
+    const LinearWithPoints map{{{.sd = sd}}};
+    const auto edges = collocation_edges(map, collocation_ranges(map, linear_launch(), 1), 1);
+    const IntegratedChain by_points = collocate(map, NodeSpace::between(edges, 8), linear_launch());
+    const IntegratedChain by_density =
+        integrate(map, NodeSpace(node_ranges(map, linear_launch(), 1), 16), linear_launch());
     const double accuracy = sd < 0.25 ? 2e-8 : 1e-9;  // signs cost digits where rest is rare
     EXPECT_NEAR(steps(by_points) / steps(by_density), 1, accuracy) << sd << ' ' << steps(by_density);
     EXPECT_NEAR(quasi_stationary(ChainSolver(by_points.chain.chain)).failure_rate /
@@ -122,10 +100,10 @@ TEST(Collocate, AgreesWithDensitiesHoweverRareRestIs) {
 }
 
 TEST(Collocate, KeepsThePeriodOfPhases) {
-  const Linear one, three{.count = 3};
+  const LinearWithPoints one, three{{{.count = 3}}};
   const std::vector<double> edges{0, 5};
-  const IntegratedChain a = collocate(one, NodeSpace::between({edges}, 4), launch()),
-                        b = collocate(three, NodeSpace::between({edges, edges, edges}, 4), launch(), 2);
+  const IntegratedChain a = collocate(one, NodeSpace::between({edges}, 4), linear_launch()),
+                        b = collocate(three, NodeSpace::between({edges, edges, edges}, 4), linear_launch(), 2);
   EXPECT_EQ(ChainSolver(b.chain.chain).period().period, 3);
   EXPECT_NEAR(steps(b) / steps(a), 1, 1e-11);
 }
@@ -150,7 +128,7 @@ TEST(Collocate, NamesTheSampledMethodWhereThereAreNoPoints) {
     int noise_dimension() const { return 1; }
     std::optional<double> landing(double state, int, std::span<const double>) const { return state; }
   };
-  EXPECT_THROW(collocate(Plain{}, NodeSpace::between({{0, 1}}, 1), launch()), std::invalid_argument);
+  EXPECT_THROW(collocate(Plain{}, NodeSpace::between({{0, 1}}, 1), linear_launch()), std::invalid_argument);
 }
 
 TEST(InterpolatedChain, TakesNegativeEntriesButNoUndefinedOnes) {

@@ -6,47 +6,17 @@
 #include <numbers>
 #include <numeric>
 
+#include "linear_map.h"
 #include "markov/quasi_stationary.h"
 #include "markov/solver.h"
 
 namespace metastable::markov {
 namespace {
 
-/// x' = x / 2 + 1 + sd z, rest where x' <= 0; as many phases as wanted, all alike.
-struct Linear {
-  double sd = 0.3;
-  int count = 1;
-  std::pair<double, double> state_interval(int) const { return {0, std::numeric_limits<double>::infinity()}; }
-  int phases() const { return count; }
-  int noise_dimension() const { return 1; }
-  std::optional<double> landing(double state, int, std::span<const double> score) const {
-    const double next = state / 2 + 1 + sd * score[0];
-    return next > 0 ? std::optional(next) : std::nullopt;
-  }
-  std::optional<double> rest_probability(double state, int) const {
-    return 0.5 * std::erfc((state / 2 + 1) / sd / std::numbers::sqrt2);
-  }
-};
-
-struct LinearWithDensity : Linear {
-  double landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const {
-    for (std::size_t k = 0; k < next.size(); ++k) {
-      const double z = (next[k] - state / 2 - 1) / sd;
-      density[k] = std::exp(-0.5 * z * z) / (sd * std::sqrt(2 * std::numbers::pi));
-    }
-    return *rest_probability(state, phase);
-  }
-};
-
-LaunchState launch() {
-  return {[](double score) { return 2 + 0.1 * score; }, 0};
-}
-
-double steps(const IntegratedChain& integrated) {
-  const ChainSolver solver(integrated.chain.chain);
-  const std::vector<double> mean = mean_first_passage(solver);
-  return 1 + std::inner_product(mean.begin(), mean.end(), integrated.chain.launch.after.begin(), 0.0);
-}
+using testing::Linear;
+using testing::linear_launch;
+using testing::LinearWithDensity;
+using testing::steps;
 
 TEST(NodeSpace, IntegratesPolynomialsExactly) {
   const NodeSpace space({{1, 3}, {0, 1}}, 2);
@@ -70,17 +40,17 @@ TEST(NodeSpace, RefusesWhatIsNoInterval) {
 TEST(Integrate, IsStableUnderDoublingHoweverRareRestIs) {
   for (const double sd : {0.6, 0.3, 0.15}) {  // 5e2, 4e8, 1e31 steps
     const LinearWithDensity map{{.sd = sd}};
-    const NodeSpace space(node_ranges(map, launch(), 1), 8);
-    const double coarse = steps(integrate(map, space, launch()));
-    const double fine = steps(integrate(map, space.with_panels(16), launch()));
+    const NodeSpace space(node_ranges(map, linear_launch(), 1), 8);
+    const double coarse = steps(integrate(map, space, linear_launch()));
+    const double fine = steps(integrate(map, space.with_panels(16), linear_launch()));
     EXPECT_NEAR(coarse / fine, 1, 1e-12) << sd << ' ' << fine;
   }
 }
 
 TEST(Integrate, RowsAndLaunchSumToOne) {
   const LinearWithDensity map;
-  const NodeSpace space(node_ranges(map, launch(), 1), 8);
-  const IntegratedChain integrated = integrate(map, space, launch(), 2);
+  const NodeSpace space(node_ranges(map, linear_launch(), 1), 8);
+  const IntegratedChain integrated = integrate(map, space, linear_launch(), 2);
   const Launch& start = integrated.chain.launch;
   EXPECT_NEAR(std::accumulate(start.after.begin(), start.after.end(), start.rest), 1, 1e-14);
   const Launch row = integrated_row(map, space, 0.0, 0);
@@ -92,7 +62,7 @@ TEST(Integrate, RowsAndLaunchSumToOne) {
 TEST(Integrate, KeepsThePeriodOfPhases) {
   const LinearWithDensity one, three{{.count = 3}};
   const NodeSpace single({{0, 4}}, 6), triple({{0, 4}, {0, 4}, {0, 4}}, 6);
-  const IntegratedChain a = integrate(one, single, launch()), b = integrate(three, triple, launch());
+  const IntegratedChain a = integrate(one, single, linear_launch()), b = integrate(three, triple, linear_launch());
   const ChainSolver solver(b.chain.chain);
   EXPECT_EQ(solver.period().period, 3);
   EXPECT_NEAR(steps(b) / steps(a), 1, 1e-12);
@@ -102,18 +72,18 @@ TEST(Integrate, KeepsThePeriodOfPhases) {
 
 TEST(Integrate, AgreesWithTheSampledChain) {
   const LinearWithDensity map{{.sd = 0.6}};
-  const NodeSpace space(node_ranges(map, launch(), 1), 8);
-  const StateSpace cells = covering_space(map, launch(), 200, 1);
-  const SampledChain sampled = discretize(map, cells, launch(), {.draws = {.count = 8192}});
+  const NodeSpace space(node_ranges(map, linear_launch(), 1), 8);
+  const StateSpace cells = covering_space(map, linear_launch(), 200, 1);
+  const SampledChain sampled = discretize(map, cells, linear_launch(), {.draws = {.count = 8192}});
   const std::vector<double> mean = mean_first_passage(ChainSolver(sampled.chain));
   const double by_cells = 1 + std::inner_product(mean.begin(), mean.end(), sampled.launch.after.begin(), 0.0);
-  EXPECT_NEAR(steps(integrate(map, space, launch())) / by_cells, 1, 5e-3);
+  EXPECT_NEAR(steps(integrate(map, space, linear_launch())) / by_cells, 1, 5e-3);
 }
 
 TEST(Integrate, RefusesAMapWithoutADensity) {
   const Linear map;
   try {
-    integrate(map, NodeSpace({{0, 4}}, 2), launch());
+    integrate(map, NodeSpace({{0, 4}}, 2), linear_launch());
     FAIL();
   } catch (const std::invalid_argument& error) {
     EXPECT_NE(std::string(error.what()).find("use the sampled method"), std::string::npos);
