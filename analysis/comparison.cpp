@@ -56,11 +56,11 @@ Contrast contrast(const Comparison& comparison, std::size_t against, std::size_t
   const auto sampling = [](const std::vector<double>& sample) {
     return sample.empty() ? 0 : t_interval(sample).half_width;
   };
-  const double ratio_half = sampling(log_ratio) + a.discretization_error + b.discretization_error;
+  const double ratio_half = std::hypot(sampling(log_ratio), a.discretization_error + b.discretization_error);
   result.ratio = Estimate{ratio, ratio * std::exp(-ratio_half), ratio * std::exp(ratio_half)};
   const double apart = b.from_start.value - a.from_start.value;
-  const double apart_half =
-      sampling(difference) + a.discretization_error * a.from_start.value + b.discretization_error * b.from_start.value;
+  const double apart_half = std::hypot(
+      sampling(difference), a.discretization_error * a.from_start.value + b.discretization_error * b.from_start.value);
   result.difference = Estimate{apart, apart - apart_half, apart + apart_half};
   result.sentence = fmt::format(
       "{} takes {:.4g} times the steps of {} (95 % interval {:.4g} to {:.4g}), {:.4g} more ({:.4g} to {:.4g})", name_b,

@@ -23,6 +23,11 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t first_cells = 128;
 constexpr std::size_t first_samples = 4096;
 constexpr int sizes = 3;  // cell sizes a ladder holds: cells, cells / 2, cells / 4
+// The extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
+constexpr double change_over_error = 3;
+
+// Error of order 2 in the cell size removed.
+double extrapolate(double fine, double coarse) { return fine + (fine - coarse) / 3; }
 
 // Nested cells for the whole range, coarsest first.
 std::vector<markov::StateSpace> nested(markov::StateSpace coarsest) {
@@ -34,8 +39,8 @@ std::vector<markov::StateSpace> nested(markov::StateSpace coarsest) {
 // Everything sampled at one resolution: the chain of all replicates' draws per cell size, and each replicate's answer.
 struct Ladder {
   std::vector<markov::StateSpace> spaces;
-  std::vector<markov::SampledChain> pooled;  // per cell size, coarsest first
-  std::vector<ExpectedSteps> replicate;      // at the finest size; empty when rest is not reached
+  std::vector<markov::SampledChain> pooled;           // per cell size, coarsest first
+  std::vector<std::vector<ExpectedSteps>> replicate;  // per cell size, per replicate
   bool rest_resolved = true;
 };
 
@@ -75,7 +80,7 @@ class Study {
     const auto threads = static_cast<std::size_t>(markov::thread_count(options_.threads));
     const std::size_t batch = std::min(threads, replicates);
     const int inner = static_cast<int>(std::max<std::size_t>(1, threads / batch));
-    std::vector<ExpectedSteps> steps(replicates);
+    std::vector<std::vector<ExpectedSteps>> steps(sizes, std::vector<ExpectedSteps>(replicates));
     for (std::size_t first = 0; first < replicates; first += batch) {
       tell(work_before + (work_after - work_before) * static_cast<double>(first) / static_cast<double>(replicates),
            fmt::format("{} cells, {} samples", cells, samples));
@@ -86,10 +91,11 @@ class Study {
         for (const markov::StateSpace& space : ladder.spaces)
           chains[k].push_back(
               markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = inner}));
-        if (rests(chains[k].back())) {
-          steps[first + k] = expected_steps(problem_.map, ladder.spaces.back(), chains[k].back(), {draws});
-        } else {
-          steps[first + k].from_start = infinite;
+        for (std::size_t s = 0; s < sizes; ++s) {
+          if (rests(chains[k][s]))
+            steps[s][first + k] = expected_steps(problem_.map, ladder.spaces[s], chains[k][s], {draws});
+          else
+            steps[s][first + k].from_start = infinite;
         }
       });
       for (std::vector<markov::SampledChain>& one : chains)
@@ -99,7 +105,9 @@ class Study {
       ladder.pooled.push_back(pool.mean());
       ladder.rest_resolved = ladder.rest_resolved && rests(ladder.pooled.back());
     }
-    for (const ExpectedSteps& one : steps) ladder.rest_resolved = ladder.rest_resolved && std::isfinite(one.from_start);
+    for (const std::vector<ExpectedSteps>& size : steps)
+      for (const ExpectedSteps& one : size)
+        ladder.rest_resolved = ladder.rest_resolved && std::isfinite(one.from_start);
     ladder.replicate = std::move(steps);
     return ladder;
   }
@@ -119,11 +127,12 @@ class Study {
       if (can_look_deeper() && std::log(result.failure_rate.value) < 0.6 * std::log(options_.tail)) return std::nullopt;
       // What is read off the finest chain as it is must be within the tolerance too.
       const double unextrapolated = std::abs(std::log(result.from_start.value / result.steps.mean));
-      const bool met =
-          std::max(result.discretization_error + result.sampling_error, unextrapolated) <= options_.tolerance;
+      const double change = change_over_error * result.discretization_error;
+      const double half = std::hypot(result.discretization_error, result.sampling_error);
+      const auto within = [&](double error) { return std::max(error, unextrapolated) <= options_.tolerance; };
+      const bool met = within(change + result.sampling_error);
       bool refined = false;
-      if (!met && free_cells &&
-          (result.discretization_error > options_.tolerance / 3 || unextrapolated > options_.tolerance) &&
+      if (!met && free_cells && (change > options_.tolerance / 3 || unextrapolated > options_.tolerance) &&
           cells < most_cells) {
         cells *= 2;
         refined = true;
@@ -134,7 +143,7 @@ class Study {
         refined = true;
       }
       if (refined) continue;
-      if (met) {
+      if (within(half)) {
         result.status = Status::converged;
       } else if (!free_cells && !free_samples) {
         result.status = Status::fixed_resolution;
@@ -143,8 +152,7 @@ class Study {
         result.message = fmt::format(
             "tolerance {} not met: the interval's half-width is {:.2g} (discretization {:.2g}, sampling {:.2g}) at {} "
             "cells and {} samples",
-            options_.tolerance, result.discretization_error + result.sampling_error, result.discretization_error,
-            result.sampling_error, cells, samples);
+            options_.tolerance, half, result.discretization_error, result.sampling_error, cells, samples);
       }
       tell(0.96, "summary");
       summarize(problem_, ladder.spaces.back(), ladder.pooled.back(), options_, result);
@@ -166,13 +174,15 @@ class Study {
     result.replicates = options_.replicates;
     const auto estimate = [&](double ExpectedSteps::*which, double& discretization, double& sampling) {
       std::vector<double> log_replicate;
-      for (const ExpectedSteps& one : ladder.replicate) log_replicate.push_back(std::log(one.*which));
+      for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
+        log_replicate.push_back(
+            extrapolate(std::log(ladder.replicate[2][r].*which), std::log(ladder.replicate[1][r].*which)));
       const double fine = std::log(pooled[2].*which), middle = std::log(pooled[1].*which),
                    coarse = std::log(pooled[0].*which);
-      const double extrapolated = fine + (fine - middle) / 3, before = middle + (middle - coarse) / 3;
-      discretization = std::abs(extrapolated - before);
+      const double extrapolated = extrapolate(fine, middle), before = extrapolate(middle, coarse);
+      discretization = std::abs(extrapolated - before) / change_over_error;
       sampling = t_interval(log_replicate).half_width;
-      const double half = discretization + sampling;
+      const double half = std::hypot(discretization, sampling);
       return Estimate{std::exp(extrapolated), std::exp(extrapolated - half), std::exp(extrapolated + half)};
     };
     result.steps.mean = pooled.back().from_start;
@@ -182,7 +192,9 @@ class Study {
     result.worst_start = estimate(&ExpectedSteps::worst_start, unused_d, unused_s);
     const Estimate& quasi = result.from_quasi_stationary;
     result.failure_rate = {1 / quasi.value, 1 / quasi.upper, 1 / quasi.lower};
-    for (const ExpectedSteps& one : ladder.replicate) result.replicate_log_steps.push_back(std::log(one.from_start));
+    for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
+      result.replicate_log_steps.push_back(
+          extrapolate(std::log(ladder.replicate[2][r].from_start), std::log(ladder.replicate[1][r].from_start)));
     return result;
   }
 

@@ -88,9 +88,9 @@ struct Metastability {
   Estimate from_quasi_stationary;           ///< the same from the metastable regime = 1 / failure_rate
   Estimate worst_start;                     ///< from the slowest survivor of a step
   Estimate failure_rate;                    ///< 1 - lambda_1 per step
-  double discretization_error = 0;          ///< relative, of from_start: estimated from three cell sizes
+  double discretization_error = 0;          ///< relative, of from_start: a third of the extrapolation's last change
   double sampling_error = 0;                ///< relative 95 % half-width of from_start over replicates
-  std::vector<double> replicate_log_steps;  ///< ln(expected steps from the launch), replicate by replicate
+  std::vector<double> replicate_log_steps;  ///< ln(expected steps from the launch), extrapolated
 
   static constexpr double levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
   Accumulated steps;                   ///< the last step counted
@@ -116,7 +116,8 @@ struct Metastability {
 ///
 /// Expected steps and the failure rate are extrapolated (Richardson, order 2, in the logarithm) from the two finest
 /// cell sizes of the chain of all replicates' draws; everything else is read off that chain at the finest size.
-/// interval_95: t-interval over replicates plus the difference of the last two extrapolations.
+/// interval_95: t-interval over the replicates' extrapolations and, as an independent error, a third of the difference
+/// of the last two extrapolations of all draws.
 /// Method::integrated: integrated_study().
 /// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails
 Metastability study(const Problem& problem, const StudyOptions& options);

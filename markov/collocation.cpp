@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
 #include "markov/parallel.h"
 #include "markov/quasi_stationary.h"
@@ -20,6 +21,7 @@ constexpr double most_above = 1e-13;      // survivors beyond the upper edge
 constexpr double most_launched = 1e-9;    // landings of the launch beyond it
 constexpr std::size_t cells = 64;         // of a phase, to find it
 constexpr std::size_t few_points = 4000;  // of a row
+constexpr std::size_t lanes = 8;          // landings worked on together
 constexpr std::size_t few_edges = 12, many_edges = 24;
 constexpr int most_generations = 8;
 constexpr const char* no_points =
@@ -42,11 +44,18 @@ NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, 
         "method");
   std::vector<Legendre> moments(space.panels(), Legendre{});
   double sum = 0;
-  for (const auto& [landing, weight] : points) {
-    const auto [panel, place] = space.locate(next, landing);
-    const Legendre p = legendre(place);
-    for (std::size_t n = 0; n < p.size(); ++n) moments[panel][n] += weight * p[n];
-    sum += weight;
+  std::array<double, lanes> place{};
+  std::array<std::size_t, lanes> panel{};
+  std::array<Legendre, lanes> p;
+  for (std::size_t first = 0; first < points.size(); first += lanes) {
+    const std::size_t count = std::min(lanes, points.size() - first);
+    for (std::size_t l = 0; l < count; ++l) std::tie(panel[l], place[l]) = space.locate(next, points[first + l].first);
+    legendre<lanes>(place.data(), p.data());
+    for (std::size_t l = 0; l < count; ++l) {
+      const double weight = points[first + l].second;
+      for (std::size_t n = 0; n < p[l].size(); ++n) moments[panel[l]][n] += weight * p[l][n];
+      sum += weight;
+    }
   }
   if (!std::isfinite(sum))
     throw ConvergenceError("integrated rows", sum, "a landing from state " + std::to_string(state) + " is not finite");

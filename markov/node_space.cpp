@@ -24,11 +24,8 @@ double gauss_weight(std::size_t k) {
 }
 
 Legendre legendre(double t) {
-  Legendre p{1, t};
-  for (std::size_t n = 1; n + 1 < p.size(); ++n) {
-    const auto d = static_cast<double>(n);
-    p[n + 1] = ((2 * d + 1) * t * p[n] - d * p[n - 1]) / (d + 1);
-  }
+  Legendre p;
+  legendre<1>(&t, &p);
   return p;
 }
 

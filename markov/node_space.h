@@ -59,6 +59,24 @@ class NodeSpace {
 /// Legendre polynomials P_0 .. P_15 at t in [-1, 1].
 using Legendre = std::array<double, NodeSpace::order>;
 Legendre legendre(double t);
+/// The same at `lanes` places side by side.
+template <std::size_t lanes>
+void legendre(const double* t, Legendre* values) {
+  double before[lanes], here[lanes];
+  for (std::size_t l = 0; l < lanes; ++l) {
+    values[l][0] = before[l] = 1;
+    values[l][1] = here[l] = t[l];
+  }
+  for (std::size_t n = 1; n + 1 < NodeSpace::order; ++n) {
+    const auto d = static_cast<double>(n);
+    const double up = (2 * d + 1) / (d + 1), down = d / (d + 1);
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double next = up * t[l] * here[l] - down * before[l];
+      before[l] = here[l];
+      values[l][n + 1] = here[l] = next;
+    }
+  }
+}
 /// Gauss-Legendre on [-1, 1], ascending; k < NodeSpace::order.
 double gauss_abscissa(std::size_t k);
 double gauss_weight(std::size_t k);

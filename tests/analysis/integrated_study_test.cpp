@@ -154,7 +154,7 @@ TEST(IntegratedStudy, TakesAnyNoise) {
   for (const Case& c : {Case{published, 7.02, {0.4, 0}, {0.4, 0.1}, {7.35, 0.19}},
                         {published, 9.59, {0.4, 0.2}, {0.4, 0.2}, {5.83, 0.28}},
                         {coulomb, 3, {0.4, 0.2}, {0.4, 0}, {4.5, 0.2}},
-                        {coulomb, 3, {0.4, 0.2}, {0.4, 0.2}, {4.5, 0.2}}}) {
+                        {coulomb, 3, {0.4, 0.2}, {0.4, 0.2}, {4.5, 0}}}) {
     Setting setting = equal_legs(c.slope_deg, c.friction);
     setting.law = c.law;
     setting.restitution = c.restitution;

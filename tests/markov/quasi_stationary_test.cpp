@@ -173,6 +173,17 @@ TEST(Mixing, GeometricDecayInClosedForm) {
   EXPECT_EQ(total_variation_mixing(solver, quasi, start, 0.001, 5), std::nullopt);
 }
 
+// metastable steps --method integrated --restitution 0.4,0.2 --friction 0.5,0: nobody survives for long, and what
+// interpolated rows leave is rounding of either sign, here a circulant's complex pair.
+TEST(QuasiStationary, EndsWhereInterpolatedRowsLeaveNobody) {
+  const double on = 1e-17, back = -5e-18;
+  const Chain chain =
+      Chain::interpolated({0, 2, 4, 6}, {1, 2, 0, 2, 0, 1}, {on, back, back, on, on, back}, {1.0, 1.0, 1.0});
+  const QuasiStationary quasi = quasi_stationary(ChainSolver(chain));
+  EXPECT_NEAR(quasi.failure_rate, 1, 1e-15);
+  EXPECT_LE(quasi.iterations, 100);
+}
+
 TEST(Mixing, CyclicChainMixesWithinItsClasses) {
   const ChainSolver solver(reference::cyclic_chain(4, 3, 5, 0.01));
   const QuasiStationary quasi = quasi_stationary(solver);
