@@ -293,7 +293,7 @@ std::optional<int> total_variation_mixing(const ChainSolver& solver, const Quasi
   int within = 0;
   for (int step = 0; step <= limit; ++step) {
     const double mass = total(survivors);
-    if (!(mass > 0)) return std::nullopt;  // nobody is left to be mixed
+    if (!(mass > (chain.interpolated() ? kNobody : 0))) return std::nullopt;  // nobody is left to be mixed
     divide(survivors, mass);
     std::vector<double> class_mass(period.classes.size(), 0.0);
     for (std::size_t i = 0; i < survivors.size(); ++i) {

@@ -182,6 +182,7 @@ TEST(QuasiStationary, EndsWhereInterpolatedRowsLeaveNobody) {
   const QuasiStationary quasi = quasi_stationary(ChainSolver(chain));
   EXPECT_NEAR(quasi.failure_rate, 1, 1e-15);
   EXPECT_LE(quasi.iterations, 100);
+  EXPECT_EQ(total_variation_mixing(ChainSolver(chain), quasi, std::vector<double>{1, 0, 0}, 0.05), std::nullopt);
 }
 
 TEST(Mixing, CyclicChainMixesWithinItsClasses) {
