@@ -5,7 +5,7 @@
 
 namespace metastable::markov::dense {
 
-/// Pivots eliminated together. The three steps below take a panel of `pivots` <= panel of them.
+/// Pivots eliminated together: the first two steps below take `pivots` <= panel of them.
 inline constexpr std::size_t panel = 64;
 
 /// Columns [0, count) of the panel's rows, in the order of elimination: for n = pivots-1 .. 1 and i < n,

@@ -25,6 +25,9 @@ constexpr std::size_t kBlockedSize = 2 * dense::panel;
 constexpr double kBlockedFill = 0.6;
 /// Rows, and columns, of a full matrix that one thread takes at a time.
 constexpr std::size_t kShare = 128;
+std::size_t shares(std::size_t count) { return (count + kShare - 1) / kShare; }
+/// Pivots whose visits are kept until they are worth a pass over the whole matrix.
+constexpr std::size_t kBlock = 4 * dense::panel;
 
 /// row += weight * source, over columns [from, to).
 void add_multiple(double* row, double weight, const double* source, std::size_t from, std::size_t to) {
@@ -162,27 +165,38 @@ void Elimination::Factors::eliminate_square(std::size_t first, std::size_t last)
 }
 
 /// The same on a full square, a panel of pivots at a time: the panel's square, the rest of its rows, the visits of the
-/// rows above to the panel, and all that these visits lead to as one matrix product.
+/// rows above to the panel, and all that these visits lead to as one matrix product. The columns left of a block of
+/// panels get it from all of them at once, so that the square passes through memory once a block.
 void Elimination::Factors::eliminate_panels(int threads) {
   const std::size_t n = size();
-  for (std::size_t last = n; last > 0;) {
-    const std::size_t first = last > dense::panel ? last - dense::panel : 0, pivots = last - first;
-    eliminate_square(first, last);
-    const double* const square = row(first) + first;
-    const std::size_t shares = (first + kShare - 1) / kShare;
-    parallel_for(shares, threads, [&](std::size_t share) {
-      const std::size_t from = share * kShare;
-      dense::eliminate_columns(row(first) + from, n, square, n, pivots, std::min(kShare, first - from));
+  for (std::size_t end = n; end > 0;) {
+    const std::size_t begin = end > kBlock ? end - kBlock : 0;
+    for (std::size_t last = end; last > begin;) {
+      const std::size_t first = last > begin + dense::panel ? last - dense::panel : begin, pivots = last - first;
+      eliminate_square(first, last);
+      const double* const square = row(first) + first;
+      parallel_for(shares(first), threads, [&](std::size_t share) {
+        const std::size_t from = share * kShare;
+        dense::eliminate_columns(row(first) + from, n, square, n, pivots, std::min(kShare, first - from));
+      });
+      parallel_for(shares(first), threads, [&](std::size_t share) {
+        const std::size_t from = share * kShare, rows = std::min(kShare, first - from);
+        double* const visits = row(from) + first;
+        dense::visit_panel(visits, n, rows, square, n, exit.data() + first, pivots);
+        for (std::size_t i = from; i < from + rows; ++i) {
+          for (std::size_t pivot = last; pivot-- > first;) kill[i] += row(i)[pivot] * kill[pivot];
+        }
+        const std::size_t above = std::clamp(begin, from, from + rows) - from;  // the block's own rows come last
+        dense::add_product(row(from) + begin, n, visits, n, row(first) + begin, n, above, pivots, first - begin);
+        dense::add_product(row(from + above), n, visits + above * n, n, row(first), n, rows - above, pivots, first);
+      });
+      last = first;
+    }
+    parallel_for(shares(begin), threads, [&](std::size_t share) {
+      const std::size_t from = share * kShare, rows = std::min(kShare, begin - from);
+      dense::add_product(row(from), n, row(from) + begin, n, row(begin), n, rows, end - begin, begin);
     });
-    parallel_for(shares, threads, [&](std::size_t share) {
-      const std::size_t from = share * kShare, rows = std::min(kShare, first - from);
-      double* const visits = row(from) + first;
-      dense::visit_panel(visits, n, rows, square, n, exit.data() + first, pivots);
-      for (std::size_t i = from; i < from + rows; ++i)
-        for (std::size_t pivot = last; pivot-- > first;) kill[i] += row(i)[pivot] * kill[pivot];
-      dense::add_product(row(from), n, visits, n, row(first), n, rows, pivots, first);
-    });
-    last = first;
+    end = begin;
   }
 }
 

@@ -52,7 +52,7 @@ TEST(Elimination, SymmetricWalkInClosedForm) {
 
 // Drift away from rest: the expected time from i to i - 1 is a sum of positive terms.
 TEST(Elimination, KeepsAllDigitsWhenRestTakes1e60Steps) {
-  constexpr std::size_t n = 200;
+  constexpr std::size_t n = 600;
   const double up = 0.4, down = 0.2;
   const Chain chain = reference::birth_death(n, up, down, false);
   const std::vector<double> mean = Elimination(chain).solve(ones(n));
@@ -77,9 +77,9 @@ TEST(Elimination, RandomChainsToRationalAnswers) {
   }
 }
 
-// Sizes on both sides of the panels of the blocked elimination, and not multiples of them.
+// Sizes on both sides of the panels of the blocked elimination and of its blocks, and not multiples of them.
 TEST(Elimination, BlockedAndRowByRowAgree) {
-  for (const std::size_t n : {127, 128, 129, 192, 250}) {
+  for (const std::size_t n : {127, 128, 129, 192, 250, 256, 257, 321, 601}) {
     const Chain chain = reference::random_chain(n, static_cast<unsigned>(n), 1e-9);
     const Elimination elimination(chain);
     std::vector<double> rhs(n);
@@ -95,10 +95,11 @@ TEST(Elimination, BlockedAndRowByRowAgree) {
 }
 
 TEST(Elimination, BitsDoNotDependOnThreads) {
-  const Chain chain = reference::random_chain(333, 7, 1e-6);
-  const std::vector<double> one = Elimination(chain, 1).solve(ones(333)),
-                            three = Elimination(chain, 3).solve(ones(333));
-  EXPECT_EQ(one, three);
+  for (const std::size_t n : {333, 601}) {
+    const Chain chain = reference::random_chain(n, 7, 1e-6);
+    const std::vector<double> one = Elimination(chain, 1).solve(ones(n)), three = Elimination(chain, 3).solve(ones(n));
+    EXPECT_EQ(one, three) << n;
+  }
 }
 
 // A chain whose rare exits (1e-25) are all in one state, full and larger than the panels: closed form by symmetry.
