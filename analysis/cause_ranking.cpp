@@ -99,9 +99,9 @@ RankedCause fit_cause(const TransitionModel& model, const Fit& base, const Scann
   return cause;
 }
 
-// What a second effect gained beyond the model error of the first.
-double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& plain) {
-  const PhaseGain before = phase_gain(model, first, plain), now = phase_gain(model, pair, first);
+// What a second effect gained beyond the model error of the first. `exact`: the part of the first that has none.
+double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact) {
+  const PhaseGain before = phase_gain(model, first, exact), now = phase_gain(model, pair, first);
   const double tolerated = model_error * model_error;
   // Only what the second effect gained by itself: one phase may have paid for the other.
   const double all = now.collisions + now.stances;
@@ -118,6 +118,15 @@ PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit&
     (model.events()[i].kind == EventKind::stance ? gain.stances : gain.collisions) +=
         2 * (better.evaluation.log_density[i] - worse.evaluation.log_density[i]);
   return gain;
+}
+
+const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<Term>& terms,
+                      const Fit& recalibrated) {
+  for (const Term& term : terms)
+    for (const RankedCause& cause : singles)
+      if (term.candidate->exact && cause.terms[0].candidate == term.candidate && !cause.fit.nuisance.empty())
+        return cause.fit;
+  return recalibrated;
 }
 
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
@@ -282,7 +291,7 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
     RankedCause& pair = pairs[i];
     pair = fit_cause(model, first.fit, tries[i].scanned);
     pair.gain = 2 * (pair.fit.penalised - recalibrated.penalised);
-    const double second = earned(model, pair.fit, first.fit, recalibrated);
+    const double second = earned(model, pair.fit, first.fit, exact_part(ranking.singles, first.terms, recalibrated));
     pair.evidence = first.evidence + log_evidence(tries[i].scanned, second) + prior;
     pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
   });

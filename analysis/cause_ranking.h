@@ -40,7 +40,8 @@ struct RankingOptions {
 /// log mean_v exp(gain_v g/(1+g)/2) - p/2 log(1+g), g = 36/p.
 /// A second effect must earn beyond `model_error`^2 of what the first one gained in the same phase (collisions,
 /// stances): no catalogue entry has exactly the form of what nature did, and a misfit of 6 % of a large effect is none
-/// of its own. Candidates whose scores promise less than a fifth of a large best gain are not fitted.
+/// of its own. (An `exact` effect is forgiven nothing.) Candidates whose scores promise less than a fifth of a large
+/// best gain are not fitted.
 /// @param candidates  to be considered
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options);
@@ -52,5 +53,9 @@ struct PhaseGain {
   double collisions = 0, stances = 0;
 };
 PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse);
+
+/// What `terms` gained beyond this fit may be off by an error of form: the fit of those of them that are exact, or
+/// `recalibrated`. @param singles  fitted causes
+const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<Term>& terms, const Fit& recalibrated);
 
 }  // namespace metastable::analysis

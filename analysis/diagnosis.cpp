@@ -26,8 +26,8 @@ namespace {
 constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes
 constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide one another; hardly ever used up
 constexpr double recalibration_level = 0.02;
-constexpr double left_over_level = 0.001;
-constexpr double left_over_square = 18;   // of a cell's statistic, beyond the model error
+constexpr double left_over_level = 0.003;
+constexpr double left_over_square = 15;   // of a cell's statistic, beyond the model error
 constexpr double least_left_over = 0.05;  // held-out gap that counts as one [nats a collision]
 constexpr double least_p_value = 1e-12;   // smaller ones are beyond what chance levels can say
 
@@ -423,12 +423,15 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   // What the best hypothesis leaves: judged beyond its own model error.
   const RankedCause* best = ordered.empty() ? nullptr : ordered.front();
   const Fit* chosen = &recalibrated;
-  double none = 0;
+  double none = 0, bent = 1;  // share of the gain that an error of form may bend
   if (gap && best && best->evidence > 0 && !best->fit.nuisance.empty()) {
     progress(0.68, "what is left");
     chosen = &best->fit;
     d.left = gap_map(model, *chosen, options.draws, options.seed + 1);
-    const PhaseGain gained = phase_gain(model, *chosen, recalibrated);
+    const Fit& exact = exact_part(ranking.singles, best->terms, recalibrated);
+    const PhaseGain gained = phase_gain(model, *chosen, exact);
+    const double all = chosen->log_likelihood - recalibrated.log_likelihood;
+    if (all > 0) bent = std::clamp((chosen->log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
     const double tolerated = model_error * model_error;
     const double beyond = d.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
     if (d.left.p_value < left_over_level && beyond > left_over_square)
@@ -448,7 +451,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     d.shrinkage = gap_shrinkage(model, recalibrated, rivals, options.folds, options.threads, options.seed);
   // Even a cause that closes nearly all of a huge gap may leave a large one.
   if (chosen != &recalibrated && !d.shrinkage.empty() &&
-      d.shrinkage[0].with_effect > least_left_over + model_error * model_error * 6 * d.shrinkage[0].baseline)
+      d.shrinkage[0].with_effect > least_left_over + model_error * model_error * 6 * bent * d.shrinkage[0].baseline)
     none = std::max(none, 1e6);
   // Probabilities over everything; the prior gives a gap even odds, shared by the effects.
   const double top = best ? std::max(0.0, best->evidence) : 0;

@@ -16,6 +16,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double tail_score = 2.2;
+constexpr double least_rests = 3;  // seen or expected, for a statement on them
 constexpr std::size_t enough_trials = 40;
 
 // Members of one cell: the events that it holds.
@@ -26,7 +27,28 @@ struct Cell {
 };
 
 bool is_stance(EventKind kind) { return kind == EventKind::stance; }
-bool is_collision(EventKind kind) { return kind == EventKind::collision || kind == EventKind::step; }
+bool is_contact(EventKind kind) { return kind != EventKind::stance && kind != EventKind::launch; }
+
+// What an event adds to the sums of a cell: functions of its normal score, or their means given that the wheel rested
+// (a score below that of the chance of rest) or did not. All have mean zero if the model is right.
+struct Residual {
+  double mean = 0, spread = 0, tail = 0;
+};
+
+Residual residual(EventKind kind, double score, double log_density) {
+  const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
+  if (kind != EventKind::rest && kind != EventKind::survival) {
+    const double s = std::clamp(score, -6.0, 6.0);
+    return {s, (s * s - 1) / std::numbers::sqrt2, (std::abs(s) > tail_score ? 1 : 0) - share_beyond};
+  }
+  const bool rested = kind == EventKind::rest;
+  const double chance = std::clamp(rested ? std::exp(log_density) : -std::expm1(log_density), 1e-12, 1 - 1e-12);
+  const double edge = dynamics::normal_quantile(chance), density = dynamics::normal_density(edge);
+  const double beyond = dynamics::normal_cdf(std::min(edge, -tail_score)) +
+                        std::max(0.0, dynamics::normal_cdf(edge) - dynamics::normal_cdf(tail_score));
+  const double weight = rested ? 1 / chance : -1 / (1 - chance);
+  return {-density * weight, -edge * density * weight / std::numbers::sqrt2, (beyond - share_beyond * chance) * weight};
+}
 
 // Cuts into `parts` of equal counts.
 std::vector<double> quantile_cuts(std::vector<double> values, int parts) {
@@ -49,7 +71,7 @@ class Cutter {
       if (stance && !two_phases) continue;
       std::vector<std::size_t> members;
       for (std::size_t i = 0; i < events.size(); ++i)
-        if (stance ? is_stance(events[i].kind) : is_collision(events[i].kind)) members.push_back(i);
+        if (stance ? is_stance(events[i].kind) : is_contact(events[i].kind)) members.push_back(i);
       if (members.size() < least_cell_events) continue;
       const std::size_t first = cells_.size();
       const std::string where = !two_phases ? "" : stance ? ", stance" : ", collision";
@@ -170,24 +192,36 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     raw.push_back(std::move(column));
     without_gap.push_back(variance);
   };
-  const double share_below = 2 * dynamics::normal_cdf(-tail_score);
+  const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
+  std::vector<Residual> residuals;
+  for (std::size_t i = 0; i < events.size(); ++i)
+    residuals.push_back(residual(events[i].kind, z[i], fit.evaluation.log_density[i]));
+  // What a unit of score is [rad/s] in the middle of a phase's distribution: where a cell's events are far out it is
+  // more there, and would exaggerate the shift that brought them out.
+  std::map<EventKind, std::pair<double, double>> units;  // their sum and number; contacts as collisions
+  const auto phase = [](EventKind kind) { return is_contact(kind) ? EventKind::collision : kind; };
+  for (std::size_t i = 0; i < events.size(); ++i)
+    if (std::abs(z[i]) < 1.5) {
+      auto& [sum, number] = units[phase(events[i].kind)];
+      sum += fit.evaluation.unit[i];
+      ++number;
+    }
   for (const Cell& cell : cells) {
     const auto n = static_cast<double>(cell.events.size());
     std::vector<std::pair<std::size_t, double>> mean, spread, tail;
-    double unit = 0, beyond = 0;
+    double beyond = 0;
     for (const std::size_t i : cell.events) {
-      const double s = std::clamp(z[i], -6.0, 6.0);
-      mean.emplace_back(i, s);
-      spread.emplace_back(i, (s * s - 1) / std::numbers::sqrt2);
-      const double rare = std::abs(s) > tail_score ? 1 : 0;
-      tail.emplace_back(i, rare - share_below);
-      unit += fit.evaluation.unit[i];
-      beyond += rare;
+      mean.emplace_back(i, residuals[i].mean);
+      spread.emplace_back(i, residuals[i].spread);
+      tail.emplace_back(i, residuals[i].tail);
+      beyond += residuals[i].tail;
     }
-    add(cell, "mean", "rad/s", unit / n, std::move(mean), n);  // of a score of one; the size follows below
+    const auto& [unit, central] = units[phase(events[cell.events.front()].kind)];
+    add(cell, "mean", "rad/s", central > 0 ? unit / central : 1, std::move(mean),
+        n);  // of a score of one; the size follows below
     add(cell, "spread", "of the model's", 0, std::move(spread), n);
     if (cell.facet == "phase")
-      add(cell, "tail", "share", beyond / n - share_below, std::move(tail), n * share_below * (1 - share_below));
+      add(cell, "tail", "share", beyond / n, std::move(tail), n * share_beyond * (1 - share_beyond));
   }
   // Memory: successive scores of a trial, of each phase; and trials that differ as a whole.
   for (const bool stance : {false, true}) {
@@ -198,10 +232,10 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     std::optional<std::size_t> previous;
     double partial = 0;
     for (std::size_t i = 0; i < events.size(); ++i) {
-      if (!(stance ? is_stance(events[i].kind) : is_collision(events[i].kind))) continue;
-      const double s = std::clamp(z[i], -6.0, 6.0);
+      if (!(stance ? is_stance(events[i].kind) : is_contact(events[i].kind))) continue;
+      const double s = residuals[i].mean;
       if (previous && events[*previous].trial == events[i].trial) {
-        const double before = std::clamp(z[*previous], -6.0, 6.0);
+        const double before = residuals[*previous].mean;
         memory.emplace_back(i, s * before);
         sum += s * before;
         sum_variance += before * before;
@@ -224,27 +258,28 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     add(trials, "spread", "correlation", between / std::max(1.0, pairs), std::move(whole), between_variance);
   }
   // Rests against what the model expects at the same speeds.
+  const std::vector<double> chance_of_rest = model.rest_chances(fit.nuisance, fit.terms);
   std::map<std::size_t, Cell> outcomes;
   for (std::size_t i = 0; i < events.size(); ++i)
-    if (events[i].kind == EventKind::rest || events[i].kind == EventKind::survival) {
+    if (events[i].rested) {
       Cell& cell = outcomes[events[i].condition];
       cell.facet = "outcome";
       cell.at = "rests in " + model.condition_name(events[i].condition);
       cell.events.push_back(i);
     }
   for (auto& [condition, cell] : outcomes) {
-    if (cell.events.size() < 5) continue;
     std::vector<std::pair<std::size_t, double>> column;
-    double excess = 0, variance = 0;
+    double excess = 0, expected = 0, rests = 0, variance = 0;
     for (const std::size_t i : cell.events) {
-      const bool rested = events[i].kind == EventKind::rest;
-      const double given = std::exp(fit.evaluation.log_density[i]);
-      const double expected = rested ? given : 1 - given;
-      column.emplace_back(i, (rested ? 1 : 0) - expected);
+      column.emplace_back(i, (*events[i].rested ? 1 : 0) - chance_of_rest[i]);
       excess += column.back().second;
-      variance += expected * (1 - expected);
+      expected += chance_of_rest[i];
+      rests += *events[i].rested;
+      variance += chance_of_rest[i] * (1 - chance_of_rest[i]);
     }
-    add(cell, "mean", "share of trials", excess / static_cast<double>(cell.events.size()), std::move(column), variance);
+    if (std::max(expected, rests) < least_rests) continue;
+    add(cell, "mean", "share of collisions", excess / static_cast<double>(cell.events.size()), std::move(column),
+        variance);
   }
 
   // Efficient: what the fitted parameters' scores explain is taken off, event by event. Nuisances move no further than

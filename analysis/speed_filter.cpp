@@ -33,10 +33,11 @@ double square(double v) { return v * v; }
 
 double score_of_probability(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
 
-SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise)
+SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack)
     : extension_(extension),
       tilt_(tilt),
       noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
+      slack2_(slack * slack),
       blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
 
 SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {
@@ -90,16 +91,19 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
   Out out =
       transition(wheel, context, *plus, rate, std::sqrt(noise2_ * rate * rate + square(*plus / mean_) * variance_));
   // It did go on: omega+ was beyond the barrier, of which the noise of the reported speed tells only so much.
-  const double beyond = (*plus - wheel.barrier(context)) / std::max(1e-3, std::sqrt(noise2_) * rate);
+  const double beyond = (*plus - wheel.barrier(context)) / std::max(1e-3, std::sqrt(noise2_ + slack2_) * rate);
   if (beyond < 8)
     out.log_density = std::max(least_log_density, out.log_density + std::log(std::max(1e-300, normal_cdf(beyond))));
   update(out, seen);
   return out;
 }
 
-SpeedFilter::Out SpeedFilter::rest(const ExtendedWheel& wheel, const StepContext& context, bool rested) {
-  double below = tilt_.below(wheel.after_collision(context, mean_, wheel.barrier(context)).below);
-  const double given = conditional(below);
+double SpeedFilter::chance_below(const ExtendedWheel& wheel, const StepContext& context, double bound) const {
+  return conditional(tilt_.below(wheel.after_collision(context, mean_, bound).below));
+}
+
+SpeedFilter::Out SpeedFilter::rest(const ExtendedWheel& wheel, const StepContext& context, double bound, bool rested) {
+  const double given = chance_below(wheel, context, bound);
   Out out;
   out.log_density = std::max(least_log_density, rested ? std::log(given) : std::log1p(-given));
   if (rested) out.score = score_of_probability(given / 2);
@@ -108,7 +112,6 @@ SpeedFilter::Out SpeedFilter::rest(const ExtendedWheel& wheel, const StepContext
 }
 
 // P of less than a score given the previous collision's.
-
 double SpeedFilter::conditional(double below) const {
   if (extension_.memory == 0 || !previous_) return std::clamp(below, 1e-300, 1.0);
   const double rho = extension_.memory;
@@ -142,8 +145,8 @@ SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepC
   previous_ = z;
   return out;
 }
-// The prior that the transition gives, taken as normal around what was seen.
 
+// The prior that the transition gives, taken as normal around what was seen.
 void SpeedFilter::update(const Out& out, double seen) {
   const double prior = out.unit * out.unit, gain = noise2_ / (noise2_ + prior);
   mean_ = std::max(1e-2, seen - gain * std::clamp(out.score, -4.0, 4.0) * out.unit);

@@ -25,8 +25,10 @@ class SpeedFilter {
     double log_density = 0, score = 0, unit = 1;
   };
 
-  /// @param noise  stated sd of reported speeds [rad/s]; both references must outlive the filter
-  SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise);
+  /// Both references must outlive the filter.
+  /// @param noise  stated sd of reported speeds [rad/s]
+  /// @param slack  sd of the least speed that a next collision can have, where the legs are not known [rad/s]
+  SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0);
 
   /// The first speed, against the stated launch.
   Out launch(const Condition& condition, double reported);
@@ -38,8 +40,10 @@ class SpeedFilter {
   Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
   /// Only the next omega- is seen: collision and stance together.
   Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
-  /// Coming to rest after the last measured speed, or not.
-  Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, bool rested);
+  /// An omega+ below `bound` (or none, of a foot that jams) after the last measured speed, or not that.
+  Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound, bool rested);
+  /// The chance of an omega+ below `bound` after the last measured speed.
+  double chance_below(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound) const;
 
  private:
   double conditional(double below) const;
@@ -50,6 +54,7 @@ class SpeedFilter {
   const dynamics::Extension& extension_;
   const ScoreTilt& tilt_;
   double noise2_;  // variance of a reported speed
+  double slack2_;
   bool blurred_;
   double mean_ = 0, variance_ = 0;
   std::optional<double> previous_;  // collision's score

@@ -34,6 +34,7 @@ struct Event {
   std::optional<double> since_previous = {};  ///< collision [s]
   double elapsed = 0;                         ///< since the trial's first collision [s]
   double speed = 0;                           ///< given, the condition of the density [rad/s]
+  std::optional<bool> rested = {};            ///< after this collision; none: not known, or no collision
 };
 
 /// Logarithm of each event's density [events] and the normal score of its probability integral transform: independent
@@ -76,6 +77,8 @@ struct Candidate {
   std::function<std::vector<Named>(const std::vector<double>& variant, const std::vector<double>& values)> report;
   /// Why these data cannot tell it; empty if they can.
   std::string undecidable;
+  /// Reality has no other form of it than this one: none of its gain is forgiven as an error of form.
+  bool exact = false;
 };
 
 /// A candidate with values.
@@ -97,6 +100,9 @@ class TransitionModel {
   virtual const std::vector<Candidate>& candidates() const = 0;
   /// Densities with these nuisances and effects. Values outside a model's reach give a very small density, never a NaN.
   virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const = 0;
+  /// [events] Probability of coming to rest after each event's collision, given what was measured before it; 0 for
+  /// events of no collision. By default 0 throughout.
+  virtual std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const Term> terms) const;
   /// The same design (trials, columns, conditions) with outcomes drawn from the model. Same seed, same data.
   virtual std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
                                                     std::uint64_t seed) const = 0;

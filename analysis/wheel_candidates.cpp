@@ -254,10 +254,12 @@ std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
       ramp_vibration(),
       slip_reversal(design),
   };
-  if (!design.noise_stated)
-    for (WheelCandidate& c : all)
-      if (c.candidate.id == "sensor_noise")
-        c.candidate.undecidable = "no sensor noise is stated: it was taken from the data";
+  for (WheelCandidate& c : all)
+    if (c.candidate.id == "sensor_noise") {
+      c.candidate.exact = true;
+      if (!design.noise_stated)
+        c.candidate.undecidable = "no sensor noise is stated: it was assumed or taken from the data";
+    }
   return all;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 // What is supposed of a wheel whose trials were measured: its contact and the effects added to it.
 
+#include <optional>
+
 #include "analysis/score_tilt.h"
 #include "dynamics/collision_density.h"
 #include "dynamics/extended_wheel.h"
@@ -11,6 +13,7 @@ struct WheelHypothesis {
   dynamics::ContactSpread contact;
   ScoreTilt tilt;  ///< change of shape of what a collision's spread gives
   dynamics::Extension extension;
+  std::optional<double> noise = {};  ///< sd of reported speeds [rad/s]; none: what the runs say
 };
 
 }  // namespace metastable::analysis

@@ -24,10 +24,9 @@ constexpr std::array<Node, 5> five_nodes{{{-2.856970013872806, 0.011257411327720
                                           {1.355626179974266, 0.2220759220056126},
                                           {2.856970013872806, 0.01125741132772069}}};
 
-}  // namespace
-
-Evaluation wheel_likelihood(const WheelRuns& measured, const std::vector<Event>& events,
-                            const WheelHypothesis& hypothesis) {
+// `rests`: filled with the chances of rest, if any.
+Evaluation follow(const WheelRuns& measured, const std::vector<Event>& events, const WheelHypothesis& hypothesis,
+                  std::vector<double>* rests) {
   const dynamics::Extension& e = hypothesis.extension;
   const std::vector<ExtendedWheel> wheel = wheels_on_ramps(measured, hypothesis.contact, e);
   Evaluation result;
@@ -38,11 +37,24 @@ Evaluation wheel_likelihood(const WheelRuns& measured, const std::vector<Event>&
   const bool spread = e.trial_friction_sd > 0;
   const std::size_t nodes = spread ? five_nodes.size() : 1;
   for (const WheelRun& run : measured.runs) {
-    std::vector<SpeedFilter> filters(nodes, SpeedFilter(e, hypothesis.tilt, measured.noise));
+    std::vector<SpeedFilter> filters(
+        nodes, SpeedFilter(e, hypothesis.tilt, hypothesis.noise.value_or(measured.noise), measured.slack));
     std::array<double, five_nodes.size()> log_weight{};
     for (std::size_t q = 0; q < nodes && spread; ++q) log_weight[q] = std::log(five_nodes[q].weight);
     const ExtendedWheel& at = wheel[run.condition];
+    const auto chance_of_rest = [&](const StepContext& context) {
+      double sum = 0, weights = 0;
+      for (std::size_t q = 0; q < nodes; ++q) {
+        StepContext shifted = context;
+        if (spread) shifted.friction_shift = five_nodes[q].score * e.trial_friction_sd;
+        const double w = std::exp(log_weight[q] - *std::max_element(log_weight.begin(), log_weight.begin() + nodes));
+        sum += w * filters[q].chance_below(at, shifted, at.barrier(shifted));
+        weights += w;
+      }
+      return sum / weights;
+    };
     const auto add = [&](auto observe) {
+      if (rests && rests->size() < result.log_density.size() + 1) rests->push_back(0);
       if (!spread) {
         const SpeedFilter::Out out = observe(filters[0], 0.0);
         result.log_density.push_back(out.log_density);
@@ -83,6 +95,7 @@ Evaluation wheel_likelihood(const WheelRuns& measured, const std::vector<Event>&
       }
       const bool last = k + 1 == run.collisions.size();
       const bool after = m.after && *m.after > 0;
+      if (rests && (after || !last || run.outcome)) rests->push_back(chance_of_rest(m.context));
       if (after) add([&](SpeedFilter& f, double shift) { return f.collision(at, context(shift), *m.after); });
       if (!last) {
         const double next = run.collisions[k + 1].before;
@@ -94,7 +107,10 @@ Evaluation wheel_likelihood(const WheelRuns& measured, const std::vector<Event>&
           add([&](SpeedFilter& f, double shift) { return f.step(at, context(shift), next); });
       } else if (!after && run.outcome) {
         const bool rested = *run.outcome == dynamics::Outcome::rest;
-        add([&](SpeedFilter& f, double shift) { return f.rest(at, context(shift), rested); });
+        add([&](SpeedFilter& f, double shift) {
+          const StepContext here = context(shift);
+          return f.rest(at, here, m.after ? jam_bound(measured) : at.barrier(here), rested);
+        });
       }
     }
   }
@@ -104,6 +120,20 @@ Evaluation wheel_likelihood(const WheelRuns& measured, const std::vector<Event>&
     if (!std::isfinite(result.score[i])) result.score[i] = -8;
   }
   return result;
+}
+
+}  // namespace
+
+Evaluation wheel_likelihood(const WheelRuns& measured, const std::vector<Event>& events,
+                            const WheelHypothesis& hypothesis) {
+  return follow(measured, events, hypothesis, nullptr);
+}
+
+std::vector<double> wheel_rest_chances(const WheelRuns& measured, const std::vector<Event>& events,
+                                       const WheelHypothesis& hypothesis) {
+  std::vector<double> rests;
+  follow(measured, events, hypothesis, &rests);
+  return rests;
 }
 
 }  // namespace metastable::analysis

@@ -13,4 +13,9 @@ namespace metastable::analysis {
 Evaluation wheel_likelihood(const WheelRuns& measured, const std::vector<Event>& events,
                             const WheelHypothesis& hypothesis);
 
+/// [events] The chance of rest after each event's collision, given what was measured before it; 0 for events of no
+/// collision.
+std::vector<double> wheel_rest_chances(const WheelRuns& measured, const std::vector<Event>& events,
+                                       const WheelHypothesis& hypothesis);
+
 }  // namespace metastable::analysis

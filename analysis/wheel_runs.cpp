@@ -52,6 +52,15 @@ void find_legs(WheelRuns& measured, bool column) {
     measured.notes.push_back("leg is missing: found for each trial from its stances, whose legs differ in length");
     return;
   }
+  // The least next speed, just over the top, differs between legs.
+  double sum = 0, squares = 0;
+  for (int leg = 0; leg < legs; ++leg) {
+    const ExtendedWheel& wheel = stated.front();
+    const double least = wheel.next({.leg = leg}, 1.001 * wheel.barrier({.leg = leg})).value_or(0);
+    sum += least / legs;
+    squares += least * least / legs;
+  }
+  measured.slack = std::sqrt(std::max(0.0, squares - sum * sum));
   measured.notes.push_back(
       "leg is missing: legs of the mean length are taken, and no effect of a single leg can be told");
   for (WheelRun& run : measured.runs)
@@ -82,8 +91,10 @@ void complete_contexts(WheelRuns& measured) {
 
 void estimate_noise(WheelRuns& measured) {
   measured.noise_stated = measured.noise > 0;
-  if (measured.noise_stated || !measured.speeds_after) {
-    measured.noise = std::max(measured.noise, 1e-4);
+  if (measured.noise_stated) return;
+  if (!measured.speeds_after) {
+    measured.noise = 0.01;
+    measured.notes.push_back("no sensor noise is stated: 0.01 rad/s assumed");
     return;
   }
   std::vector<double> residual;
@@ -97,6 +108,7 @@ void estimate_noise(WheelRuns& measured) {
   }
   if (residual.size() < 20) {
     measured.noise = 0.01;
+    measured.notes.push_back("no sensor noise is stated: 0.01 rad/s assumed");
     return;
   }
   const auto median = [](std::vector<double> v) {
@@ -166,6 +178,7 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   find_legs(measured, leg_column);
   complete_contexts(measured);
   estimate_noise(measured);
+  for (WheelRun& run : measured.runs) mark_jam(measured, run);
   if (experiment.columns.time == Presence::none)
     measured.notes.push_back(
         "time_s is missing: times between collisions are those of the model's stance; ramp_vibration rests on them");
@@ -178,6 +191,14 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   if (!experiment.columns.outcomes)
     measured.notes.push_back("trials.csv is missing: whether trials came to rest is not known");
   return measured;
+}
+
+double jam_bound(const WheelRuns& measured) { return std::max(2e-3, 4 * measured.noise); }
+
+void mark_jam(const WheelRuns& measured, WheelRun& run) {
+  std::optional<double>& after = run.collisions.back().after;
+  if (after && *after < jam_bound(measured) && run.outcome.value_or(dynamics::Outcome::rest) == dynamics::Outcome::rest)
+    after = 0;
 }
 
 std::vector<Event> wheel_events(const WheelRuns& measured) {
@@ -204,9 +225,14 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
       if (k == 0 && measured.conditions[run.condition].initial_speed) add(EventKind::launch);
       const bool last = k + 1 == run.collisions.size();
       const bool after = m.after && *m.after > 0;
+      if (!last)
+        event.rested = false;
+      else if (run.outcome)
+        event.rested = *run.outcome == dynamics::Outcome::rest;
       if (after) add(EventKind::collision);
       if (!last) {
         if (after) event.speed = *m.after;
+        if (after) event.rested.reset();
         if (!after || !measured.exact_stances) add(after ? EventKind::stance : EventKind::step);
       } else if (!after && run.outcome) {
         add(*run.outcome == dynamics::Outcome::rest ? EventKind::rest : EventKind::survival);

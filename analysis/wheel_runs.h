@@ -32,7 +32,8 @@ struct WheelRuns {
   dynamics::Law law = dynamics::Law::published;
   std::vector<Condition> conditions;
   std::vector<WheelRun> runs;
-  double noise = 0;                ///< sd of reported speeds [rad/s], stated or taken from the stances
+  double noise = 0;                ///< sd of reported speeds [rad/s], stated, taken from the stances or assumed
+  double slack = 0;                ///< sd of a stance's outcome because its leg is not known [rad/s]
   bool noise_stated = true;        ///< noise is the experiment's own
   bool legs_known = true;          ///< by the column, or found
   bool speeds_after = false;       ///< omega+ is there
@@ -49,6 +50,12 @@ std::vector<dynamics::ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, 
 /// taken; missing positions and times follow from the geometry.
 /// @throws std::invalid_argument for a coast-down and for `plastic`
 WheelRuns wheel_runs(const Experiment& experiment);
+
+/// An omega+ below this is that of a foot that jammed, seen through the noise [rad/s].
+double jam_bound(const WheelRuns& measured);
+
+/// The last collision's omega+ becomes 0 where it is below jam_bound and the wheel is not known to have gone on.
+void mark_jam(const WheelRuns& measured, WheelRun& run);
 
 /// Their transitions: per trial launch (where one is stated), then collision and stance, or step, and rest or survival
 /// where the outcome is known.

@@ -34,7 +34,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
   const dynamics::TruncatedNormal restitution(contact.restitution_mean, contact.restitution_sd, 0, 1);
   const dynamics::TruncatedNormal friction(contact.friction_mean, contact.friction_sd, 0);
   const ExtendedWheel& wheel = wheels[design.condition];
-  const double noise = std::sqrt(all.noise * all.noise + e.noise_sd * e.noise_sd);
+  const double noise = std::hypot(hypothesis.noise.value_or(all.noise), e.noise_sd);
   const auto score = [](double u) { return dynamics::normal_quantile(u); };
   const auto first = uniforms(seed, index, 0);
   WheelRun run = design;
@@ -84,7 +84,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
     m.before = std::max(1e-3, omega + e.bias_before + noise * score(error[0]));
     const bool rests = !plus || *plus < barrier;
     if (like.after && plus) m.after = std::max(1e-3, *plus + e.bias_after + noise * score(error[1]));
-    if (like.after && !plus) m.after.reset();
+    if (like.after && !plus) m.after = 0;
     run.collisions.push_back(m);
     const auto next = rests ? std::nullopt : wheel.next(m.context, *plus);
     if (!next) {
@@ -100,6 +100,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
   }
   for (RunCollision& m : run.collisions) m.context.friction_shift = 0;
   if (!design.outcome) run.outcome.reset();
+  mark_jam(all, run);
   return run;
 }
 

@@ -18,6 +18,33 @@
 namespace metastable::analysis {
 namespace {
 
+// The experiment with the legs that follow from each condition's first one.
+Experiment with_legs_from_the_first(Experiment experiment) {
+  const auto legs = static_cast<int>(experiment.wheel.leg_length.size());
+  for (MeasuredTrial& trial : experiment.trials)
+    for (std::size_t k = 0; k < trial.collisions.size(); ++k)
+      trial.collisions[k].leg = (experiment.conditions[trial.condition].first_landing_leg + static_cast<int>(k)) % legs;
+  return experiment;
+}
+
+// Legs that were neither noted nor found follow from the stated first one, where the transitions bear that out.
+WheelRuns runs_with_legs(const Experiment& experiment) {
+  constexpr double clearly = 3;  // in log likelihood
+  WheelRuns measured = wheel_runs(experiment);
+  if (measured.legs_known || experiment.wheel.equal_legs()) return measured;
+  WheelRuns stated = wheel_runs(with_legs_from_the_first(experiment));
+  const NominalContact& c = experiment.contact;
+  const WheelHypothesis nominal{
+      .contact = {c.restitution.mean, std::max(0.01, c.restitution.sd), c.friction.mean, std::max(0.01, c.friction.sd)},
+      .tilt = ScoreTilt(0, 0),
+      .extension = {}};
+  const double with = wheel_likelihood(stated, wheel_events(stated), nominal).total();
+  if (!(with > wheel_likelihood(measured, wheel_events(measured), nominal).total() + clearly)) return measured;
+  stated.notes.insert(stated.notes.begin(),
+                      "leg is missing: taken from each condition's first_landing_leg, which the transitions bear out");
+  return stated;
+}
+
 class WheelTransitions : public TransitionModel {
  public:
   explicit WheelTransitions(const Experiment& experiment);
@@ -31,6 +58,7 @@ class WheelTransitions : public TransitionModel {
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   const std::vector<std::string>& notes() const override { return measured_.notes; }
   Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const override;
+  std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const Term> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
                                             std::uint64_t seed) const override;
   std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
@@ -56,7 +84,7 @@ class WheelTransitions : public TransitionModel {
 };
 
 WheelTransitions::WheelTransitions(const Experiment& experiment)
-    : experiment_(experiment), measured_(wheel_runs(experiment)), events_(wheel_events(measured_)) {
+    : experiment_(experiment), measured_(runs_with_legs(experiment)), events_(wheel_events(measured_)) {
   if (events_.size() < 2 || std::none_of(events_.begin(), events_.end(), [](const Event& e) {
         return e.kind == EventKind::collision || e.kind == EventKind::step;
       }))
@@ -76,6 +104,9 @@ void WheelTransitions::set_up_parameters() {
       {"log friction_sd", std::log(std::max(0.01, c.friction.sd)), 0.4, 1e-3, std::log(0.005), std::log(0.5)},
       {"skew", 0, 0.06, 1e-3, -0.5, 0.5},
       {"tails", 0, 0.06, 1e-3, -0.4, 0.4}};
+  // Where nobody stated the noise, the stances say it only together with the effects that act in them.
+  if (!measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances)
+    nuisances_.push_back({"log noise_sd", std::log(measured_.noise), 0.5, 1e-3, std::log(1e-4), 0});
   WheelDesign design;
   design.legs = measured_.wheel.legs();
   design.legs_known = measured_.legs_known;
@@ -83,7 +114,7 @@ void WheelTransitions::set_up_parameters() {
   design.speeds_after = measured_.speeds_after;
   design.launches_stated = std::any_of(measured_.conditions.begin(), measured_.conditions.end(),
                                        [](const Condition& one) { return one.initial_speed.has_value(); });
-  design.noise_stated = measured_.noise_stated || !measured_.speeds_after;
+  design.noise_stated = measured_.noise_stated;
   design.trials = measured_.runs.size();
   design.leg_lengths = measured_.wheel.leg_length;
   design.law = measured_.law;
@@ -124,6 +155,7 @@ WheelHypothesis WheelTransitions::hypothesis(std::span<const double> nuisance, s
   WheelHypothesis h{.contact = {nuisance[0], std::exp(nuisance[1]), nuisance[2], std::exp(nuisance[3])},
                     .tilt = ScoreTilt(nuisance[4], nuisance[5]),
                     .extension = {}};
+  if (nuisance.size() > 6) h.noise = std::exp(nuisance[6]);
   for (const Term& term : terms)
     for (const WheelCandidate& effect : effects_)
       if (effect.candidate.id == term.candidate->id) effect.apply(h.extension, term.variant, term.values);
@@ -132,6 +164,11 @@ WheelHypothesis WheelTransitions::hypothesis(std::span<const double> nuisance, s
 
 Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::span<const Term> terms) const {
   return wheel_likelihood(measured_, events_, hypothesis(nuisance, terms));
+}
+
+std::vector<double> WheelTransitions::rest_chances(std::span<const double> nuisance,
+                                                   std::span<const Term> terms) const {
+  return wheel_rest_chances(measured_, events_, hypothesis(nuisance, terms));
 }
 
 std::unique_ptr<TransitionModel> WheelTransitions::simulate(std::span<const double> nuisance,

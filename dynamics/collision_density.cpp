@@ -17,8 +17,10 @@ namespace {
 
 constexpr double reach = 4.6;  // scores beyond it weigh 4e-6
 
+constexpr double finest = 0.05, widest = 0.8;  // spacing of nodes
+
 // Nodes in the standard score between `from` and `to`, with the normal's probabilities: equally spaced where the normal
-// fades out at both ends (then the rule converges exponentially), Gauss-Legendre where it is cut.
+// fades out at both ends (then the rule converges exponentially), panels of Gauss-Legendre nodes where it is cut.
 template <class Add>
 void score_nodes(double from, double to, double spacing, Add add) {
   if (from <= -reach && to >= reach) {
@@ -30,12 +32,24 @@ void score_nodes(double from, double to, double spacing, Add add) {
   to = std::min(to, reach);
   if (!(from < to)) return;
   using Rule = boost::math::quadrature::gauss<double, 30>;
-  const double middle = (from + to) / 2, half = (to - from) / 2;
-  for (std::size_t i = 0; i < Rule::abscissa().size(); ++i) {
-    const double offset = half * Rule::abscissa()[i], weight = half * Rule::weights()[i];
-    add(middle - offset, weight * normal_density(middle - offset));
-    if (offset != 0) add(middle + offset, weight * normal_density(middle + offset));
+  const int panels = std::max(1, static_cast<int>(std::ceil((to - from) / (30 * spacing))));
+  const double half = (to - from) / (2 * panels);
+  for (int panel = 0; panel < panels; ++panel) {
+    const double middle = from + half * (2 * panel + 1);
+    for (std::size_t i = 0; i < Rule::abscissa().size(); ++i) {
+      const double offset = half * Rule::abscissa()[i], weight = half * Rule::weights()[i];
+      add(middle - offset, weight * normal_density(middle - offset));
+      if (offset != 0) add(middle + offset, weight * normal_density(middle + offset));
+    }
   }
+}
+
+// The spacing of nodes in one variable's score where the other's density is known in closed form: along the line of
+// equal loss the product of both densities is narrower than that variable's by what it contributes to the loss.
+// @param own, other  change of the loss with a standard deviation of either
+double node_spacing(double own, double other) {
+  const double ratio = own / std::max(1e-12, other);
+  return std::clamp(1.25 / std::sqrt(1 + ratio * ratio), finest, widest);
 }
 
 // Density and upper tail of mu = ratio N(mean, sd^2), mu >= 0.
@@ -66,14 +80,14 @@ CollisionDensity::CollisionDensity(const ContactModel& model, const ContactSprea
   const double from = -contact.restitution_mean / contact.restitution_sd;
   const double to = (1 - contact.restitution_mean) / contact.restitution_sd;
   restitution_mass_ = normal_cdf(to) - normal_cdf(from);
-  // Along the line of equal loss the product of the two densities is narrower than eta's alone by the ratio of what eta
-  // and mu contribute to the loss, about sd(eta) eta : 3 sd(mu); twice that, to be safe.
-  const double contribution = 0.6 * contact.restitution_sd * contact.restitution_mean / contact.friction_sd;
-  const double spacing = std::clamp(0.8 / std::sqrt(1 + contribution * contribution), 0.1, 0.8);
-  score_nodes(from, to, spacing, [&](double score, double weight) {
-    const double eta = contact.restitution_mean + contact.restitution_sd * score;
-    nodes_.push_back({eta, weight / restitution_mass_, contact_duration(eta)});
-  });
+  double spacing = widest;
+  for (std::vector<Node>& nodes : nodes_) {
+    score_nodes(from, to, spacing, [&](double score, double weight) {
+      const double eta = contact.restitution_mean + contact.restitution_sd * score;
+      nodes.push_back({eta, weight / restitution_mass_, contact_duration(eta)});
+    });
+    spacing /= 2;
+  }
 }
 
 double CollisionDensity::contact_duration(double restitution) {
@@ -145,9 +159,23 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
     return one;
   };
 
+  // Nodes as close as the loss's slopes at the means ask for.
+  const double spacing = [&] {
+    const double eta = std::min(1.0, contact_.restitution_mean * change.restitution_ratio), mu = friction.mean();
+    const double d = a - b * mu, squared = (1 + eta) * (1 + eta), rubbing = mu * (cc * mu - b);
+    const double kept = 1 - change.rebound_lost, alpha = 1 - eta * eta * kept;
+    const double by_eta = (-2 * eta * kept * d + 2 * (1 + eta) * rubbing) / (d * d);
+    const double by_mu = (squared * (2 * cc * mu - b) - alpha * b + 2 * b * (alpha + squared * rubbing / d)) / (d * d);
+    return node_spacing(contact_.restitution_sd * change.restitution_ratio * std::abs(by_eta),
+                        friction.sd() * (std::abs(by_mu) + friction.sd() * squared * cc / (d * d)));
+  }();
+  std::size_t level = 0;
+  for (double s = widest; level + 1 < nodes_.size() && s > 1.01 * spacing; s /= 2) ++level;
+  const std::vector<Node>& nodes = nodes_[level];
+
   SpeedDensity result;
   double edge = -1;  // the largest restitution of a node that cannot lose so little
-  for (const Node& node : nodes_) {
+  for (const Node& node : nodes) {
     const Curve k = curve(node.restitution, node.duration);
     if (!(k.discriminant > 0)) {
       result.below += node.weight;
@@ -161,7 +189,7 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
   result.below = std::clamp(result.below, 0.0, 1.0);
   if (edge < 0) return result;
   const Node* next = nullptr;  // after the edge
-  for (const Node& node : nodes_)
+  for (const Node& node : nodes)
     if (node.restitution > edge && (!next || node.restitution < next->restitution)) next = &node;
   if (!next || next->weight * at_restitution(curve(next->restitution, next->duration)).density < 1e-4 * result.density)
     return result;
@@ -229,11 +257,23 @@ SpeedDensity CollisionDensity::coulomb(const Collision& c, double before, double
   add(friction.above(sticking), model_.mass * (rg2 + y * y) / (rg2 + x * x + y * y), 0);
   const double from = -friction.mean() / friction.sd(), to = (sticking - friction.mean()) / friction.sd();
   const double mass_above_zero = normal_cdf(-from);
-  score_nodes(from, to, 0.5, [&](double score, double weight) {
-    const double mu = friction.mean() + friction.sd() * score;
+  // The slopes of the loss below, mass (1 - eta^2) + rubbing (1 + eta)^2, at the means.
+  const auto parts = [&](double mu) {
     const double normal = (rg2 + x * x - mu * x * y) / (model_.mass * rg2);
     const double tangential = (x * y - mu * (rg2 + y * y)) / (model_.mass * rg2);
-    add(weight / mass_above_zero, 1 / normal, mu * std::abs(tangential) / (normal * normal));
+    return std::pair{1 / normal, mu * std::abs(tangential) / (normal * normal)};
+  };
+  const double middle = std::min(friction.mean(), sticking), step = 1e-4;
+  const auto [mass, rubbing] = parts(middle);
+  const auto [mass_less, rubbing_less] = parts(middle - step);
+  const double squared = (1 + eta_mean) * (1 + eta_mean);
+  const double by_mu = ((mass - mass_less) * (1 - eta_mean * eta_mean) + (rubbing - rubbing_less) * squared) / step;
+  const double by_eta = -2 * eta_mean * mass + 2 * (1 + eta_mean) * rubbing;
+  const double spacing =
+      std::min(0.5, node_spacing(friction.sd() * std::abs(by_mu), eta_sd * (std::abs(by_eta) + eta_sd * mass)));
+  score_nodes(from, to, spacing, [&](double score, double weight) {
+    const auto [mass_at, rubbing_at] = parts(friction.mean() + friction.sd() * score);
+    add(weight / mass_above_zero, mass_at, rubbing_at);
   });
   result.below = std::clamp(result.below, 0.0, 1.0);
   return result;

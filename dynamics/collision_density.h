@@ -1,6 +1,7 @@
 #pragma once
 // The density of the speed just after one collision, fast enough for likelihoods of whole experiments.
 
+#include <array>
 #include <vector>
 
 #include "dynamics/contact_law.h"
@@ -33,10 +34,10 @@ struct SpeedDensity {
 /// omega+ just after a collision of a rolling wheel (u0 = 0) with random (eta, mu): under `published` a sum over eta
 /// with mu in closed form (the root of (18)-(34) in mu), under `coulomb` a sum over mu with eta in closed form, the
 /// sticking collisions (mu >= mu_c) being one term. The sum is trapezoidal in the normal score, Gauss-Legendre where
-/// truncation, or the least restitution that can lose so little, cuts inside 4.6 sds. Error below 4e-4 of the peak while
-/// mu's mean is four sds above 0 (6e-3 of the probability is lost where it is two): smooth enough in every parameter for
-/// a likelihood of thousands of collisions to be climbed.
-/// LandingDensity is the exact, slower way. One value costs about a microsecond.
+/// truncation, or the least restitution that can lose so little, cuts inside 4.6 sds. Error below 4e-4 of the peak
+/// while mu's mean is four sds above 0 (6e-3 of the probability is lost where it is two): smooth enough in every
+/// parameter for a likelihood of thousands of collisions to be climbed. LandingDensity is the exact, slower way. One
+/// value costs about a microsecond.
 class CollisionDensity {
  public:
   /// @throws std::invalid_argument for `plastic`, which has neither eta nor mu, and for sds <= 0
@@ -61,8 +62,8 @@ class CollisionDensity {
 
   ContactModel model_;
   ContactSpread contact_;
-  std::vector<Node> nodes_;      // published: restitutions
-  double restitution_mass_ = 1;  // of the untruncated normal in [0, 1]
+  std::array<std::vector<Node>, 5> nodes_;  // published: restitutions, each level half as far apart
+  double restitution_mass_ = 1;             // of the untruncated normal in [0, 1]
 };
 
 }  // namespace metastable::dynamics

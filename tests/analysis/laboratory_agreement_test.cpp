@@ -91,14 +91,10 @@ TEST(LaboratoryAgreement, RestsThatDidNotHappenAreNoGap) {
   const auto model = wheel_transitions(parse_experiment(
       {"laboratory", made.files.experiment_toml, made.files.collisions_csv, made.files.trials_csv, std::nullopt}));
   const GapMap map = gap_map(*model, fit(*model, {0.54, std::log(0.045), 0.352, std::log(0.043), 0, 0}, {}), 300, 1);
-  int outcomes = 0;
   for (const GapCell& cell : map.cells) {
     EXPECT_LT(std::abs(cell.statistic), 4.5) << cell.facet << ' ' << cell.aspect << ' ' << cell.at;
-    if (cell.facet != "outcome") continue;
-    ++outcomes;
-    EXPECT_LT(std::abs(cell.statistic), 1.5);
+    EXPECT_NE(cell.facet, "outcome") << "fewer than three rests are seen or expected";
   }
-  EXPECT_EQ(outcomes, 1);
 }
 
 }  // namespace

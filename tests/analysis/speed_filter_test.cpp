@@ -33,7 +33,7 @@ TEST(SpeedFilter, NextSpeedAndRestShareAProbabilityOfOne) {
           for (const double omega : {4.3, 5.2}) {
             SpeedFilter resting(*extension, tilt, noise);
             resting.start(omega);
-            double sum = std::exp(resting.rest(wheel, context, true).log_density);
+            double sum = std::exp(resting.rest(wheel, context, wheel.barrier(context), true).log_density);
             const double width = 2e-3;
             for (double next = 3; next < 9; next += width) {
               SpeedFilter walking(*extension, tilt, noise);
