@@ -97,5 +97,62 @@ TEST(LaboratoryAgreement, RestsThatDidNotHappenAreNoGap) {
   }
 }
 
+RealityFiles many_rests(const std::vector<std::string>& dropped) {
+  Setting base = stand_in_setting();
+  base.slope_deg = 6.0;
+  base.initial_speed = {5.2, 0.28};
+  base.first_landing_leg = 3;
+  const std::vector<RealityCondition> conditions{{"slow", base, 100}};
+  const dynamics::LaboratorySetup setup =
+      laboratory_setup(conditions, {.sensor_noise = 0.008, .flight = false, .seed = 4});
+  return reality_files(conditions, setup, run_laboratory(setup, 0), {.dropped = dropped});
+}
+
+std::unique_ptr<TransitionModel> model_of(const RealityFiles& made) {
+  return wheel_transitions(parse_experiment(
+      {"laboratory", made.files.experiment_toml, made.files.collisions_csv, made.files.trials_csv, std::nullopt}));
+}
+
+const std::vector<double> true_contact{0.54, std::log(0.045), 0.352, std::log(0.043), 0, 0};
+
+// A good part of the trials come to rest. Rests are the lower end of the next speed's distribution: left out of it, the other
+// steps look too fast and too narrow (-0.25 of the model's spread), and counted only where they came, too many.
+TEST(LaboratoryAgreement, RestsAreNoGap) {
+  for (const char* dropped : {"omega_plus_rad_s", "position_m"}) {
+    const auto model = model_of(many_rests({dropped}));
+    EXPECT_GT(model->rests().second, 30);
+    const GapMap map = gap_map(*model, fit(*model, true_contact, {}), 300, 1);
+    int outcomes = 0;
+    for (const GapCell& cell : map.cells) {
+      EXPECT_LT(std::abs(cell.statistic), 4) << dropped << ' ' << cell.facet << ' ' << cell.aspect << ' ' << cell.at;
+      outcomes += cell.facet == "outcome";
+    }
+    EXPECT_EQ(outcomes, 1);
+    double expected = 0;
+    for (const double chance : model->rest_chances(true_contact, {})) expected += chance;
+    EXPECT_NEAR(expected, model->rests().second, 4 * std::sqrt(expected));
+  }
+}
+
+TEST(LaboratoryAgreement, LegsThatWereNotNotedFollowFromTheFirstOneIfTheTransitionsAgree) {
+  RealityFiles made = many_rests({"omega_plus_rad_s", "leg"});
+  EXPECT_EQ(model_of(made)->legs(), 8);
+  const std::string stated = "first_landing_leg = 3";
+  const auto at = made.files.experiment_toml.find(stated);
+  ASSERT_NE(at, std::string::npos);
+  made.files.experiment_toml.replace(at, stated.size(), "first_landing_leg = 7");
+  EXPECT_EQ(model_of(made)->legs(), 0);
+}
+
+TEST(LaboratoryAgreement, ANoiseThatIsNotStatedIsFitted) {
+  const auto model = model_of(many_rests({"noise"}));
+  ASSERT_EQ(model->nuisances().back().name, "log noise_sd");
+  std::vector<double> start = true_contact;
+  start.push_back(std::log(0.016));
+  const Fit found = fit(*model, start, {});
+  EXPECT_TRUE(found.converged) << found.reason;
+  EXPECT_NEAR(std::exp(found.nuisance.back()), 0.008, 0.0008);
+}
+
 }  // namespace
 }  // namespace metastable::analysis::test

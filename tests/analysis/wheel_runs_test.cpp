@@ -95,5 +95,21 @@ TEST(WheelRuns, EventsFollowFromWhatWasMeasured) {
   EXPECT_EQ(kinds(e), (std::vector{step, rest}));
 }
 
+// A foot that jams leaves no speed; what is reported there is noise (0.008 rad/s).
+TEST(WheelRuns, NoiseAroundZeroIsNoSpeed) {
+  Experiment e = test::wheel_design(2, 2);
+  for (MeasuredTrial& trial : e.trials) trial.collisions.back().omega_plus = 0.02;
+  e.trials[0].outcome = dynamics::Outcome::rest;
+  const WheelRuns read = wheel_runs(e);
+  EXPECT_EQ(*read.runs[0].collisions.back().after, 0);
+  EXPECT_EQ(*read.runs[1].collisions.back().after, 0.02);  // this one went on
+  const std::vector<Event> events = wheel_events(read);
+  EXPECT_EQ(events[3].kind, EventKind::rest);
+  EXPECT_EQ(events[3].rested, true);
+  EXPECT_EQ(events[1].rested, false);
+  EXPECT_EQ(events.back().kind, EventKind::collision);
+  EXPECT_EQ(events.back().rested, false);
+}
+
 }  // namespace
 }  // namespace metastable::analysis

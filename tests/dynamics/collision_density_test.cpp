@@ -24,6 +24,32 @@ double inertia_before(const WheelMap& map, int phase) {
   return map.stance((phase + map.phases() - 1) % map.phases()).inertia;
 }
 
+// Where one of eta and mu hardly varies, nodes in the other that lie too far apart make a comb of the density.
+TEST(CollisionDensity, NarrowSpreadsLoseNoProbabilityAndWinNone) {
+  for (const auto& [law, contact] : {std::pair{Law::published, ContactSpread{0.49, 0.0785, 0.15, 0.0096}},
+                                     std::pair{Law::published, ContactSpread{0.2, 0.1, 0.15, 0.0096}},
+                                     std::pair{Law::published, ContactSpread{0.5, 0.05, 0.35, 0.01}},
+                                     std::pair{Law::coulomb, ContactSpread{0.5, 0.01, 0.2, 0.05}}}) {
+    const WheelMap map = uneven(law, 9.59, contact);
+    const CollisionDensity fast(map.contact_model(), contact);
+    const Stance& stance = map.stance(6);
+    const double omega = 6.0, width = 5e-4;
+    double sum = 0, largest = 0;
+    const auto at = [&](double plus) {
+      return fast.at(map.collision(6, omega), inertia_before(map, 6), stance.inertia, {}, plus);
+    };
+    double before = at(0.5).below;
+    for (double plus = 0.5; plus < omega; plus += width) {
+      const double added = width * at(plus + width / 2).density, below = at(plus + width).below;
+      largest = std::max(largest, std::abs(added - (below - before)));
+      sum += added;
+      before = below;
+    }
+    EXPECT_NEAR(sum, 1, 1e-3) << contact.friction_sd;
+    EXPECT_LT(largest, 1e-4) << contact.friction_sd;  // of a density of at most 10 over 5e-4
+  }
+}
+
 class AgainstTheExactDensity : public ::testing::TestWithParam<std::tuple<Law, double, ContactSpread, double>> {};
 
 // Another route to the same numbers: adaptive quadrature of the landing, over the stance's energy.
