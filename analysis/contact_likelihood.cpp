@@ -73,7 +73,6 @@ ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps
     if (!term.landing) {
       // Intervals of mu that rest, for each eta.
       for (std::size_t j = 0; j < columns; ++j) {
-        const double width = (j == 0 || j + 1 == columns ? 0.5 : 1.0) / (columns - 1);
         const double* column = after.data() + j * rows;
         for (std::size_t i = 0; i + 1 < rows; ++i) {
           const double a = column[i] - stance.barrier, b = column[i + 1] - stance.barrier;
@@ -81,11 +80,10 @@ ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps
           double from = mu[i], to = mu[i + 1];
           if (a >= 0) from = std::isinf(b) ? to : from + (to - from) * a / (a - b);
           if (b >= 0) to = std::isinf(a) ? from : from + (to - from) * a / (a - b);
-          if (!term.pieces.empty() && term.pieces.back().restitution == eta(j) &&
-              term.pieces.back().friction_to == from)
+          if (!term.pieces.empty() && term.pieces.back().column == j && term.pieces.back().friction_to == from)
             term.pieces.back().friction_to = to;
           else
-            term.pieces.push_back({eta(j), from, width, to});
+            term.pieces.push_back({eta(j), from, 0, to, j});
         }
         if (column[rows - 1] < stance.barrier && !term.pieces.empty()) term.pieces.back().friction_to = infinity;
       }
@@ -124,7 +122,7 @@ ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps
       }
       const double weight = std::hypot(x2 - x1, y2 - y1) / gradient / 2;
       for (const double at : {0.5 - gauss, 0.5 + gauss})
-        term.pieces.push_back({x1 + at * (x2 - x1) + shift_x, y1 + at * (y2 - y1) + shift_y, weight, 0});
+        term.pieces.push_back({x1 + at * (x2 - x1) + shift_x, y1 + at * (y2 - y1) + shift_y, weight, 0, 0});
     };
     for (std::size_t j = 0; j + 1 < columns; ++j)
       for (std::size_t i = 0; i + 1 < rows; ++i) {
@@ -163,26 +161,47 @@ ContactLikelihood::Value ContactLikelihood::density(const Term& term, const Cont
   return {a * b / (2 * std::numbers::pi) * sum, {a * u1 / sum, a * (u2 / sum - 1), b * v1 / sum, b * (v2 / sum - 1)}};
 }
 
-ContactLikelihood::Value ContactLikelihood::rest(const Term& term, const dynamics::TruncatedNormal& restitution,
+// A function that is linear between the columns has its mean over eta as the sum of its values there by these weights,
+// however narrow the density: a mean far outside [0, 1] leaves a sliver at the bound.
+std::vector<ContactLikelihood::ColumnWeight> ContactLikelihood::column_weights(
+    const dynamics::TruncatedNormal& restitution) {
+  const double mean = restitution.mean(), sd = restitution.sd(), h = 1.0 / (columns - 1);
+  std::vector<ColumnWeight> weights(columns);
+  for (std::size_t j = 0; j + 1 < columns; ++j) {
+    const double a = static_cast<double>(j) * h, b = static_cast<double>(j + 1) * h;
+    const double at_a = restitution.density(a), at_b = restitution.density(b);
+    // Mass between the columns and its first moment about a, with their derivatives by mean and sd.
+    const double mass[3] = {restitution.between(a, b), at_a - at_b, (at_a * (a - mean) - at_b * (b - mean)) / sd};
+    const double moment[3] = {(mean - a) * mass[0] - sd * sd * (at_b - at_a), mass[0] - h * at_b,
+                              -h * at_b * (b - mean) / sd - sd * (at_b - at_a)};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double right = moment[k] / h;
+      weights[j][k] += mass[k] - right;
+      weights[j + 1][k] += right;
+    }
+  }
+  return weights;
+}
+
+ContactLikelihood::Value ContactLikelihood::rest(const Term& term, const std::vector<ColumnWeight>& weights,
                                                  const dynamics::TruncatedNormal& friction, const ContactParameters& p,
                                                  const ContactParameters& truncation) {
   Value rest;
   for (const Piece& piece : term.pieces) {
-    const double share = piece.weight * restitution.density(piece.restitution);
-    if (!(share > 0)) continue;
+    const ColumnWeight& weight = weights[piece.column];
+    if (!(weight[0] > 0)) continue;
     const double within = friction.between(piece.friction, piece.friction_to);
-    const double u = (piece.restitution - p[0]) / p[1];
-    rest.value += share * within;
-    rest.slope[0] += share * within * u / p[1];
-    rest.slope[1] += share * within * (u * u - 1) / p[1];
+    rest.value += weight[0] * within;
+    rest.slope[0] += weight[1] * within;
+    rest.slope[1] += weight[2] * within;
     // The limits of mu move against its normal.
     const double from = friction.density(piece.friction), v = (piece.friction - p[2]) / p[3];
-    rest.slope[2] += share * from;
-    rest.slope[3] += share * from * v;
+    rest.slope[2] += weight[0] * from;
+    rest.slope[3] += weight[0] * from * v;
     if (std::isfinite(piece.friction_to)) {
       const double to = friction.density(piece.friction_to);
-      rest.slope[2] -= share * to;
-      rest.slope[3] -= share * to * (piece.friction_to - p[2]) / p[3];
+      rest.slope[2] -= weight[0] * to;
+      rest.slope[3] -= weight[0] * to * (piece.friction_to - p[2]) / p[3];
     }
   }
   for (std::size_t i = 0; i < 4; ++i) rest.slope[i] = rest.slope[i] / rest.value - truncation[i];
@@ -200,6 +219,7 @@ double ContactLikelihood::operator()(const ContactParameters& p, ContactParamete
   const double at_low = restitution.density(0), at_high = restitution.density(1), at_zero = friction.density(0);
   const ContactParameters truncation = {at_low - at_high, at_low * low - at_high * high, at_zero,
                                         -at_zero * p[2] / p[3]};
+  const std::vector<ColumnWeight> weights = column_weights(restitution);
   struct Sum {
     double value = 0;
     ContactParameters slope{};
@@ -214,7 +234,7 @@ double ContactLikelihood::operator()(const ContactParameters& p, ContactParamete
         sums[s].value += std::log(landing.value / inside);
         for (std::size_t k = 0; k < 4; ++k) sums[s].slope[k] += landing.slope[k] - truncation[k];
       } else if (term.rested || !term.pieces.empty()) {
-        const Value stays = rest(term, restitution, friction, p, truncation);
+        const Value stays = rest(term, weights, friction, p, truncation);
         sums[s].value += term.rested ? std::log(stays.value) : std::log1p(-stays.value);
         if (stays.value == 0 && !term.rested) continue;
         const double share = term.rested ? 1 : -stays.value / (1 - stays.value);

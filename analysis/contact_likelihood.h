@@ -36,9 +36,10 @@ class ContactLikelihood {
   std::size_t impossible() const { return impossible_; }
 
  private:
-  struct Piece {  // of a curve: a point, and its share of length / |grad x'|; of a region: eta and its width, mu from
-                  // and to
+  struct Piece {  // of a curve: a point, and its share of length / |grad x'|; of a region: column of eta, mu from and
+                  // to
     double restitution, friction, weight, friction_to;
+    std::size_t column;
   };
   struct Term {
     bool landing, rested;
@@ -51,7 +52,9 @@ class ContactLikelihood {
   };
   // Of the untruncated normals.
   static Value density(const Term& term, const ContactParameters& parameters);
-  static Value rest(const Term& term, const dynamics::TruncatedNormal& restitution,
+  using ColumnWeight = std::array<double, 3>;  // of one eta of the grid, and its derivatives by eta's mean and sd
+  static std::vector<ColumnWeight> column_weights(const dynamics::TruncatedNormal& restitution);
+  static Value rest(const Term& term, const std::vector<ColumnWeight>& weights,
                     const dynamics::TruncatedNormal& friction, const ContactParameters& parameters,
                     const ContactParameters& truncation);
 

@@ -6,6 +6,7 @@
 #include <boost/math/special_functions/ellint_rf.hpp>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -70,6 +71,12 @@ double pendulum_integral(double a, double b, double from, double to) {
 
 }  // namespace
 
+// Made when first asked for: they take a thousand times as long as the rest of a map, and few maps are asked.
+struct WheelMap::FastDensities {
+  std::once_flag made;
+  std::vector<PublishedDensity> by_phase;
+};
+
 WheelMap::WheelMap(Wheel wheel, double slope, Law law, ContactNoise noise, double rebound_lost)
     : wheel_(std::move(wheel)), slope_(slope), noise_(std::move(noise)) {
   wheel_.validate();
@@ -85,9 +92,15 @@ WheelMap::WheelMap(Wheel wheel, double slope, Law law, ContactNoise noise, doubl
     triangle_.push_back(dynamics::triangle(leg(p + count - 1), leg(p), wheel_.leg_angle()));
   for (std::size_t p = 0; p < count; ++p)
     stance_.push_back(make_stance(wheel_, law, leg(p), triangle_[p], triangle_[(p + 1) % count], slope));
-  std::vector<PublishedDensity> density;
-  for (int p = 0; p < phases() && PublishedDensity::covers(*this); ++p) density.emplace_back(*this, p);
-  density_ = std::make_shared<const std::vector<PublishedDensity>>(std::move(density));
+  fast_densities_ = std::make_shared<FastDensities>();
+}
+
+const std::vector<PublishedDensity>& WheelMap::fast_densities() const {
+  std::call_once(fast_densities_->made, [this] {
+    if (!PublishedDensity::covers(*this)) return;
+    for (int p = 0; p < phases(); ++p) fast_densities_->by_phase.emplace_back(*this, p);
+  });
+  return fast_densities_->by_phase;
 }
 
 Collision WheelMap::collision(int phase, double omega) const {
@@ -142,8 +155,9 @@ std::optional<double> WheelMap::rest_probability(double state, int phase) const 
 
 std::optional<double> WheelMap::landing_density(double state, int phase, std::span<const double> next,
                                                 std::span<double> density) const {
-  if (density_->empty()) return std::nullopt;
-  const PublishedDensity& fast = (*density_)[static_cast<std::size_t>(phase)];
+  const std::vector<PublishedDensity>& densities = fast_densities();
+  if (densities.empty()) return std::nullopt;
+  const PublishedDensity& fast = densities[static_cast<std::size_t>(phase)];
   if (state >= fast.slowest()) return fast(state, next, density);
   const LandingDensity at(*this, state, phase);
   std::transform(next.begin(), next.end(), density.begin(), at);

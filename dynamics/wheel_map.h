@@ -113,9 +113,12 @@ class WheelMap {
   double slope_;
   ContactNoise noise_;
   ContactModel model_;
-  std::vector<Triangle> triangle_;                                // of the collision in which leg p lands
-  std::vector<Stance> stance_;                                    // on leg p after it
-  std::shared_ptr<const std::vector<PublishedDensity>> density_;  // by phase; empty where it does not cover the map
+  std::vector<Triangle> triangle_;  // of the collision in which leg p lands
+  std::vector<Stance> stance_;      // on leg p after it
+  struct FastDensities;
+  /// By phase; empty where PublishedDensity does not cover the map.
+  const std::vector<PublishedDensity>& fast_densities() const;
+  std::shared_ptr<FastDensities> fast_densities_;  // shared by copies
 };
 
 /// Angular speed above which the foot lifts just before the collision at `phase` [rad/s]: omega^2 L1 = g sin(beta1 -

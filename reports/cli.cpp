@@ -187,6 +187,10 @@ int parse_and_run(int argc, const char* const* argv) {
   } catch (const CLI::Success& success) {  // --help, --version
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
+    for (const CLI::App* sub : subcommands)  // before what may be missing because of it
+      for (const std::string& word : sub->remaining())
+        if (word.starts_with("-"))
+          throw std::invalid_argument(fmt::format("{}: is no option of '{}'", word, sub->get_name()));
     throw std::invalid_argument(error.what());
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
