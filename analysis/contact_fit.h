@@ -65,9 +65,12 @@ std::vector<std::string> ambiguities(const ContactFit& fit);
 /// The likelihood of every landing and, after a trial's last collision, of rest or of survival
 /// (contact_likelihood.h). Quasi-Newton descents from a grid of starts on every few-th transition, then on all from
 /// the places they end at; standard errors from second differences, intervals from the profile over all maxima found
-/// (profile_interval.h): of 12 simulated experiments like the stand-in's all held all four, of 16 with 10 trials under
-/// coulomb 14 or more. Speeds are taken as exact: sensor noise goes into the spreads. Where legs are not known the
-/// wheel is taken with equal legs of its mean length.
+/// (profile_interval.h). How many hold the truth, under published, of (eta mean, eta sd, mu mean, mu sd):
+///   like the stand-in, trials that last:       9 trials, of 50: 48, 49, 49, 50;  50 trials, of 40: 39, 40, 39, 39
+///   N(0.4, 0.1^2) both at 9.59 deg, soon rest: 9 trials, of 50: 44, 45, 50, 44;  50 trials, of 40: 39, 36, 39, 40
+/// (96 % of all; 9 trials of the second are 53 transitions: the chi^2 behind the intervals makes them too narrow); of
+/// 16 with 10 trials under coulomb 14 or more. Speeds are taken as exact: sensor noise goes into the spreads. Where
+/// legs are not known the wheel is taken with equal legs of its mean length.
 /// @throws std::invalid_argument for a coast-down, conditions out of range, no transition to fit, or
 ///         Transition::collision without omega_plus
 /// Cost: about 5 ms a transition, 2 ms without intervals

@@ -18,7 +18,8 @@ using ContactParameters = std::array<double, 4>;
 /// The density of the landing is the integral of f(eta) f(mu) / |grad x'| along it; the probability of rest, that of
 /// the region below the barrier. Curves are found once, on triangles of a grid over [0, 1] x [0, 3] (spacing 1/160 up
 /// to mu = 0.9, a line of it on the law's kink); a likelihood is then a sum over their pieces. Good to about 1e-3 of a
-/// density for sds of 0.01 and more (dynamics/landing_density.h is the exact form).
+/// density for sds of 0.01 and more (dynamics/landing_density.h is the exact form); too low where eta is left in less
+/// than a column by a mean beyond [0, 1], which a wider sd describes as well.
 class ContactLikelihood {
  public:
   /// @param maps  one a condition of the transitions; their noise does not matter
