@@ -6,7 +6,8 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double density_tolerance = 1e-6;
+constexpr double density_error = 1e-5, density_tolerance = 2 * density_error;
+constexpr double rounding = 1e-13;                        // of the solvers
 constexpr int few_generations = 2, many_generations = 8;  // of edges
 
 // One value tells.
@@ -27,10 +28,13 @@ ExactRows::ExactRows(const Problem& problem, double tolerance, int threads)
     : collocated_(!has_density(problem) || (tolerance < density_tolerance && has_points(problem))), threads_(threads) {
   ranges_ = collocated_ ? markov::collocation_ranges(problem.map, problem.launch, threads)
                         : markov::node_ranges(problem.map, problem.launch, threads);
+  error_ = collocated_ || !has_points(problem) ? rounding : density_error;  // without points, densities are exact
   if (collocated_ && !ranges_.empty())
     edges_ = markov::collocation_edges(problem.map, ranges_,
                                        tolerance < density_tolerance ? many_generations : few_generations);
 }
+
+double ExactRows::error() const { return error_; }
 
 std::size_t ExactRows::coarsest() const {
   return markov::NodeSpace::order * (collocated_ ? edges_.front().size() - 1 : 1);

