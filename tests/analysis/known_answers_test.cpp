@@ -62,15 +62,24 @@ class RoughTerrain : public testing::TestWithParam<Rough> {
   }
 };
 
+// 95 % intervals miss now and then: of six seeds one may.
 TEST_P(RoughTerrain, StudyHoldsTheReferenceInItsInterval) {
-  const Metastability result = study(problem(), {});
-  EXPECT_EQ(result.status, Status::converged);
-  EXPECT_LE(result.from_start.lower, GetParam().from_fixed_point);
-  EXPECT_GE(result.from_start.upper, GetParam().from_fixed_point);
-  EXPECT_LE(result.from_quasi_stationary.lower, GetParam().from_quasi_stationary);
-  EXPECT_GE(result.from_quasi_stationary.upper, GetParam().from_quasi_stationary);
-  EXPECT_LE(result.failure_rate.lower, GetParam().rate);
-  EXPECT_GE(result.failure_rate.upper, GetParam().rate);
+  constexpr int seeds = 6;
+  int from_start = 0, from_quasi_stationary = 0, rate = 0;
+  const auto inside = [](const Estimate& e, double known) { return e.lower <= known && known <= e.upper; };
+  for (int seed = 1; seed <= seeds; ++seed) {
+    StudyOptions options;
+    options.seed = static_cast<std::uint64_t>(seed);
+    const Metastability result = study(problem(), options);
+    EXPECT_EQ(result.status, Status::converged);
+    EXPECT_NEAR(result.from_start.value / GetParam().from_fixed_point, 1, options.tolerance);
+    from_start += inside(result.from_start, GetParam().from_fixed_point);
+    from_quasi_stationary += inside(result.from_quasi_stationary, GetParam().from_quasi_stationary);
+    rate += inside(result.failure_rate, GetParam().rate);
+  }
+  EXPECT_GE(from_start, seeds - 1);
+  EXPECT_GE(from_quasi_stationary, seeds - 1);
+  EXPECT_GE(rate, seeds - 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(KnownAnswers, RoughTerrain,
