@@ -127,7 +127,8 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
 
   Proportion alarms, alarms_true, alarms_unlike, place_alarms, absorbed;
   std::map<int, Proportion> found, found_left, cause, holds, facet;
-  Proportion misnamed, unexplained, left_misnamed, left_right, both, both_findable, no_third, interval, shrinkage;
+  Proportion misnamed, unexplained, left_misnamed, left_right, both, both_findable, no_third, no_third_first, interval,
+      shrinkage;
   std::map<int, std::pair<double, int>> set_size;
   std::vector<std::pair<double, bool>> forecasts;
   for (std::size_t i = 0; i < truths.size(); ++i) {
@@ -189,9 +190,12 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
                                                          [](double left) { return left >= pair_power_left; }))
           both_findable.count(named_both);
         if (answer && answer->verdict == "explained" && !answer->cause_set.empty()) {
-          const std::vector<std::string> named = members(answer->cause_set.front());
-          no_third.count(
-              std::all_of(named.begin(), named.end(), [&](const std::string& id) { return id == a || id == b; }));
+          const auto of_the_two = [&](const std::string& name) {
+            const std::vector<std::string> named = members(name);
+            return std::all_of(named.begin(), named.end(), [&](const std::string& id) { return id == a || id == b; });
+          };
+          no_third.count(std::any_of(answer->cause_set.begin(), answer->cause_set.end(), of_the_two));
+          no_third_first.count(of_the_two(answer->cause_set.front()));
         }
         break;
       }
@@ -232,7 +236,8 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
   add("left-out effect unexplained, or of its ambiguity group", left_right, 0.7, 1);
   add("two effects: both named", both, 0.7, 1);
   add("  each with power left beside the other", both_findable, 0.7, 1);
-  add("two effects: no false third", no_third, 0.9, 1);
+  add("two effects: no false third, up to stated ambiguity", no_third, 0.9, 1);
+  add("  in the first of the set", no_third_first, 0.9, 1);
   add("where: claims in cases without a gap", place_alarms, 0, 0.1);
   for (const int strength : {2, 4}) add(fmt::format("where: right facet, {}x", strength), facet[strength], 0.9, 1);
   add("90 % intervals of effect size hold the truth", interval, 0.87, 0.93);

@@ -18,12 +18,15 @@ namespace {
 constexpr double tail_score = 2.2;
 constexpr double least_rests = 3;  // seen or expected, for a statement on them
 constexpr std::size_t enough_trials = 40;
+constexpr double largest_frequency = 60;  // [Hz] of a swing with the time since the previous collision
+constexpr double most_frequencies = 30;
 
-// Members of one cell: the events that it holds.
+// Members of one cell: the events that it holds. With weights it is a contrast of means: a trend, a swing.
 struct Cell {
   std::string facet, at;
   std::vector<std::size_t> events;
   bool stance = false;
+  std::vector<double> weights;  // by event; empty: 1
 };
 
 bool is_stance(EventKind kind) { return kind == EventKind::stance; }
@@ -93,19 +96,21 @@ class Cutter {
       });
       ranges("trial", members, where, 6, "",
              [](const Event& e) { return std::optional(static_cast<double>(e.trial + 1)); });
+      if (model_.trials() > 2) trend(members, where);
       ranges("time", members, where, 5, "s since the previous collision",
              [](const Event& e) { return e.since_previous; });
+      if (!stance && model_.legs() > 0) swings(members, where);  // a drum's time is its speed
       if (model_.conditions() > 1)
         groups("condition", members, where, [this](const Event& e) {
           return std::optional(std::pair{static_cast<int>(e.condition), model_.condition_name(e.condition)});
         });
-      cells_.push_back({"phase", !two_phases ? "step" : stance ? "stance" : "collision", members, stance});
+      cells_.push_back({"phase", !two_phases ? "step" : stance ? "stance" : "collision", members, stance, {}});
       for (std::size_t c = first; c < cells_.size(); ++c) cells_[c].stance = stance;
     }
     std::vector<std::size_t> launches;
     for (std::size_t i = 0; i < events.size(); ++i)
       if (events[i].kind == EventKind::launch) launches.push_back(i);
-    if (launches.size() >= 10) cells_.push_back({"collision", "launch", launches, false});
+    if (launches.size() >= 10) cells_.push_back({"collision", "launch", launches, false, {}});
     return std::move(cells_);
   }
 
@@ -146,6 +151,40 @@ class Cutter {
     });
   }
 
+  // From -1 at the first trial to 1 at the last one.
+  void trend(const std::vector<std::size_t>& members, const std::string& where) {
+    Cell cell{"trial", "trend over the trials" + where, members, false, {}};
+    const double last = static_cast<double>(model_.trials() - 1);
+    for (const std::size_t i : members)
+      cell.weights.push_back(2 * static_cast<double>(model_.events()[i].trial) / last - 1);
+    cells_.push_back(std::move(cell));
+  }
+  // Cosine and sine of the time since the previous collision: as many frequencies as its spread tells apart.
+  void swings(const std::vector<std::size_t>& members, const std::string& where) {
+    std::vector<double> times;
+    Cell cell{"time", "", {}, false, {}};
+    for (const std::size_t i : members)
+      if (const auto t = model_.events()[i].since_previous) {
+        cell.events.push_back(i);
+        times.push_back(*t);
+      }
+    if (times.size() < 2 * least_cell_events) return;
+    std::vector<double> sorted = times;
+    std::sort(sorted.begin(), sorted.end());
+    const double middle = sorted[sorted.size() / 2],
+                 spread = sorted[sorted.size() * 19 / 20] - sorted[sorted.size() / 20];
+    if (!(spread > 0)) return;
+    const double spacing = std::max(0.5 / spread, largest_frequency / most_frequencies);
+    for (double f = 1 / spread; f <= largest_frequency; f += spacing)
+      for (const double phase : {0.0, 0.5 * std::numbers::pi}) {
+        cell.at = fmt::format("{} of {:.3g} Hz in the time since the previous collision{}",
+                              phase == 0 ? "cosine" : "sine", f, where);
+        cell.weights.clear();
+        for (const double t : times) cell.weights.push_back(std::cos(2 * std::numbers::pi * f * (t - middle) - phase));
+        cells_.push_back(cell);
+      }
+  }
+
   const TransitionModel& model_;
   std::vector<Cell> cells_;
 };
@@ -153,7 +192,8 @@ class Cutter {
 }  // namespace
 
 Eigen::MatrixXd mean_columns(const TransitionModel& model) {
-  const std::vector<Cell> cells = Cutter(model).cells();
+  std::vector<Cell> cells = Cutter(model).cells();
+  std::erase_if(cells, [](const Cell& cell) { return !cell.weights.empty(); });
   Eigen::MatrixXd columns =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.events().size()), static_cast<Eigen::Index>(cells.size()));
   for (std::size_t c = 0; c < cells.size(); ++c)
@@ -177,7 +217,8 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   // Each column of `raw` sums to the statistic of one cell and aspect; its mean is zero without a gap.
   GapMap map;
   std::vector<std::vector<std::pair<std::size_t, double>>> raw;
-  std::vector<double> without_gap;  // variance of each sum under the model
+  std::vector<double> without_gap;            // variance of each sum under the model
+  std::vector<std::vector<double>> contrast;  // of a cell that is a contrast; empty: 1
   const auto add = [&](const Cell& cell, const char* aspect, std::string unit, double size,
                        std::vector<std::pair<std::size_t, double>> column, double variance) {
     GapCell out;
@@ -191,6 +232,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     map.cells.push_back(std::move(out));
     raw.push_back(std::move(column));
     without_gap.push_back(variance);
+    contrast.push_back(cell.weights);
   };
   const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
   std::vector<Residual> residuals;
@@ -207,7 +249,19 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
       ++number;
     }
   for (const Cell& cell : cells) {
-    const auto n = static_cast<double>(cell.events.size());
+    auto n = static_cast<double>(cell.events.size());
+    const auto& [unit, central] = units[phase(events[cell.events.front()].kind)];
+    const double in_speed = central > 0 ? unit / central : 1;  // [rad/s] of a score of one
+    if (!cell.weights.empty()) {
+      std::vector<std::pair<std::size_t, double>> weighted;
+      n = 0;
+      for (std::size_t k = 0; k < cell.events.size(); ++k) {
+        weighted.emplace_back(cell.events[k], cell.weights[k] * residuals[cell.events[k]].mean);
+        n += cell.weights[k] * cell.weights[k];
+      }
+      add(cell, "mean", "rad/s", in_speed, std::move(weighted), n);
+      continue;
+    }
     std::vector<std::pair<std::size_t, double>> mean, spread, tail;
     double beyond = 0;
     for (const std::size_t i : cell.events) {
@@ -216,9 +270,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
       tail.emplace_back(i, residuals[i].tail);
       beyond += residuals[i].tail;
     }
-    const auto& [unit, central] = units[phase(events[cell.events.front()].kind)];
-    add(cell, "mean", "rad/s", central > 0 ? unit / central : 1, std::move(mean),
-        n);  // of a score of one; the size follows below
+    add(cell, "mean", "rad/s", in_speed, std::move(mean), n);  // the size follows below
     add(cell, "spread", "of the model's", 0, std::move(spread), n);
     if (cell.facet == "phase")
       add(cell, "tail", "share", beyond / n, std::move(tail), n * share_beyond * (1 - share_beyond));
@@ -226,11 +278,11 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   // Memory: successive scores of a trial, of each phase; and trials that differ as a whole.
   for (const bool stance : {false, true}) {
     std::vector<std::pair<std::size_t, double>> memory, whole;
-    Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}, stance};
-    Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance};
-    double sum = 0, between = 0, sum_variance = 0, between_variance = 0;
+    Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}, stance, {}};
+    Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance, {}};
+    double sum = 0, between = 0, before_variance = 0;
     std::optional<std::size_t> previous;
-    double partial = 0;
+    double partial = 0, in_trial = 0;
     for (std::size_t i = 0; i < events.size(); ++i) {
       if (!(stance ? is_stance(events[i].kind) : is_contact(events[i].kind))) continue;
       const double s = residuals[i].mean;
@@ -238,24 +290,24 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
         const double before = residuals[*previous].mean;
         memory.emplace_back(i, s * before);
         sum += s * before;
-        sum_variance += before * before;
         cell.events.push_back(i);
         whole.emplace_back(i, s * partial);  // adds up to half of (sum^2 - sum of squares)
         between += s * partial;
-        between_variance += partial * partial;
+        before_variance += in_trial++;
         partial += s;
         trials.events.push_back(i);
       } else {
         partial = s;
+        in_trial = 1;
       }
       previous = i;
     }
     if (memory.size() < 20) continue;
     const double n = static_cast<double>(memory.size());
-    add(cell, "memory", "correlation", sum / n, std::move(memory), sum_variance);
+    add(cell, "memory", "correlation", sum / n, std::move(memory), n);
     const double pairs =
         n * (static_cast<double>(model.trials()) > 0 ? n / static_cast<double>(model.trials()) : 1) / 2;
-    add(trials, "spread", "correlation", between / std::max(1.0, pairs), std::move(whole), between_variance);
+    add(trials, "spread", "correlation", between / std::max(1.0, pairs), std::move(whole), before_variance);
   }
   // Rests against what the model expects at the same speeds.
   const std::vector<double> chance_of_rest = model.rest_chances(fit.nuisance, fit.terms);
@@ -332,9 +384,13 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     // rest, no far score) the events themselves show almost none.
     // Where nearly all of the column is explained there is nothing left to say: a tenth is kept as the least share.
     const double kept = whole_norm[c] > 0 ? dense.col(c).squaredNorm() / whole_norm[c] : 1;
-    scale[c] = std::sqrt(std::max({dense.col(c).squaredNorm(), by_unit.col(c).squaredNorm(), scatter[c],
-                                   0.1 * whole_norm[c], kept * without_gap[static_cast<std::size_t>(c)], 1e-24}));
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
+    double variance = std::max(kept * without_gap[static_cast<std::size_t>(c)], 1e-24);
+    // Products of scores spread by what they look for: the model's own variance alone.
+    if (cell.unit != "correlation")
+      variance = std::max(
+          {variance, dense.col(c).squaredNorm(), by_unit.col(c).squaredNorm(), scatter[c], 0.1 * whole_norm[c]});
+    scale[c] = std::sqrt(variance);
     cell.statistic = std::isfinite(sum) ? sum / scale[c] : 0;  // a fit far off may have no slopes to project on
     // Efficient size: the score by its information, so that size and statistic have one sign.
     double left_over = kept;
@@ -342,8 +398,11 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
       // How much of a shift of the cell the fitted parameters take up, by the slopes of its scores: where the gap is
       // large the events' own products say too much.
       Eigen::VectorXd follows = Eigen::VectorXd::Zero(fit.derivatives.change.cols());
-      for (const auto& [i, value] : raw[static_cast<std::size_t>(c)])
-        follows += fit.derivatives.change.row(static_cast<Eigen::Index>(i)).transpose();
+      const std::vector<double>& weight = contrast[static_cast<std::size_t>(c)];
+      for (std::size_t k = 0; k < raw[static_cast<std::size_t>(c)].size(); ++k) {
+        const auto i = static_cast<Eigen::Index>(raw[static_cast<std::size_t>(c)][k].first);
+        follows += (weight.empty() ? 1 : weight[k]) * fit.derivatives.change.row(i).transpose();
+      }
       left_over = 1 - follows.dot(fit.information.ldlt().solve(follows)) / without_gap[static_cast<std::size_t>(c)];
     }
     const double information = std::max(1e-12, std::max(0.1, left_over) * without_gap[static_cast<std::size_t>(c)]);

@@ -139,8 +139,11 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& re
     const auto solver = ridge.ldlt();
     const Eigen::VectorXd shift = solver.solve(cells.transpose() * (training.asDiagonal() * bounded));
     const Eigen::VectorXd predicted = cells * shift;
-    // Without a gap the shifts are noise: their expected loss on a new event is half its predicted variance.
-    const Eigen::MatrixXd noise = solver.solve(solver.solve(gram).transpose());
+    // Without a gap the shifts are noise, less what the fitted parameters took up: their expected loss on a new event
+    // is half its predicted variance.
+    const Eigen::MatrixXd taken = chosen.derivatives.change.transpose() * (training.asDiagonal() * cells);
+    const Eigen::MatrixXd left = gram - taken.transpose() * chosen.information.ldlt().solve(taken);
+    const Eigen::MatrixXd noise = solver.solve(solver.solve(left).transpose());
     const Eigen::VectorXd variance = (cells * noise).cwiseProduct(cells).rowwise().sum();
 
     const Evaluation* models[3] = {&as_given, &plain.evaluation, &chosen.evaluation};

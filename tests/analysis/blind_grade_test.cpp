@@ -98,14 +98,16 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
   const BlindTruth outside = truth(BlindKind::outside, {}, 0), left = truth(BlindKind::left_out, {"leg_contact"}, 2);
   const BlindTruth full = truth(BlindKind::effect, {"leg_contact"}, 2);
   const BlindGrades g =
-      grade({pair, pair, hidden, outside, outside, outside, left, left, left, full},
+      grade({pair, pair, hidden, pair, outside, outside, outside, left, left, left, full},
             {said("explained", {"trial_drift+inertia"}), said("explained", {"inertia"}),
-             said("explained", {"inertia+bounce"}), said("unexplained"), said("explained", {"bounce"}),
-             said("explained", {"bounce", "inertia"}), said("unexplained"), said("explained", {"leg_lengths"}),
-             said("explained", {"bounce"}), said("explained", {"leg_contact", "leg_lengths"})});
-  expect(g, "two effects: both named", 1, 3);
-  expect(g, "  each with power left beside the other", 1, 2);
-  expect(g, "two effects: no false third", 2, 3);
+             said("explained", {"inertia+bounce"}), said("explained", {"bounce+inertia", "inertia+trial_drift"}),
+             said("unexplained"), said("explained", {"bounce"}), said("explained", {"bounce", "inertia"}),
+             said("unexplained"), said("explained", {"leg_lengths"}), said("explained", {"bounce"}),
+             said("explained", {"leg_contact", "leg_lengths"})});
+  expect(g, "two effects: both named", 2, 4);
+  expect(g, "  each with power left beside the other", 2, 3);
+  expect(g, "two effects: no false third, up to stated ambiguity", 3, 4);
+  expect(g, "  in the first of the set", 2, 4);
   expect(g, "effect outside the catalogue confidently misnamed", 1, 3);
   expect(g, "effect outside the catalogue called unexplained", 1, 3);
   // leg_lengths shares the sets of leg_contact in this run: its own ambiguity group.

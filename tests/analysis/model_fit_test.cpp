@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -10,6 +11,9 @@
 
 namespace metastable::analysis {
 namespace {
+
+// Spread evenly over 0.1 to 0.2 s.
+double since_previous(std::size_t i) { return 0.1 + 0.1 * std::fmod(0.618034 * static_cast<double>(i), 1); }
 
 // y = mean + slope w + noise: everything about it is known in closed form.
 class Line : public TransitionModel {
@@ -21,6 +25,7 @@ class Line : public TransitionModel {
       e.number = static_cast<int>(i % 4) + 1;
       e.speed = w_[i];
       e.position = static_cast<double>(i % 4);
+      e.since_previous = since_previous(i);
       events_.push_back(e);
     }
     nuisances_ = {{"mean", 0, 1e3, 1e-4, -1e3, 1e3}, {"log sd", 0, 1e3, 1e-4, -5, 5}};
@@ -38,7 +43,7 @@ class Line : public TransitionModel {
   const std::vector<Event>& events() const override { return events_; }
   std::size_t trials() const override { return events_.back().trial + 1; }
   std::size_t conditions() const override { return 1; }
-  int legs() const override { return 0; }
+  int legs() const override { return 4; }
   std::string condition_name(std::size_t) const override { return "all"; }
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
@@ -179,6 +184,55 @@ TEST(GapMap, FindsTheCellThatIsShiftedAndNothingInNone) {
   EXPECT_LT(found.p_value, 0.001);
   EXPECT_TRUE(facet == "collision" || facet == "position") << facet << ' ' << at;
   EXPECT_GT(gap_map(plain, fit(plain, {3, -0.7}, {}), 500, 1).p_value, 0.02);
+}
+
+// The cell that stands out most where `shift` (event) is added to noise of 0.5.
+template <class Shift>
+GapCell first_cell(unsigned seed, Shift shift) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> y, w;
+  for (std::size_t i = 0; i < 1200; ++i) {
+    w.push_back(normal(generator));
+    y.push_back(3 + 0.5 * normal(generator) + shift(i));
+  }
+  const Line model(y, w);
+  const GapMap map = gap_map(model, fit(model, {3, -0.7}, {}), 500, 1);
+  return *std::min_element(map.cells.begin(), map.cells.end(),
+                           [](const GapCell& a, const GapCell& b) { return a.p_adjusted < b.p_adjusted; });
+}
+
+TEST(GapMap, SeesATrendOverTheTrials) {
+  const GapCell cell = first_cell(21, [](std::size_t i) { return 0.14 * (static_cast<double>(i / 4) / 149.5 - 1); });
+  EXPECT_EQ(cell.at, "trend over the trials");
+  EXPECT_LT(cell.p_adjusted, 0.01);
+  EXPECT_NEAR(cell.size, 0.14, 3 * 0.5 / std::sqrt(1200 / 3.0));  // at the last trial, from the middle
+}
+
+TEST(GapMap, SeesASwingWithTheTimeSinceThePreviousCollision) {
+  const GapCell cell =
+      first_cell(22, [](std::size_t i) { return 0.13 * std::sin(2 * 3.14159 * 40 * since_previous(i)); });
+  EXPECT_EQ(cell.facet, "time");
+  EXPECT_NE(cell.at.find("Hz in the time since the previous collision"), std::string::npos) << cell.at;
+  EXPECT_LT(cell.p_adjusted, 0.01);
+}
+
+TEST(GapMap, SeesTrialsThatDifferAsWholes) {
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> offset(0, 0.2);
+  std::vector<double> offsets(300);
+  for (double& o : offsets) o = offset(generator);
+  const GapCell cell = first_cell(23, [&](std::size_t i) { return offsets[i / 4]; });
+  EXPECT_EQ(cell.at, "trials as a whole");
+  EXPECT_LT(cell.p_adjusted, 1e-4);
+}
+
+TEST(GapMap, LevelsAreHonest) {
+  constexpr int sets = 150;
+  int below = 0;
+  for (unsigned seed = 100; seed < 100 + sets; ++seed)
+    below += first_cell(seed, [](std::size_t) { return 0.0; }).p_adjusted < 0.05;
+  EXPECT_LE(below, 0.05 * sets + 3 * std::sqrt(0.05 * 0.95 * sets));
 }
 
 TEST(GapMap, IsTheSameForTheSameSeed) {
