@@ -13,6 +13,7 @@ struct GapCell {
   std::string aspect;          ///< mean, spread, tail, memory
   std::string at;              ///< the cell in words, with its phase where stance and collision are separate
   bool stance = false;         ///< of stance events, where they are separate
+  bool swing = false;          ///< cosine or sine of the time since the previous collision: one of many
   double statistic = 0;        ///< standard normal without a gap
   double p_value = 1;          ///< of this cell alone
   double p_adjusted = 1;       ///< step-down max-T over all cells

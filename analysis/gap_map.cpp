@@ -23,10 +23,11 @@ constexpr double most_frequencies = 30;
 
 // Members of one cell: the events that it holds. With weights it is a contrast of means: a trend, a swing.
 struct Cell {
-  std::string facet, at;
-  std::vector<std::size_t> events;
+  std::string facet = {}, at = {};
+  std::vector<std::size_t> events = {};
   bool stance = false;
-  std::vector<double> weights;  // by event; empty: 1
+  std::vector<double> weights = {};  // by event; empty: 1
+  bool swing = false;
 };
 
 bool is_stance(EventKind kind) { return kind == EventKind::stance; }
@@ -104,13 +105,13 @@ class Cutter {
         groups("condition", members, where, [this](const Event& e) {
           return std::optional(std::pair{static_cast<int>(e.condition), model_.condition_name(e.condition)});
         });
-      cells_.push_back({"phase", !two_phases ? "step" : stance ? "stance" : "collision", members, stance, {}});
+      cells_.push_back({"phase", !two_phases ? "step" : stance ? "stance" : "collision", members, stance});
       for (std::size_t c = first; c < cells_.size(); ++c) cells_[c].stance = stance;
     }
     std::vector<std::size_t> launches;
     for (std::size_t i = 0; i < events.size(); ++i)
       if (events[i].kind == EventKind::launch) launches.push_back(i);
-    if (launches.size() >= 10) cells_.push_back({"collision", "launch", launches, false, {}});
+    if (launches.size() >= 10) cells_.push_back({"collision", "launch", launches, false});
     return std::move(cells_);
   }
 
@@ -153,7 +154,7 @@ class Cutter {
 
   // From -1 at the first trial to 1 at the last one.
   void trend(const std::vector<std::size_t>& members, const std::string& where) {
-    Cell cell{"trial", "trend over the trials" + where, members, false, {}};
+    Cell cell{"trial", "trend over the trials" + where, members, false};
     const double last = static_cast<double>(model_.trials() - 1);
     for (const std::size_t i : members)
       cell.weights.push_back(2 * static_cast<double>(model_.events()[i].trial) / last - 1);
@@ -162,7 +163,7 @@ class Cutter {
   // Cosine and sine of the time since the previous collision: as many frequencies as its spread tells apart.
   void swings(const std::vector<std::size_t>& members, const std::string& where) {
     std::vector<double> times;
-    Cell cell{"time", "", {}, false, {}};
+    Cell cell{.facet = "time", .swing = true};
     for (const std::size_t i : members)
       if (const auto t = model_.events()[i].since_previous) {
         cell.events.push_back(i);
@@ -229,6 +230,7 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     out.size = size;
     out.events = cell.events.size();
     out.stance = cell.stance;
+    out.swing = cell.swing;
     map.cells.push_back(std::move(out));
     raw.push_back(std::move(column));
     without_gap.push_back(variance);
@@ -278,8 +280,8 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   // Memory: successive scores of a trial, of each phase; and trials that differ as a whole.
   for (const bool stance : {false, true}) {
     std::vector<std::pair<std::size_t, double>> memory, whole;
-    Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}, stance, {}};
-    Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance, {}};
+    Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}, stance};
+    Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance};
     double sum = 0, between = 0, before_variance = 0;
     std::optional<std::size_t> previous;
     double partial = 0, in_trial = 0;

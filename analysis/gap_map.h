@@ -11,8 +11,9 @@ namespace metastable::analysis {
 /// Transitions that a cell of the map holds at least.
 inline constexpr int least_cell_events = 20;
 
-/// Scores of the events of `fit` in every cell: mean, spread, tail share, correlation with the previous one; what the
-/// fitted parameters could take up is projected out. Chance levels from `draws` multiplier-bootstrap draws over trials.
+/// Scores of the events of `fit` in every cell: mean, spread, tail share, correlation with the previous one, and of
+/// all: the trend over the trials, cosines and sines of the time since the previous collision. What the fitted
+/// parameters could take up is projected out. Chance levels from `draws` multiplier-bootstrap draws over trials.
 GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uint64_t seed);
 
 /// The columns of the map that shift means, cell by cell [events x cells], for a flexible model of what is left.

@@ -30,6 +30,7 @@ std::string row_name(const GapCell& cell) {
   std::string name = cell.at;
   for (const std::string_view mark : {stance_mark, collision_mark, since_mark})
     if (const std::size_t at = name.rfind(mark); at != std::string::npos) name.erase(at, mark.size());
+  if (cell.swing) return "largest swing with the time";
   return cell.facet == "phase" ? "all" : name;
 }
 
@@ -51,7 +52,8 @@ Figure map_figure(const std::vector<ModelMap>& models, bool stances, const std::
         if (cell.aspect != aspect || cell.stance != stances) continue;
         const std::string row = row_name(cell);
         if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
-        scores[{row, column}] = cell.statistic;
+        double& score = scores[{row, column}];
+        if (!cell.swing || std::abs(cell.statistic) > std::abs(score)) score = cell.statistic;
       }
     }
   std::reverse(rows.begin(), rows.end());  // the first on top
