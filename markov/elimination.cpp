@@ -20,14 +20,14 @@ using Index = Eigen::Index;
 using Vector = Eigen::Map<Eigen::VectorXd>;
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
+/// Pivots eliminated together from a full matrix.
+constexpr std::size_t kBlock = 128;
 /// Below this size, or below this fill of the square, the row-by-row elimination is used.
-constexpr std::size_t kBlockedSize = 2 * dense::panel;
+constexpr std::size_t kBlockedSize = kBlock;
 constexpr double kBlockedFill = 0.6;
-/// Rows, and columns, of a full matrix that one thread takes at a time.
-constexpr std::size_t kShare = 128;
-std::size_t shares(std::size_t count) { return (count + kShare - 1) / kShare; }
-/// Pivots whose visits are kept until they are worth a pass over the whole matrix.
-constexpr std::size_t kBlock = 4 * dense::panel;
+/// Columns, and rows, of a full matrix that one thread takes at a time.
+constexpr std::size_t kColumnShare = 16 * dense::tile_columns, kRowShare = 96;
+std::size_t shares(std::size_t count, std::size_t share) { return (count + share - 1) / share; }
 
 /// row += weight * source, over columns [from, to).
 void add_multiple(double* row, double weight, const double* source, std::size_t from, std::size_t to) {
@@ -37,6 +37,11 @@ void add_multiple(double* row, double weight, const double* source, std::size_t 
 
 double sum(const double* row, std::size_t from, std::size_t to) {
   return ConstVector(row + from, static_cast<Index>(to - from)).sum();
+}
+
+double dot(const double* a, const double* b, std::size_t from, std::size_t to) {
+  const auto count = static_cast<Index>(to - from);
+  return ConstVector(a + from, count).dot(ConstVector(b + from, count));
 }
 
 }  // namespace
@@ -65,7 +70,7 @@ struct Elimination::Factors final : Elimination::Solver {
   std::size_t find_envelope(const Chain& chain);
   void eliminate_rows();
   void eliminate_square(std::size_t first, std::size_t last);
-  void eliminate_panels(int threads);
+  void eliminate_blocks(int threads);
   static double checked_rate(std::size_t n, double rate);
 
   std::vector<std::size_t> top_;  ///< first row whose envelope reaches column n
@@ -106,11 +111,12 @@ Elimination::Factors::Factors(const Chain& chain, int threads) : kill(chain.kill
     std::fill(high.begin(), high.end(), n - 1);
   }
   offset.resize(n);
-  entries.assign(total, 0.0);
+  entries.reserve(total);
   std::size_t used = 0;
   for (std::size_t i = 0; i < n; ++i) {
     offset[i] = used;
     used += high[i] - low[i] + 1;
+    entries.resize(used);
     const auto columns = chain.columns(i);
     const auto values = chain.values(i);
     double* entry = row(i);
@@ -118,7 +124,7 @@ Elimination::Factors::Factors(const Chain& chain, int threads) : kill(chain.kill
   }
   exit.resize(n);
   if (blocked) {
-    eliminate_panels(threads);
+    eliminate_blocks(threads);
   } else {
     eliminate_rows();
   }
@@ -150,53 +156,43 @@ void Elimination::Factors::eliminate_rows() {
 /// The pivots last-1 .. first among themselves, in the columns first .. last-1 only. What lies left of these and the
 /// kill rate enter the rate of leaving as one number, carried along as a kill rate is.
 void Elimination::Factors::eliminate_square(std::size_t first, std::size_t last) {
-  std::vector<double> beyond;
-  for (std::size_t i = first; i < last; ++i) beyond.push_back(kill[i] + sum(row(i), 0, first));
+  const std::size_t pivots = last - first;
+  std::vector<double> copy;
+  for (std::size_t i = first; i < last; ++i) {
+    copy.push_back(kill[i] + sum(row(i), 0, first));
+    copy.insert(copy.end(), row(i) + first, row(i) + last);
+  }
+  dense::eliminate_square({copy.data(), pivots + 1}, exit.data() + first, pivots);
   for (std::size_t n = last; n-- > first;) {
-    exit[n] = checked_rate(n, beyond[n - first] + sum(row(n), first, n));
-    for (std::size_t i = first; i < n; ++i) {
-      double* target = row(i);
-      target[n] /= exit[n];
-      add_multiple(target, target[n], row(n), first, n);
-      beyond[i - first] += target[n] * beyond[n - first];
-      kill[i] += target[n] * kill[n];
-    }
+    checked_rate(n, exit[n]);
+    std::copy_n(copy.data() + (n - first) * (pivots + 1) + 1, pivots, row(n) + first);
   }
 }
 
-/// The same on a full square, a panel of pivots at a time: the panel's square, the rest of its rows, the visits of the
-/// rows above to the panel, and all that these visits lead to as one matrix product. The columns left of a block of
-/// panels get it from all of them at once, so that the square passes through memory once a block.
-void Elimination::Factors::eliminate_panels(int threads) {
+/// The same on a full square, a block of pivots at a time: the block's square, the rest of its rows, the visits of the
+/// rows above to the block, and all that these visits lead to as one matrix product.
+void Elimination::Factors::eliminate_blocks(int threads) {
   const std::size_t n = size();
-  for (std::size_t end = n; end > 0;) {
-    const std::size_t begin = end > kBlock ? end - kBlock : 0;
-    for (std::size_t last = end; last > begin;) {
-      const std::size_t first = last > begin + dense::panel ? last - dense::panel : begin, pivots = last - first;
-      eliminate_square(first, last);
-      const double* const square = row(first) + first;
-      parallel_for(shares(first), threads, [&](std::size_t share) {
-        const std::size_t from = share * kShare;
-        dense::eliminate_columns(row(first) + from, n, square, n, pivots, std::min(kShare, first - from));
-      });
-      parallel_for(shares(first), threads, [&](std::size_t share) {
-        const std::size_t from = share * kShare, rows = std::min(kShare, first - from);
-        double* const visits = row(from) + first;
-        dense::visit_panel(visits, n, rows, square, n, exit.data() + first, pivots);
-        for (std::size_t i = from; i < from + rows; ++i) {
-          for (std::size_t pivot = last; pivot-- > first;) kill[i] += row(i)[pivot] * kill[pivot];
-        }
-        const std::size_t above = std::clamp(begin, from, from + rows) - from;  // the block's own rows come last
-        dense::add_product(row(from) + begin, n, visits, n, row(first) + begin, n, above, pivots, first - begin);
-        dense::add_product(row(from + above), n, visits + above * n, n, row(first), n, rows - above, pivots, first);
-      });
-      last = first;
-    }
-    parallel_for(shares(begin), threads, [&](std::size_t share) {
-      const std::size_t from = share * kShare, rows = std::min(kShare, begin - from);
-      dense::add_product(row(from), n, row(from) + begin, n, row(begin), n, rows, end - begin, begin);
+  std::vector<dense::TileRow> onward(shares(n, dense::tile_columns) * kBlock);
+  for (std::size_t last = n; last > 0;) {
+    const std::size_t first = last > kBlock ? last - kBlock : 0, pivots = last - first;
+    eliminate_square(first, last);
+    const dense::Part square{row(first) + first, n};
+    dense::eliminate_columns({kill.data() + first, 1}, square, pivots, 1);
+    parallel_for(shares(first, kColumnShare), threads, [&](std::size_t share) {
+      const std::size_t from = share * kColumnShare, columns = std::min(kColumnShare, first - from);
+      const dense::Part rows{row(first) + from, n};
+      dense::eliminate_columns(rows, square, pivots, columns);
+      dense::pack(rows, pivots, columns, onward.data() + from / dense::tile_columns * pivots);
     });
-    end = begin;
+    parallel_for(shares(first, kRowShare), threads, [&](std::size_t share) {
+      const std::size_t from = share * kRowShare, rows = std::min(kRowShare, first - from);
+      const dense::Part visits{row(from) + first, n};
+      dense::visit_pivots(visits, rows, square, exit.data() + first, pivots);
+      for (std::size_t i = from; i < from + rows; ++i) kill[i] += dot(row(i), kill.data(), first, last);
+      dense::add_product({row(from), n}, visits, onward.data(), rows, pivots, first);
+    });
+    last = first;
   }
 }
 
@@ -292,19 +288,30 @@ std::vector<double> checked(std::vector<double> solution) {
   return solution;
 }
 
-}  // namespace
-
-Elimination::Elimination(const Chain& chain, int threads) {
+void check_reach(const Chain& chain) {
   const std::vector<std::uint8_t> can_rest = classify(chain).can_rest;
   const auto stuck = std::find(can_rest.begin(), can_rest.end(), 0);
   if (stuck != can_rest.end()) {
     throw std::domain_error("elimination: rest cannot be reached from state " +
                             std::to_string(stuck - can_rest.begin()));
   }
-  if (chain.interpolated())
+}
+
+}  // namespace
+
+Elimination::Elimination(const Chain& chain, int threads) {
+  if (chain.interpolated()) {
+    check_reach(chain);
     solver_ = std::make_unique<Bordered>(chain);
-  else
+    return;
+  }
+  // The first of the states that cannot reach rest is left at a rate of exactly zero once the others are eliminated.
+  try {
     solver_ = std::make_unique<Factors>(chain, threads);
+  } catch (const ConvergenceError&) {
+    check_reach(chain);
+    throw;
+  }
 }
 
 Elimination::~Elimination() = default;
@@ -321,12 +328,8 @@ std::vector<double> Elimination::Factors::solve(std::span<const double> rhs) con
   const Factors& f = *this;
   f.check_right_side(rhs);
   std::vector<double> x(rhs.begin(), rhs.end());
-  const auto dot = [&x](const double* row, std::size_t from, std::size_t to) {
-    const auto count = static_cast<Index>(to - from);
-    return ConstVector(row + from, count).dot(ConstVector(x.data() + from, count));
-  };
-  for (std::size_t i = x.size(); i-- > 0;) x[i] += dot(f.row(i), i + 1, f.high[i] + 1);
-  for (std::size_t i = 0; i < x.size(); ++i) x[i] = (x[i] + dot(f.row(i), f.low[i], i)) / f.exit[i];
+  for (std::size_t i = x.size(); i-- > 0;) x[i] += dot(f.row(i), x.data(), i + 1, f.high[i] + 1);
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = (x[i] + dot(f.row(i), x.data(), f.low[i], i)) / f.exit[i];
   return x;
 }
 

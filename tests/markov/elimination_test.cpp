@@ -77,7 +77,7 @@ TEST(Elimination, RandomChainsToRationalAnswers) {
   }
 }
 
-// Sizes on both sides of the panels of the blocked elimination and of its blocks, and not multiples of them.
+// Sizes on both sides of the blocks of the blocked elimination, and not multiples of them.
 TEST(Elimination, BlockedAndRowByRowAgree) {
   for (const std::size_t n : {127, 128, 129, 192, 250, 256, 257, 321, 601}) {
     const Chain chain = reference::random_chain(n, static_cast<unsigned>(n), 1e-9);
@@ -102,7 +102,7 @@ TEST(Elimination, BitsDoNotDependOnThreads) {
   }
 }
 
-// A chain whose rare exits (1e-25) are all in one state, full and larger than the panels: closed form by symmetry.
+// A chain whose rare exits (1e-25) are all in one state, full and larger than a block: closed form by symmetry.
 TEST(Elimination, BlockedKeepsAllDigitsWhenRestIsRare) {
   constexpr std::size_t n = 200;
   std::vector<double> matrix(n * n, 1.0 / n), kill(n, 0.0);
@@ -166,6 +166,20 @@ TEST(Elimination, IllegalInputs) {
               elimination.solve(std::vector<double>{1, std::nan(""), 0});
             }),
             "elimination: entry 1 of the right side is nan, not a finite number >= 0");
+}
+
+TEST(Elimination, FullChainsThatCannotRest) {
+  constexpr std::size_t n = 300, open = 120;  // the states from `open` on never leave each other
+  std::vector<double> matrix(n * n), kill(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t first = i < open ? 0 : open;
+    std::fill(matrix.begin() + static_cast<std::ptrdiff_t>(i * n + first),
+              matrix.begin() + static_cast<std::ptrdiff_t>((i + 1) * n), 0.5 / n);
+    if (i < open) kill[i] = 0.5;
+  }
+  const Chain chain = Chain::from_dense(n, matrix, kill);
+  EXPECT_EQ(message_of<std::domain_error>([&] { Elimination{chain}; }),
+            "elimination: rest cannot be reached from state 120");
 }
 
 TEST(Elimination, TimesBeyondDoubleAreAnErrorNotInfinity) {
