@@ -46,7 +46,8 @@ Benchmark wheel(double slope_deg, Spread friction, bool equal_legs) {
           1e-8,
           {},
           {},
-          {}};
+          {},
+          true};
 }
 
 double by_launch(const markov::Launch& launch, const std::vector<double>& mean) {
@@ -124,6 +125,15 @@ Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes)
   compare(result.failure_rate, benchmark.known_failure_rate);
   compare(result.from_quasi_stationary, benchmark.known_from_quasi_stationary);
   compare(result.from_start, benchmark.known_from_start);
+  if (benchmark.by_collocation) {
+    StudyOptions options;
+    options.method = Method::integrated;
+    options.tolerance = benchmark.tolerance;
+    options.threads = threads;
+    const Metastability other = study(benchmark.problem, options);
+    compare(result.failure_rate, other.failure_rate.value);
+    compare(result.from_start, other.from_start.value);
+  }
   ask_other_solvers(result);
   return result;
 }

@@ -19,6 +19,7 @@ struct Benchmark {
   Problem problem;
   double tolerance = 1e-8;  ///< wanted stability of the expected steps and the failure rate under doubling of nodes
   std::optional<double> known_failure_rate, known_from_quasi_stationary, known_from_start;
+  bool by_collocation = false;  ///< compared with a study that collocates (analysis/exact_rows.h), to `tolerance`
 };
 
 /// The rough-terrain wheel (mean slope 8 deg, from its fixed point; sixty-digit values where physics has them) out to
@@ -31,7 +32,7 @@ struct Verified {
   std::size_t nodes = 0;  ///< per phase, of the finest
   double from_start = 0, from_quasi_stationary = 0, failure_rate = 0;
   double change = 0;            ///< largest relative change of the three at the last doubling
-  std::optional<double> error;  ///< largest relative distance from the known values
+  std::optional<double> error;  ///< largest relative distance from the known values, or those of collocation
   /// The same chain by other solvers: expected steps from the launch by sparse LU, from the quasi-stationary
   /// distribution as 1 / (1 - lambda_1) by Arnoldi; nothing where they give up. Neither has to be positive.
   std::optional<double> lu_from_start, arnoldi_from_quasi_stationary;

@@ -31,6 +31,9 @@ TEST(Verification, ThePapersWheelIsStableUnderDoubling) {
   const Benchmark rare = wheel_benchmarks()[4];  // 4.7e4 steps
   const Verified verified = verify(rare, 1, 128);
   EXPECT_LT(verified.change, 1e-8);
+  ASSERT_TRUE(verified.error);
+  EXPECT_GT(*verified.error, 0);
+  EXPECT_LT(*verified.error, 1e-7);  // densities by their fast form
 }
 
 TEST(Verification, CoverageCountsSeeds) {
