@@ -277,39 +277,45 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     if (cell.facet == "phase")
       add(cell, "tail", "share", beyond / n, std::move(tail), n * share_beyond * (1 - share_beyond));
   }
-  // Memory: successive scores of a trial, of each phase; and trials that differ as a whole.
+  // Memory: successive scores of a trial, of each phase; and trials that differ as a whole. By correlation, so that a
+  // model far off does not pass for either.
   for (const bool stance : {false, true}) {
+    std::vector<std::size_t> members;
+    for (std::size_t i = 0; i < events.size(); ++i)
+      if (stance ? is_stance(events[i].kind) : is_contact(events[i].kind)) members.push_back(i);
+    double middle = 0, square = 0;
+    for (const std::size_t i : members) {
+      middle += residuals[i].mean / static_cast<double>(members.size());
+      square += residuals[i].mean * residuals[i].mean / static_cast<double>(members.size());
+    }
+    const double sd = std::sqrt(std::max(1.0, square - middle * middle));
     std::vector<std::pair<std::size_t, double>> memory, whole;
     Cell cell{"collision", stance ? "successive stances" : "successive collisions", {}, stance};
     Cell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance};
-    double sum = 0, between = 0, before_variance = 0;
+    double sum = 0, between = 0, pairs = 0, in_trial = 0, partial = 0, before = 0;
     std::optional<std::size_t> previous;
-    double partial = 0, in_trial = 0;
-    for (std::size_t i = 0; i < events.size(); ++i) {
-      if (!(stance ? is_stance(events[i].kind) : is_contact(events[i].kind))) continue;
-      const double s = residuals[i].mean;
+    for (const std::size_t i : members) {
+      const double s = (residuals[i].mean - middle) / sd;
       if (previous && events[*previous].trial == events[i].trial) {
-        const double before = residuals[*previous].mean;
         memory.emplace_back(i, s * before);
         sum += s * before;
         cell.events.push_back(i);
         whole.emplace_back(i, s * partial);  // adds up to half of (sum^2 - sum of squares)
         between += s * partial;
-        before_variance += in_trial++;
-        partial += s;
         trials.events.push_back(i);
+        pairs += in_trial;
       } else {
-        partial = s;
-        in_trial = 1;
+        partial = in_trial = 0;
       }
+      partial += s;
+      ++in_trial;
+      before = s;
       previous = i;
     }
     if (memory.size() < 20) continue;
     const double n = static_cast<double>(memory.size());
     add(cell, "memory", "correlation", sum / n, std::move(memory), n);
-    const double pairs =
-        n * (static_cast<double>(model.trials()) > 0 ? n / static_cast<double>(model.trials()) : 1) / 2;
-    add(trials, "spread", "correlation", between / std::max(1.0, pairs), std::move(whole), before_variance);
+    add(trials, "spread", "correlation", between / pairs, std::move(whole), pairs);
   }
   // Rests against what the model expects at the same speeds.
   const std::vector<double> chance_of_rest = model.rest_chances(fit.nuisance, fit.terms);
