@@ -18,6 +18,7 @@ namespace {
 constexpr double tail_score = 2.2;
 constexpr double least_rests = 3;  // seen or expected, for a statement on them
 constexpr std::size_t enough_trials = 40;
+constexpr double beyond_doubt = 5;        // [standard deviations]
 constexpr double largest_frequency = 60;  // [Hz] of a swing with the time since the previous collision
 constexpr double most_frequencies = 30;
 
@@ -393,13 +394,15 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
     // Where nearly all of the column is explained there is nothing left to say: a tenth is kept as the least share.
     const double kept = whole_norm[c] > 0 ? dense.col(c).squaredNorm() / whole_norm[c] : 1;
     GapCell& cell = map.cells[static_cast<std::size_t>(c)];
-    double variance = std::max(kept * without_gap[static_cast<std::size_t>(c)], 1e-24);
-    // Products of scores spread by what they look for: the model's own variance alone.
-    if (cell.unit != "correlation")
-      variance = std::max(
-          {variance, dense.col(c).squaredNorm(), by_unit.col(c).squaredNorm(), scatter[c], 0.1 * whole_norm[c]});
-    scale[c] = std::sqrt(variance);
+    const double own = std::max(kept * without_gap[static_cast<std::size_t>(c)], 1e-24);
+    scale[c] = std::sqrt(
+        std::max({own, dense.col(c).squaredNorm(), by_unit.col(c).squaredNorm(), scatter[c], 0.1 * whole_norm[c]}));
     cell.statistic = std::isfinite(sum) ? sum / scale[c] : 0;  // a fit far off may have no slopes to project on
+    // Products of scores spread by what they look for: whether there is anything, the model's own variance tells.
+    if (cell.unit == "correlation" && std::isfinite(sum)) {
+      const double plain = std::clamp(sum / std::sqrt(own), -beyond_doubt, beyond_doubt);
+      if (std::abs(plain) > std::abs(cell.statistic)) cell.statistic = plain;
+    }
     // Efficient size: the score by its information, so that size and statistic have one sign.
     double left_over = kept;
     if (cell.aspect == "mean" && cell.facet != "outcome" && fit.derivatives.change.cols() > 0) {
