@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "analysis/csv_reader.h"
+#include "analysis/median.h"
 #include "analysis/trial_index.h"
 
 namespace metastable::analysis {
@@ -28,9 +29,7 @@ void check_frames(const MeasuredAngle& angle, const std::vector<std::size_t>& li
   }
   std::vector<double> interval(time.size() - 1);
   for (std::size_t i = 0; i + 1 < time.size(); ++i) interval[i] = time[i + 1] - time[i];
-  std::vector<double> sorted = interval;
-  std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
-  const double frame = sorted[sorted.size() / 2];
+  const double frame = median(interval);
   for (std::size_t i = 0; i < interval.size(); ++i) {
     if (interval[i] <= 0)
       defects.add(file, {lines[i + 1], 1},

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "analysis/input_error.h"
+#include "analysis/median.h"
 
 namespace metastable::analysis {
 namespace {
@@ -20,15 +21,8 @@ constexpr int least_block = 10;                          // revolutions
 constexpr std::size_t around = 5;                        // periods on either side that a period is compared with
 constexpr double missed_from = 1.5, double_below = 0.6;  // of the median period
 constexpr double huber = 1.345;                          // 95 % efficiency under normal noise
-constexpr double to_sd = 1.4826;                         // median absolute deviation of a normal to its sd
 constexpr std::array<const char*, 5> columns{"time_us", "drum_speed_km_h", "drum_revolutions", "wheel_speed_km_h",
                                              "wheel_revolutions"};
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::vector<double> running_median(const std::vector<double>& values, std::size_t reach) {
   std::vector<double> medians;
@@ -138,6 +132,12 @@ CounterLog parse_counter_log(const std::string& file, std::string_view text) {
 
 CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options) {
   options.validate();
+  if (log.time.size() < least_block)
+    throw std::invalid_argument(
+        fmt::format("{}: {} ticks are too few, {} are needed", log.name, log.time.size(), least_block));
+  if (log.skipped.size() != log.time.size())
+    throw std::invalid_argument(
+        fmt::format("{}: skipped has {} entries for {} ticks", log.name, log.skipped.size(), log.time.size()));
   std::vector<double> periods;
   for (std::size_t k = 1; k < log.time.size(); ++k) periods.push_back(log.time[k] - log.time[k - 1]);
   const std::vector<double> medians = running_median(periods, around);
@@ -171,7 +171,7 @@ CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options) 
   };
   for (std::size_t k = first; k < end; ++k) {
     const double ratio = periods[k] / medians[k];
-    const bool displaced = off[k] > std::max(2e-4, 8 * to_sd * usual[k]);
+    const bool displaced = off[k] > std::max(2e-4, 8 * median_deviation_to_sd * usual[k]);
     bool defect = true;
     if (log.skipped[k + 1] > 0) {
       run.missed += static_cast<std::size_t>(log.skipped[k + 1]);
@@ -227,7 +227,7 @@ LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear) {
     residual = y - terms * next;
     std::vector<double> sizes(omega.size());
     for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] = std::abs(residual[static_cast<Eigen::Index>(k)]);
-    scale = to_sd * median(sizes);
+    scale = median_deviation_to_sd * median(sizes);
     const bool settled = i > 0 && (next - value).norm() <= 1e-12 * next.norm();
     value = next;
     if (settled || scale == 0) break;

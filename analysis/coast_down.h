@@ -51,7 +51,9 @@ struct CoastDownRun {
 /// the median of the eleven around it and more is a missed tick, one below 0.6 a double one; periods off the line
 /// between their neighbours by more than eight robust standard deviations of the fifty around (and 0.02 %) show a
 /// displaced one. Blocks end there and begin anew, so that no transition goes over a defect.
-/// @throws std::invalid_argument if the top speed is not above `stop`, or no block remains
+/// @param log  at least 10 ticks
+/// @throws std::invalid_argument for fewer ticks, for skips that are not one a tick, if the top speed is not above
+///         `stop`, or if no block remains
 CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options);
 
 /// Terms of the loss with their standard errors.

@@ -1,20 +1,29 @@
 #include "analysis/gap_shrinkage.h"
 
-#include <Random123/philox.h>
+#include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <numeric>
+#include <stdexcept>
 
 #include "analysis/gap_map.h"
+#include "analysis/median.h"
+#include "analysis/random.h"
 #include "dynamics/truncated_normal.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
 namespace {
 
-constexpr double cell_shift_sd = 0.15;  // prior of a cell's shift, in scores
+constexpr double cell_shift_sd = 0.15;   // prior of a cell's shift, in scores
+constexpr double parameter_price = 1.5;  // log likelihood that a rival pays for each of its effects' parameters
+constexpr int interval_draws = 400;      // of the bootstrap over trials
+constexpr double bounded_score = 6;      // scores further out count as this one to the flexible model
+constexpr double farthest_score = 12;    // and as this one to the CRPS
 
 // What one trial, held out, says.
 struct HeldOut {
@@ -30,15 +39,14 @@ double crps(double z) {
   return z * (2 * dynamics::normal_cdf(z) - 1) + 2 * dynamics::normal_density(z) - std::numbers::inv_sqrtpi;
 }
 
+// [rad/s of a score] by kind of event.
 std::vector<double> typical_units(const TransitionModel& model, const Evaluation& e) {
   std::vector<double> typical(6, 0.0);
   for (std::size_t kind = 0; kind < typical.size(); ++kind) {
     std::vector<double> units;
     for (std::size_t i = 0; i < e.unit.size(); ++i)
       if (static_cast<std::size_t>(model.events()[i].kind) == kind) units.push_back(e.unit[i]);
-    if (units.empty()) continue;
-    std::nth_element(units.begin(), units.begin() + static_cast<std::ptrdiff_t>(units.size() / 2), units.end());
-    typical[kind] = units[units.size() / 2];
+    if (!units.empty()) typical[kind] = median(std::move(units));
   }
   return typical;
 }
@@ -66,15 +74,10 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
   s.recalibrated = here[1];
   s.with_effect = here[2];
   s.floor = here[3];
-  constexpr int draws = 400;
   std::vector<double> gaps, closed;
   std::vector<double> baselines;
-  for (int draw = 0; draw < draws; ++draw) {  // trials drawn anew, by exponential weights
-    const auto mean = average([&](std::size_t t) {
-      const r123::Philox4x64::ctr_type counter{{static_cast<std::uint64_t>(draw), t, 3, 0}};
-      const auto bits = r123::Philox4x64()(counter, {{seed, 0x73687269}});
-      return -std::log((static_cast<double>(bits[0] >> 12) + 0.5) * 0x1p-52);
-    });
+  for (std::uint64_t draw = 0; draw < interval_draws; ++draw) {  // trials drawn anew, by exponential weights
+    const auto mean = average([&](std::size_t t) { return exponential_weight(seed, draw, t); });
     baselines.push_back(mean[0]);
     gaps.push_back(mean[0] - mean[3]);
     if (gaps.back() > 0) closed.push_back((mean[0] - mean[2]) / gaps.back());
@@ -82,9 +85,9 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
   std::sort(baselines.begin(), baselines.end());
   std::sort(gaps.begin(), gaps.end());
   std::sort(closed.begin(), closed.end());
-  s.baseline_lower = baselines[draws * 5 / 100];
-  s.baseline_upper = baselines[draws * 95 / 100];
-  if (gaps[draws * 5 / 100] > 0 && closed.size() > draws / 2) {
+  s.baseline_lower = baselines[interval_draws * 5 / 100];
+  s.baseline_upper = baselines[interval_draws * 95 / 100];
+  if (gaps[interval_draws * 5 / 100] > 0 && closed.size() > interval_draws / 2) {
     s.closed = (s.baseline - s.with_effect) / (s.baseline - s.floor);
     s.closed_lower = closed[closed.size() * 5 / 100];
     s.closed_upper = closed[closed.size() * 95 / 100];
@@ -92,78 +95,99 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
   return s;
 }
 
+// [trials] Trials go to folds in turn, in an order of their own.
+std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t seed) {
+  std::vector<std::size_t> order(trials);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [seed](std::size_t a, std::size_t b) { return shuffling_key(seed, a) < shuffling_key(seed, b); });
+  std::vector<int> fold(trials);
+  for (std::size_t k = 0; k < trials; ++k) fold[order[k]] = static_cast<int>(k % static_cast<std::size_t>(folds));
+  return fold;
+}
+
+// The rival that does best on the trials counted; without any, `plain`.
+Fit best_rival(const TransitionModel& model, const std::vector<const Fit*>& rivals, const Fit& plain,
+               const FitOptions& options) {
+  Fit chosen = plain;
+  double best = -1e300;
+  for (const Fit* rival : rivals) {
+    Fit tried = fit(model, rival->nuisance, rival->terms, options);
+    std::size_t parameters = 0;
+    for (const Term& term : rival->terms) parameters += term.values.size();
+    const double score = tried.penalised - parameter_price * static_cast<double>(parameters);
+    if (score > best) {
+      best = score;
+      chosen = std::move(tried);
+    }
+  }
+  return chosen;
+}
+
+// The flexible model: shifts of the scores in every cell, ridge-fitted to the trials counted.
+struct Flexible {
+  Eigen::VectorXd bounded;    // [events] scores of the chosen model
+  Eigen::VectorXd predicted;  // [events] their shifts
+  Eigen::VectorXd variance;   // [events] of the shifts, without a gap
+};
+
+Flexible flexible_model(const Fit& chosen, const Eigen::MatrixXd& cells, const Eigen::VectorXd& training) {
+  Flexible f;
+  const Eigen::Map<const Eigen::VectorXd> z(chosen.evaluation.score.data(), training.size());
+  f.bounded = z.cwiseMax(-bounded_score).cwiseMin(bounded_score);
+  const Eigen::MatrixXd gram = cells.transpose() * training.asDiagonal() * cells;
+  Eigen::MatrixXd ridge = gram;
+  ridge.diagonal().array() += 1 / (cell_shift_sd * cell_shift_sd);
+  const auto solver = ridge.ldlt();
+  const Eigen::VectorXd shift = solver.solve(cells.transpose() * (training.asDiagonal() * f.bounded));
+  f.predicted = cells * shift;
+  // Without a gap the shifts are noise, less what the fitted parameters took up: their expected loss on a new event
+  // is half its predicted variance.
+  const Eigen::MatrixXd taken = chosen.derivatives.change.transpose() * (training.asDiagonal() * cells);
+  const Eigen::MatrixXd left = gram - taken.transpose() * chosen.information.ldlt().solve(taken);
+  const Eigen::MatrixXd noise = solver.solve(solver.solve(left).transpose());
+  f.variance = (cells * noise).cwiseProduct(cells).rowwise().sum();
+  return f;
+}
+
 }  // namespace
 
 std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& recalibrated,
                                      const std::vector<const Fit*>& rivals, int folds, int threads,
                                      std::uint64_t seed) {
+  if (folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", folds));
   const std::size_t trials = model.trials();
-  const std::vector<double> nominal = nominal_values(model);
-  const Evaluation as_given = model.evaluate(nominal, {});
+  const Evaluation as_given = model.evaluate(nominal_values(model), {});
   const Eigen::MatrixXd cells = mean_columns(model);
+  const std::vector<int> fold = folds_of_trials(trials, folds, seed);
   std::vector<HeldOut> held(trials);
-
-  // Trials go to folds in turn, in an order of their own.
-  std::vector<std::size_t> order(trials);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto key = [seed](std::size_t t) { return r123::Philox4x64()({{t, 4, 0, 0}}, {{seed, 0x666f6c64}})[0]; };
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
-  std::vector<int> fold(trials);
-  for (std::size_t k = 0; k < trials; ++k) fold[order[k]] = static_cast<int>(k % static_cast<std::size_t>(folds));
-
   markov::parallel_for(static_cast<std::size_t>(folds), threads, [&](std::size_t f) {
     FitOptions options;
     options.count.resize(trials);
     for (std::size_t t = 0; t < trials; ++t) options.count[t] = fold[t] != static_cast<int>(f);
     const Fit plain = fit(model, recalibrated.nuisance, {}, options);
-    Fit chosen = plain;
-    double best = -1e300;
-    for (const Fit* rival : rivals) {
-      Fit tried = fit(model, rival->nuisance, rival->terms, options);
-      std::size_t parameters = 0;
-      for (const Term& term : rival->terms) parameters += term.values.size();
-      const double score = tried.penalised - 1.5 * static_cast<double>(parameters);
-      if (score > best) {
-        best = score;
-        chosen = std::move(tried);
-      }
-    }
-    // The flexible model: shifts of the scores in every cell, ridge-fitted to the other trials.
+    const Fit chosen = best_rival(model, rivals, plain, options);
     const Eigen::VectorXd training = event_weights(model, options.count);
-    const Eigen::VectorXd testing = Eigen::VectorXd::Ones(training.size()) - training;
-    const Eigen::Map<const Eigen::VectorXd> z(chosen.evaluation.score.data(), training.size());
-    const Eigen::VectorXd bounded = z.cwiseMax(-6.0).cwiseMin(6.0);
-    const Eigen::MatrixXd gram = cells.transpose() * training.asDiagonal() * cells;
-    Eigen::MatrixXd ridge = gram;
-    ridge.diagonal().array() += 1 / (cell_shift_sd * cell_shift_sd);
-    const auto solver = ridge.ldlt();
-    const Eigen::VectorXd shift = solver.solve(cells.transpose() * (training.asDiagonal() * bounded));
-    const Eigen::VectorXd predicted = cells * shift;
-    // Without a gap the shifts are noise, less what the fitted parameters took up: their expected loss on a new event
-    // is half its predicted variance.
-    const Eigen::MatrixXd taken = chosen.derivatives.change.transpose() * (training.asDiagonal() * cells);
-    const Eigen::MatrixXd left = gram - taken.transpose() * chosen.information.ldlt().solve(taken);
-    const Eigen::MatrixXd noise = solver.solve(solver.solve(left).transpose());
-    const Eigen::VectorXd variance = (cells * noise).cwiseProduct(cells).rowwise().sum();
-
-    const Evaluation* models[3] = {&as_given, &plain.evaluation, &chosen.evaluation};
-    std::vector<double> units[3];
-    for (int m = 0; m < 3; ++m) units[m] = typical_units(model, *models[m]);
+    const Flexible flexible = flexible_model(chosen, cells, training);
+    const std::array<const Evaluation*, 3> models{&as_given, &plain.evaluation, &chosen.evaluation};
+    std::array<std::vector<double>, 3> units;
+    for (std::size_t m = 0; m < 3; ++m) units[m] = typical_units(model, *models[m]);
     for (std::size_t i = 0; i < model.events().size(); ++i) {
       const auto at = static_cast<Eigen::Index>(i);
-      if (testing[at] == 0) continue;
+      if (training[at] != 0) continue;
       const Event& event = model.events()[i];
       HeldOut& out = held[event.trial];
       const bool speed = event.kind == EventKind::collision || event.kind == EventKind::step;
       out.collisions += speed;
-      for (int m = 0; m < 3; ++m) out.log_score[m] += models[m]->log_density[i];
-      out.flexible += bounded[at] * predicted[at] - 0.5 * predicted[at] * predicted[at];
-      out.flexible_floor -= 0.5 * variance[at];
-      if (speed || event.kind == EventKind::stance) {
-        const auto kind = static_cast<std::size_t>(event.kind);
-        for (int m = 0; m < 3; ++m) out.crps[m] += units[m][kind] * crps(std::clamp(models[m]->score[i], -12.0, 12.0));
-        out.crps_floor += units[2][kind] * std::numbers::inv_sqrtpi;
-      }
+      for (std::size_t m = 0; m < 3; ++m) out.log_score[m] += models[m]->log_density[i];
+      const double shift = flexible.predicted[at];
+      out.flexible += flexible.bounded[at] * shift - 0.5 * shift * shift;
+      out.flexible_floor -= 0.5 * flexible.variance[at];
+      if (!speed && event.kind != EventKind::stance) continue;
+      const auto kind = static_cast<std::size_t>(event.kind);
+      for (std::size_t m = 0; m < 3; ++m)
+        out.crps[m] += units[m][kind] * crps(std::clamp(models[m]->score[i], -farthest_score, farthest_score));
+      out.crps_floor += units[2][kind] * std::numbers::inv_sqrtpi;
     }
   });
 

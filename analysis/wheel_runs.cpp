@@ -8,10 +8,17 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/median.h"
+
 namespace metastable::analysis {
 namespace {
 
 using dynamics::ExtendedWheel;
+
+constexpr double assumed_noise = 0.01;     // sd of reported speeds where neither text nor stances say it [rad/s]
+constexpr std::size_t least_stances = 20;  // to take the noise from them
+constexpr double two_speeds = 1.2;         // sd of a stance's residual, in noises: of two speeds, one damped to 0.65
+constexpr double rounding = 1e-5;          // residuals below are those of printed digits [rad/s]
 
 std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
 
@@ -89,14 +96,8 @@ void complete_contexts(WheelRuns& measured) {
   }
 }
 
-void estimate_noise(WheelRuns& measured) {
-  measured.noise_stated = measured.noise > 0;
-  if (measured.noise_stated) return;
-  if (!measured.speeds_after) {
-    measured.noise = 0.01;
-    measured.notes.push_back("no sensor noise is stated: 0.01 rad/s assumed");
-    return;
-  }
+// What the stances miss the model's next speed by [rad/s].
+std::vector<double> stance_residuals(const WheelRuns& measured) {
   std::vector<double> residual;
   const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
   for (const WheelRun& run : measured.runs) {
@@ -106,20 +107,24 @@ void estimate_noise(WheelRuns& measured) {
         if (const auto next = stated.next(run.collisions[k].context, *run.collisions[k].after))
           residual.push_back(run.collisions[k + 1].before - *next);
   }
-  if (residual.size() < 20) {
-    measured.noise = 0.01;
-    measured.notes.push_back("no sensor noise is stated: 0.01 rad/s assumed");
+  return residual;
+}
+
+void estimate_noise(WheelRuns& measured) {
+  measured.noise_stated = measured.noise > 0;
+  if (measured.noise_stated) return;
+  std::vector<double> residual;
+  if (measured.speeds_after) residual = stance_residuals(measured);
+  if (residual.size() < least_stances) {
+    measured.noise = assumed_noise;
+    measured.notes.push_back(fmt::format("no sensor noise is stated: {} rad/s assumed", assumed_noise));
     return;
   }
-  const auto median = [](std::vector<double> v) {
-    std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
-    return v[v.size() / 2];
-  };
   const double middle = median(residual);
   for (double& r : residual) r = std::abs(r - middle);
-  measured.noise =
-      std::max(1e-4, 1.4826 * median(residual) / 1.2);  // of the sum of two speeds' noise, one damped to 0.65
-  measured.exact_stances = std::abs(middle) < 1e-5 && median(residual) < 1e-5;
+  const double deviation = median(residual);
+  measured.noise = std::max(1e-4, median_deviation_to_sd * deviation / two_speeds);
+  measured.exact_stances = std::abs(middle) < rounding && deviation < rounding;
   if (measured.exact_stances) {
     measured.notes.push_back("the stances repeat the model to rounding, as simulated ones do: they are left out");
     return;
@@ -205,10 +210,8 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
   std::vector<Event> events;
   for (std::size_t t = 0; t < measured.runs.size(); ++t) {
     const WheelRun& run = measured.runs[t];
-    double elapsed = 0;
     for (std::size_t k = 0; k < run.collisions.size(); ++k) {
       const RunCollision& m = run.collisions[k];
-      if (k > 0) elapsed += m.context.since_previous.value_or(0);
       Event event;
       event.trial = t;
       event.condition = run.condition;
@@ -216,7 +219,6 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
       if (measured.legs_known) event.leg = m.context.leg;
       event.position = m.context.position;
       event.since_previous = m.context.since_previous;
-      event.elapsed = elapsed;
       event.speed = m.before;
       const auto add = [&](EventKind kind) {
         event.kind = kind;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/random.h"
 #include "dynamics/truncated_normal.h"
 
 namespace metastable::analysis {
@@ -20,7 +21,7 @@ std::array<double, 4> uniforms(std::uint64_t seed, std::uint64_t index, std::uin
   const r123::Philox4x64::key_type key{{seed, 0}};
   const auto bits = r123::Philox4x64()(counter, key);
   std::array<double, 4> u{};
-  for (std::size_t i = 0; i < 4; ++i) u[i] = (static_cast<double>(bits[i] >> 12) + 0.5) * 0x1p-52;
+  for (std::size_t i = 0; i < 4; ++i) u[i] = unit_interval(bits[i]);
   return u;
 }
 

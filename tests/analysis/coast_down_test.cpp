@@ -106,5 +106,25 @@ TEST(CoastDown, NamesWhatIsWrongWithALog) {
   EXPECT_THROW((CoastDownOptions{.block = 3}.validate()), std::invalid_argument);
 }
 
+TEST(CoastDown, NeedsTicksAndASkipForEach) {
+  CounterLog log{.name = "free", .time = {}, .skipped = {}};
+  const auto message = [&log] {
+    try {
+      coast_down(log, {});
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(message(), "free: 0 ticks are too few, 10 are needed");
+  log.time = {0.5};
+  log.skipped = {0};
+  EXPECT_EQ(message(), "free: 1 ticks are too few, 10 are needed");
+  log.time = ticks(0.15, 0.002, 0.05, 3);
+  EXPECT_EQ(message(), fmt::format("free: skipped has 1 entries for {} ticks", log.time.size()));
+  log.skipped.assign(log.time.size(), 0);
+  EXPECT_EQ(message(), "accepted");
+}
+
 }  // namespace
 }  // namespace metastable::analysis::test

@@ -6,6 +6,7 @@
 
 #include "analysis/coast_down_transitions.h"
 #include "tests/analysis/diagnosed.h"
+#include "tests/analysis/rotor.h"
 
 namespace metastable::analysis {
 namespace {
@@ -161,24 +162,7 @@ TEST(Diagnosis, RefusesOptionsOutOfRange) {
 
 // The second system: a rotor with a torque that its nominal losses lack.
 TEST(Diagnosis, NamesTheTorqueOnARotor) {
-  Experiment e;
-  e.system = System::coast_down;
-  e.loss = {0.15, 0, 0.00165, 0.02};
-  e.rotor_inertia = 1;
-  e.conditions = {{"runs", 0, 0, {}, 0}};
-  for (int t = 0; t < 16; ++t) {
-    MeasuredTrial trial;
-    trial.number = t + 1;
-    for (int k = 0; k < 40; ++k)
-      trial.collisions.push_back({.number = k + 1,
-                                  .leg = {},
-                                  .time = {},
-                                  .position = {},
-                                  .omega_minus = 28.0 - 5.0 * (t % 4),
-                                  .omega_plus = {}});
-    e.trials.push_back(trial);
-  }
-  const auto design = coast_down_transitions(e);
+  const auto design = coast_down_transitions(test::coasting_rotor());
   const auto dragged =
       design->simulate(nominal(*design), std::vector{term(*design, "rolling_resistance", {}, {0.02})}, 5);
   const Diagnosis d = diagnose(*dragged, quick());

@@ -1,0 +1,29 @@
+#pragma once
+// Random numbers of the diagnosis, by counter: the same bits on any number of threads.
+
+#include <Eigen/Core>
+#include <cstdint>
+
+namespace metastable::analysis {
+
+/// The centre of one of 2^52 equal cells of (0, 1), picked by the upper bits of a random word: never 0 or 1.
+inline double unit_interval(std::uint64_t word) { return (static_cast<double>(word >> 12) + 0.5) * 0x1p-52; }
+
+/// What draws under one seed are for; each has numbers of its own.
+enum class DrawStream : std::uint64_t {
+  chance_of_effects = 1,  ///< multipliers of the effects' scores
+  chance_on_map = 2,      ///< multipliers of the map's scores
+  held_out_weights = 3,   ///< weights of held-out trials
+  folds = 4               ///< the order in which trials go to folds
+};
+
+/// Standard normals by which a bootstrap multiplies scores: those of draw number `draw`. @param count  >= 0
+Eigen::VectorXd normal_multipliers(std::uint64_t seed, std::uint64_t draw, DrawStream stream, Eigen::Index count);
+
+/// Weight of a held-out trial in a bootstrap by exponential weights (mean 1): that of draw number `draw`.
+double exponential_weight(std::uint64_t seed, std::uint64_t draw, std::uint64_t trial);
+
+/// A word by which to put trials into a random order.
+std::uint64_t shuffling_key(std::uint64_t seed, std::uint64_t trial);
+
+}  // namespace metastable::analysis
