@@ -10,8 +10,7 @@ namespace {
 
 constexpr double much_harder = 1.5;                // smallest size over smallest size
 constexpr double not_told = 0.9, well_told = 0.8;  // share of an effect's information that another imitates
-constexpr double believed_noise = 0.005;           // of speeds after collisions, where none is stated [rad/s]
-constexpr std::size_t most_variants = 6;
+constexpr std::size_t most_variants = 6;           // of an effect, to stand for all of its own
 
 // Every effect's visibility in data drawn from the model, by its id.
 std::map<std::string, Visibility> look(const TransitionModel& model, const std::vector<double>& nuisance,
@@ -39,31 +38,6 @@ double share_of(const Visibility& v, const std::string& other) {
 }
 
 }  // namespace
-
-std::vector<std::pair<std::string, Experiment>> completed_experiments(const Experiment& experiment) {
-  std::vector<std::pair<std::string, Experiment>> all;
-  const auto add = [&](const char* column, auto fill) {
-    Experiment e = experiment;
-    for (MeasuredTrial& trial : e.trials)
-      for (std::size_t k = 0; k < trial.collisions.size(); ++k) fill(e, trial, k);
-    all.emplace_back(column, std::move(e));
-  };
-  if (experiment.columns.leg != Presence::all)
-    add("leg", [](Experiment& e, MeasuredTrial& trial, std::size_t k) {
-      e.columns.leg = Presence::all;
-      trial.collisions[k].leg =
-          static_cast<int>((static_cast<std::size_t>(e.conditions[trial.condition].first_landing_leg) + k) %
-                           static_cast<std::size_t>(e.wheel.legs()));
-    });
-  if (experiment.columns.omega_plus != Presence::all)
-    add("omega_plus_rad_s", [](Experiment& e, MeasuredTrial& trial, std::size_t k) {
-      e.columns.omega_plus = Presence::all;
-      if (!(e.sensor.noise_sd.value_or(0) > 0)) e.sensor.noise_sd = believed_noise;
-      const bool rested = trial.outcome == dynamics::Outcome::rest && k + 1 == trial.collisions.size();
-      if (!rested) trial.collisions[k].omega_plus = trial.collisions[k].omega_minus;  // to be drawn anew
-    });
-  return all;
-}
 
 std::vector<MissingColumn> missing_columns(const TransitionModel& model, const Fit& recalibrated,
                                            const std::vector<const Candidate*>& candidates, int threads,

@@ -2,18 +2,12 @@
 // What columns that were not measured hide: the same design with and without each, by the information it holds.
 
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "analysis/diagnosis.h"
-#include "analysis/experiment.h"
 #include "analysis/model_fit.h"
 
 namespace metastable::analysis {
-
-/// A rimless wheel's experiment with each column that is missing filled in, by the column's name: legs in their turn
-/// from the condition's first, speeds after collisions as values to be drawn anew.
-std::vector<std::pair<std::string, Experiment>> completed_experiments(const Experiment& experiment);
 
 /// Effects that a missing column hides or makes much harder to see, and those that look alike for lack of it. Both
 /// designs with data drawn from the recalibrated model, so that a gap does not blur the comparison.

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "analysis/missing_columns.h"
 #include "analysis/wheel_candidates.h"
+#include "analysis/wheel_columns.h"
 #include "analysis/wheel_hypothesis.h"
 #include "analysis/wheel_likelihood.h"
 #include "analysis/wheel_runs.h"
@@ -17,15 +17,6 @@
 
 namespace metastable::analysis {
 namespace {
-
-// The experiment with the legs that follow from each condition's first one.
-Experiment with_legs_from_the_first(Experiment experiment) {
-  const auto legs = static_cast<int>(experiment.wheel.leg_length.size());
-  for (MeasuredTrial& trial : experiment.trials)
-    for (std::size_t k = 0; k < trial.collisions.size(); ++k)
-      trial.collisions[k].leg = (experiment.conditions[trial.condition].first_landing_leg + static_cast<int>(k)) % legs;
-  return experiment;
-}
 
 // Legs that were neither noted nor found follow from the stated first one, where the transitions bear that out.
 WheelRuns runs_with_legs(const Experiment& experiment) {
@@ -205,7 +196,7 @@ std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTrans
   if (!measured_.speeds_after)
     add("the speed after each collision measured as well", [](WheelTransitions& w) {
       w.measured_.speeds_after = true;
-      w.measured_.noise = std::max(w.measured_.noise, 0.005);
+      w.measured_.noise = std::max(w.measured_.noise, imagined_noise);
       for (WheelRun& run : w.measured_.runs)
         for (RunCollision& m : run.collisions) m.after = m.before;  // a value to be drawn anew
     });
