@@ -11,9 +11,44 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double expected_gain = 36;        // of an effect before its size is known
-constexpr double pair_prior = 0.05;         // odds of two effects to one
+// The prior.
+constexpr double expected_gain = 36;  // of an effect before its size is known
+constexpr double pair_prior = 0.05;   // odds of two effects to one
+
+// Which hypotheses are fitted; the others are weighed by what their scores promise. These save time, and decide only
+// where scores promise far too little. Gains are 2 Delta log likelihood, evidence is a log Bayes factor.
+constexpr double least_promise = 2;         // gain by the scores, for a fit
+constexpr double promise_share = 0.2;       // of the largest promised gain, less
+constexpr double promise_margin = 40;       //   this much
+constexpr double overlooked_margin = 12;    // evidence by the scores below the best fitted one, for a fit after all
+constexpr std::size_t most_variants = 3;    // of one effect that are fitted:
+constexpr double variant_gain = 8;          //   those that promise this much
+constexpr double variant_share = 0.8;       //   and this share of the best variant's gain
+constexpr std::size_t most_leaders = 3;     // single effects that are refined, and that pairs are built on
+constexpr double leader_evidence = 2;       // of such an effect
+constexpr double refined_share = 0.7;       // of the best evidence, less
+constexpr double refined_margin = 10;       //   this much, for an effect worth refining
+constexpr double refit_margin = 60;         // evidence below the best, for a fit that did not settle to be tried again
 constexpr double least_pair_evidence = -4;  // promised beyond the first effect's, for a pair worth fitting
+constexpr std::size_t most_partners = 3;    // of one leader that are fitted
+
+// How fits are run.
+constexpr double furthest_start = 0.25;  // share of a parameter's range
+constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
+constexpr int refinements = 3;           // of a variant, each with half the moves
+constexpr int refining_steps = 4;        // of the fit at each move
+constexpr double worth_moving = 0.2;     // rise of the log likelihood
+constexpr int law_steps = 12;            // of another law's fit, from either start
+constexpr int more_law_steps = 60;       // where it may still come near
+constexpr double law_hopeless = -100;    // log likelihood below the recalibrated model's that no more steps make good
+
+// When a fit that did not settle is decided all the same.
+constexpr double law_refuted = -30;     // gain of another law: so far below that what it could still rise is nothing
+constexpr double small_gain = 10;       // by fit and by scores: at the optimum up to what differences resolve
+constexpr double rise_weight = 3;       // of the rise that the slope still promises, as evidence, and
+constexpr double far_behind = 12;       //   evidence below the best that it leaves
+constexpr double next_to_nothing = 2;   // promised rise of the log likelihood, plus
+constexpr double share_of_gain = 1e-3;  //   this share of the gain
 
 // Log of the mean likelihood ratio over variants and sizes. `gain` is the fitted one of the best variant.
 double log_evidence(const ScannedEffect& scanned, double gain) {
@@ -33,8 +68,8 @@ Term term_at(const ScannedEffect& scanned, std::size_t variant) {
   Term term{scanned.candidate, scanned.candidate->variants[variant], {}};
   for (std::size_t p = 0; p < scanned.candidate->parameters.size(); ++p) {
     const FreeParameter& parameter = scanned.candidate->parameters[p];
-    // No further than a quarter of the range: far from the neutral value the scores say little.
-    const double reach = 0.25 * (parameter.upper - parameter.lower);
+    // Far from the neutral value the scores say little.
+    const double reach = furthest_start * (parameter.upper - parameter.lower);
     const double step = std::clamp(scanned.start[variant][static_cast<Eigen::Index>(p)], -reach, reach);
     term.values.push_back(std::clamp(parameter.neutral + step, parameter.lower, parameter.upper));
   }
@@ -49,8 +84,8 @@ std::vector<std::size_t> leading_variants(const ScannedEffect& scanned) {
             [&](std::size_t a, std::size_t b) { return scanned.gain[a] > scanned.gain[b]; });
   std::vector<std::size_t> leading;
   for (const std::size_t v : order)
-    if (leading.empty() ||
-        (leading.size() < 3 && scanned.gain[v] > 8 && scanned.gain[v] > 0.8 * scanned.gain[order[0]]))
+    if (leading.empty() || (leading.size() < most_variants && scanned.gain[v] > variant_gain &&
+                            scanned.gain[v] > variant_share * scanned.gain[order[0]]))
       leading.push_back(v);
   return leading;
 }
@@ -59,14 +94,15 @@ std::vector<std::size_t> leading_variants(const ScannedEffect& scanned) {
 void refine_variant(const TransitionModel& model, Fit& best) {
   const std::vector<double> spacing = best.terms.back().candidate->refine;
   double share = 0.5;
-  for (int round = 0; round < 3; ++round, share /= 2)
+  for (int round = 0; round < refinements; ++round, share /= 2)
     for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
       if (spacing[entry] == 0) continue;
       for (const double sign : {1.0, -1.0}) {
         std::vector<Term> terms = best.terms;
         terms.back().variant[entry] += sign * share * spacing[entry];
-        Fit tried = fit(model, best.nuisance, terms, {.count = {}, .refit_nuisances = true, .most_iterations = 4});
-        if (!(tried.penalised > best.penalised + 0.2)) continue;
+        Fit tried =
+            fit(model, best.nuisance, terms, {.count = {}, .refit_nuisances = true, .most_iterations = refining_steps});
+        if (!(tried.penalised > best.penalised + worth_moving)) continue;
         const bool was_converged = best.converged;
         best = std::move(tried);
         best.converged = best.converged || was_converged;
@@ -86,7 +122,7 @@ RankedCause fit_cause(const TransitionModel& model, const Fit& base, const Scann
     if (tried.penalised < base.penalised) {  // a bad start: from nothing instead
       for (std::size_t p = 0; p < terms.back().values.size(); ++p) {
         const FreeParameter& parameter = scanned.candidate->parameters[p];
-        terms.back().values[p] = parameter.try_at != 0 ? parameter.try_at * 0.1 : parameter.neutral;
+        terms.back().values[p] = parameter.try_at != 0 ? parameter.try_at * small_start : parameter.neutral;
       }
       Fit again = fit(model, base.nuisance, terms);
       if (again.penalised > tried.penalised) tried = std::move(again);
@@ -108,6 +144,247 @@ double earned(const TransitionModel& model, const Fit& pair, const Fit& first, c
   const double beyond = std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +
                         std::max(0.0, now.stances - tolerated * std::max(0.0, before.stances));
   return std::max(0.0, std::min(all, beyond));
+}
+
+bool fitted(const RankedCause& cause) { return !cause.fit.nuisance.empty(); }
+
+const ScannedEffect* find(const EffectScan& scan, const Candidate* candidate) {
+  for (const ScannedEffect& effect : scan.effects)
+    if (effect.candidate == candidate) return &effect;
+  return nullptr;
+}
+
+// The ranking in its steps, in the order in which they are taken.
+class Ranker {
+ public:
+  Ranker(const TransitionModel& model, const Fit& recalibrated, const std::vector<const Candidate*>& candidates,
+         const RankingOptions& options)
+      : model_(model),
+        recalibrated_(recalibrated),
+        candidates_(candidates),
+        threads_(options.threads),
+        scan_(scan_effects(model, recalibrated, candidates, options.threads)),
+        chance_(scan_, options.draws, options.seed),
+        singles_(candidates.size()) {}
+
+  void fit_singles();
+  void fit_overlooked();
+  void refine_leaders();
+  void refit_unsettled();
+  void decide_unsettled();
+  void scan_pairs();
+  void fit_pairs();
+  CauseRanking result() {
+    return {std::move(scan_), std::move(singles_), std::move(pairs_), chance_.look_elsewhere(least_p_)};
+  }
+
+ private:
+  struct Try {
+    std::size_t leader;
+    ScannedEffect second;
+  };
+
+  void fit_law(RankedCause& cause) const;
+  void fit_effect(RankedCause& cause, const ScannedEffect& scanned) const;
+  void take(RankedCause& cause, Fit better) const;
+  double gain(const Fit& fit) const { return 2 * (fit.penalised - recalibrated_.penalised); }
+  double p_value(const Candidate* candidate, double gain) const;
+  std::vector<std::size_t> leaders(bool to_refine) const;
+
+  const TransitionModel& model_;
+  const Fit& recalibrated_;
+  const std::vector<const Candidate*>& candidates_;
+  int threads_;
+  EffectScan scan_;
+  ChanceGains chance_;
+  std::vector<RankedCause> singles_, pairs_;
+  std::vector<Try> tries_;
+  double least_p_ = 1;  // of the single effects as listed: chance is drawn for those
+  double top_ = 0;      // evidence of the best of them
+};
+
+// Chance of such a gain by one effect alone.
+double Ranker::p_value(const Candidate* candidate, double gain) const {
+  if (candidate->parameters.empty()) return 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, gain)));
+  return chance_.p_value(candidate, gain);
+}
+
+// Another law has nothing to scan. Contact parameters that suit one law mislead under the other: the nominal ones are a
+// start, too.
+void Ranker::fit_law(RankedCause& cause) const {
+  const auto from = [&](const std::vector<double>& nuisance, int iterations) {
+    return fit(model_, nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = iterations});
+  };
+  cause.fit = from(nominal_values(model_), law_steps);
+  Fit other = from(recalibrated_.nuisance, law_steps);
+  if (other.penalised > cause.fit.penalised) cause.fit = std::move(other);
+  if (!cause.fit.converged && cause.fit.penalised - recalibrated_.penalised > law_hopeless)
+    cause.fit = from(cause.fit.nuisance, more_law_steps);
+  cause.gain = gain(cause.fit);
+  // Far below and hardly rising any more: decided against.
+  if (!cause.fit.converged && cause.gain > law_refuted) cause.not_decided = cause.fit.reason;
+  cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
+  cause.evidence = 0.5 * cause.gain;
+}
+
+void Ranker::fit_effect(RankedCause& cause, const ScannedEffect& scanned) const {
+  cause = fit_cause(model_, recalibrated_, scanned);
+  cause.gain = gain(cause.fit);
+  // At the optimum up to what the differences resolve: small gains that the scores confirm are decided.
+  if (cause.gain < small_gain && scanned.gain[scanned.best] < small_gain) cause.not_decided.clear();
+  cause.p_value = p_value(scanned.candidate, cause.gain);
+  cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
+}
+
+void Ranker::fit_singles() {
+  double largest = 0;
+  for (const ScannedEffect& effect : scan_.effects) largest = std::max(largest, effect.gain[effect.best]);
+  markov::parallel_for(candidates_.size(), threads_, [&](std::size_t i) {
+    const Candidate* candidate = candidates_[i];
+    RankedCause& cause = singles_[i];
+    cause.terms = {Term{candidate, candidate->variants[0], {}}};
+    if (!candidate->undecidable.empty()) {
+      cause.not_decided = candidate->undecidable;
+      cause.evidence = -std::numeric_limits<double>::infinity();
+      return;
+    }
+    if (candidate->parameters.empty()) return fit_law(cause);
+    const ScannedEffect& scanned = *find(scan_, candidate);
+    const double promised = scanned.gain[scanned.best];
+    if (promised >= least_promise && promised >= promise_share * largest - promise_margin)
+      return fit_effect(cause, scanned);
+    cause.gain = promised;
+    cause.evidence = log_evidence(scanned, promised);
+    cause.terms = {term_at(scanned, scanned.best)};
+    cause.p_value = p_value(candidate, promised);
+  });
+}
+
+// Scores promise too much now and then: whoever would come near the fitted ones is fitted after all.
+void Ranker::fit_overlooked() {
+  double best = 0;
+  for (const RankedCause& cause : singles_)
+    if (fitted(cause)) best = std::max(best, cause.evidence);
+  markov::parallel_for(singles_.size(), threads_, [&](std::size_t i) {
+    RankedCause& cause = singles_[i];
+    if (cause.candidate_undecided() || fitted(cause) || cause.evidence < std::max(0.0, best - overlooked_margin))
+      return;
+    fit_effect(cause, *find(scan_, candidates_[i]));
+  });
+  for (const RankedCause& cause : singles_)
+    if (!cause.candidate_undecided()) {
+      least_p_ = std::min(least_p_, cause.p_value);
+      top_ = std::max(top_, cause.evidence);
+    }
+}
+
+// The strongest fitted effects, by falling evidence. `to_refine`: of those with variants between the listed ones.
+std::vector<std::size_t> Ranker::leaders(bool to_refine) const {
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < singles_.size(); ++i)
+    if (singles_[i].evidence > leader_evidence && fitted(singles_[i]) &&
+        (!to_refine || !singles_[i].terms[0].candidate->refine.empty()))
+      all.push_back(i);
+  std::sort(all.begin(), all.end(),
+            [&](std::size_t a, std::size_t b) { return singles_[a].evidence > singles_[b].evidence; });
+  if (all.size() > most_leaders) all.resize(most_leaders);
+  return all;
+}
+
+// A better fit of the same effect: the likelihoods of its other variants, and so its prior, stay what they were.
+void Ranker::take(RankedCause& cause, Fit better) const {
+  const double now = gain(better);
+  cause.evidence += 0.5 * (now - cause.gain);
+  cause.gain = now;
+  cause.fit = std::move(better);
+  cause.terms = cause.fit.terms;
+}
+
+// The p-value stays that of the listed variants: chance has not been drawn between them.
+void Ranker::refine_leaders() {
+  const std::vector<std::size_t> strongest = leaders(true);
+  markov::parallel_for(strongest.size(), threads_, [&](std::size_t k) {
+    RankedCause& cause = singles_[strongest[k]];
+    if (cause.evidence < refined_share * top_ - refined_margin) return;
+    Fit refined = cause.fit;
+    refine_variant(model_, refined);
+    take(cause, std::move(refined));
+  });
+}
+
+// Where a fit did not settle near the top: once more, from the nuisances that suit the leader.
+void Ranker::refit_unsettled() {
+  const auto best = std::max_element(singles_.begin(), singles_.end(), [](const RankedCause& a, const RankedCause& b) {
+    return a.evidence < b.evidence;
+  });
+  markov::parallel_for(singles_.size(), threads_, [&](std::size_t i) {
+    RankedCause& cause = singles_[i];
+    if (&cause == &*best || cause.fit.converged || !fitted(cause) || !fitted(*best) ||
+        cause.evidence < top_ - refit_margin)
+      return;
+    Fit again = fit(model_, best->fit.nuisance, cause.terms);
+    if (!(again.penalised > cause.fit.penalised)) return;
+    take(cause, std::move(again));
+    cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
+    if (cause.fit.converged) cause.not_decided.clear();
+  });
+}
+
+// A fit that did not settle is decided where all it could still rise leaves it far behind, or is next to nothing.
+void Ranker::decide_unsettled() {
+  for (RankedCause& cause : singles_)
+    if (!cause.candidate_undecided() && fitted(cause) &&
+        (cause.evidence + rise_weight * cause.fit.promised < top_ - far_behind ||
+         cause.fit.promised < next_to_nothing + share_of_gain * cause.gain))
+      cause.not_decided.clear();
+}
+
+double pair_log_prior(std::size_t candidates) {
+  return std::log(pair_prior / std::max(1.0, 0.5 * static_cast<double>(candidates - 1)));
+}
+
+// What the leaders leave, scanned again.
+void Ranker::scan_pairs() {
+  const double prior = pair_log_prior(candidates_.size());
+  for (const std::size_t leader : leaders(false)) {
+    const RankedCause& first = singles_[leader];
+    std::vector<const Candidate*> others;
+    for (const Candidate* other : candidates_)
+      if (other != first.terms[0].candidate) others.push_back(other);
+    const EffectScan scan = scan_effects(model_, first.fit, others, threads_);
+    std::vector<std::pair<double, const ScannedEffect*>> promising;
+    for (const ScannedEffect& effect : scan.effects) {
+      const double promised = log_evidence(effect, effect.gain[effect.best]);
+      if (promised + prior > least_pair_evidence) promising.emplace_back(promised, &effect);
+    }
+    std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    for (std::size_t k = 0; k < std::min(most_partners, promising.size()); ++k)
+      tries_.push_back({leader, *promising[k].second});
+  }
+}
+
+void Ranker::fit_pairs() {
+  const double prior = pair_log_prior(candidates_.size());
+  std::vector<RankedCause> tried(tries_.size());
+  markov::parallel_for(tries_.size(), threads_, [&](std::size_t i) {
+    const RankedCause& first = singles_[tries_[i].leader];
+    RankedCause& pair = tried[i];
+    pair = fit_cause(model_, first.fit, tries_[i].second);
+    pair.gain = gain(pair.fit);
+    const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
+    pair.evidence = first.evidence + log_evidence(tries_[i].second, second) + prior;
+    pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
+  });
+  // The same pair from either side counts once, the better fit.
+  for (RankedCause& pair : tried) {
+    const auto same = std::find_if(pairs_.begin(), pairs_.end(), [&](const RankedCause& other) {
+      return other.terms[0].candidate == pair.terms[1].candidate && other.terms[1].candidate == pair.terms[0].candidate;
+    });
+    if (same == pairs_.end())
+      pairs_.push_back(std::move(pair));
+    else if (pair.evidence > same->evidence)
+      *same = std::move(pair);
+  }
 }
 
 }  // namespace
@@ -134,180 +411,20 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   const auto progress = [&](double share) {
     if (options.progress) options.progress(share);
   };
-  CauseRanking ranking;
-  ranking.scan = scan_effects(model, recalibrated, candidates, options.threads);
+  Ranker ranker(model, recalibrated, candidates, options);
   progress(0.15);
-  const ChanceGains chance(ranking.scan, options.draws, options.seed);
-
-  double largest = 0;
-  for (const ScannedEffect& effect : ranking.scan.effects) largest = std::max(largest, effect.gain[effect.best]);
-
-  ranking.singles.resize(candidates.size());
-  const auto scanned_of = [&](const EffectScan& scan, const Candidate* candidate) -> const ScannedEffect* {
-    for (const ScannedEffect& effect : scan.effects)
-      if (effect.candidate == candidate) return &effect;
-    return nullptr;
-  };
-  markov::parallel_for(candidates.size(), options.threads, [&](std::size_t i) {
-    const Candidate* candidate = candidates[i];
-    RankedCause& cause = ranking.singles[i];
-    cause.terms = {Term{candidate, candidate->variants[0], {}}};
-    if (!candidate->undecidable.empty()) {
-      cause.not_decided = candidate->undecidable;
-      cause.evidence = -std::numeric_limits<double>::infinity();
-      return;
-    }
-    if (candidate->parameters.empty()) {  // another law: nothing to scan
-      // Contact parameters that suit one law mislead under the other: the nominal ones are a start, too.
-      const auto from = [&](const std::vector<double>& nuisance, int iterations) {
-        return fit(model, nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = iterations});
-      };
-      cause.fit = from(nominal_values(model), 12);
-      Fit other = from(recalibrated.nuisance, 12);
-      if (other.penalised > cause.fit.penalised) cause.fit = std::move(other);
-      if (!cause.fit.converged && cause.fit.penalised - recalibrated.penalised > -100)
-        cause.fit = from(cause.fit.nuisance, 60);
-      cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
-      // Far below and hardly rising any more: decided against.
-      if (!cause.fit.converged && cause.gain > -30) cause.not_decided = cause.fit.reason;
-      cause.p_value = 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, cause.gain)));
-      cause.evidence = 0.5 * cause.gain;
-      return;
-    }
-    const ScannedEffect& scanned = *scanned_of(ranking.scan, candidate);
-    const double promised = scanned.gain[scanned.best];
-    if (promised < 2 || promised < 0.2 * largest - 40) {  // far behind: the scores say enough
-      cause.gain = promised;
-      cause.evidence = log_evidence(scanned, promised);
-      cause.terms = {term_at(scanned, scanned.best)};
-      for (std::size_t e = 0; e < ranking.scan.effects.size(); ++e)
-        if (ranking.scan.effects[e].candidate == candidate) cause.p_value = chance.p_value(e, promised);
-      return;
-    }
-    cause = fit_cause(model, recalibrated, scanned);
-    cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
-    // At the optimum up to what the differences resolve: small gains that the scores confirm are decided.
-    if (!cause.not_decided.empty() && cause.gain < 10 && scanned.gain[scanned.best] < 10) cause.not_decided.clear();
-    for (std::size_t e = 0; e < ranking.scan.effects.size(); ++e)
-      if (ranking.scan.effects[e].candidate == candidate) cause.p_value = chance.p_value(e, cause.gain);
-    cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
-  });
-  // Scores promise too much now and then: whoever would come near the fitted ones is fitted after all.
-  double fitted = 0;
-  for (const RankedCause& cause : ranking.singles)
-    if (!cause.fit.nuisance.empty()) fitted = std::max(fitted, cause.evidence);
-  markov::parallel_for(ranking.singles.size(), options.threads, [&](std::size_t i) {
-    RankedCause& cause = ranking.singles[i];
-    if (cause.candidate_undecided() || !cause.fit.nuisance.empty() || cause.evidence < std::max(0.0, fitted - 12))
-      return;
-    const ScannedEffect& scanned = *scanned_of(ranking.scan, candidates[i]);
-    cause = fit_cause(model, recalibrated, scanned);
-    cause.gain = 2 * (cause.fit.penalised - recalibrated.penalised);
-    for (std::size_t e = 0; e < ranking.scan.effects.size(); ++e)
-      if (ranking.scan.effects[e].candidate == candidates[i]) cause.p_value = chance.p_value(e, cause.gain);
-    cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
-  });
+  ranker.fit_singles();
+  ranker.fit_overlooked();
   progress(0.5);
-  double least = 1, top = 0;
-  std::vector<std::size_t> strongest;
-  for (std::size_t i = 0; i < ranking.singles.size(); ++i) {
-    const RankedCause& cause = ranking.singles[i];
-    if (cause.candidate_undecided()) continue;
-    least = std::min(least, cause.p_value);
-    top = std::max(top, cause.evidence);
-    if (cause.evidence > 2 && !cause.fit.nuisance.empty() && !cause.terms[0].candidate->refine.empty())
-      strongest.push_back(i);
-  }
-  std::sort(strongest.begin(), strongest.end(),
-            [&](std::size_t a, std::size_t b) { return ranking.singles[a].evidence > ranking.singles[b].evidence; });
-  if (strongest.size() > 3) strongest.resize(3);
-  markov::parallel_for(strongest.size(), options.threads, [&](std::size_t k) {
-    RankedCause& cause = ranking.singles[strongest[k]];
-    if (cause.evidence < 0.7 * top - 10) return;
-    refine_variant(model, cause.fit);
-    const double gain = 2 * (cause.fit.penalised - recalibrated.penalised);
-    cause.evidence += 0.5 * (gain - cause.gain);
-    cause.gain = gain;
-    cause.terms = cause.fit.terms;
-  });
-  // Where a fit did not settle near the top: once more, from the nuisances that suit the leader.
-  const auto best_single =
-      std::max_element(ranking.singles.begin(), ranking.singles.end(),
-                       [](const RankedCause& a, const RankedCause& b) { return a.evidence < b.evidence; });
-  markov::parallel_for(ranking.singles.size(), options.threads, [&](std::size_t i) {
-    RankedCause& cause = ranking.singles[i];
-    if (&cause == &*best_single || cause.fit.converged || cause.fit.nuisance.empty() ||
-        best_single->fit.nuisance.empty() || cause.evidence < top - 60)
-      return;
-    Fit again = fit(model, best_single->fit.nuisance, cause.terms);
-    if (!(again.penalised > cause.fit.penalised)) return;
-    const double gain = 2 * (again.penalised - recalibrated.penalised);
-    cause.evidence += 0.5 * (gain - cause.gain);
-    cause.gain = gain;
-    cause.fit = std::move(again);
-    cause.terms = cause.fit.terms;
-    if (cause.fit.converged) cause.not_decided.clear();
-  });
-  // A fit that did not settle is decided where all it could still rise leaves it far behind, or is next to nothing.
-  for (RankedCause& cause : ranking.singles)
-    if (!cause.candidate_undecided() && !cause.fit.nuisance.empty() &&
-        (cause.evidence + 3 * cause.fit.promised < top - 12 || cause.fit.promised < 2 + 1e-3 * cause.gain))
-      cause.not_decided.clear();
+  ranker.refine_leaders();
+  ranker.refit_unsettled();
+  ranker.decide_unsettled();
   progress(0.6);
-  ranking.p_value = chance.look_elsewhere(least);
-
-  // Pairs: what the leaders leave, scanned again.
-  std::vector<std::size_t> leaders;
-  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
-    if (ranking.singles[i].evidence > 2 && !ranking.singles[i].fit.nuisance.empty()) leaders.push_back(i);
-  std::sort(leaders.begin(), leaders.end(),
-            [&](std::size_t a, std::size_t b) { return ranking.singles[a].evidence > ranking.singles[b].evidence; });
-  if (leaders.size() > 3) leaders.resize(3);
-  const double prior = std::log(pair_prior / std::max(1.0, 0.5 * static_cast<double>(candidates.size() - 1)));
-  struct Try {
-    std::size_t leader;
-    ScannedEffect scanned;
-  };
-  std::vector<Try> tries;
-  for (const std::size_t leader : leaders) {
-    const RankedCause& first = ranking.singles[leader];
-    std::vector<const Candidate*> others;
-    for (const Candidate* other : candidates)
-      if (other != first.terms[0].candidate) others.push_back(other);
-    const EffectScan scan = scan_effects(model, first.fit, others, options.threads);
-    std::vector<std::pair<double, const ScannedEffect*>> promising;
-    for (const ScannedEffect& effect : scan.effects) {
-      const double promised = log_evidence(effect, effect.gain[effect.best]);
-      if (promised + prior > least_pair_evidence) promising.emplace_back(promised, &effect);
-    }
-    std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-    for (std::size_t k = 0; k < std::min<std::size_t>(3, promising.size()); ++k)
-      tries.push_back({leader, *promising[k].second});
-  }
+  ranker.scan_pairs();
   progress(0.8);
-  std::vector<RankedCause> pairs(tries.size());
-  markov::parallel_for(tries.size(), options.threads, [&](std::size_t i) {
-    const RankedCause& first = ranking.singles[tries[i].leader];
-    RankedCause& pair = pairs[i];
-    pair = fit_cause(model, first.fit, tries[i].scanned);
-    pair.gain = 2 * (pair.fit.penalised - recalibrated.penalised);
-    const double second = earned(model, pair.fit, first.fit, exact_part(ranking.singles, first.terms, recalibrated));
-    pair.evidence = first.evidence + log_evidence(tries[i].scanned, second) + prior;
-    pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
-  });
-  // The same pair from either side counts once, the better fit.
-  for (RankedCause& pair : pairs) {
-    const auto same = std::find_if(ranking.pairs.begin(), ranking.pairs.end(), [&](const RankedCause& other) {
-      return (other.terms[0].candidate == pair.terms[1].candidate &&
-              other.terms[1].candidate == pair.terms[0].candidate);
-    });
-    if (same == ranking.pairs.end())
-      ranking.pairs.push_back(std::move(pair));
-    else if (pair.evidence > same->evidence)
-      *same = std::move(pair);
-  }
+  ranker.fit_pairs();
   progress(1);
-  return ranking;
+  return ranker.result();
 }
 
 }  // namespace metastable::analysis

@@ -14,8 +14,10 @@ namespace metastable::analysis {
 struct RankedCause {
   std::vector<Term> terms;
   Fit fit;
-  double gain = 0;          ///< 2 Delta penalised log likelihood over the recalibrated model
-  double p_value = 1;       ///< of the (last) effect's gain by chance
+  double gain = 0;  ///< 2 Delta penalised log likelihood over the recalibrated model
+  /// Of the gain by chance: of a single effect by the variants listed, before one between them was sought; of a pair
+  /// that of what the second effect earned beyond the first.
+  double p_value = 1;
   double evidence = 0;      ///< log Bayes factor against the recalibrated model, prior odds of pairs included
   std::string not_decided;  ///< why, where the data cannot tell or the fit did not settle
   bool candidate_undecided() const { return !terms[0].candidate->undecidable.empty(); }
@@ -25,7 +27,7 @@ struct CauseRanking {
   EffectScan scan;                   ///< at the recalibrated model
   std::vector<RankedCause> singles;  ///< every candidate, in the order of the catalogue
   std::vector<RankedCause> pairs;
-  double p_value = 1;  ///< of the best single effect, with the look elsewhere
+  double p_value = 1;  ///< of the best single effect among those listed, with the look elsewhere
 };
 
 struct RankingOptions {

@@ -1,17 +1,20 @@
 #include "analysis/effect_scan.h"
 
-#include <Random123/philox.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <stdexcept>
 
-#include "dynamics/truncated_normal.h"
+#include "analysis/random.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
 namespace {
 
 constexpr double largest_step = 0.1;  // of a difference, in standard errors
+constexpr double far_out = 0.03;      // share of the draws beyond which a tail follows its law instead of their count
 
 // Gain of the score `u` with information `info`; one parameter at its lower bound gains only upwards.
 double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,
@@ -115,34 +118,33 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   return scan;
 }
 
-ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) {
+namespace {
+
+// Scores whose rows, multiplied by independent standard normals and summed, are a draw of chance.
+Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
   // Around their mean, so that a gap does not count as chance.
   const Eigen::RowVectorXd mean = scan.by_trial.colwise().mean();
   Eigen::MatrixXd rows = scan.by_trial.rowwise() - mean;
-  if (!scan.trials_suffice) {
-    // Trials that scatter more than their transitions would by themselves widen it.
-    const double trials = static_cast<double>(rows.rows());
-    const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
-    const Eigen::ArrayXd own = scan.information.diagonal().array().max(1e-300);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> split(scan.information);
-    rows = split.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * split.eigenvectors().transpose() *
-           (scatter / own).max(1).sqrt().matrix().asDiagonal();
-  }
-  const auto count_of_rows = rows.rows();
-  sorted_.resize(scan.effects.size());
-  for (const ScannedEffect& effect : scan.effects)
-    degrees_.push_back(static_cast<double>(effect.candidate->parameters.size()));
-  std::vector<std::vector<double>> gains(scan.effects.size());
-  Eigen::VectorXd multiplier(count_of_rows);
+  if (scan.trials_suffice) return rows;
+  // Trials that scatter more than their transitions would by themselves widen it.
+  const double trials = static_cast<double>(rows.rows());
+  const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
+  const Eigen::ArrayXd own = scan.information.diagonal().array().max(1e-300);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> split(scan.information);
+  rows = split.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * split.eigenvectors().transpose() *
+         (scatter / own).max(1).sqrt().matrix().asDiagonal();
+  return rows;
+}
+
+}  // namespace
+
+ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) {
+  if (draws < 1) throw std::invalid_argument(fmt::format("draws: {} is below 1", draws));
+  const Eigen::MatrixXd rows = rows_of_chance(scan);
+  std::vector<std::vector<double>> gains(scan.effects.size());  // by effect and draw
   for (int draw = 0; draw < draws; ++draw) {
-    for (Eigen::Index t = 0; t < count_of_rows; t += 4) {
-      const r123::Philox4x64::ctr_type counter{{static_cast<std::uint64_t>(draw), static_cast<std::uint64_t>(t), 1, 0}};
-      const auto bits = r123::Philox4x64()(counter, {{seed, 0x6d756c74}});
-      for (Eigen::Index i = 0; i < 4 && t + i < count_of_rows; ++i)
-        multiplier[t + i] =
-            dynamics::normal_quantile((static_cast<double>(bits[static_cast<std::size_t>(i)] >> 12) + 0.5) * 0x1p-52);
-    }
-    const Eigen::VectorXd score = rows.transpose() * multiplier;
+    const Eigen::VectorXd score = rows.transpose() * normal_multipliers(seed, static_cast<std::uint64_t>(draw),
+                                                                        DrawStream::chance_of_effects, rows.rows());
     for (std::size_t e = 0; e < scan.effects.size(); ++e) {
       const ScannedEffect& effect = scan.effects[e];
       const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
@@ -154,36 +156,42 @@ ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) 
     }
   }
   for (std::size_t e = 0; e < gains.size(); ++e) {
-    sorted_[e] = gains[e];
-    std::sort(sorted_[e].begin(), sorted_[e].end(), std::greater<>());
+    const Candidate* effect = scan.effects[e].candidate;
+    effects_.push_back({effect, static_cast<double>(effect->parameters.size()), gains[e]});
+    std::sort(effects_[e].sorted.begin(), effects_[e].sorted.end(), std::greater<>());
   }
   for (int draw = 0; draw < draws; ++draw) {
     double least = 1;
     for (std::size_t e = 0; e < gains.size(); ++e)
-      least = std::min(least, p_value(e, gains[e][static_cast<std::size_t>(draw)]));
+      least = std::min(least, effects_[e].p_value(gains[e][static_cast<std::size_t>(draw)]));
     least_.push_back(least);
   }
   std::sort(least_.begin(), least_.end());
 }
 
-double ChanceGains::p_value(std::size_t effect, double gain) const {
-  const std::vector<double>& sorted = sorted_[effect];
+double ChanceGains::p_value(const Candidate* effect, double gain) const {
+  for (const ByChance& one : effects_)
+    if (one.effect == effect) return one.p_value(gain);
+  throw std::invalid_argument("ChanceGains::p_value: the effect was not scanned");
+}
+
+double ChanceGains::ByChance::p_value(double gain) const {
   const auto draws = static_cast<double>(sorted.size());
   const auto more = static_cast<double>(
       std::lower_bound(sorted.begin(), sorted.end(), gain, [](double s, double g) { return s >= g; }) - sorted.begin());
   const double counted = (more + 1) / (draws + 1);
   // Beyond the largest few per cent the tail is taken as chi-squared.
-  const double anchor = sorted[static_cast<std::size_t>(0.03 * draws)];
+  const double anchor = sorted[static_cast<std::size_t>(far_out * draws)];
   if (gain <= anchor || anchor <= 0) return counted;
-  return std::min(1.0, 0.03 * std::pow(gain / anchor, degrees_[effect] / 2 - 1) * std::exp(-(gain - anchor) / 2));
+  return std::min(1.0, far_out * std::pow(gain / anchor, degrees / 2 - 1) * std::exp(-(gain - anchor) / 2));
 }
 
 double ChanceGains::look_elsewhere(double p) const {
   const auto draws = static_cast<double>(least_.size());
   const auto fewer = static_cast<double>(std::upper_bound(least_.begin(), least_.end(), p) - least_.begin());
-  const double anchor = least_[static_cast<std::size_t>(0.03 * draws)];
+  const double anchor = least_[static_cast<std::size_t>(far_out * draws)];
   if (p >= anchor) return (fewer + 1) / (draws + 1);
-  return std::min(1.0, 0.03 * p / anchor);
+  return std::min(1.0, far_out * p / anchor);
 }
 
 }  // namespace metastable::analysis

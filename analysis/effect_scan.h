@@ -40,16 +40,23 @@ inline constexpr std::size_t enough_trials = 40, enough_transitions = 4;
 /// that: chance has the covariance of the information then.
 class ChanceGains {
  public:
+  /// @param draws  >= 1 @throws std::invalid_argument for fewer
   ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed);
   /// P(the effect's largest gain over its variants >= gain) by chance.
-  double p_value(std::size_t effect, double gain) const;
+  /// @param effect  one of those scanned @throws std::invalid_argument for another
+  double p_value(const Candidate* effect, double gain) const;
   /// P(some effect's p-value is <= p) by chance.
   double look_elsewhere(double p) const;
 
  private:
-  std::vector<std::vector<double>> sorted_;  // by effect, descending
-  std::vector<double> degrees_;              // by effect: parameters
-  std::vector<double> least_;                // smallest p-value of each draw, ascending
+  struct ByChance {
+    const Candidate* effect;
+    double degrees;              // its parameters
+    std::vector<double> sorted;  // gains, descending
+    double p_value(double gain) const;
+  };
+  std::vector<ByChance> effects_;
+  std::vector<double> least_;  // smallest p-value of each draw, ascending
 };
 
 }  // namespace metastable::analysis

@@ -162,7 +162,7 @@ TEST(EffectScan, ChanceLevelsAreHonest) {
     const Line model = line(0, 100 + seed, 240);
     const Fit plain = fit(model, {3, -0.7}, {});
     const EffectScan scan = scan_effects(model, plain, {&model.candidates()[0]}, 1);
-    const double p = ChanceGains(scan, 400, 1).p_value(0, scan.effects[0].gain[0]);
+    const double p = ChanceGains(scan, 400, 1).p_value(&model.candidates()[0], scan.effects[0].gain[0]);
     below_tenth += p < 0.1;
     below_hundredth += p < 0.01;
   }
