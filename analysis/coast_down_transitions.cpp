@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/random.h"
 #include "dynamics/truncated_normal.h"
 
 namespace metastable::analysis {
@@ -36,6 +37,7 @@ class CoastDownTransitions : public TransitionModel {
   std::size_t trials() const override { return speeds_.size(); }
   std::size_t conditions() const override { return names_.size(); }
   int legs() const override { return 0; }
+  bool time_tells() const override { return false; }  // a revolution's time is its speed
   std::string condition_name(std::size_t condition) const override { return names_.at(condition); }
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
@@ -101,7 +103,6 @@ CoastDownTransitions::CoastDownTransitions(const Experiment& experiment) : state
 
 void CoastDownTransitions::list_events() {
   for (std::size_t t = 0; t < speeds_.size(); ++t) {
-    double elapsed = 0;
     for (std::size_t k = 0; k + 1 < speeds_[t].size(); ++k) {
       Event e;
       e.kind = EventKind::step;
@@ -110,8 +111,6 @@ void CoastDownTransitions::list_events() {
       e.number = static_cast<int>(k) + 1;
       e.speed = speeds_[t][k];
       if (k > 0) e.since_previous = 4 * pi / (speeds_[t][k - 1] + speeds_[t][k]);
-      elapsed += e.since_previous.value_or(0);
-      e.elapsed = elapsed;
       e.position = 2 * pi * static_cast<double>(k);
       events_.push_back(e);
     }
@@ -248,7 +247,7 @@ std::unique_ptr<TransitionModel> CoastDownTransitions::simulate(std::span<const 
     const double run = speeds_.size() > 1 ? static_cast<double>(t) / static_cast<double>(speeds_.size() - 1) : 0;
     const auto normal = [&](std::uint64_t event, std::size_t which) {
       const auto bits = r123::Philox4x64()({{t, event, 0x636f617374, 0}}, {{seed, 0}});
-      return dynamics::normal_quantile((static_cast<double>(bits[which] >> 12) + 0.5) * 0x1p-52);
+      return dynamics::normal_quantile(unit_interval(bits[which]));
     };
     const double own = l.trial_sd * normal(2000000, 3);
     double squared = speeds_[t].empty() ? 0 : speeds_[t][0] * speeds_[t][0], carried = 0;

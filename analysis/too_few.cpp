@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/gap_map.h"
+#include "analysis/map_cells.h"
 
 namespace metastable::analysis {
 namespace {

@@ -32,7 +32,6 @@ struct Event {
   std::optional<int> leg = {};
   double position = 0;                        ///< [m]
   std::optional<double> since_previous = {};  ///< collision [s]
-  double elapsed = 0;                         ///< since the trial's first collision [s]
   double speed = 0;                           ///< given, the condition of the density [rad/s]
   std::optional<bool> rested = {};            ///< after this collision; none: not known, or no collision
 };
@@ -94,7 +93,11 @@ class TransitionModel {
   virtual const std::vector<Event>& events() const = 0;
   virtual std::size_t trials() const = 0;
   virtual std::size_t conditions() const = 0;
+  /// Legs, where events know theirs; 0: not known which leg landed, or a system without legs.
   virtual int legs() const = 0;
+  /// Whether the events' times since the previous one tell more than their speeds do: false where a time was computed
+  /// from the event's own speed alone.
+  virtual bool time_tells() const = 0;
   virtual std::string condition_name(std::size_t condition) const = 0;
   virtual const std::vector<Nuisance>& nuisances() const = 0;
   virtual const std::vector<Candidate>& candidates() const = 0;

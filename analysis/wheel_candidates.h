@@ -12,9 +12,8 @@ namespace metastable::analysis {
 /// What the data allow, for the choice of variants and for saying what cannot be told.
 struct WheelDesign {
   int legs = 8;
-  bool legs_known = true, times_known = true, speeds_after = true, equal_launch = true;
+  bool legs_known = true, speeds_after = true;
   bool launches_stated = true, noise_stated = true;
-  std::size_t trials = 0;
   std::vector<double> leg_lengths;  ///< stated [m]
   double furthest = 1.8;            ///< landing foot [m]
   double ramp_length = 3.66;        ///< [m]

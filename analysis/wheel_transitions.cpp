@@ -44,6 +44,8 @@ class WheelTransitions : public TransitionModel {
   std::size_t trials() const override { return measured_.runs.size(); }
   std::size_t conditions() const override { return measured_.conditions.size(); }
   int legs() const override { return measured_.legs_known ? measured_.wheel.legs() : 0; }
+  // Times that were not measured follow from the speeds, and from the leg where it is known.
+  bool time_tells() const override { return measured_.legs_known || experiment_.columns.time != Presence::none; }
   std::string condition_name(std::size_t condition) const override { return measured_.conditions.at(condition).id; }
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
@@ -101,12 +103,10 @@ void WheelTransitions::set_up_parameters() {
   WheelDesign design;
   design.legs = measured_.wheel.legs();
   design.legs_known = measured_.legs_known;
-  design.times_known = experiment_.columns.time != Presence::none;
   design.speeds_after = measured_.speeds_after;
   design.launches_stated = std::any_of(measured_.conditions.begin(), measured_.conditions.end(),
                                        [](const Condition& one) { return one.initial_speed.has_value(); });
   design.noise_stated = measured_.noise_stated;
-  design.trials = measured_.runs.size();
   design.leg_lengths = measured_.wheel.leg_length;
   design.law = measured_.law;
   design.furthest = 0.1;

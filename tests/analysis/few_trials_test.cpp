@@ -96,6 +96,7 @@ class Jagged : public TransitionModel {
   std::size_t trials() const override { return model_->trials(); }
   std::size_t conditions() const override { return model_->conditions(); }
   int legs() const override { return model_->legs(); }
+  bool time_tells() const override { return model_->time_tells(); }
   std::string condition_name(std::size_t condition) const override { return model_->condition_name(condition); }
   const std::vector<Nuisance>& nuisances() const override { return model_->nuisances(); }
   const std::vector<Candidate>& candidates() const override { return model_->candidates(); }
