@@ -7,29 +7,49 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 #include "analysis/cause_ranking.h"
+#include "analysis/diagnosis_sentences.h"
 #include "analysis/gap_map.h"
 #include "analysis/gap_shrinkage.h"
 #include "analysis/missing_columns.h"
 #include "analysis/too_few.h"
 #include "analysis/visibility.h"
 #include "dynamics/effect_catalogue.h"
-#include "dynamics/truncated_normal.h"
-#include "markov/parallel.h"
 
 namespace metastable::analysis {
 namespace {
 
+// The test for a gap.
 constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes
 constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide one another; hardly ever used up
 constexpr double recalibration_level = 0.02;
-constexpr double left_over_level = 0.003;
-constexpr double left_over_square = 15;   // of a cell's statistic, beyond the model error
-constexpr double least_left_over = 0.05;  // held-out gap that counts as one [nats a collision]
-constexpr double least_p_value = 1e-12;   // smaller ones are beyond what chance levels can say
+constexpr double least_p_value = 1e-12;  // smaller ones are beyond what chance levels can say
+
+// What the best hypothesis may leave before none of all is believed.
+constexpr double left_over_level = 0.003;  // of the map's p-value
+constexpr double left_over_square = 15;    // of a cell's statistic, beyond the model error
+constexpr double least_left_over = 0.05;   // held-out gap that counts as one [nats a collision]
+constexpr double left_over_errors = 6;     // squared model errors of the gap as given that count as none, held out
+constexpr double largest_log_odds = 300;   // of none: their exponential stays finite
+constexpr double certain = 1e6;            // odds of none where a test decides against all that were fitted
+
+// Odds and sets.
+constexpr double none_prior = 0.01;      // odds of none to a gap where nothing is left over
+constexpr double set_share = 0.95;       // of what the effects share that the set holds
+constexpr double least_of_first = 0.05;  // one less likely than this share of the first is not named for completeness
+
+constexpr std::size_t most_rivals = 3;  // hypotheses that compete in each fold of the cross-validation:
+constexpr double rival_evidence = 4;    //   those no further behind the best. Saves time
+// A recalibration that did not settle is mentioned beyond this rise that its slope still promises.
+constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likelihood; of the largest gain found
+
+constexpr double score_90 = 1.6448536269514722, score_95 = 1.96;  // half-widths of two-sided intervals
+
+constexpr int longest_profile = 40;          // collisions
+constexpr std::uint64_t profile_rounds = 4;  // simulated experiments that its means are taken over
+constexpr double least_profile_trials = 3;
 
 // P of as large a quadratic form of the nuisances' scores by chance: the prior shrinks each direction of the
 // information.
@@ -73,7 +93,6 @@ double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit
 }
 
 std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixXd& covariance, Eigen::Index first) {
-  constexpr double score90 = 1.6448536269514722;
   const std::vector<double>& variant = term.variant;
   const std::vector<Named> here = term.candidate->report(variant, term.values);
   std::vector<EstimatedParameter> all;
@@ -81,7 +100,7 @@ std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixX
   const auto count = term.values.size();
   if (count == 1) {  // reported numbers are monotone in the one value: its ends are theirs
     const FreeParameter& p = term.candidate->parameters[0];
-    const double half = score90 * std::sqrt(std::max(0.0, covariance(first, first)));
+    const double half = score_90 * std::sqrt(std::max(0.0, covariance(first, first)));
     for (const double end : {-half, half}) {
       const auto there = term.candidate->report(variant, {std::clamp(term.values[0] + end, p.lower, p.upper)});
       for (std::size_t k = 0; k < all.size(); ++k) {
@@ -102,7 +121,7 @@ std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixX
       slope[static_cast<Eigen::Index>(p)] = (term.candidate->report(variant, moved)[k].second - here[k].second) / step;
     }
     const auto block = covariance.block(first, first, slope.size(), slope.size());
-    const double half = score90 * std::sqrt(std::max(0.0, slope.dot(block * slope)));
+    const double half = score_90 * std::sqrt(std::max(0.0, slope.dot(block * slope)));
     all[k].lower -= half;
     all[k].upper += half;
     all[k].fitted = half > 0;
@@ -145,7 +164,7 @@ std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, 
       slope[static_cast<Eigen::Index>(p)] =
           (model.report_nuisances(moved)[k].second - here[k].second) / model.nuisances()[p].step;
     }
-    const double half = 1.645 * std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
+    const double half = score_90 * std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
     all.push_back({here[k].first, here[k].second, here[k].second - half, here[k].second + half, true});
   }
   return all;
@@ -183,7 +202,7 @@ std::vector<ProfilePoint> profiles(const TransitionModel& model, const std::vect
     for (const Event& e : m.events()) {
       const bool before = e.kind == EventKind::collision || e.kind == EventKind::step || e.kind == EventKind::rest ||
                           e.kind == EventKind::survival;
-      if (!before || e.number > 40) continue;
+      if (!before || e.number > longest_profile) continue;
       if (previous && previous->trial == e.trial && previous->number == e.number) continue;
       previous = &e;
       auto& of = sums[e.condition];
@@ -196,7 +215,7 @@ std::vector<ProfilePoint> profiles(const TransitionModel& model, const std::vect
   };
   std::vector<std::vector<Sum>> measured(model.conditions()), given(model.conditions()), with(model.conditions());
   gather(model, measured);
-  for (std::uint64_t round = 0; round < 4; ++round) {
+  for (std::uint64_t round = 0; round < profile_rounds; ++round) {
     gather(*model.simulate(nominal, {}, seed + round), given);
     gather(*model.simulate(chosen.nuisance, chosen.terms, seed + round), with);
   }
@@ -204,7 +223,7 @@ std::vector<ProfilePoint> profiles(const TransitionModel& model, const std::vect
   for (std::size_t c = 0; c < measured.size(); ++c)
     for (std::size_t k = 0; k < measured[c].size(); ++k) {
       const Sum& m = measured[c][k];
-      if (m.count < 3) continue;
+      if (m.count < least_profile_trials) continue;
       const auto mean = [](const Sum& s) { return s.count > 0 ? s.sum / s.count : 0.0; };
       const auto sd = [&](const Sum& s) {
         return s.count > 1 ? std::sqrt(std::max(0.0, s.squares / s.count - mean(s) * mean(s)) * s.count / (s.count - 1))
@@ -219,94 +238,158 @@ std::vector<ProfilePoint> profiles(const TransitionModel& model, const std::vect
       if (k < given[c].size()) p.baseline = mean(given[c][k]);
       if (k < with[c].size()) {
         p.with_effect = mean(with[c][k]);
-        p.band = 1.96 * sd(with[c][k]) / std::sqrt(m.count);
+        p.band = score_95 * sd(with[c][k]) / std::sqrt(m.count);
       }
       points.push_back(p);
     }
   return points;
 }
 
-std::string quantity(double value) { return fmt::format("{:.3g}", value); }
-
-std::string with_parameters(const Cause& cause) {
-  std::string text;
-  for (std::size_t e = 0; e < cause.effects.size(); ++e) {
-    text += (e ? " and " : "") + cause.effects[e];
-    std::string inside;
-    for (const EstimatedParameter& p : cause.parameters[e]) {
-      if (cause.parameters[e].size() > 3 && inside.size() > 40) break;
-      inside += (inside.empty() ? "" : ", ") + p.name + " " + quantity(p.value);
-    }
-    if (!inside.empty() && cause.parameters[e].size() <= 3) text += " (" + inside + ")";
-  }
-  return text;
+void check(const DiagnosisOptions& options) {
+  if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
+  if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
+  if (!(options.level > 0 && options.level < 0.5))
+    throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
+  for (const std::string& id : options.catalogue) dynamics::effect_info(id);  // throws for unknown ones
 }
 
-void say(Diagnosis& d) {
-  auto& s = d.sentences;
-  switch (d.verdict) {
-    case Verdict::no_gap:
-      s.push_back("No gap beyond chance: the data agree with the model as given.");
-      break;
-    case Verdict::recalibrate:
-      s.push_back("There is a gap as given, and other contact parameters remove it: no missing physics shows.");
-      break;
-    case Verdict::explained:
-      if (d.cause_set.size() == 1)
-        s.push_back(fmt::format("There is a gap that recalibration does not remove, and one cause explains it: {}.",
-                                with_parameters(d.causes.front())));
-      else {
-        std::string names;
-        for (const std::string& name : d.cause_set) names += (names.empty() ? "" : ", ") + name;
-        s.push_back(fmt::format(
-            "There is a gap that recalibration does not remove. These data cannot tell {} causes apart: {}.",
-            d.cause_set.size(), names));
-        s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(d.causes.front()),
-                                d.causes.front().probability));
-      }
-      break;
-    case Verdict::unexplained:
-      s.push_back("There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
-      if (!d.causes.empty() && d.causes.front().gain > 10)
-        s.push_back(
-            fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.", d.causes.front().name()));
-      break;
+std::vector<const Candidate*> wanted(const TransitionModel& model, const std::vector<std::string>& catalogue) {
+  std::vector<const Candidate*> candidates;
+  for (const Candidate& candidate : model.candidates())
+    if (catalogue.empty() || std::find(catalogue.begin(), catalogue.end(), candidate.id) != catalogue.end())
+      candidates.push_back(&candidate);
+  return candidates;
+}
+
+// The model without anything fitted: nothing to project out.
+Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
+  Fit given;
+  given.nuisance = nominal;
+  given.evaluation = model.evaluate(nominal, {});
+  given.log_likelihood = given.evaluation.total();
+  return given;
+}
+
+// The tests for a gap, together.
+void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated) {
+  d.p_effects = std::max(least_p_value, ranking.p_value);
+  d.p_where = std::max(least_p_value, d.recalibrated.p_value);
+  d.p_recalibration = std::max(least_p_value, d.p_recalibration);
+  const double pairs = std::max(least_p_value, pairs_p_value(ranking, candidates, recalibrated));
+  d.p_value =
+      std::min({1.0, d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects), pairs / share_for_pairs});
+  d.p_as_given = std::min(1.0, 2 * std::min(d.p_recalibration, d.p_value));
+}
+
+void note_what_is_rough(Diagnosis& d, const CauseRanking& ranking, const Fit& recalibrated, double largest_gain) {
+  // Where the model is far off its likelihood is rough; what the fit missed is said where it is not next to nothing.
+  for (const RankedCause& cause : ranking.singles) largest_gain = std::max(largest_gain, cause.gain);
+  if (!recalibrated.converged && recalibrated.promised > settled_rise + settled_share * largest_gain)
+    d.notes.push_back(
+        fmt::format("the recalibrated parameters did not settle ({}): by its slope the likelihood could rise by {:.2g} "
+                    "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
+                    recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
+  if (!ranking.scan.trials_suffice)
+    d.notes.push_back(fmt::format(
+        "{} {} of {:.2g} transitions: chance levels come from the model's information alone; from {} trials "
+        "of {} transitions on, from the trials' own scatter",
+        d.trials, d.trials == 1 ? "trial" : "trials",
+        static_cast<double>(d.events) / static_cast<double>(std::max<std::size_t>(1, d.trials)), enough_trials,
+        enough_transitions));
+}
+
+// All hypotheses by falling evidence; those that are not decided go to the diagnosis.
+std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking) {
+  std::vector<const RankedCause*> ordered;
+  for (const RankedCause& cause : ranking.singles) {
+    if (cause.not_decided.empty())
+      ordered.push_back(&cause);
+    else
+      d.not_decided.push_back(describe(model, cause));
   }
-  const GapMap& map = d.verdict == Verdict::unexplained ? d.left : d.recalibrated;
-  if (d.verdict == Verdict::explained || d.verdict == Verdict::unexplained) {
-    const auto largest = std::min_element(map.cells.begin(), map.cells.end(), [](const GapCell& a, const GapCell& b) {
-      return std::abs(a.statistic) > std::abs(b.statistic);
-    });
-    if (largest != map.cells.end() && largest->p_adjusted < 0.05)
-      s.push_back(fmt::format("It shows most in the {} of {} ({:+.2g} {}).", largest->aspect, largest->at,
-                              largest->size, largest->unit));
+  for (const RankedCause& pair : ranking.pairs) ordered.push_back(&pair);
+  std::stable_sort(ordered.begin(), ordered.end(),
+                   [](const RankedCause* a, const RankedCause* b) { return a->evidence > b->evidence; });
+  return ordered;
+}
+
+// The best hypothesis, and what speaks against it.
+struct Chosen {
+  const Fit* fit = nullptr;  // the recalibrated model where no hypothesis is worth having
+  double none = 0;           // odds that it is none of the catalogue
+  double bent = 1;           // share of its gain that an error of form may bend
+};
+
+// What the best hypothesis leaves on the map: judged beyond its own model error.
+Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking, const RankedCause& best,
+              const Fit& recalibrated, const DiagnosisOptions& options) {
+  Chosen chosen{&best.fit};
+  d.left = gap_map(model, best.fit, options.draws, options.seed + 1);
+  const Fit& exact = exact_part(ranking.singles, best.terms, recalibrated);
+  const PhaseGain gained = phase_gain(model, best.fit, exact);
+  const double all = best.fit.log_likelihood - recalibrated.log_likelihood;
+  if (all > 0) chosen.bent = std::clamp((best.fit.log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
+  const double tolerated = model_error * model_error;
+  const double beyond = d.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
+  if (d.left.p_value < left_over_level && beyond > left_over_square)
+    chosen.none = std::exp(std::min(largest_log_odds, 0.5 * (beyond - left_over_square)));
+  return chosen;
+}
+
+// Those that compete on the trials held out.
+std::vector<const Fit*> rivals(const std::vector<const RankedCause*>& ordered) {
+  std::vector<const Fit*> all;
+  for (const RankedCause* cause : ordered) {
+    if (all.size() == most_rivals || cause->evidence < ordered.front()->evidence - rival_evidence) break;
+    if (!cause->fit.nuisance.empty()) all.push_back(&cause->fit);
   }
-  if (!d.shrinkage.empty() && d.shrinkage[0].closed && d.verdict != Verdict::no_gap) {
-    const Shrinkage& log_score = d.shrinkage[0];
-    s.push_back(
-        fmt::format("Held out, {:.0f} % of the gap closes (90 %: {:.0f} to {:.0f} %), from {:.2g} to {:.2g} nats a "
-                    "collision.",
-                    100 * *log_score.closed, 100 * *log_score.closed_lower, 100 * *log_score.closed_upper,
-                    log_score.baseline, log_score.with_effect));
+  return all;
+}
+
+// Probabilities over everything; the prior gives a gap even odds, shared by the effects. Returns the share of the
+// effects together.
+double share_probabilities(Diagnosis& d, const TransitionModel& model, const std::vector<const RankedCause*>& ordered,
+                           std::size_t candidates, bool gap, double none) {
+  const double top = ordered.empty() ? 0 : std::max(0.0, ordered.front()->evidence);
+  const double effects = std::max<double>(1, static_cast<double>(candidates));
+  const double weight_null = std::exp(-top);
+  double given_gap = 0;
+  for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
+  // The tests decide whether there is a gap, because their levels are calibrated and the evidence's are not: where both
+  // disagree, the odds of a gap go no further than even.
+  const double even = weight_null / (1 + none_prior + none);
+  double share = 1;
+  if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
+  const double weight_none = (none + none_prior) * (given_gap > 0 ? share * given_gap : even);
+  const double sum = weight_null + share * given_gap + weight_none;
+  d.p_none = weight_none / sum;
+  (d.p_recalibration < recalibration_level ? d.p_recalibrate : d.p_no_gap) = weight_null / sum;
+  for (const RankedCause* cause : ordered) {
+    Cause one = describe(model, *cause);
+    one.probability = share * std::exp(cause->evidence - top) / effects / sum;
+    d.causes.push_back(std::move(one));
   }
-  const auto list = [](const std::vector<std::string>& names) {
-    std::string text;
-    for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-    return text;
-  };
-  for (const MissingColumn& missing : d.missing) {
-    std::vector<std::string> hidden;
-    for (const HiddenEffect& effect : missing.effects)
-      if (!effect.smallest) hidden.push_back(effect.effect);
-    if (!hidden.empty())
-      s.push_back(fmt::format("Without {}, {} cannot be told; what they do may show under other names.", missing.column,
-                              list(hidden)));
+  return share * given_gap / sum;
+}
+
+void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) {
+  if (!gap) {
+    d.verdict = d.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
+    if (d.verdict == Verdict::recalibrate) d.cause_set = {"contact_distribution"};
+    return;
   }
-  std::vector<std::string> too_few;
-  for (const NotPossible& n : d.not_possible)
-    if (n.of_the_gap)
-      too_few.push_back(n.trials ? fmt::format("{} ({} trials would do)", n.statement, *n.trials) : n.statement);
-  if (!too_few.empty()) s.push_back(fmt::format("Too few trials to say {}.", list(too_few)));
+  if (none >= 1) {
+    d.verdict = Verdict::unexplained;
+    return;
+  }
+  d.verdict = Verdict::explained;
+  double covered = 0;
+  for (const Cause& cause : d.causes) {
+    if (covered >= set_share * share_of_effects || cause.probability < least_of_first * d.causes.front().probability)
+      break;
+    d.cause_set.push_back(cause.name());
+    covered += cause.probability;
+  }
 }
 
 }  // namespace
@@ -325,23 +408,11 @@ std::string verdict_name(Verdict verdict) {
   throw std::logic_error("verdict_name: unknown verdict");
 }
 
-std::string Cause::name() const {
-  std::string joined;
-  for (const std::string& effect : effects) joined += (joined.empty() ? "" : "+") + effect;
-  return joined;
-}
+std::string Cause::name() const { return fmt::format("{}", fmt::join(effects, "+")); }
 
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options) {
-  if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
-  if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
-  if (!(options.level > 0 && options.level < 0.5))
-    throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
-  for (const std::string& id : options.catalogue) dynamics::effect_info(id);  // throws for unknown ones
-  std::vector<const Candidate*> candidates;
-  for (const Candidate& candidate : model.candidates())
-    if (options.catalogue.empty() ||
-        std::find(options.catalogue.begin(), options.catalogue.end(), candidate.id) != options.catalogue.end())
-      candidates.push_back(&candidate);
+  check(options);
+  const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
   const auto progress = [&](double share, const char* doing) {
     if (options.progress) options.progress(share, doing);
   };
@@ -356,10 +427,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   progress(0, "the model as given");
   const std::vector<double> nominal = nominal_values(model);
   const Fit as_given = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
-  Fit given;  // nothing refitted: nothing to project out
-  given.nuisance = nominal;
-  given.evaluation = model.evaluate(nominal, {});
-  given.log_likelihood = given.evaluation.total();
+  const Fit given = unfitted(model, nominal);
   d.as_given = gap_map(model, given, options.draws / 2, options.seed);
   const Fit recalibrated = fit(model, nominal, {});
   d.contact = contact_estimates(model, recalibrated);
@@ -368,140 +436,53 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
 
   progress(0.1, "where the gap lies");
   d.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
-  d.p_where = d.recalibrated.p_value;
 
   CauseRanking ranking = rank_causes(
       model, recalibrated, candidates,
       {.threads = options.threads, .draws = options.draws, .seed = options.seed, .progress = [&](double share) {
          progress(0.15 + 0.5 * share, "which effect");
        }});
-  d.p_effects = ranking.p_value;
-  d.p_effects = std::max(least_p_value, d.p_effects);
-  d.p_where = std::max(least_p_value, d.p_where);
-  d.p_recalibration = std::max(least_p_value, d.p_recalibration);
-  d.p_value =
-      std::min({1.0, d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects),
-                std::max(least_p_value, pairs_p_value(ranking, candidates.size(), recalibrated)) / share_for_pairs});
-  d.p_as_given = std::min(1.0, 2 * std::min(d.p_recalibration, d.p_value));
-
-  // Where the model is far off its likelihood is rough; what the fit missed is said where it is not next to nothing.
-  double largest_gain = recalibration_gain;
-  for (const RankedCause& cause : ranking.singles) largest_gain = std::max(largest_gain, cause.gain);
-  if (!recalibrated.converged && recalibrated.promised > 0.5 + 0.005 * largest_gain)
-    d.notes.push_back(
-        fmt::format("the recalibrated parameters did not settle ({}): by its slope the likelihood could rise by {:.2g} "
-                    "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
-                    recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
-
-  if (!ranking.scan.trials_suffice)
-    d.notes.push_back(fmt::format(
-        "{} {} of {:.2g} transitions: chance levels come from the model's information alone; from {} trials "
-        "of {} transitions on, from the trials' own scatter",
-        d.trials, d.trials == 1 ? "trial" : "trials",
-        static_cast<double>(d.events) / static_cast<double>(std::max<std::size_t>(1, d.trials)), enough_trials,
-        enough_transitions));
-
+  test_for_gap(d, ranking, candidates.size(), recalibrated);
+  note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
   // What the data hold no information on is not decided, whatever its evidence.
   d.visible = visibility(ranking.scan, candidates);
   for (std::size_t i = 0; i < ranking.singles.size(); ++i)
     if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && d.visible[i].smallest == 0)
       ranking.singles[i].not_decided = d.visible[i].undecidable;
-
-  // All hypotheses by falling evidence.
-  std::vector<const RankedCause*> ordered;
-  for (const RankedCause& cause : ranking.singles) {
-    if (cause.not_decided.empty())
-      ordered.push_back(&cause);
-    else
-      d.not_decided.push_back(describe(model, cause));
-  }
-  for (const RankedCause& pair : ranking.pairs) ordered.push_back(&pair);
-  std::stable_sort(ordered.begin(), ordered.end(),
-                   [](const RankedCause* a, const RankedCause* b) { return a->evidence > b->evidence; });
+  const std::vector<const RankedCause*> ordered = hypotheses(d, model, ranking);
   const bool gap = d.p_value < options.level;
 
-  // What the best hypothesis leaves: judged beyond its own model error.
-  const RankedCause* best = ordered.empty() ? nullptr : ordered.front();
-  const Fit* chosen = &recalibrated;
-  double none = 0, bent = 1;  // share of the gain that an error of form may bend
-  if (gap && best && best->evidence > 0 && !best->fit.nuisance.empty()) {
+  Chosen chosen{&recalibrated};
+  if (gap && !ordered.empty() && ordered.front()->evidence > 0 && !ordered.front()->fit.nuisance.empty()) {
     progress(0.68, "what is left");
-    chosen = &best->fit;
-    d.left = gap_map(model, *chosen, options.draws, options.seed + 1);
-    const Fit& exact = exact_part(ranking.singles, best->terms, recalibrated);
-    const PhaseGain gained = phase_gain(model, *chosen, exact);
-    const double all = chosen->log_likelihood - recalibrated.log_likelihood;
-    if (all > 0) bent = std::clamp((chosen->log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
-    const double tolerated = model_error * model_error;
-    const double beyond = d.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
-    if (d.left.p_value < left_over_level && beyond > left_over_square)
-      none = std::exp(std::min(300.0, 0.5 * (beyond - left_over_square)));
+    chosen = choose(d, model, ranking, *ordered.front(), recalibrated, options);
   } else {
     d.left = d.recalibrated;
-    if (gap) none = 1e6;  // cells of the map stand out, and no effect does
+    if (gap) chosen.none = certain;  // cells of the map stand out, and no effect does
   }
   progress(0.7, "how far it shrinks");
-  std::vector<const Fit*> rivals;
-  if (chosen != &recalibrated)
-    for (const RankedCause* cause : ordered) {
-      if (rivals.size() == 3 || cause->evidence < best->evidence - 4) break;
-      if (!cause->fit.nuisance.empty()) rivals.push_back(&cause->fit);
-    }
+  const bool named = chosen.fit != &recalibrated;
   if (d.trials >= trials_for_folds(options.folds))
-    d.shrinkage = gap_shrinkage(model, recalibrated, rivals, options.folds, options.threads, options.seed);
+    d.shrinkage = gap_shrinkage(model, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
+                                options.threads, options.seed);
   // Even a cause that closes nearly all of a huge gap may leave a large one.
-  if (chosen != &recalibrated && !d.shrinkage.empty() &&
-      d.shrinkage[0].with_effect > least_left_over + model_error * model_error * 6 * bent * d.shrinkage[0].baseline)
-    none = std::max(none, 1e6);
-  // Probabilities over everything; the prior gives a gap even odds, shared by the effects.
-  const double top = best ? std::max(0.0, best->evidence) : 0;
-  const double effects = std::max<double>(1, static_cast<double>(candidates.size()));
-  const double weight_null = std::exp(-top);
-  double given_gap = 0;
-  for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
-  // The tests decide whether there is a gap, because their levels are calibrated and the evidence's are not: where both
-  // disagree, the odds of a gap go no further than even.
-  const double even = weight_null / (1.01 + none);
-  double share = 1;
-  if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
-  const double weight_none = (none + 0.01) * (given_gap > 0 ? share * given_gap : even);
-  const double sum = weight_null + share * given_gap + weight_none;
-  d.p_none = weight_none / sum;
-  const bool needs_recalibration = d.p_recalibration < recalibration_level;
-  (needs_recalibration ? d.p_recalibrate : d.p_no_gap) = weight_null / sum;
-  double covered = 0;
-  for (const RankedCause* cause : ordered) {
-    Cause one = describe(model, *cause);
-    one.probability = share * std::exp(cause->evidence - top) / effects / sum;
-    d.causes.push_back(std::move(one));
-  }
-
-  if (!gap) {
-    d.verdict = needs_recalibration ? Verdict::recalibrate : Verdict::no_gap;
-  } else if (none >= 1) {
-    d.verdict = Verdict::unexplained;
-  } else {
-    d.verdict = Verdict::explained;
-    for (const Cause& cause : d.causes) {
-      // 95 % of what the effects share; one twenty times less likely than the first is not named for completeness.
-      if (covered >= 0.95 * (share * given_gap / sum) || cause.probability < 0.05 * d.causes.front().probability) break;
-      d.cause_set.push_back(cause.name());
-      covered += cause.probability;
-    }
-  }
-  if (d.verdict != Verdict::explained && d.verdict != Verdict::unexplained) chosen = &recalibrated;
-  if (d.verdict == Verdict::recalibrate) d.cause_set = {"contact_distribution"};
+  if (named && !d.shrinkage.empty() &&
+      d.shrinkage[0].with_effect >
+          least_left_over + model_error * model_error * left_over_errors * chosen.bent * d.shrinkage[0].baseline)
+    chosen.none = std::max(chosen.none, certain);
+  const double share_of_effects = share_probabilities(d, model, ordered, candidates.size(), gap, chosen.none);
+  give_verdict(d, gap, chosen.none, share_of_effects);
 
   progress(0.88, "steps before failure");
-  d.steps = steps_before_failure(model, nominal, recalibrated, *chosen, options.seed);
-  d.profile = profiles(model, nominal, *chosen, options.seed);
+  d.steps = steps_before_failure(model, nominal, recalibrated, *chosen.fit, options.seed);
+  d.profile = profiles(model, nominal, *chosen.fit, options.seed);
   progress(0.93, "what could not be seen");
   d.missing = missing_columns(model, recalibrated, candidates, options.threads, options.seed);
   d.not_possible = too_few(model, d, options);
   if (d.verdict == Verdict::explained && d.cause_set.size() > 1 && ordered.size() > 1)
     d.next = next_experiments(model, ordered[0]->fit, ordered[1]->terms, options.threads, options.seed);
   progress(1, "done");
-  say(d);
+  d.sentences = sentences(d);
   return d;
 }
 

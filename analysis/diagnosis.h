@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,7 +16,7 @@ struct DiagnosisOptions {
   std::uint64_t seed = 1;
   int threads = 0;                     ///< the same bits on any number
   std::vector<std::string> catalogue;  ///< ids to consider, those the model lacks left out; empty: all
-  int draws = 2000;                    ///< of each bootstrap, >= 200
+  int draws = 2000;                    ///< bootstrap draws of each chance level, >= 200; the map as given takes half
   double level = 0.03;                 ///< of the test for a gap after recalibration, in (0, 0.5)
   int folds = 5;                       ///< of the cross-validation by trial, >= 2
   /// Called now and then with the share done, 0..1, and what is being done; may throw to stop.
@@ -39,7 +38,7 @@ struct Cause {
   std::vector<std::string> effects;  ///< one or two ids
   double probability = 0;            ///< over all causes, "no_gap", "recalibration" and "none_of_these"
   double gain = 0;                   ///< 2 Delta log likelihood over the recalibrated model
-  double p_value = 1;                ///< of that gain by chance, for this effect alone
+  double p_value = 1;                ///< of the gain by chance, for this effect alone (RankedCause::p_value)
   double evidence = 0;               ///< log Bayes factor against the recalibrated model
   std::vector<std::vector<EstimatedParameter>> parameters;  ///< by effect
   std::string not_decided;   ///< why, if the fit failed or the data cannot tell; empty otherwise
@@ -111,6 +110,9 @@ struct NextExperiment {
 struct Diagnosis {
   Verdict verdict = Verdict::no_gap;
   std::vector<std::string> sentences;  ///< the verdict in plain words
+  /// p-values by chance, none below 1e-12: of the model as given (twice the smaller of the next two); of as large a
+  /// gain by recalibration; of a gap after it (the smallest of the tests below, shared out over them, with one of
+  /// pairs); of the best single effect, with the look elsewhere; of the largest cell of the map.
   double p_as_given = 1, p_recalibration = 1, p_value = 1, p_effects = 1, p_where = 1;
   GapMap as_given, recalibrated, left;  ///< maps under the nominal, the refitted, and the chosen model
   std::vector<Cause> causes;            ///< by falling probability; singles, then pairs that were tried among them
@@ -131,7 +133,10 @@ struct Diagnosis {
   std::size_t trials = 0, collisions = 0, events = 0;
 };
 
-/// @throws std::invalid_argument for options out of range and unknown ids
+/// Compares the trials with their nominal model and with every effect that the model knows: fits, chance levels,
+/// probabilities and a verdict. The same seed gives the same bits. Seconds to minutes: some hundred fits, each of many
+/// evaluations of all events.
+/// @throws std::invalid_argument for options out of range and unknown ids; what options.progress throws
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options = {});
 
 }  // namespace metastable::analysis
