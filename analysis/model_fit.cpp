@@ -6,6 +6,12 @@
 namespace metastable::analysis {
 namespace {
 
+constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is the optimum
+// Where no step rises: a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
+// what differences do not resolve.
+constexpr double unresolved = 0.5, unresolved_share = 1e-4;
+constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
+
 // All parameters of a hypothesis as one vector.
 class Point {
  public:
@@ -116,6 +122,45 @@ bool search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::Ve
   return false;
 }
 
+// Gradient of the penalised likelihood at the point where result.derivatives were taken over `steps`. The prior goes
+// into the information, too, and the slots get the steps of their next differences.
+Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen::VectorXd& weights,
+                                   const std::vector<double>& steps, Fit& result) {
+  Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const auto p = static_cast<Eigen::Index>(k);
+    Point::Slot& s = slots[k];
+    double& resolved = result.information(p, p);
+    if (resolved > 0) s.step = std::min(s.largest_step, difference_share / std::sqrt(resolved));
+    // A forward difference is the slope half a step on: taken back by the curvature, which matters along ridges.
+    gradient[p] += 0.5 * steps[k] * resolved;
+    if (s.prior_sd > 0) {
+      gradient[p] -= (*s.value - s.nominal) / (s.prior_sd * s.prior_sd);
+      resolved += 1 / (s.prior_sd * s.prior_sd);
+    }
+  }
+  return gradient;
+}
+
+// Indices of the parameters that may move: one held at a bound by the gradient stays there.
+struct FreeParts {
+  std::vector<Eigen::Index> all, of_nuisances, of_terms;
+};
+
+FreeParts free_parts(const std::vector<Point::Slot>& slots, const Eigen::VectorXd& gradient,
+                     const Eigen::MatrixXd& information) {
+  FreeParts parts;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const auto p = static_cast<Eigen::Index>(k);
+    const Point::Slot& s = slots[k];
+    const bool held = (*s.value <= s.lower && gradient[p] <= 0) || (*s.value >= s.upper && gradient[p] >= 0);
+    if (held || !(information(p, p) > 0)) continue;
+    parts.all.push_back(p);
+    (s.prior_sd > 0 ? parts.of_nuisances : parts.of_terms).push_back(p);
+  }
+  return parts;
+}
+
 }  // namespace
 
 Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count) {
@@ -144,7 +189,6 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
         const FitOptions& options) {
   Point point(model, nuisance, terms, options.refit_nuisances);
   auto& slots = point.slots();
-  const auto size = static_cast<Eigen::Index>(slots.size());
   const Eigen::VectorXd weights = event_weights(model, options.count);
   std::vector<double> steps(slots.size());
   Fit result;
@@ -155,31 +199,9 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   for (int iteration = 0; iteration < options.most_iterations && !slots.empty(); ++iteration) {
     result.derivatives = differences(point, result.evaluation, steps);
     result.information = information(result.derivatives, result.evaluation, weights);
-    for (Eigen::Index p = 0; p < size; ++p) {  // differences over a small share of what the data resolve
-      Point::Slot& s = slots[static_cast<std::size_t>(p)];
-      if (result.information(p, p) > 0) s.step = std::min(s.largest_step, 0.05 / std::sqrt(result.information(p, p)));
-    }
-    Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
-    // A forward difference is the slope half a step on: taken back by the curvature, which matters along ridges.
-    for (Eigen::Index p = 0; p < size; ++p)
-      gradient[p] += 0.5 * steps[static_cast<std::size_t>(p)] * result.information(p, p);
-    for (Eigen::Index p = 0; p < size; ++p) {
-      const Point::Slot& s = slots[static_cast<std::size_t>(p)];
-      if (s.prior_sd > 0) {
-        gradient[p] -= (*s.value - s.nominal) / (s.prior_sd * s.prior_sd);
-        result.information(p, p) += 1 / (s.prior_sd * s.prior_sd);
-      }
-    }
-    // Parameters held at a bound by the gradient stay there.
-    std::vector<Eigen::Index> free, of_nuisances, of_terms;
-    for (Eigen::Index p = 0; p < size; ++p) {
-      const Point::Slot& s = slots[static_cast<std::size_t>(p)];
-      const bool held = (*s.value <= s.lower && gradient[p] <= 0) || (*s.value >= s.upper && gradient[p] >= 0);
-      if (held || !(result.information(p, p) > 0)) continue;
-      free.push_back(p);
-      (s.prior_sd > 0 ? of_nuisances : of_terms).push_back(p);
-    }
-    if (free.empty()) {
+    const Eigen::VectorXd gradient = penalised_gradient(slots, weights, steps, result);
+    const FreeParts parts = free_parts(slots, gradient, result.information);
+    if (parts.all.empty()) {
       result.converged = true;
       break;
     }
@@ -187,30 +209,30 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     const double before = best;
     double promised = 0;
     bool better = false;
-    for (const auto* part : {&free, &of_terms, &of_nuisances}) {
+    for (const auto* part : {&parts.all, &parts.of_terms, &parts.of_nuisances}) {
       if (part->empty()) continue;
       const Eigen::VectorXd step = gauss_newton(result.information, gradient, *part);
       const double rise = 0.5 * step.dot(picked(gradient, *part));
-      if (part == &free) {
+      if (part == &parts.all) {
         promised = rise;
-        if (!(promised > 0.003)) break;
+        if (!(promised > worth_a_step)) break;
       }
-      if (rise > 0.003) better = search(point, *part, step, weights, best, result.evaluation);
+      if (rise > worth_a_step) better = search(point, *part, step, weights, best, result.evaluation);
       if (better) break;
     }
     result.promised = promised;
-    if (!(promised > 0.003)) {
+    if (!(promised > worth_a_step)) {
       result.converged = std::isfinite(promised);
       if (!result.converged) result.reason = "its information matrix is singular";
       break;
     }
     if (!better) {
       // At the optimum, up to what the differences resolve.
-      result.converged = promised < 0.5 + 1e-4 * (best - start);
+      result.converged = promised < unresolved + unresolved_share * (best - start);
       if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
       break;
     }
-    if (best - before < 0.003) {
+    if (best - before < worth_a_step) {
       result.converged = true;
       break;
     }
