@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/random.h"
 #include "dynamics/stance_motion.h"
 #include "markov/parallel.h"
 
@@ -24,7 +25,7 @@ constexpr double lead = 0.3, tail = 0.3;  // [s] recorded before collision 1 and
 double uniform(std::uint64_t seed, std::uint64_t index, std::uint64_t number) {
   const r123::Philox4x64::ctr_type counter{{index, number, 1, 0}};
   const r123::Philox4x64::key_type key{{seed, 0}};
-  return (static_cast<double>(r123::Philox4x64()(counter, key)[0] >> 12) + 0.5) * 0x1p-52;
+  return unit_interval(r123::Philox4x64()(counter, key)[0]);
 }
 
 // The motion between two collisions, or before the first, or after the last.

@@ -9,6 +9,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "analysis/random.h"
+
 namespace metastable::analysis {
 namespace {
 
@@ -19,7 +21,7 @@ constexpr int resamples = 2000;
 double uniform(std::uint64_t seed, std::uint64_t replicate, std::uint64_t number) {
   const r123::Philox4x64::ctr_type counter{{replicate, number, 2, 0}};
   const r123::Philox4x64::key_type key{{seed, 0}};
-  return (static_cast<double>(r123::Philox4x64()(counter, key)[0] >> 12) + 0.5) * 0x1p-52;
+  return unit_interval(r123::Philox4x64()(counter, key)[0]);
 }
 
 // Area under S over [0, steps) and S there.

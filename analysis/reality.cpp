@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/random.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -20,7 +21,7 @@ constexpr double tail = 0.3;  // [s] recorded of a wheel that has come to rest
 double uniform(std::uint64_t seed, std::uint64_t index, std::uint64_t number, std::uint64_t stream) {
   const r123::Philox4x64::ctr_type counter{{index, number, stream, 0}};
   const auto bits = r123::Philox4x64()(counter, r123::Philox4x64::key_type{{seed, 0}});
-  return (static_cast<double>(bits[0] >> 12) + 0.5) * 0x1p-52;
+  return unit_interval(bits[0]);
 }
 
 std::string angles(const std::string& id, const dynamics::LaboratoryTrial& trial, std::size_t index,

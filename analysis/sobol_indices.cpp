@@ -8,6 +8,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "analysis/random.h"
 #include "analysis/t_interval.h"
 #include "markov/parallel.h"
 
@@ -22,8 +23,7 @@ void fill(std::span<double> inputs, std::uint64_t seed, std::uint64_t row, std::
   for (std::size_t i = 0; i < inputs.size(); i += 2) {
     const r123::Philox4x64::ctr_type counter{{row, i / 2, 3, matrix}};
     const auto bits = r123::Philox4x64()(counter, key);
-    for (std::size_t j = 0; j < 2 && i + j < inputs.size(); ++j)
-      inputs[i + j] = (static_cast<double>(bits[j] >> 12) + 0.5) * 0x1p-52;
+    for (std::size_t j = 0; j < 2 && i + j < inputs.size(); ++j) inputs[i + j] = unit_interval(bits[j]);
   }
 }
 
