@@ -187,6 +187,7 @@ class Ranker {
   void fit_law(RankedCause& cause) const;
   void fit_effect(RankedCause& cause, const ScannedEffect& scanned) const;
   void take(RankedCause& cause, Fit better) const;
+  double gain_alone(const RankedCause& pair) const;
   double gain(const Fit& fit) const { return 2 * (fit.penalised - recalibrated_.penalised); }
   double p_value(const Candidate* candidate, double gain) const;
   std::vector<std::size_t> leaders(bool to_refine) const;
@@ -363,6 +364,15 @@ void Ranker::scan_pairs() {
   }
 }
 
+// What the two effects of a pair gain each by itself, summed.
+double Ranker::gain_alone(const RankedCause& pair) const {
+  double alone = 0;
+  for (const RankedCause& cause : singles_)
+    for (const Term& term : pair.terms)
+      if (cause.terms[0].candidate == term.candidate) alone += std::max(0.0, cause.gain);
+  return alone;
+}
+
 void Ranker::fit_pairs() {
   const double prior = pair_log_prior(candidates_.size());
   std::vector<RankedCause> tried(tries_.size());
@@ -374,6 +384,7 @@ void Ranker::fit_pairs() {
     const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
     pair.evidence = first.evidence + log_evidence(tries_[i].second, second) + prior;
     pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
+    pair.together = pair.gain / std::max(1.0, gain_alone(pair));
   });
   // The same pair from either side counts once, the better fit.
   for (RankedCause& pair : tried) {

@@ -333,6 +333,8 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
   const double beyond = d.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
   if (d.left.p_value < left_over_level && beyond > left_over_square)
     chosen.none = std::exp(std::min(largest_log_odds, 0.5 * (beyond - left_over_square)));
+  d.together = best.together;
+  if (d.together > most_together) chosen.none = std::max(chosen.none, certain);
   return chosen;
 }
 

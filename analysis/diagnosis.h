@@ -120,6 +120,7 @@ struct Diagnosis {
   std::vector<std::string> cause_set;  ///< names; empty if unexplained or no gap
   /// Probabilities. A gap has at least even odds where the tests find one, and at most even odds where they do not.
   double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
+  double together = 1;  ///< of the best hypothesis, if a pair: its gain over the sum of its effects' (cause_ranking.h)
   std::vector<EstimatedParameter> contact;  ///< recalibrated
   std::vector<Shrinkage> shrinkage;         ///< log score first, then CRPS; empty: too few trials
   StepsBeforeFailure steps;

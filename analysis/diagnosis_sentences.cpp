@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/cause_ranking.h"
+
 namespace metastable::analysis {
 namespace {
 
@@ -42,10 +44,21 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
         s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(d.causes.front()),
                                 d.causes.front().probability));
       }
+      if (const auto left = std::count_if(d.left.cells.begin(), d.left.cells.end(),
+                                          [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
+        s.push_back(
+            fmt::format("It leaves {} {} of the map beyond chance, by no more than the {:.0f} % of its own size "
+                        "that the form of a cause is allowed to be off.",
+                        left, left == 1 ? "cell" : "cells", 100 * model_error));
       break;
     case Verdict::unexplained:
       s.push_back("There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
-      if (!d.causes.empty() && d.causes.front().gain > worth_naming)
+      if (d.together > most_together)
+        s.push_back(fmt::format(
+            "The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: two "
+            "causes would add up, these bend each other into the shape of something else.",
+            d.causes.front().name(), d.together));
+      else if (!d.causes.empty() && d.causes.front().gain > worth_naming)
         s.push_back(
             fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.", d.causes.front().name()));
       break;

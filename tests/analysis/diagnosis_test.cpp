@@ -4,7 +4,10 @@
 
 #include <cmath>
 
+#include "analysis/cause_ranking.h"
 #include "analysis/coast_down_transitions.h"
+#include "analysis/reality.h"
+#include "analysis/stand_in.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/rotor.h"
 
@@ -116,6 +119,7 @@ TEST(Diagnosis, NamesBothOfTwoCauses) {
   const std::string name = d.causes[0].name();
   EXPECT_NE(name.find("contact_memory"), std::string::npos) << name;
   EXPECT_EQ(d.causes[0].effects.size(), 2u) << name;
+  EXPECT_LT(d.together, most_together);
 }
 
 // Without the true effect in the catalogue the answer is that nothing explains it.
@@ -125,6 +129,26 @@ TEST(Diagnosis, SaysUnexplainedWhenTheCatalogueLacksTheCause) {
   const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.5}}}}, 25), options);
   EXPECT_EQ(d.verdict, Verdict::unexplained);
   EXPECT_TRUE(d.cause_set.empty());
+}
+
+// Noise of the contact that grows with speed: two effects on its mean that cancel one another take its shape.
+TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
+  auto conditions = stand_in_conditions(stand_in_setting());
+  const dynamics::LaboratorySetup setup =
+      laboratory_setup(conditions, {.outside = {{"speed_spread", 0.45}}, .sensor_noise = 0.008, .seed = 27});
+  const ExperimentFiles files = reality_files(conditions, setup, run_laboratory(setup, 0), {}).files;
+  const Experiment experiment =
+      parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+  DiagnosisOptions options = quick();
+  options.catalogue = {"speed_dependent_restitution", "speed_dependent_friction", "leg_contact"};
+  const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
+  ASSERT_FALSE(d.causes.empty());
+  EXPECT_EQ(d.causes[0].effects.size(), 2U) << d.causes[0].name();
+  EXPECT_GT(d.together, most_together);
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_TRUE(d.cause_set.empty());
+  ASSERT_GE(d.sentences.size(), 2U);
+  EXPECT_NE(d.sentences[1].find("as much together as alone"), std::string::npos) << d.sentences[1];
 }
 
 TEST(Diagnosis, IsTheSameOnAnyNumberOfThreads) {
