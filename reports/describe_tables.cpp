@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "analysis/t_interval.h"
 #include "dynamics/contact_law.h"
@@ -15,6 +16,11 @@ Cell mean_cell(const analysis::SpeedSummary& s) {
   if (s.count == 0) return "";
   if (s.count == 1) return s.mean;
   return mean_interval(s);
+}
+
+Cell slope_cell(const std::optional<analysis::ReturnMapLine>& line) {
+  if (!line) return "";
+  return with_error(line->slope, line->slope_error);
 }
 
 Cell cell(const analysis::Estimate& e) {
@@ -57,7 +63,7 @@ Table conditions_table(const analysis::Description& description, const Provenanc
     row.push_back(mean_cell(c.steady));
     row.push_back(c.steady.count > 1 ? Cell(c.steady.sd) : Cell(""));
     row.push_back(c.steady_collisions.count > 1 ? Cell(c.steady_collisions.sd) : Cell(""));
-    row.push_back(c.line ? Cell(with_error(c.line->slope, c.line->slope_error)) : Cell(""));
+    row.push_back(slope_cell(c.line));
     row.push_back(c.line && c.line->fixed_point ? Cell(*c.line->fixed_point) : Cell(""));
     row.push_back(c.survival ? Cell(c.survival->rests) : Cell(""));
     row.push_back(c.survival ? cell(c.survival->expected.from_start) : Cell(""));

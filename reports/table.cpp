@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/interval_95.h"
+
 namespace metastable::reports {
 namespace {
 
@@ -139,16 +141,6 @@ std::string plain_number(double value, const Column& column) {
 }
 
 // CSV
-
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos && !text.starts_with('#')) return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"') quoted += '"';
-    quoted += c;
-  }
-  return quoted + '"';
-}
 
 void append_comment(std::string& out, std::string_view prefix, std::string_view text) {
   while (true) {
@@ -384,6 +376,21 @@ std::string escape_html(std::string_view text) {
     }
   }
   return out;
+}
+
+Estimate with_error(double value, double standard_error) {
+  const double half = analysis::normal_95 * standard_error;
+  return {value, value - half, value + half};
+}
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos && !text.starts_with('#')) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + '"';
 }
 
 std::string to_csv(const Table& table) {
