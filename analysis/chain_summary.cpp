@@ -118,7 +118,7 @@ Accumulated accumulated(const markov::Moments& moments, std::vector<double> quan
 }  // namespace
 
 ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
-                             const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws) {
+                       const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws) {
   const markov::ChainSolver solver(sampled.chain);
   const std::vector<double> mean = markov::mean_first_passage(solver);
   ChainSteps steps;

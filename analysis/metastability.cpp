@@ -39,7 +39,7 @@ std::vector<markov::StateSpace> nested(markov::StateSpace coarsest) {
 // Everything sampled at one resolution: the chain of all replicates' draws per cell size, and each replicate's answer.
 struct Ladder {
   std::vector<markov::StateSpace> spaces;
-  std::vector<markov::SampledChain> pooled;           // per cell size, coarsest first
+  std::vector<markov::SampledChain> pooled;        // per cell size, coarsest first
   std::vector<std::vector<ChainSteps>> replicate;  // per cell size, per replicate
   bool rest_resolved = true;
 };
@@ -106,8 +106,7 @@ class Study {
       ladder.rest_resolved = ladder.rest_resolved && rests(ladder.pooled.back());
     }
     for (const std::vector<ChainSteps>& size : steps)
-      for (const ChainSteps& one : size)
-        ladder.rest_resolved = ladder.rest_resolved && std::isfinite(one.from_start);
+      for (const ChainSteps& one : size) ladder.rest_resolved = ladder.rest_resolved && std::isfinite(one.from_start);
     ladder.replicate = std::move(steps);
     return ladder;
   }

@@ -124,7 +124,8 @@ class RestProbability {
     std::vector<NegativeInterval> ordered;
     for (std::size_t i = 0; i + 1 < edges.size(); ++i) ordered.push_back({edges[i], edges[i + 1]});
     const auto mass = [this](const NegativeInterval& i) { return restitution_.between(i.lower, i.upper); };
-    std::sort(ordered.begin(), ordered.end(), [&](const NegativeInterval& a, const NegativeInterval& b) { return mass(a) > mass(b); });
+    std::sort(ordered.begin(), ordered.end(),
+              [&](const NegativeInterval& a, const NegativeInterval& b) { return mass(a) > mass(b); });
     std::vector<Panel> panels;  // a heap, worst on top
     double sum = 0, error = 0;
     const auto add = [&](double lower, double upper) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "analysis/t_interval.h"
 #include "dynamics/contact_law.h"
@@ -16,11 +15,6 @@ Cell mean_cell(const analysis::SpeedSummary& s) {
   if (s.count == 0) return "";
   if (s.count == 1) return s.mean;
   return mean_interval(s);
-}
-
-Cell slope_cell(const std::optional<analysis::ReturnMapLine>& line) {
-  if (!line) return "";
-  return with_error(line->slope, line->slope_error);
 }
 
 Cell cell(const analysis::Estimate& e) {
@@ -63,7 +57,7 @@ Table conditions_table(const analysis::Description& description, const Provenanc
     row.push_back(mean_cell(c.steady));
     row.push_back(c.steady.count > 1 ? Cell(c.steady.sd) : Cell(""));
     row.push_back(c.steady_collisions.count > 1 ? Cell(c.steady_collisions.sd) : Cell(""));
-    row.push_back(slope_cell(c.line));
+    row.push_back(c.line ? Cell(with_error(c.line->slope, c.line->slope_error)) : Cell(""));
     row.push_back(c.line && c.line->fixed_point ? Cell(*c.line->fixed_point) : Cell(""));
     row.push_back(c.survival ? Cell(c.survival->rests) : Cell(""));
     row.push_back(c.survival ? cell(c.survival->expected.from_start) : Cell(""));
@@ -100,10 +94,12 @@ Table profiles_table(const analysis::Description& description, const Provenance&
   for (std::size_t k = 0; k < longest; ++k) {
     std::vector<Cell> row{k + 1};
     for (const analysis::ConditionDescription& c : description.conditions) {
-      const bool there = k < c.profile.size();
-      row.push_back(there ? c.profile[k].count : std::size_t{0});
-      row.push_back(there ? Cell(c.profile[k].mean) : Cell(""));
-      row.push_back(there && c.profile[k].count > 1 ? Cell(c.profile[k].standard_error) : Cell(""));
+      if (k >= c.profile.size()) {
+        row.insert(row.end(), {std::size_t{0}, "", ""});
+        continue;
+      }
+      const analysis::SpeedSummary& s = c.profile[k];
+      row.insert(row.end(), {s.count, s.mean, s.count > 1 ? Cell(s.standard_error) : Cell("")});
     }
     table.rows.push_back(std::move(row));
   }

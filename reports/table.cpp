@@ -9,8 +9,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "analysis/interval_95.h"
-
 namespace metastable::reports {
 namespace {
 
@@ -376,11 +374,6 @@ std::string escape_html(std::string_view text) {
     }
   }
   return out;
-}
-
-Estimate with_error(double value, double standard_error) {
-  const double half = analysis::normal_95 * standard_error;
-  return {value, value - half, value + half};
 }
 
 std::string csv_field(const std::string& text) {

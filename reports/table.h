@@ -8,6 +8,8 @@
 #include <variant>
 #include <vector>
 
+#include "analysis/interval_95.h"
+
 namespace metastable::reports {
 
 /// What made a result. Carried by every table, figure and page.
@@ -28,7 +30,10 @@ struct Estimate {
   double high = 0;
 };
 /// Normal 95 % interval.
-Estimate with_error(double value, double standard_error);
+inline Estimate with_error(double value, double standard_error) {
+  const double half = analysis::normal_95 * standard_error;
+  return {value, value - half, value + half};
+}
 /// Rendered as the word "infinite".
 struct Infinite {};
 

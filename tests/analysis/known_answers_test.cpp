@@ -23,8 +23,9 @@ struct Row {
 
 class PublishedWheel : public testing::TestWithParam<Row> {};
 
-// Direct simulation of whole trials (tests/dynamics/trials_test.cpp does it again): equal legs of 0.1519 m, `published`,
-// eta ~ N(0.4, 0.1^2). The figures have three digits; half a unit of the third is allowed beside their error.
+// Direct simulation of whole trials (tests/dynamics/trials_test.cpp does it again): equal legs of 0.1519 m,
+// `published`, eta ~ N(0.4, 0.1^2). The figures have three digits; half a unit of the third is allowed beside their
+// error.
 TEST_P(PublishedWheel, ExpectedStepsAreInsideTheStudysOwnInterval) {
   const Row row = GetParam();
   Setting setting = paper_setting(row.slope_deg, true);
