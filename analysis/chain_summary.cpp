@@ -117,11 +117,11 @@ Accumulated accumulated(const markov::Moments& moments, std::vector<double> quan
 
 }  // namespace
 
-ExpectedSteps expected_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
-                             const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws) {
+ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
+                       const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws) {
   const markov::ChainSolver solver(sampled.chain);
   const std::vector<double> mean = markov::mean_first_passage(solver);
-  ExpectedSteps steps;
+  ChainSteps steps;
   steps.from_start = 1 + dot(sampled.launch.after, mean);
   steps.from_quasi_stationary = 1 / markov::quasi_stationary(solver).failure_rate;
   int worst_phase = 0;

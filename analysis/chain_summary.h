@@ -10,7 +10,7 @@
 
 namespace metastable::analysis {
 
-struct ExpectedSteps {
+struct ChainSteps {
   double from_start = 0;
   double from_quasi_stationary = 0;
   double worst_start = 0;
@@ -18,8 +18,8 @@ struct ExpectedSteps {
 
 /// Expected steps of a chain whose every state reaches rest. The worst start is the lowest state a survivor can have,
 /// at the phase where that is worst; its landings are drawn with `draws` (each at most 16384, the first four).
-ExpectedSteps expected_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
-                             const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws);
+ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
+                       const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws);
 
 /// Fills everything of `result` that is read off one chain (all but the estimates and their errors).
 void summarize(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,

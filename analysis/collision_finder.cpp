@@ -158,6 +158,10 @@ void FinderOptions::validate() const {
     throw std::invalid_argument(fmt::format("fit span: {} s is outside (0, inf)", fit_span));
 }
 
+double reported_speed(const FoundCollision& c, bool peak) { return peak || !c.fit ? c.peak : c.fit->omega_minus; }
+
+double reported_time(const FoundCollision& c) { return c.fit ? c.fit->time : c.peak_time; }
+
 int smoothing_window(const FinderOptions& options, double rate) {
   if (options.window != 0) return options.window;
   return std::max(5, 2 * static_cast<int>(std::lround(rate * default_span / 2)) + 1);

@@ -33,6 +33,10 @@ struct FoundCollision {
   int bounces = 0;       ///< peaks between this collision and the next (or the end)
 };
 
+/// What a collisions.csv says of it: the fit, or the peak where there is no fit or `peak` is wanted.
+double reported_speed(const FoundCollision& collision, bool peak);  ///< omega_minus [rad/s]
+double reported_time(const FoundCollision& collision);              ///< [s]; of the peak where there is no fit
+
 struct FoundTrial {
   std::vector<FoundCollision> collisions;
   /// Why there are fewer than asked for; empty if there are not.

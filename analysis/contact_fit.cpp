@@ -197,6 +197,94 @@ void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, con
   }
 }
 
+// Minima of the cost from the best starts.
+std::vector<Mode> modes_from_starts(const SmoothFunction& function, std::vector<Point> starts) {
+  std::vector<Mode> modes;
+  for (Point& start : starts) {
+    Point unused(4);
+    const double value = function(start, unused);
+    if (std::isfinite(value)) modes.push_back({settle(function, {std::move(start), value}), {}});
+  }
+  if (modes.empty()) throw std::runtime_error("contact fit: no start with a finite likelihood");
+  return modes;
+}
+
+struct Maximum {
+  Mode mode;
+  std::vector<ProfileInterval> profiles = std::vector<ProfileInterval>(4);
+  bool settled = false;  ///< no profile finds a higher likelihood
+};
+
+// The best of the modes and its profiles. A profile that finds a higher likelihood on its way starts the search anew
+// from there.
+Maximum best_of(const SmoothFunction& function, std::vector<Mode> modes, bool intervals) {
+  Maximum result;
+  for (int restart = 0; restart < 8 && !result.settled; ++restart) {
+    std::stable_sort(modes.begin(), modes.end(),
+                     [](const Mode& a, const Mode& b) { return a.minimum.value < b.minimum.value; });
+    // Starts that came down to the same place are one mode.
+    for (std::size_t m = 1; m < modes.size();)
+      if (same(modes[m].minimum.at, modes[m - 1].minimum.at, 0.005))
+        modes.erase(modes.begin() + static_cast<std::ptrdiff_t>(m));
+      else
+        ++m;
+    for (Mode& mode : modes) mode.hessian = curvature(function, mode.minimum);
+    result.settled = true;
+    if (!intervals || !modes.front().hessian.allFinite()) break;
+    std::vector<Mode> inside;
+    for (const Mode& mode : modes)
+      if (mode.hessian.allFinite()) inside.push_back(mode);
+    result.profiles =
+        profile_intervals(function, inside, {lowest.begin(), lowest.end()}, {highest.begin(), highest.end()});
+    for (const ProfileInterval& profile : result.profiles)
+      if (profile.better) {
+        modes.push_back({settle(function, *profile.better), {}});
+        result.settled = false;
+      }
+  }
+  result.mode = modes.front();
+  return result;
+}
+
+// Standard errors, directions and correlations from the curvature. A spread that the data do not show is at its least
+// value; the others then have their standard errors given that. Returns the names of such spreads.
+std::string describe_errors(ContactFit& fit, const Mode& mode) {
+  std::vector<std::size_t> free;
+  std::vector<std::string_view> bound;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (i % 2 == 0 || fit.value[i] > 1.3 * least_sd)
+      free.push_back(i);
+    else
+      bound.push_back(contact_parameter_names[i]);
+  }
+  const auto size = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd information(size, size);
+  const auto slope = [&](std::size_t i) {
+    return i % 2 == 0 ? 1 : fit.value[i] / mode.minimum.at[i];
+  };  // of the variable
+  for (Eigen::Index a = 0; a < size; ++a)
+    for (Eigen::Index b = 0; b < size; ++b) {
+      const std::size_t i = free[static_cast<std::size_t>(a)], j = free[static_cast<std::size_t>(b)];
+      information(a, b) =
+          slope(i) * slope(j) * mode.hessian(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  describe_curvature(fit, information, free);
+  return fmt::format("{}", fmt::join(bound, " and "));
+}
+
+// Profile intervals; unbounded where they are not known.
+void describe_intervals(ContactFit& fit, const Maximum& best, bool intervals) {
+  const bool known = intervals && best.settled && best.mode.hessian.allFinite();
+  for (std::size_t i = 0; i < 4; ++i) {
+    const bool sd = i % 2 == 1;
+    const ProfileInterval& profile = best.profiles[i];
+    const double lower = sd ? to_sd(profile.lower) : profile.lower;
+    const double upper = sd ? to_sd(profile.upper) : profile.upper;
+    fit.lower_95[i] = known && profile.bounded_below ? lower : sd && intervals ? 0 : -infinity;
+    fit.upper_95[i] = known && profile.bounded_above ? upper : infinity;
+  }
+}
+
 }  // namespace
 
 double contact_log_likelihood(const Experiment& experiment, const std::vector<std::size_t>& conditions,
@@ -263,70 +351,16 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
     thinned.push_back(all[i]);
   const ContactLikelihood of_thinned(maps, thinned, options.threads);
   const SmoothFunction function = costs(likelihood);
-  std::vector<Mode> modes;
-  for (Point& start : best_starts(costs(of_thinned), experiment, options.law)) {
-    Point unused(4);
-    const double value = function(start, unused);
-    if (std::isfinite(value)) modes.push_back({settle(function, {std::move(start), value}), {}});
-  }
-  if (modes.empty()) throw std::runtime_error("contact fit: no start with a finite likelihood");
-  // A profile that finds a higher likelihood on its way starts the search anew from there.
-  bool settled = false;
-  std::vector<ProfileInterval> profiles(4);
-  for (int restart = 0; restart < 8 && !settled; ++restart) {
-    std::stable_sort(modes.begin(), modes.end(),
-                     [](const Mode& a, const Mode& b) { return a.minimum.value < b.minimum.value; });
-    // Starts that came down to the same place are one mode.
-    for (std::size_t m = 1; m < modes.size();)
-      if (same(modes[m].minimum.at, modes[m - 1].minimum.at, 0.005))
-        modes.erase(modes.begin() + static_cast<std::ptrdiff_t>(m));
-      else
-        ++m;
-    for (Mode& mode : modes) mode.hessian = curvature(function, mode.minimum);
-    settled = true;
-    if (!options.intervals || !modes.front().hessian.allFinite()) break;
-    std::vector<Mode> inside;
-    for (const Mode& mode : modes)
-      if (mode.hessian.allFinite()) inside.push_back(mode);
-    profiles = profile_intervals(function, inside, {lowest.begin(), lowest.end()}, {highest.begin(), highest.end()});
-    for (const ProfileInterval& profile : profiles)
-      if (profile.better) {
-        modes.push_back({settle(function, *profile.better), {}});
-        settled = false;
-      }
-  }
-  const Minimum& minimum = modes.front().minimum;
-  const Eigen::MatrixXd& hessian = modes.front().hessian;
-  fit.value = to_parameters(minimum.at);
-  fit.log_likelihood = -minimum.value;
-  // A spread that the data do not show goes to its least value; the others then have their standard errors given that.
-  std::vector<std::size_t> free;
-  std::string bound;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (i % 2 == 0 || fit.value[i] > 1.3 * least_sd)
-      free.push_back(i);
-    else
-      bound += fmt::format("{}{}", bound.empty() ? "" : " and ", contact_parameter_names[i]);
-  }
-  const auto size = static_cast<Eigen::Index>(free.size());
-  Eigen::MatrixXd information(size, size);
-  const auto slope = [&](std::size_t i) { return i % 2 == 0 ? 1 : fit.value[i] / minimum.at[i]; };  // of the variable
-  for (Eigen::Index a = 0; a < size; ++a)
-    for (Eigen::Index b = 0; b < size; ++b) {
-      const std::size_t i = free[static_cast<std::size_t>(a)], j = free[static_cast<std::size_t>(b)];
-      information(a, b) = slope(i) * slope(j) * hessian(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-    }
-  describe_curvature(fit, information, free);
-  for (std::size_t i = 0; i < 4; ++i) {
-    const bool known = options.intervals && settled && hessian.allFinite(), sd = i % 2 == 1;
-    const double lower = sd ? to_sd(profiles[i].lower) : profiles[i].lower;
-    const double upper = sd ? to_sd(profiles[i].upper) : profiles[i].upper;
-    fit.lower_95[i] = known && profiles[i].bounded_below ? lower : sd && options.intervals ? 0 : -infinity;
-    fit.upper_95[i] = known && profiles[i].bounded_above ? upper : infinity;
-  }
+  const Maximum best =
+      best_of(function, modes_from_starts(function, best_starts(costs(of_thinned), experiment, options.law)),
+              options.intervals);
+  fit.value = to_parameters(best.mode.minimum.at);
+  fit.log_likelihood = -best.mode.minimum.value;
+  const std::string bound = describe_errors(fit, best.mode);
+  describe_intervals(fit, best, options.intervals);
   if (fit.status == ContactFit::Status::converged && !bound.empty())
     fit.message = fmt::format("{} is at {}, the least value: likeliest is no such spread at all", bound, least_sd);
-  if (fit.status == ContactFit::Status::converged && !settled && fit.message.empty())
+  if (fit.status == ContactFit::Status::converged && !best.settled && fit.message.empty())
     fit.message = "the search for the maximum did not settle: the likelihood is nearly flat along its ridge";
   if (fit.impossible > 0)
     fit.message += fmt::format("{}{} transitions are outside what {} can do and are left out",

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <ranges>
 
 namespace metastable::analysis {
 namespace {
@@ -33,9 +34,8 @@ CsvReader::CsvReader(std::string file, std::string_view text, std::span<const Cs
   for (std::size_t i = 0; i < fields_.size(); ++i) {
     const auto known = std::ranges::find(columns_, fields_[i].text, &CsvColumn::name);
     if (known == columns_.end()) {
-      std::string names;
-      for (const CsvColumn& column : columns_) names += fmt::format("{}{}", names.empty() ? "" : ", ", column.name);
-      report(fields_[i].offset, fmt::format("unknown column {} (known: {})", shown_text(fields_[i].text), names));
+      report(fields_[i].offset, fmt::format("unknown column {} (known: {})", shown_text(fields_[i].text),
+                                            fmt::join(columns_ | std::views::transform(&CsvColumn::name), ", ")));
       continue;
     }
     std::optional<std::size_t>& position = position_[static_cast<std::size_t>(known - columns_.begin())];

@@ -1,7 +1,5 @@
 #include "analysis/description.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <stdexcept>
 
@@ -39,7 +37,6 @@ ConditionDescription describe_condition(const Experiment& experiment, std::size_
   c.steady_collisions = summarize(steady_speeds(c.speeds));
   c.legs = speed_per_leg(experiment, index, experiment.legs() + 1);
   c.line = return_map_line(c.speeds, 1);
-  c.steady_line = return_map_line(c.speeds, steady_collision);
   c.survival = survival(experiment, index, seed);
   return c;
 }

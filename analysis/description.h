@@ -28,12 +28,12 @@ struct ConditionDescription {
   double slope_deg = 0;
   std::size_t trials = 0, collisions = 0;
   TrialSpeeds speeds;
-  std::vector<SpeedSummary> profile;               ///< entry k: collision k + 1
-  SpeedSummary steady;                             ///< of trial means from collision 13 on
-  SpeedSummary steady_collisions;                  ///< of all collisions from there on; not independent of each other
-  std::optional<std::vector<SpeedSummary>> legs;   ///< from the second turn on; nothing: legs unknown
-  std::optional<ReturnMapLine> line, steady_line;  ///< through all pairs; through those of the steady state
-  std::optional<Survival> survival;                ///< nothing: outcomes unknown
+  std::vector<SpeedSummary> profile;              ///< entry k: collision k + 1
+  SpeedSummary steady;                            ///< of trial means from collision 13 on
+  SpeedSummary steady_collisions;                 ///< of all collisions from there on; not independent of each other
+  std::optional<std::vector<SpeedSummary>> legs;  ///< from the second turn on; nothing: legs unknown
+  std::optional<ReturnMapLine> line;              ///< through all pairs of consecutive speeds
+  std::optional<Survival> survival;               ///< nothing: outcomes unknown
 };
 
 /// All tests on two samples.

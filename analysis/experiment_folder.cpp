@@ -77,11 +77,8 @@ std::string wheel_description(const Setting& setting, Spread restitution, Spread
                               const std::vector<std::string>& comment) {
   std::string toml;
   for (const std::string& line : comment) toml += "# " + line + "\n";
-  toml += fmt::format("title = {}\n\n[wheel]\nhub_mass_kg = {}\nleg_lengths_m = [", toml_text(title),
-                      setting.wheel.hub_mass);
-  for (std::size_t i = 0; i < setting.wheel.leg_length.size(); ++i)
-    toml += fmt::format("{}{}", i == 0 ? "" : ", ", setting.wheel.leg_length[i]);
-  toml += "]\n";
+  toml += fmt::format("title = {}\n\n[wheel]\nhub_mass_kg = {}\nleg_lengths_m = [{}]\n", toml_text(title),
+                      setting.wheel.hub_mass, fmt::join(setting.wheel.leg_length, ", "));
   if (setting.wheel.inertia) toml += fmt::format("inertia_kg_m2 = {}\n", *setting.wheel.inertia);
   if (setting.law != dynamics::Law::published)
     toml += fmt::format("radius_of_gyration_m = {}\n",

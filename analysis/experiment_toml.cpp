@@ -125,11 +125,9 @@ class Keys {
   void finish() {
     for (const auto& [key, node] : table_) {
       if (known_.contains(key.str())) continue;
-      std::string names;
-      for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
       defects_.add(file_, place(key.source()),
                    fmt::format("unknown key {}{} (known: {})", shown_text(key.str()),
-                               name_.empty() ? "" : fmt::format(" in {}", name_), names));
+                               name_.empty() ? "" : fmt::format(" in {}", name_), fmt::join(known_, ", ")));
     }
   }
 

@@ -3,18 +3,9 @@
 #include <fmt/format.h>
 
 namespace metastable::analysis {
-namespace {
-
-std::string joined(const std::vector<std::string>& lines) {
-  std::string text;
-  for (const std::string& line : lines) text += (text.empty() ? "" : "\n") + line;
-  return text;
-}
-
-}  // namespace
 
 InputError::InputError(std::vector<std::string> lines)
-    : std::invalid_argument(joined(lines)), lines_(std::move(lines)) {}
+    : std::invalid_argument(fmt::format("{}", fmt::join(lines, "\n"))), lines_(std::move(lines)) {}
 
 void Defects::add(std::string_view file, Place place, std::string_view what) {
   if (++count_ > most_shown) return;

@@ -9,6 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "analysis/interval_95.h"
 #include "analysis/random.h"
 
 namespace metastable::analysis {
@@ -44,14 +45,6 @@ Restricted restricted(std::span<const ObservedSteps> trials, int steps) {
   return r;
 }
 
-// Of `rests` in `collisions`: exact 95 % interval.
-Estimate rate(int rests, int collisions) {
-  using boost::math::beta_distribution;
-  const double d = rests, m = collisions;
-  return {d / m, rests == 0 ? 0 : boost::math::quantile(beta_distribution<>(d, m - d + 1), 0.025),
-          rests == collisions ? 1 : boost::math::quantile(beta_distribution<>(d + 1, m - d), 0.975)};
-}
-
 }  // namespace
 
 std::vector<SurvivalPoint> kaplan_meier(std::span<const ObservedSteps> trials) {
@@ -78,7 +71,7 @@ std::vector<SurvivalPoint> kaplan_meier(std::span<const ObservedSteps> trials) {
     if (survival == 1) {
       point.lower = std::pow(0.025, 1 / at_risk);
     } else if (survival > 0) {
-      const double log = std::log(survival), half = 1.959963984540054 * std::sqrt(greenwood) / -log;
+      const double log = std::log(survival), half = normal_95 * std::sqrt(greenwood) / -log;
       point.lower = std::exp(log * std::exp(half));
       point.upper = std::exp(log * std::exp(-half));
     } else {  // nobody survived the last risk set: the bound of the binomial there
@@ -125,7 +118,8 @@ ExpectedSteps expected_steps(std::span<const ObservedSteps> trials, int steady_f
                                  seen.survival > 0 ? " so far, a lower bound" : "");
     return result;
   }
-  result.failure_rate = rate(result.steady_rests, result.steady_collisions);
+  result.failure_rate =
+      exact_share(static_cast<std::size_t>(result.steady_rests), static_cast<std::size_t>(result.steady_collisions));
   if (result.steady_rests == 0) {
     result.from_start = {infinity, quantile(0.05), infinity};
     result.message = fmt::format("no rest in {} collisions from collision {} on: only a lower bound (95 %)",

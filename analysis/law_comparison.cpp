@@ -1,23 +1,14 @@
 #include "analysis/law_comparison.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <boost/math/distributions/beta.hpp>
 
 #include "analysis/experiment_folder.h"
+#include "analysis/interval_95.h"
 #include "analysis/transitions.h"
 #include "analysis/two_sample_tests.h"
 
 namespace metastable::analysis {
 namespace {
-
-Estimate share(std::size_t count, std::size_t of) {
-  using boost::math::beta_distribution;
-  const auto k = static_cast<double>(count), n = static_cast<double>(of);
-  return {k / n, count == 0 ? 0 : boost::math::quantile(beta_distribution<>(k, n - k + 1), 0.025),
-          count == of ? 1 : boost::math::quantile(beta_distribution<>(k + 1, n - k), 0.975)};
-}
 
 void summarize_speeds(LawRow& row, const TrialSpeeds& speeds, const std::vector<double>& measured) {
   row.trials = speeds.size();
@@ -51,7 +42,7 @@ LawComparison compare_laws(const Experiment& experiment, const std::vector<dynam
       longest = std::max(longest, trial.collisions.size());
       rests += trial.outcome == dynamics::Outcome::rest;
     }
-    if (data.outcomes_known) data.rest_share = share(rests, data.trials);
+    if (data.outcomes_known) data.rest_share = exact_share(rests, data.trials);
     const std::vector<double> means = steady_trial_means(measured);
     result.rows.push_back(data);
 
@@ -62,7 +53,7 @@ LawComparison compare_laws(const Experiment& experiment, const std::vector<dynam
       const std::vector<dynamics::Trial> simulated = simulate_trials(
           setting, {.trials = trials, .collisions = static_cast<int>(longest), .seed = seed, .threads = threads});
       summarize_speeds(row, speeds(simulated), means);
-      row.rest_share = share(
+      row.rest_share = exact_share(
           static_cast<std::size_t>(std::count_if(simulated.begin(), simulated.end(),
                                                  [](const auto& t) { return t.outcome == dynamics::Outcome::rest; })),
           simulated.size());

@@ -39,8 +39,8 @@ std::vector<markov::StateSpace> nested(markov::StateSpace coarsest) {
 // Everything sampled at one resolution: the chain of all replicates' draws per cell size, and each replicate's answer.
 struct Ladder {
   std::vector<markov::StateSpace> spaces;
-  std::vector<markov::SampledChain> pooled;           // per cell size, coarsest first
-  std::vector<std::vector<ExpectedSteps>> replicate;  // per cell size, per replicate
+  std::vector<markov::SampledChain> pooled;        // per cell size, coarsest first
+  std::vector<std::vector<ChainSteps>> replicate;  // per cell size, per replicate
   bool rest_resolved = true;
 };
 
@@ -80,7 +80,7 @@ class Study {
     const auto threads = static_cast<std::size_t>(markov::thread_count(options_.threads));
     const std::size_t batch = std::min(threads, replicates);
     const int inner = static_cast<int>(std::max<std::size_t>(1, threads / batch));
-    std::vector<std::vector<ExpectedSteps>> steps(sizes, std::vector<ExpectedSteps>(replicates));
+    std::vector<std::vector<ChainSteps>> steps(sizes, std::vector<ChainSteps>(replicates));
     for (std::size_t first = 0; first < replicates; first += batch) {
       tell(work_before + (work_after - work_before) * static_cast<double>(first) / static_cast<double>(replicates),
            fmt::format("{} cells, {} samples", cells, samples));
@@ -93,7 +93,7 @@ class Study {
               markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = inner}));
         for (std::size_t s = 0; s < sizes; ++s) {
           if (rests(chains[k][s]))
-            steps[s][first + k] = expected_steps(problem_.map, ladder.spaces[s], chains[k][s], {draws});
+            steps[s][first + k] = chain_steps(problem_.map, ladder.spaces[s], chains[k][s], {draws});
           else
             steps[s][first + k].from_start = infinite;
         }
@@ -105,9 +105,8 @@ class Study {
       ladder.pooled.push_back(pool.mean());
       ladder.rest_resolved = ladder.rest_resolved && rests(ladder.pooled.back());
     }
-    for (const std::vector<ExpectedSteps>& size : steps)
-      for (const ExpectedSteps& one : size)
-        ladder.rest_resolved = ladder.rest_resolved && std::isfinite(one.from_start);
+    for (const std::vector<ChainSteps>& size : steps)
+      for (const ChainSteps& one : size) ladder.rest_resolved = ladder.rest_resolved && std::isfinite(one.from_start);
     ladder.replicate = std::move(steps);
     return ladder;
   }
@@ -164,15 +163,15 @@ class Study {
   Metastability assess(const Ladder& ladder, std::size_t cells, std::size_t samples) const {
     std::vector<markov::DrawOptions> draws;
     for (int r = 0; r < options_.replicates; ++r) draws.push_back(draw_options(options_, samples, r));
-    std::vector<ExpectedSteps> pooled;
+    std::vector<ChainSteps> pooled;
     for (std::size_t s = 0; s < sizes; ++s)
-      pooled.push_back(expected_steps(problem_.map, ladder.spaces[s], ladder.pooled[s], draws));
+      pooled.push_back(chain_steps(problem_.map, ladder.spaces[s], ladder.pooled[s], draws));
 
     Metastability result;
     result.cells = cells;
     result.samples = samples;
     result.replicates = options_.replicates;
-    const auto estimate = [&](double ExpectedSteps::*which, double& discretization, double& sampling) {
+    const auto estimate = [&](double ChainSteps::*which, double& discretization, double& sampling) {
       std::vector<double> log_replicate;
       for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
         log_replicate.push_back(
@@ -187,9 +186,9 @@ class Study {
     };
     result.steps.mean = pooled.back().from_start;
     double unused_d = 0, unused_s = 0;
-    result.from_start = estimate(&ExpectedSteps::from_start, result.discretization_error, result.sampling_error);
-    result.from_quasi_stationary = estimate(&ExpectedSteps::from_quasi_stationary, unused_d, unused_s);
-    result.worst_start = estimate(&ExpectedSteps::worst_start, unused_d, unused_s);
+    result.from_start = estimate(&ChainSteps::from_start, result.discretization_error, result.sampling_error);
+    result.from_quasi_stationary = estimate(&ChainSteps::from_quasi_stationary, unused_d, unused_s);
+    result.worst_start = estimate(&ChainSteps::worst_start, unused_d, unused_s);
     const Estimate& quasi = result.from_quasi_stationary;
     result.failure_rate = {1 / quasi.value, 1 / quasi.upper, 1 / quasi.lower};
     for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <ranges>
 #include <stdexcept>
-#include <string>
 
 namespace metastable::analysis {
 namespace {
@@ -39,12 +39,10 @@ dynamics::ContactModel model(const Setting& setting) {
 }  // namespace
 
 Parameter parameter_from_name(std::string_view name) {
-  std::string names;
-  for (const Known& one : known) {
+  for (const Known& one : known)
     if (one.name == name) return one.parameter;
-    names += (names.empty() ? "" : ", ") + std::string(one.name);
-  }
-  throw std::invalid_argument(fmt::format("parameter: '{}' is none of {}", name, names));
+  throw std::invalid_argument(
+      fmt::format("parameter: '{}' is none of {}", name, fmt::join(known | std::views::transform(&Known::name), ", ")));
 }
 
 std::string_view parameter_name(Parameter parameter) { return entry(parameter).name; }

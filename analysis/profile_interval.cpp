@@ -7,12 +7,14 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/interval_95.h"
+
 namespace metastable::analysis {
 namespace {
 
-constexpr double level = 1.959963984540054;  // sqrt(2 (cost - least)) at the ends
-constexpr double close_enough = 0.02;        // of it
-constexpr double lower_by = 0.01;            // a better minimum, not rounding
+constexpr double level = normal_95;    // sqrt(2 (cost - least)) at the ends
+constexpr double close_enough = 0.02;  // of it
+constexpr double lower_by = 0.01;      // a better minimum, not rounding
 
 // The others at their best for given values of one variable.
 class Profile {

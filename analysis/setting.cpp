@@ -52,8 +52,7 @@ std::string Setting::describe() const {
   if (wheel.equal_legs()) {
     legs = fmt::format("{} legs of {} m", wheel.legs(), wheel.leg_length.front());
   } else {
-    for (const double length : wheel.leg_length) legs += fmt::format("{}{}", legs.empty() ? "" : ", ", length);
-    legs = "legs " + legs + " m";
+    legs = fmt::format("legs {} m", fmt::join(wheel.leg_length, ", "));
   }
   std::string contact = pairs.empty() ? fmt::format("eta ~ N({}, {}^2), mu ~ N({}, {}^2)", restitution.mean,
                                                     restitution.sd, friction.mean, friction.sd)

@@ -13,6 +13,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "analysis/interval_95.h"
+
 namespace metastable::analysis {
 namespace {
 
@@ -135,7 +137,7 @@ EffectSize superiority(std::span<const double> a, std::span<const double> b) {
     const double bound = std::pow(0.025, 1 / std::min(n, m));
     return value >= 1 ? EffectSize{1, bound, 1} : EffectSize{0, 0, 1 - bound};
   }
-  const double logit = std::log(value / (1 - value)), half = 1.959963984540054 * se / (value * (1 - value));
+  const double logit = std::log(value / (1 - value)), half = normal_95 * se / (value * (1 - value));
   const auto back = [](double l) { return 1 / (1 + std::exp(-l)); };
   return {value, back(logit - half), back(logit + half)};
 }

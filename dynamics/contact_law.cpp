@@ -39,7 +39,7 @@ double radius_of_gyration(const Wheel& wheel, Law law) {
 Law law_from_name(std::string_view name) {
   for (const auto& [known, law] : names)
     if (known == name) return law;
-  throw std::invalid_argument(fmt::format("law: \"{}\" is none of published, coulomb, plastic", name));
+  throw std::invalid_argument(fmt::format("law: \"{}\" is none of {}", name, fmt::join(law_names(), ", ")));
 }
 
 std::string_view law_name(Law law) { return names[static_cast<std::size_t>(law)].first; }

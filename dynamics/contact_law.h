@@ -61,7 +61,7 @@ struct ContactModel {
 ContactModel contact_model(const Wheel& wheel, Law law, double rebound_lost = 0);
 
 /// Energy lost in one collision under the model's law.
-///   published: (4)-(34) as printed with the readings of physics ("published"), any sign of u0
+///   published: the paper's (4)-(34) as published_law.h reads them, any sign of u0
 ///   coulomb:   planar stick-slip with energetic restitution (Stronge 1990), any sign of u0, slip stop and reversal
 ///   plastic:   no slip, no rebound (McGeer 1990); the loss is that of the angular momentum balance about the foot
 /// O(1).

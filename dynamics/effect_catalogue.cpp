@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 #include <stdexcept>
 #include <utility>
 
@@ -182,9 +183,8 @@ const EffectInfo& effect_info(std::string_view id) {
   const auto& all = effect_catalogue();
   const auto found = std::find_if(all.begin(), all.end(), [id](const EffectInfo& info) { return info.id == id; });
   if (found != all.end()) return *found;
-  std::string known;
-  for (const EffectInfo& info : all) known += (known.empty() ? "" : ", ") + info.id;
-  throw std::invalid_argument(fmt::format("effect: \"{}\" is none of {}", id, known));
+  throw std::invalid_argument(
+      fmt::format("effect: \"{}\" is none of {}", id, fmt::join(all | std::views::transform(&EffectInfo::id), ", ")));
 }
 
 Effect effect_from_values(std::string_view id, const std::map<std::string, std::vector<double>>& values,
@@ -193,8 +193,8 @@ Effect effect_from_values(std::string_view id, const std::map<std::string, std::
   for (const auto& [name, given] : values)
     if (std::none_of(info.parameters.begin(), info.parameters.end(),
                      [&name = name](const EffectParameter& p) { return p.name == name; })) {
-      std::string known;
-      for (const EffectParameter& p : info.parameters) known += (known.empty() ? "" : ", ") + p.name;
+      const std::string known =
+          fmt::format("{}", fmt::join(info.parameters | std::views::transform(&EffectParameter::name), ", "));
       refuse(id, "", fmt::format("\"{}\" is none of its parameters ({})", name, known.empty() ? "it has none" : known));
     }
   Effect effect{info.id, {}};

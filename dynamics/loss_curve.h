@@ -7,8 +7,8 @@ namespace metastable::dynamics {
 
 /// Loss [J] of a rolling wheel's collision (u0 = 0) at `phase` with x = omega^2 [rad^2/s^2] = state, > 0.
 ///
-/// g(mu) = a/A + b mu B/A^2 + c mu B/A with A = 1/m_- and B = mu/n_- linear in mu (physics: (19), (21), (33)); a, b, c
-/// depend on eta. `published`: it falls to its least value and rises until the foot jams. `coulomb`: it rises to its
+/// g(mu) = a/A + b mu B/A^2 + c mu B/A with A = 1/m_- and B = mu/n_- linear in mu (the paper's (19), (21), (33)); a, b,
+/// c depend on eta. `published`: it falls to its least value and rises until the foot jams. `coulomb`: it rises to its
 /// largest value and falls until mu_c, from where on the foot sticks and the loss is that at mu_c.
 class LossCurve {
  public:

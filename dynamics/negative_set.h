@@ -10,7 +10,7 @@
 
 namespace metastable::dynamics {
 
-struct Interval {
+struct NegativeInterval {
   double lower = 0, upper = 0;
 };
 
@@ -21,7 +21,7 @@ struct Interval {
 /// its bottom, so that a pair of roots between two samples is found. Finer structure than a step is missed. Cost:
 /// samples + 2 calls a piece, about ten a root, about 30 a dip.
 template <class F>
-std::vector<Interval> negative_set(const F& f, std::span<const double> edges, int samples) {
+std::vector<NegativeInterval> negative_set(const F& f, std::span<const double> edges, int samples) {
   const auto negative = [](double v) { return v < 0; };
   std::vector<double> roots;
   const auto bracket = [&](double a, double fa, double b, double fb) {
@@ -74,7 +74,7 @@ std::vector<Interval> negative_set(const F& f, std::span<const double> edges, in
     if (last_dips) dip(at[count - 1], value[count - 1], at[count], value[count]);
   }
 
-  std::vector<Interval> found;
+  std::vector<NegativeInterval> found;
   bool inside = starts_inside;
   double start = edges.front();
   for (double root : roots) {

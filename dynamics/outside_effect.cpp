@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <ranges>
 #include <stdexcept>
 
 namespace metastable::dynamics {
@@ -23,9 +24,8 @@ const OutsideInfo& outside_info(std::string_view id) {
   const auto& all = outside_effects();
   const auto found = std::find_if(all.begin(), all.end(), [id](const OutsideInfo& info) { return info.id == id; });
   if (found != all.end()) return *found;
-  std::string known;
-  for (const OutsideInfo& info : all) known += (known.empty() ? "" : ", ") + info.id;
-  throw std::invalid_argument(fmt::format("outside effect: \"{}\" is none of {}", id, known));
+  throw std::invalid_argument(fmt::format("outside effect: \"{}\" is none of {}", id,
+                                          fmt::join(all | std::views::transform(&OutsideInfo::id), ", ")));
 }
 
 }  // namespace metastable::dynamics

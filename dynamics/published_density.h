@@ -11,11 +11,11 @@ namespace metastable::dynamics {
 /// Density of the landing x' under `published` for independent eta and mu, both with spreads.
 ///
 /// The loss is v0^2/2 g(eta, mu), g = (1 - eta^2)/A + (1 + eta)^2 mu B/A^2 + kappa (1 + eta) s(eta) mu B/A
-/// (physics: (19), (21), (33), (34)), A = 1/m_- and B = mu/n_- linear in mu, s = sqrt(pi^2 + ln^2 eta). The density is
-/// the integral of f(eta) f(mu) / |grad g| along the curve g = level. Above mu_c (B = 0 there) g rises with mu and the
-/// curve is a function of eta; below, g falls with eta and the curve is a function of mu: neither part has a fold, and
-/// their common end is known in closed form. Each part is a Gauss-Legendre sum over the window that holds all but 1e-9
-/// of it, for many landings at once.
+/// (the paper's (19), (21), (33), (34)), A = 1/m_- and B = mu/n_- linear in mu, s = sqrt(pi^2 + ln^2 eta). The density
+/// is the integral of f(eta) f(mu) / |grad g| along the curve g = level. Above mu_c (B = 0 there) g rises with mu and
+/// the curve is a function of eta; below, g falls with eta and the curve is a function of mu: neither part has a fold,
+/// and their common end is known in closed form. Each part is a Gauss-Legendre sum over the window that holds all but
+/// 1e-9 of it, for many landings at once.
 ///
 /// One thing is not exact: where mu < mu_c, s is taken at sqrt(eta^2 + rounding()^2), rounding() about 0.01. That moves
 /// landings by about 1e-4 of their size, with the probability of those mu and of an eta below a few rounding().

@@ -1,5 +1,12 @@
 #pragma once
-// The paper's contact law, (4)-(34), with the readings of physics ("published").
+// The paper's contact law, (4)-(34): T. Nanayakkara, K. Byl, H. Liu, X. Song and T. Villabona, "Dominant Sources of
+// Variability in Passive Walking" (ICRA 2012).
+//
+// Where the print cannot be meant, it is read so: (9) with u_comp = u0 - j mu v0 m_j/n_j; (11) with mu, as (21) follows
+// from it; in (28) t_r = T_r/2, and T_r in the third case; (37) with M for m; a foot that never stops slipping (zeta >=
+// 1 + eta) loses energy over P_+ alone. x_cp and y_cp are distances, which gives the losses of Fig. 8. (29) and (30)
+// lack 1/mu and are kept as printed. The contact's mass "m" of (25) is M. (2) with the true triangle of hub and feet,
+// by which u0 = 0 for any legs. There is no rule of rest in print: stance.barrier of wheel_map.h is this library's.
 
 #include "dynamics/contact_law.h"
 

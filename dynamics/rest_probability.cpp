@@ -63,7 +63,7 @@ class RestProbability {
       if (b > lower && b < last) edges.push_back(b);
     edges.push_back(last);
     double sum = 0;
-    for (const Interval& i : negative_set(at, edges, samples))
+    for (const NegativeInterval& i : negative_set(at, edges, samples))
       sum += friction_.between(i.lower == lower ? -infinity : i.lower, i.upper == last ? infinity : i.upper);
     return std::min(1.0, sum);
   }
@@ -76,7 +76,7 @@ class RestProbability {
     edges.push_back(restitution_.upper());
     double sum = 0;
     const auto at = [&](double eta) { return margin({eta, friction_.mean()}); };
-    for (const Interval& i : negative_set(at, edges, samples))
+    for (const NegativeInterval& i : negative_set(at, edges, samples))
       sum += restitution_.between(i.lower == edges.front() ? -infinity : i.lower, i.upper);
     return std::min(1.0, sum);
   }
@@ -121,10 +121,11 @@ class RestProbability {
   double integrate() const {
     // Panels in the order of the mass of eta they hold, until what is left cannot matter.
     const std::vector<double> edges = restitution_edges();
-    std::vector<Interval> ordered;
+    std::vector<NegativeInterval> ordered;
     for (std::size_t i = 0; i + 1 < edges.size(); ++i) ordered.push_back({edges[i], edges[i + 1]});
-    const auto mass = [this](const Interval& i) { return restitution_.between(i.lower, i.upper); };
-    std::sort(ordered.begin(), ordered.end(), [&](const Interval& a, const Interval& b) { return mass(a) > mass(b); });
+    const auto mass = [this](const NegativeInterval& i) { return restitution_.between(i.lower, i.upper); };
+    std::sort(ordered.begin(), ordered.end(),
+              [&](const NegativeInterval& a, const NegativeInterval& b) { return mass(a) > mass(b); });
     std::vector<Panel> panels;  // a heap, worst on top
     double sum = 0, error = 0;
     const auto add = [&](double lower, double upper) {

@@ -13,8 +13,8 @@ double normal_density(double z);
 /// Score whose lower tail probability is p. @throws std::domain_error for p outside (0, 1)
 double normal_quantile(double p);
 
-/// N(mean, sd^2) conditioned on [lower, upper]. `mean` and `sd` are those of the untruncated normal
-/// (physics: "Means and sds of truncated normals are those of the untruncated one"). sd = 0 is a constant.
+/// N(mean, sd^2) conditioned on [lower, upper]. `mean` and `sd` are those of the untruncated normal.
+/// sd = 0 is a constant.
 class TruncatedNormal {
  public:
   /// @throws std::invalid_argument: sd < 0, NaN, lower >= upper, a constant outside [lower, upper], or less than

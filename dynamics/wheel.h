@@ -32,7 +32,7 @@ struct Wheel {
   void validate() const;
 };
 
-/// Both feet on the ramp: stance leg `first`, landing leg `second` (physics: "One collision").
+/// Both feet on the ramp: stance leg `first`, landing leg `second`: a collision's geometry.
 struct Triangle {
   double chord = 0;        ///< c [m], distance between the feet
   double hub_height = 0;   ///< h [m], of the hub over the ramp = y_cp

@@ -32,7 +32,7 @@ struct Stance {
 };
 
 /// One collision followed by one stance. Losses that the return map needs, for u0 = 0, proportional to omega^2
-/// and omega: omega+^2 = scale * x - drag * sqrt(x) (physics: "one sampled (eta, mu) gives three numbers").
+/// and omega: omega+^2 = scale * x - drag * sqrt(x) (one draw of eta and mu serves every speed).
 struct StepCoefficients {
   double scale = 0;  ///< -infinity when the foot jams
   double drag = 0;   ///< [rad/s]

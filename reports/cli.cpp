@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <deque>
 #include <optional>
+#include <ranges>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -28,110 +29,125 @@
 namespace metastable::reports {
 namespace {
 
+Command steps() {
+  return {"steps", "Expected steps before failure of one setting, with their interval",
+          [](Options& o) {
+            o.add("slope", "DEG", "7.02", "Ramp slope [deg], above 0 and below half the angle between legs");
+            o.add("initial-speed", "MEAN,SD", "",
+                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
+            add_wheel(o), add_contact(o), add_course(o), add_study(o);
+            o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
+            o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
+            add_standard_errors(o);
+            o.add("json", "FILE|-", "", "Write the results as JSON");
+          },
+          [](const Options& o, const std::string& line) {
+            StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
+            request.sensitivities = o.flag("sensitivities");
+            request.standard_errors = standard_errors(o, request.setting);
+            run_steps(request);
+          }};
+}
+
+Command compare() {
+  return {"compare", "Expected steps of two or more slopes on common random numbers",
+          [](Options& o) {
+            o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]; later ones are compared with the first");
+            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
+            add_wheel(o), add_contact(o), add_course(o), add_study(o);
+            o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
+            add_standard_errors(o);
+            o.add("json", "FILE|-", "", "Write the results as JSON");
+          },
+          [](const Options& o, const std::string& line) {
+            CompareRequest request{several_settings(o, 2), study_options(o), o.count("collisions", 1, 63),
+                                   o.text("json"), line};
+            request.standard_errors = standard_errors(o, request.settings.front());
+            run_compare(request);
+          }};
+}
+
+Command sweep() {
+  return {
+      "sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
+      [](Options& o) {
+        o.add("slope", "RANGE", "7.02", "[deg] first:last:step, a comma list or one value; likewise the other axes");
+        o.add("restitution-mean", "RANGE", "", "Mean of eta");
+        o.add("restitution-sd", "RANGE", "", "Sd of eta");
+        o.add("friction-mean", "RANGE", "", "Mean of mu");
+        o.add("friction-sd", "RANGE", "", "Sd of mu");
+        o.add("initial-speed", "MEAN,SD", "", "Of all points (default: the paper's if the one slope is 7.02 or 9.59)");
+        add_wheel(o), add_contact(o), add_course(o), add_study(o);
+        o.add("out", "FILE", "sweep.csv",
+              "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
+      },
+      [](const Options& o, const std::string& line) {
+        SweepRequest request;
+        request.setting = common_setting(o);
+        for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
+          if (o.text(name).empty()) continue;
+          analysis::Axis axis{analysis::parameter_from_name(name), range_value(name, o.text(name))};
+          if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
+            request.setting.slope_deg = axis.values.front();
+          else
+            request.axes.push_back(std::move(axis));
+        }
+        if (request.axes.empty())
+          throw std::invalid_argument(
+              "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
+              "--friction-mean or --friction-sd as first:last:step)");
+        for (const analysis::Axis& axis : request.axes)
+          if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
+            throw std::invalid_argument(
+                fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
+        const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
+        std::optional<std::string> launch;
+        if (o.given("initial-speed")) launch = o.text("initial-speed");
+        if (!launch && !one_slope) throw std::invalid_argument("--initial-speed: must be given when the slope varies");
+        request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
+        request.study = study_options(o);
+        request.out = o.text("out");
+        request.command = line;
+        run_sweep(request);
+      }};
+}
+
+Command report() {
+  return {"report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
+          [](Options& o) {
+            o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]");
+            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
+            add_wheel(o), add_contact(o), add_course(o), add_study(o);
+            o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
+            o.add("out", "DIR", "report", "Folder for the files");
+          },
+          [](const Options& o, const std::string& line) {
+            run_report(
+                {several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000), o.text("out"), line});
+          }};
+}
+
+Command verify() {
+  return {"verify", "How accurate the program is: known values, doubling of nodes, three solvers side by side",
+          [](Options& o) {
+            o.add("seeds", "N", "0",
+                  "Sampled studies a benchmark, to count how often their interval is right; 0: none");
+            o.add("nodes", "N", "512", "Nodes a landing leg at which doubling stops, 128..4096");
+            o.add_threads();
+            o.add("out", "DIR", "", "Folder for the tables (CSV, Markdown, LaTeX)");
+            o.add("export", "DIR", "", "Folder for the default wheel's chain (PRISM .tra, .lab, .srew; MatrixMarket)");
+          },
+          [](const Options& o, const std::string& line) {
+            run_verify({o.count("seeds", 0, 1000), o.whole("nodes", 128, 4096), o.threads(), o.text("out"),
+                        o.text("export"), line});
+          }};
+}
+
 std::vector<Command> commands() {
-  std::vector<Command> all = {
-      {"steps", "Expected steps before failure of one setting, with their interval",
-       [](Options& o) {
-         o.add("slope", "DEG", "7.02", "Ramp slope [deg], above 0 and below half the angle between legs");
-         o.add("initial-speed", "MEAN,SD", "",
-               "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
-         add_wheel(o), add_contact(o), add_course(o), add_study(o);
-         o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
-         o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
-         add_standard_errors(o);
-         o.add("json", "FILE|-", "", "Write the results as JSON");
-       },
-       [](const Options& o, const std::string& line) {
-         StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
-         request.sensitivities = o.flag("sensitivities");
-         request.standard_errors = standard_errors(o, request.setting);
-         run_steps(request);
-       }},
-      {"compare", "Expected steps of two or more slopes on common random numbers",
-       [](Options& o) {
-         o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]; later ones are compared with the first");
-         o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
-         add_wheel(o), add_contact(o), add_course(o), add_study(o);
-         o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
-         add_standard_errors(o);
-         o.add("json", "FILE|-", "", "Write the results as JSON");
-       },
-       [](const Options& o, const std::string& line) {
-         CompareRequest request{several_settings(o, 2), study_options(o), o.count("collisions", 1, 63), o.text("json"),
-                                line};
-         request.standard_errors = standard_errors(o, request.settings.front());
-         run_compare(request);
-       }},
-      {"sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
-       [](Options& o) {
-         o.add("slope", "RANGE", "7.02", "[deg] first:last:step, a comma list or one value; likewise the other axes");
-         o.add("restitution-mean", "RANGE", "", "Mean of eta");
-         o.add("restitution-sd", "RANGE", "", "Sd of eta");
-         o.add("friction-mean", "RANGE", "", "Mean of mu");
-         o.add("friction-sd", "RANGE", "", "Sd of mu");
-         o.add("initial-speed", "MEAN,SD", "", "Of all points (default: the paper's if the one slope is 7.02 or 9.59)");
-         add_wheel(o), add_contact(o), add_course(o), add_study(o);
-         o.add("out", "FILE", "sweep.csv",
-               "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
-       },
-       [](const Options& o, const std::string& line) {
-         SweepRequest request;
-         request.setting = common_setting(o);
-         for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
-           if (o.text(name).empty()) continue;
-           analysis::Axis axis{analysis::parameter_from_name(name), range_value(name, o.text(name))};
-           if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
-             request.setting.slope_deg = axis.values.front();
-           else
-             request.axes.push_back(std::move(axis));
-         }
-         if (request.axes.empty())
-           throw std::invalid_argument(
-               "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
-               "--friction-mean or --friction-sd as first:last:step)");
-         for (const analysis::Axis& axis : request.axes)
-           if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
-             throw std::invalid_argument(
-                 fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
-         const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
-         std::optional<std::string> launch;
-         if (o.given("initial-speed")) launch = o.text("initial-speed");
-         if (!launch && !one_slope) throw std::invalid_argument("--initial-speed: must be given when the slope varies");
-         request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
-         request.study = study_options(o);
-         request.out = o.text("out");
-         request.command = line;
-         run_sweep(request);
-       }},
-      {"report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
-       [](Options& o) {
-         o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]");
-         o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
-         add_wheel(o), add_contact(o), add_course(o), add_study(o);
-         o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
-         o.add("out", "DIR", "report", "Folder for the files");
-       },
-       [](const Options& o, const std::string& line) {
-         run_report(
-             {several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000), o.text("out"), line});
-       }},
-      {"verify", "How accurate the program is: known values, doubling of nodes, three solvers side by side",
-       [](Options& o) {
-         o.add("seeds", "N", "0", "Sampled studies a benchmark, to count how often their interval is right; 0: none");
-         o.add("nodes", "N", "512", "Nodes a landing leg at which doubling stops, 128..4096");
-         o.add_threads();
-         o.add("out", "DIR", "", "Folder for the tables (CSV, Markdown, LaTeX)");
-         o.add("export", "DIR", "", "Folder for the default wheel's chain (PRISM .tra, .lab, .srew; MatrixMarket)");
-       },
-       [](const Options& o, const std::string& line) {
-         run_verify({o.count("seeds", 0, 1000), o.whole("nodes", 128, 4096), o.threads(), o.text("out"),
-                     o.text("export"), line});
-       }},
-  };
-  const std::vector<Command> experiments = experiment_commands();
-  all.insert(all.begin() + 3, experiments.begin(), experiments.end());
-  const std::vector<Command> blind = blind_commands();
-  all.insert(all.end(), blind.begin(), blind.end());
+  std::vector<Command> all{steps(), compare(), sweep()};
+  for (const std::vector<Command>& more :
+       {experiment_commands(), std::vector<Command>{report(), verify()}, blind_commands()})
+    all.insert(all.end(), more.begin(), more.end());
   return all;
 }
 
@@ -177,8 +193,7 @@ int parse_and_run(int argc, const char* const* argv) {
   }
   if (argc < 2 || (argv[1][0] != '-' &&
                    std::none_of(all.begin(), all.end(), [&](const Command& c) { return c.name == argv[1]; }))) {
-    std::string names;
-    for (const Command& command : all) names += (names.empty() ? "" : ", ") + command.name;
+    const std::string names = fmt::format("{}", fmt::join(all | std::views::transform(&Command::name), ", "));
     throw std::invalid_argument(argc < 2 ? fmt::format("a subcommand is needed: {}", names)
                                          : fmt::format("'{}' is none of the subcommands {}", argv[1], names));
   }

@@ -3,23 +3,15 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
-#include "analysis/input_error.h"
+#include "reports/input_file.h"
 #include "reports/output_file.h"
 #include "reports/table.h"
 #include "reports/version.h"
 
 namespace metastable::reports {
 namespace {
-
-std::string file_text(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) throw analysis::InputError({path + ": cannot be read"});
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // Even or odd blocks: what one half says can be checked on the other.
 void keep(analysis::CoastDownRun& run, const std::string& which) {
@@ -39,7 +31,7 @@ void run_coast_down(const CoastDownRequest& request) {
       throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
   std::vector<analysis::CoastDownRun> runs;
   for (const std::string& path : request.logs) {
-    analysis::CounterLog log = analysis::parse_counter_log(path, file_text(path));
+    analysis::CounterLog log = analysis::parse_counter_log(path, read_file(path));
     log.name = std::filesystem::path(path).stem().string();
     if (log.name.find_first_of(",\"\r\n") != std::string::npos)
       throw std::invalid_argument(

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -10,10 +9,12 @@
 #include <vector>
 
 #include "analysis/angle_file.h"
+#include "analysis/collision_comparison.h"
 #include "analysis/experiment.h"
 #include "analysis/input_error.h"
 #include "markov/parallel.h"
 #include "reports/output_file.h"
+#include "reports/table.h"
 
 namespace metastable::reports {
 namespace {
@@ -22,33 +23,10 @@ namespace fs = std::filesystem;
 using analysis::FoundCollision;
 using analysis::FoundTrial;
 
-// Mean and spread of differences.
-class Differences {
- public:
-  void add(double difference) {
-    const double step = difference - mean_;
-    mean_ += step / ++count_;
-    squares_ += step * (difference - mean_);
-  }
-  std::string text() const {
-    if (count_ < 2) return "too few to say";
-    const double sd = std::sqrt(squares_ / (count_ - 1));
-    return fmt::format("bias {:+.4f} +- {:.4f} rad/s, spread (sd) {:.4f} rad/s, n = {:.0f}", mean_,
-                       1.96 * sd / std::sqrt(count_), sd, count_);
-  }
-
- private:
-  double count_ = 0, mean_ = 0, squares_ = 0;
-};
-
-double omega_minus(const FoundCollision& c, bool peak) { return peak || !c.fit ? c.peak : c.fit->omega_minus; }
-double time_of(const FoundCollision& c) { return c.fit ? c.fit->time : c.peak_time; }
-
-std::string csv_text(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + '"';
+std::string text(const analysis::SpeedDifferences& d) {
+  if (d.count < 2) return "too few to say";
+  return fmt::format("bias {:+.4f} +- {:.4f} rad/s, spread (sd) {:.4f} rad/s, n = {}", d.bias, d.bias_half_width, d.sd,
+                     d.count);
 }
 
 struct Files {
@@ -66,10 +44,11 @@ Files write_files(const analysis::Experiment& experiment, const std::vector<anal
     const dynamics::WheelMap& map = maps[angles[t].condition];
     double position = 0;  // chord by chord
     for (const FoundCollision& c : found[t].collisions) {
-      const std::string key = fmt::format("{},{},{}", csv_text(condition.id), angles[t].number, c.number);
+      const std::string key = fmt::format("{},{},{}", csv_field(condition.id), angles[t].number, c.number);
       const int leg = (condition.first_landing_leg + c.number - 1) % experiment.legs();
-      fmt::format_to(std::back_inserter(files.collisions), "{},{},{:.6f},{:.6f},{:.6g},{}\n", key, leg, time_of(c),
-                     position, omega_minus(c, peak), c.fit ? fmt::format("{:.6g}", c.fit->omega_plus) : "");
+      fmt::format_to(std::back_inserter(files.collisions), "{},{},{:.6f},{:.6f},{:.6g},{}\n", key, leg,
+                     reported_time(c), position, reported_speed(c, peak),
+                     c.fit ? fmt::format("{:.6g}", c.fit->omega_plus) : "");
       position += map.advance(leg % map.phases());
       const std::string fit = c.fit ? fmt::format("{:.6f},{:.6g},{:.6g},{:.3g}", c.fit->time, c.fit->omega_minus,
                                                   c.fit->omega_plus, c.fit->residual_sd)
@@ -81,39 +60,13 @@ Files write_files(const analysis::Experiment& experiment, const std::vector<anal
   return files;
 }
 
-// How the found collisions differ from known ones: the same number, and within a tenth of a second if both have a time.
-void print_comparison(const analysis::Experiment& known, const std::vector<analysis::MeasuredAngle>& angles,
-                      const std::vector<FoundTrial>& found, const CollisionsRequest& request) {
-  std::map<int, const analysis::MeasuredTrial*> trials;
-  for (const analysis::MeasuredTrial& trial : known.trials) trials[trial.number] = &trial;
-  std::size_t due = 0, hits = 0, extra = 0;
-  Differences reported, peaks, before, after;
-  for (std::size_t t = 0; t < angles.size(); ++t) {
-    const auto trial = trials.find(angles[t].number);
-    if (trial == trials.end()) continue;
-    const auto& truth = trial->second->collisions;
-    const std::size_t wanted = std::min(truth.size(), static_cast<std::size_t>(request.finder.collisions));
-    due += wanted;
-    for (const FoundCollision& c : found[t].collisions) {
-      const auto i = static_cast<std::size_t>(c.number) - 1;
-      if (i >= wanted || (truth[i].time && std::abs(*truth[i].time - time_of(c)) > 0.1)) {
-        ++extra;
-        continue;
-      }
-      ++hits;
-      reported.add(omega_minus(c, request.peak) - truth[i].omega_minus);
-      peaks.add(c.peak - truth[i].omega_minus);
-      if (!c.fit) continue;
-      before.add(c.fit->omega_minus - truth[i].omega_minus);
-      if (truth[i].omega_plus) after.add(c.fit->omega_plus - *truth[i].omega_plus);
-    }
-  }
-  fmt::print("against the {} collisions of collisions.csv: {} found ({:.2f} %), {} others\n", due, hits,
-             due > 0 ? 100.0 * static_cast<double>(hits) / static_cast<double>(due) : 0.0, extra);
-  fmt::print("  omega_minus as written:  {}\n", reported.text());
-  fmt::print("  omega_minus, peak:       {}\n", peaks.text());
-  fmt::print("  omega_minus, stance fit: {}\n", before.text());
-  fmt::print("  omega_plus, stance fit:  {}\n", after.text());
+void print_comparison(const analysis::CollisionComparison& c) {
+  fmt::print("against the {} collisions of collisions.csv: {} found ({:.2f} %), {} others\n", c.due, c.found,
+             c.due > 0 ? 100.0 * static_cast<double>(c.found) / static_cast<double>(c.due) : 0.0, c.others);
+  fmt::print("  omega_minus as written:  {}\n", text(c.written));
+  fmt::print("  omega_minus, peak:       {}\n", text(c.peak));
+  fmt::print("  omega_minus, stance fit: {}\n", text(c.fit_before));
+  fmt::print("  omega_plus, stance fit:  {}\n", text(c.fit_after));
 }
 
 // Trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two files
@@ -227,7 +180,8 @@ void run_collisions(const CollisionsRequest& request) {
         unfitted);
   for (const auto& [why, trials] : stopped) fmt::print("{} trials without a collision: {}\n", trials, why);
   print_cut_rests(source, files.collisions, angles, cut, limit);
-  if (known) print_comparison(*known, angles, found, request);
+  if (known)
+    print_comparison(analysis::compare_collisions(*known, angles, found, request.peak, request.finder.collisions));
 }
 
 }  // namespace metastable::reports

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "reports/input_file.h"
+
 namespace metastable::reports {
 namespace {
 
@@ -37,7 +39,7 @@ std::string joined(const std::filesystem::path& file, std::string_view key, cons
 std::vector<ConfigEntry> read_config(const std::filesystem::path& file) {
   toml::table table;
   try {
-    table = toml::parse_file(file.string());
+    table = toml::parse(read_file(file), file.string());
   } catch (const toml::parse_error& error) {
     throw std::invalid_argument(fmt::format("{}: {}", place(file, error.source()), error.description()));
   }

@@ -1,7 +1,5 @@
 #include "reports/describe_figures.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "reports/describe_tables.h"

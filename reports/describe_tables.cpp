@@ -94,10 +94,12 @@ Table profiles_table(const analysis::Description& description, const Provenance&
   for (std::size_t k = 0; k < longest; ++k) {
     std::vector<Cell> row{k + 1};
     for (const analysis::ConditionDescription& c : description.conditions) {
-      const bool there = k < c.profile.size();
-      row.push_back(there ? c.profile[k].count : std::size_t{0});
-      row.push_back(there ? Cell(c.profile[k].mean) : Cell(""));
-      row.push_back(there && c.profile[k].count > 1 ? Cell(c.profile[k].standard_error) : Cell(""));
+      if (k >= c.profile.size()) {
+        row.insert(row.end(), {std::size_t{0}, "", ""});
+        continue;
+      }
+      const analysis::SpeedSummary& s = c.profile[k];
+      row.insert(row.end(), {s.count, s.mean, s.count > 1 ? Cell(s.standard_error) : Cell("")});
     }
     table.rows.push_back(std::move(row));
   }

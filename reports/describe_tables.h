@@ -2,7 +2,6 @@
 // The tables of `metastable describe`, from a finished description.
 
 #include <string>
-#include <vector>
 
 #include "analysis/description.h"
 #include "analysis/law_comparison.h"

@@ -6,8 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
 #include <string>
+
+#include "analysis/interval_95.h"
 
 namespace metastable::reports {
 namespace {
@@ -16,7 +17,6 @@ using analysis::Diagnosis;
 using analysis::GapCell;
 using analysis::GapMap;
 
-constexpr double normal_95 = 1.959963984540054;
 constexpr double full_colour = 6;  // score beyond which colours do not change
 constexpr std::size_t bars_at_most = 12;
 constexpr double shown_probability = 0.0005;
@@ -112,8 +112,8 @@ std::vector<Figure> profile_figures(const Diagnosis& d) {
       if (p.condition != c) continue;
       const double x = p.collision;
       measured.x.push_back(x), measured.y.push_back(p.measured);
-      measured.lower.push_back(p.measured - normal_95 * p.measured_error);
-      measured.upper.push_back(p.measured + normal_95 * p.measured_error);
+      measured.lower.push_back(p.measured - analysis::normal_95 * p.measured_error);
+      measured.upper.push_back(p.measured + analysis::normal_95 * p.measured_error);
       if (p.baseline > 0) given.x.push_back(x), given.y.push_back(p.baseline);
       if (!(p.with_effect > 0)) continue;
       effect.x.push_back(x), effect.y.push_back(p.with_effect);

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <string>
 
+#include "analysis/interval_95.h"
 #include "dynamics/effect_catalogue.h"
 
 namespace metastable::reports {
@@ -16,8 +16,6 @@ using analysis::Cause;
 using analysis::Diagnosis;
 using analysis::EstimatedParameter;
 using analysis::GapCell;
-
-constexpr double normal_95 = 1.959963984540054;
 
 // What is not known is an empty cell.
 Cell known(double value) { return std::isnan(value) ? Cell("") : Cell(value); }
@@ -240,7 +238,7 @@ Table profile_table(const Diagnosis& d) {
                           {"with effect", "rad/s", NumberFormat::significant, 4},
                           {"band", "rad/s"}}};
   for (const analysis::ProfilePoint& p : d.profile) {
-    const double half = normal_95 * p.measured_error;
+    const double half = analysis::normal_95 * p.measured_error;
     table.rows.push_back({d.condition_names.at(p.condition), p.collision, p.trials,
                           std::isnan(p.measured) ? Cell("")
                           : std::isnan(half)     ? Cell(p.measured)
@@ -278,10 +276,9 @@ Table missing_table(const Diagnosis& d) {
   for (const analysis::MissingColumn& m : d.missing) {
     if (m.effects.empty()) table.rows.push_back({m.column, "no effect is much harder to see", "", "", "", "", ""});
     for (const analysis::HiddenEffect& e : m.effects) {
-      std::string others;
-      for (const std::string& other : e.not_told_from) others += (others.empty() ? "" : ", ") + other;
       table.rows.push_back({m.column, e.effect, e.parameter, known(e.smallest), known(e.smallest_with_it),
-                            std::string(effect_unit(e.effect, e.parameter)), others});
+                            std::string(effect_unit(e.effect, e.parameter)),
+                            fmt::format("{}", fmt::join(e.not_told_from, ", "))});
     }
   }
   return table;

@@ -2,17 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
+#include "analysis/diagnosis.h"
 #include "analysis/experiment_model.h"
-#include "analysis/metastability.h"
-#include "analysis/reality.h"
-#include "analysis/stand_in.h"
+#include "analysis/interval_95.h"
 #include "analysis/step_balance.h"
-#include "analysis/uncharged_sticking.h"
+#include "analysis/worked_examples.h"
 #include "reports/diagnosis_figures.h"
 #include "reports/diagnosis_tables.h"
 #include "reports/page_folder.h"
@@ -24,32 +27,11 @@ namespace {
 
 using analysis::Diagnosis;
 using analysis::Experiment;
-using analysis::Setting;
-
-analysis::ExperimentSource source_of(const analysis::ExperimentFiles& files, const std::string& name) {
-  return {name, files.experiment_toml, files.collisions_csv, files.trials_csv, {}};
-}
-
-// The stand-in's trials in the virtual laboratory, with effects.
-Experiment laboratory_experiment(std::vector<dynamics::Effect> effects, const LessonsRequest& request) {
-  const auto conditions = analysis::stand_in_conditions(analysis::stand_in_setting());
-  analysis::RealityOptions options;
-  options.effects = std::move(effects);
-  options.sensor_noise = 0.008;
-  options.seed = request.seed;
-  options.threads = request.threads;
-  const dynamics::LaboratorySetup setup = analysis::laboratory_setup(conditions, options);
-  const auto trials = analysis::run_laboratory(setup, request.threads);
-  return analysis::parse_experiment(
-      source_of(analysis::reality_files(conditions, setup, trials, {.title = "laboratory"}).files, "laboratory"));
-}
 
 Diagnosis diagnosed(const Experiment& experiment, const std::string& what, const LessonsRequest& request) {
   const auto model = analysis::transition_model(experiment);
   Progress progress(what, study_units);
-  analysis::DiagnosisOptions options;
-  options.seed = request.seed;
-  options.threads = request.threads;
+  analysis::DiagnosisOptions options = request.options;
   options.progress = study_progress(progress);
   return analysis::diagnose(*model, options);
 }
@@ -79,8 +61,7 @@ Table answers(const std::string& id, const std::string& title, const std::string
 }
 
 void add_answer(Table& table, const std::string& what, const Diagnosis& d) {
-  std::string causes;
-  for (const std::string& name : d.cause_set) causes += (causes.empty() ? "" : ", ") + name;
+  std::string causes = fmt::format("{}", fmt::join(d.cause_set, ", "));
   if (causes.empty() && d.verdict == analysis::Verdict::unexplained && !d.causes.empty())
     causes = fmt::format("(nearest: {})", d.causes.front().name());
   std::vector<Cell> row{what, analysis::verdict_name(d.verdict), causes, d.p_as_given};
@@ -109,6 +90,20 @@ Table said(const std::string& id, const std::string& title, const Diagnosis& d) 
   return table;
 }
 
+const char* source_name(analysis::Source source) {
+  switch (source) {
+    case analysis::Source::none:
+      return "nothing";
+    case analysis::Source::launch:
+      return "launch speeds (H1)";
+    case analysis::Source::legs:
+      return "differences of the legs (H2)";
+    case analysis::Source::contact:
+      return "restitution and friction (H3)";
+  }
+  throw std::logic_error("source without a name");
+}
+
 // --- What the charge on sticking collisions does -------------------------------------------------------------------
 
 Table charge_table(const LessonsRequest& request) {
@@ -124,44 +119,15 @@ Table charge_table(const LessonsRequest& request) {
                   {"published"},
                   {"uncharged"},
                   {"coulomb"}}};
-  for (const double slope : {7.02, 9.59}) {
-    Setting setting;
-    setting.wheel.leg_length.assign(8, 0.1519);
-    setting.slope_deg = slope;
-    setting.initial_speed = *analysis::paper_launch(slope);
-    const analysis::StudyOptions options{
-        .tolerance = 0.05, .seed = request.seed, .threads = request.threads, .brief = true};
-    const auto cell = [&](const analysis::Problem& problem) -> Cell {
-      const analysis::Estimate e = analysis::study(problem, options).from_start;
-      if (!std::isfinite(e.value)) return Infinite{};
-      return Estimate{e.value, e.lower, e.upper};
-    };
-    analysis::Problem without = setting.problem();
-    const analysis::UnchargedSticking uncharged(setting.map());
-    without.map = markov::AnyReturnMap(uncharged);
-    Setting coulomb = setting;
-    coulomb.law = dynamics::Law::coulomb;
-    const double critical = uncharged.sticking_friction(0);
-    const double share = 1 - dynamics::TruncatedNormal(setting.friction.mean, setting.friction.sd, 0).cdf(critical);
-    table.rows.push_back({slope, critical, share, cell(setting.problem()), cell(without), cell(coulomb.problem())});
-  }
+  const auto cell = [](const analysis::Estimate& e) -> Cell {
+    if (!std::isfinite(e.value)) return Infinite{};
+    return Estimate{e.value, e.lower, e.upper};
+  };
+  for (const analysis::ChargeOnSticking& ramp :
+       analysis::charge_on_sticking(request.options.seed, request.options.threads))
+    table.rows.push_back({ramp.slope_deg, ramp.critical_friction, ramp.share_above, cell(ramp.published),
+                          cell(ramp.uncharged), cell(ramp.coulomb)});
   return table;
-}
-
-// --- The paper's hypotheses as effects -----------------------------------------------------------------------------
-
-Experiment halved(Experiment e, int hypothesis) {
-  if (hypothesis == 1)
-    for (analysis::Condition& c : e.conditions) c.initial_speed->sd /= 2;
-  if (hypothesis == 2) {
-    const double mean = e.wheel.mean_leg_length();
-    for (double& length : e.wheel.leg_length) length = mean + (length - mean) / 2;
-  }
-  if (hypothesis == 3) {
-    e.contact.restitution.sd /= 2;
-    e.contact.friction.sd /= 2;
-  }
-  return e;
 }
 
 // --- Measured trials -----------------------------------------------------------------------------------------------
@@ -204,91 +170,113 @@ Figure balance_figure(const std::string& id, const analysis::StepBalances& b) {
   for (const analysis::StepBalance& s : b.slides) {
     figure.series[0].x.push_back(1000 * *s.slide);
     figure.series[0].y.push_back(s.mean);
-    const double half = 1.96 * s.sd / std::sqrt(static_cast<double>(s.steps));
+    const double half = analysis::normal_95 * s.sd / std::sqrt(static_cast<double>(s.steps));
     figure.series[0].lower.push_back(s.mean - half);
     figure.series[0].upper.push_back(s.mean + half);
   }
   return figure;
 }
 
-}  // namespace
+// The page as its sections are written.
+class Lessons {
+ public:
+  explicit Lessons(const LessonsRequest& request)
+      : request_(request),
+        pages_(request.out),
+        provenance_{request.command, "the stand-in's wheel and contact unless said otherwise", request.options.seed,
+                    version()} {
+    pages_.page().title = "Worked examples: what the diagnosis says";
+    pages_.page().provenance = provenance_;
+  }
 
-void run_lessons(const LessonsRequest& request) {
-  std::vector<Experiment> measured;
-  for (const std::string& folder : request.data) measured.push_back(analysis::read_experiment(folder));
-  PageFolder pages(request.out);
-  const Provenance provenance{request.command, "the stand-in's wheel and contact unless said otherwise", request.seed,
-                              version()};
-  Page& page = pages.page();
-  page.title = "Worked examples: what the diagnosis says";
-  page.provenance = provenance;
-  const auto section = [&](const std::string& id, const std::string& heading, const std::string& reading,
-                           std::vector<Figure> figures, std::vector<Table> tables) {
-    for (Figure& figure : figures) {
-      if (figure.id.rfind(id, 0) != 0) figure.id = id + "-" + figure.id;
-      figure.provenance = provenance;
-    }
-    for (Table& table : tables) table.provenance = provenance;
-    pages.section(id, heading, reading, figures, std::move(tables));
-  };
-
-  {
-    const Diagnosis d = diagnosed(laboratory_experiment({{"slip_reversal", {}}}, request), "coulomb wheel", request);
+  void coulomb_wheel() {
+    const Diagnosis d = diagnosed(laboratory({{"slip_reversal", {}}}), "coulomb wheel", request_);
     Table table = answers("coulomb-wheel", "Nominal law `published`, the wheel obeys `coulomb`", "wheel");
     add_answer(table, "laboratory, coulomb, three conditions", d);
     section("coulomb-wheel", "A wheel that obeys coulomb, under the published law",
             "A laboratory wheel of the stand-in's conditions that sticks above mu_c, diagnosed with the published law.",
             map_figures(d), {table, said("coulomb-wheel-said", "In words", d)});
   }
-  section("charge", "The charge on sticking collisions",
-          "The published law charges friction where a foot would stick; without that charge rest is rarer.", {},
-          {charge_table(request)});
-  {
+
+  void charge() {
+    section("charge", "The charge on sticking collisions",
+            "The published law charges friction where a foot would stick; without that charge rest is rarer.", {},
+            {charge_table(request_)});
+  }
+
+  void hypotheses() {
     Table table = answers("hypotheses", "The paper's hypotheses as effects: each source believed half as wide as it is",
                           "believed half as wide");
-    const auto stand_in = laboratory_experiment({}, request);
-    const char* names[] = {"nothing", "launch speeds (H1)", "differences of the legs (H2)",
-                           "restitution and friction (H3)"};
-    for (int h = 0; h < 4; ++h) add_answer(table, names[h], diagnosed(halved(stand_in, h), names[h], request));
+    const Experiment stand_in = laboratory({});
+    for (const analysis::Source source : analysis::sources)
+      add_answer(table, source_name(source),
+                 diagnosed(believed_half_as_wide(stand_in, source), source_name(source), request_));
     table.notes.push_back(
         "A source that dominates moves the steps before failure when it is believed wrongly, not only the likelihood.");
     section("hypotheses", "H1, H2 and H3 as effects",
             "Simulated trials of the stand-in; the nominal model believes each source half as wide in turn.", {},
             {table});
   }
-  for (std::size_t i = 0; i < measured.size(); ++i) {
-    const std::string name = std::filesystem::path(request.data[i]).lexically_normal().filename().string();
-    const std::string id = fmt::format("data-{}", i + 1);
-    Table table = answers(id + "-answers", measured[i].title, "nominal law");
-    std::vector<Table> tables;
+
+  /// @param number  from 1
+  void measured(const Experiment& experiment, const std::string& name, std::size_t number) {
+    const std::string id = fmt::format("data-{}", number);
+    Table table = answers(id + "-answers", experiment.title, "nominal law");
+    std::vector<Table> in_words;
+    for (const analysis::UnderLaw& one : analysis::under_both_laws(experiment)) {
+      const std::string_view law = dynamics::law_name(one.law);
+      const std::string what = fmt::format("{}{}", law, one.whole_steps ? ", whole steps (omega_plus left out)" : "");
+      const Diagnosis d = diagnosed(one.experiment, what, request_);
+      add_answer(table, what, d);
+      in_words.push_back(said(fmt::format("{}-{}{}", id, law, one.whole_steps ? "-steps" : ""), what, d));
+    }
+    std::vector<Table> tables{table};
+    tables.insert(tables.end(), in_words.begin(), in_words.end());
     std::vector<Figure> figures;
-    for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb})
-      for (const bool after : {true, false}) {
-        Experiment e = measured[i];
-        e.contact.law = law;
-        if (!after) {
-          if (e.columns.omega_plus == analysis::Presence::none) continue;
-          e.columns.omega_plus = analysis::Presence::none;
-          for (analysis::MeasuredTrial& trial : e.trials)
-            for (analysis::MeasuredCollision& c : trial.collisions) c.omega_plus.reset();
-        }
-        const std::string what =
-            fmt::format("{}{}", dynamics::law_name(law), after ? "" : ", whole steps (omega_plus left out)");
-        const Diagnosis d = diagnosed(e, what, request);
-        add_answer(table, what, d);
-        tables.push_back(said(fmt::format("{}-{}{}", id, dynamics::law_name(law), after ? "" : "-steps"), what, d));
-      }
-    tables.insert(tables.begin(), table);
-    if (measured[i].system == analysis::System::rimless_wheel && measured[i].columns.leg == analysis::Presence::all) {
-      const analysis::StepBalances balances = analysis::step_balances(measured[i]);
+    if (experiment.system == analysis::System::rimless_wheel && experiment.columns.leg == analysis::Presence::all) {
+      const analysis::StepBalances balances = analysis::step_balances(experiment);
       tables.push_back(balance_table(id + "-balance", name, balances));
       if (!balances.slides.empty()) figures.push_back(balance_figure(id + "-slides", balances));
     }
-    section(id, measured[i].title.empty() ? name : measured[i].title,
-            "Where no law of the catalogue fits, the balance of whole steps says what one would have to do.", figures,
-            std::move(tables));
+    section(id, experiment.title.empty() ? name : experiment.title,
+            "Where no law of the catalogue fits, the balance of whole steps says what one would have to do.",
+            std::move(figures), std::move(tables));
   }
-  pages.write_index();
+
+  void write_index() const { pages_.write_index(); }
+
+ private:
+  Experiment laboratory(const std::vector<dynamics::Effect>& effects) const {
+    return analysis::laboratory_stand_in(effects, request_.options.seed, request_.options.threads, request_.trials);
+  }
+
+  void section(const std::string& id, const std::string& heading, const std::string& reading,
+               std::vector<Figure> figures, std::vector<Table> tables) {
+    for (Figure& figure : figures) {
+      if (!figure.id.starts_with(id)) figure.id = id + "-" + figure.id;
+      figure.provenance = provenance_;
+    }
+    for (Table& table : tables) table.provenance = provenance_;
+    pages_.section(id, heading, reading, figures, std::move(tables));
+  }
+
+  const LessonsRequest& request_;
+  PageFolder pages_;
+  Provenance provenance_;
+};
+
+}  // namespace
+
+void run_lessons(const LessonsRequest& request) {
+  std::vector<Experiment> measured;
+  for (const std::string& folder : request.data) measured.push_back(analysis::read_experiment(folder));
+  Lessons lessons(request);
+  lessons.coulomb_wheel();
+  lessons.charge();
+  lessons.hypotheses();
+  for (std::size_t i = 0; i < measured.size(); ++i)
+    lessons.measured(measured[i], std::filesystem::path(request.data[i]).lexically_normal().filename().string(), i + 1);
+  lessons.write_index();
   fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 

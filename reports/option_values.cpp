@@ -6,12 +6,13 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
+#include <sstream>
 #include <stdexcept>
 
 #include "analysis/sweep.h"
 #include "dynamics/effect_catalogue.h"
 #include "dynamics/wheel.h"
+#include "reports/input_file.h"
 
 namespace metastable::reports {
 namespace {
@@ -114,9 +115,8 @@ std::vector<double> legs_value(std::string_view name, std::string_view text, int
   return lengths;
 }
 
-std::vector<dynamics::Contact> contact_list(std::string_view name, const std::string& file) {
-  std::ifstream in(file);
-  if (!in) throw std::invalid_argument(fmt::format("--{}: {}: cannot be read", name, file));
+std::vector<dynamics::Contact> contact_list(const std::string& file) {
+  std::istringstream in(read_file(file));
   std::vector<dynamics::Contact> pairs;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
@@ -156,8 +156,7 @@ std::vector<std::string> catalogue_value(std::string_view name, const std::strin
   };
   std::error_code too_long;  // a list of names need not be a possible path
   if (std::filesystem::is_regular_file(text, too_long)) {
-    std::ifstream in(text);
-    if (!in) throw std::invalid_argument(fmt::format("--{}: {}: cannot be read", name, text));
+    std::istringstream in(read_file(text));
     std::string line;
     for (int number = 1; std::getline(in, line); ++number) {
       const std::string_view word = trimmed(std::string_view(line).substr(0, line.find('#')));

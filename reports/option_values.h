@@ -24,7 +24,7 @@ std::vector<double> range_value(std::string_view name, std::string_view text);
 /// "paper", one length (then `count` legs of it), or a comma list of at least three [m].
 std::vector<double> legs_value(std::string_view name, std::string_view text, int count);
 /// Pairs from a CSV file with the header "restitution,friction"; errors name file, line and column.
-std::vector<dynamics::Contact> contact_list(std::string_view name, const std::string& file);
+std::vector<dynamics::Contact> contact_list(const std::string& file);
 
 /// Ids of effects from a comma list, or from a file with one a line (# starts a comment); each once, in that order.
 /// Errors name the id and the known ones, in a file the line too.

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "reports/describe_tables.h"
 
 namespace metastable::reports {

@@ -137,8 +137,8 @@ struct DiagnoseRequest {
 struct LessonsRequest {
   std::vector<std::string> data;  ///< experiment folders to be diagnosed under each law
   std::string out = "lessons";
-  std::uint64_t seed = 1;
-  int threads = 0;
+  analysis::DiagnosisOptions options;  ///< of every diagnosis; seed and threads also of the simulated trials
+  int trials = 0;                      ///< simulated, of each condition; 0: as many as the paper has
   std::string command;
 };
 

@@ -98,7 +98,7 @@ analysis::Setting common_setting(const Options& options) {
   if (options.given("contact-list")) {
     if (options.given("restitution") || options.given("friction") || options.given("correlation"))
       throw std::invalid_argument("--contact-list: excludes --restitution, --friction and --correlation");
-    setting.pairs = contact_list("contact-list", options.text("contact-list"));
+    setting.pairs = contact_list(options.text("contact-list"));
   }
   setting.ramp_length = options.number("ramp-length");
   setting.first_landing_leg = options.count("first-leg", 0, setting.wheel.legs() - 1);

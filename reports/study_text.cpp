@@ -91,10 +91,7 @@ std::string study_text(const analysis::Setting& setting, const analysis::Metasta
   if (!endless)
     text += line("stationary speed, relaunched",
                  fmt::format("{:.4f} rad/s, sd {:.4f}", study.restart_mean, study.restart_sd));
-  std::string moduli;
-  for (const double modulus : study.eigenvalue_moduli)
-    moduli += fmt::format("{}{:.6g}", moduli.empty() ? "" : ", ", modulus);
-  text += line("eigenvalue moduli per step", moduli);
+  text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.eigenvalue_moduli, ", ")));
   std::string mixing = fmt::format("{:.4g} steps (spectral)", study.mixing_steps);
   if (study.total_variation_steps)
     mixing += fmt::format(", {} from the launch (total variation)", *study.total_variation_steps);

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <optional>
 
 #include "reports/figure.h"
+#include "reports/input_file.h"
 #include "reports/output_file.h"
 #include "reports/progress.h"
 #include "reports/version.h"
@@ -64,11 +64,6 @@ std::string row(const analysis::SweepPoint& point) {
                             number(study.from_quasi_stationary.value), number(study.failure_rate.value),
                             study.observable_mean, study.observable_sd, study.reach_end ? number(*study.reach_end) : "",
                             analysis::status_text(study.status));
-}
-
-std::string whole_file(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 // Complete rows behind the head; a last line without its end was cut short and is dropped.
@@ -162,13 +157,14 @@ void run_sweep(const SweepRequest& request) {
     analysis::sweep_setting(request.setting, request.axes, i).problem();
 
   std::vector<std::string> rows;
+  if (std::filesystem::is_directory(out)) throw OutputError(out, "is a folder");
   if (std::filesystem::exists(out)) {
-    const std::string text = whole_file(out);
+    const std::string text = read_file(out);
     if (!text.starts_with(first_lines))
       throw OutputError(out, "holds another sweep; choose another --out or remove it");
     rows = rows_behind(text, first_lines);
   } else if (std::filesystem::exists(partial)) {
-    const std::string text = whole_file(partial);
+    const std::string text = read_file(partial);
     if (!text.starts_with(first_lines))
       throw OutputError(partial, "belongs to another sweep; choose another --out or remove it");
     rows = rows_behind(text, first_lines);

@@ -140,16 +140,6 @@ std::string plain_number(double value, const Column& column) {
 
 // CSV
 
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos && !text.starts_with('#')) return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"') quoted += '"';
-    quoted += c;
-  }
-  return quoted + '"';
-}
-
 void append_comment(std::string& out, std::string_view prefix, std::string_view text) {
   while (true) {
     const std::size_t end = text.find('\n');
@@ -384,6 +374,16 @@ std::string escape_html(std::string_view text) {
     }
   }
   return out;
+}
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos && !text.starts_with('#')) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + '"';
 }
 
 std::string to_csv(const Table& table) {

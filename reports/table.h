@@ -8,6 +8,8 @@
 #include <variant>
 #include <vector>
 
+#include "analysis/interval_95.h"
+
 namespace metastable::reports {
 
 /// What made a result. Carried by every table, figure and page.
@@ -29,8 +31,8 @@ struct Estimate {
 };
 /// Normal 95 % interval.
 inline Estimate with_error(double value, double standard_error) {
-  constexpr double z = 1.959963984540054;
-  return {value, value - z * standard_error, value + z * standard_error};
+  const double half = analysis::normal_95 * standard_error;
+  return {value, value - half, value + half};
 }
 /// Rendered as the word "infinite".
 struct Infinite {};
@@ -83,6 +85,8 @@ struct Table {
 /// header "name [unit]", then the rows at full precision. A column with an Estimate becomes three: "name [unit]",
 /// "name low95 [unit]", "name high95 [unit]". Infinite is the word "infinite".
 std::string to_csv(const Table& table);
+/// One field of such a file: in quotes where it holds a comma, a quote or a line end, or starts with '#'.
+std::string csv_field(const std::string& text);
 /// Title as bold text, pipe table, notes, provenance.
 std::string to_markdown(const Table& table);
 /// A floating table for \usepackage{booktabs}, any engine: everything but ASCII is turned into commands where LaTeX

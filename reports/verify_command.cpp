@@ -110,7 +110,6 @@ Table coverage_table(const std::vector<Checked>& rows, const VerifyRequest& requ
 }
 
 void export_chain(const Checked& checked, const std::filesystem::path& folder) {
-  make_folder(folder);
   const markov::SampledChain& chain = checked.verified.chain;
   const markov::ChainFiles files = markov::chain_files(chain.chain, chain.launch);
   write_file(folder / "chain.tra", files.transitions);
@@ -125,6 +124,8 @@ void export_chain(const Checked& checked, const std::filesystem::path& folder) {
 }  // namespace
 
 void run_verify(const VerifyRequest& request) {
+  for (const std::string& folder : {request.out, request.export_to})  // before any long computation
+    if (!folder.empty()) make_folder(folder);
   const std::vector<analysis::Benchmark> terrain = analysis::rough_terrain_benchmarks(),
                                          wheels = analysis::wheel_benchmarks();
   Progress progress("verify", (terrain.size() + wheels.size()) * (request.seeds > 0 ? 2 : 1));
@@ -150,7 +151,6 @@ void run_verify(const VerifyRequest& request) {
                               "rough terrain: mean slope 8 deg, g 9.8 m/s^2, l 1 m, from the fixed point\n"
                               "wheel: law published, eta ~ N(0.4, 0.1^2), the paper's launch, equal legs of 0.1519 m",
                               1, version()};
-  if (!request.out.empty()) make_folder(request.out);
   for (Table& table : tables) {
     table.provenance = provenance;
     if (!request.out.empty()) {

@@ -1,4 +1,4 @@
-// Guaranteed bounds around the known answers of physics.md.
+// Guaranteed bounds around expected steps that other methods give.
 
 #include "analysis/certify.h"
 

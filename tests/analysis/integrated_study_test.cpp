@@ -30,7 +30,7 @@ Metastability integrated(const Setting& setting, double tolerance, std::size_t c
 }
 
 TEST(IntegratedStudy, GivesTheKnownAnswersOfThePapersWheel) {
-  // physics.md: 4.26 and 6.17, within 0.1 %; sampled and extrapolated: 4.2585(1), 6.1746(2).
+  // Direct simulation: 4.26 and 6.17 (tests/dynamics/trials_test.cpp); sampled and extrapolated: 4.2585(1), 6.1746(2).
   const Metastability flat = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-3);
   EXPECT_EQ(flat.method, Method::integrated);
   EXPECT_EQ(flat.status, Status::converged);
@@ -136,8 +136,8 @@ TEST(IntegratedStudy, TakesCoulomb) {
   setting.initial_speed = {4.5, 0.2};
   const Metastability result = integrated(setting, 1e-8);
   EXPECT_EQ(result.status, Status::converged);
-  // physics.md: 24.68 (s.e. 0.03), by simulation. The digits: 24 panels of 16 nodes between edges of three generations,
-  // and 30 points a panel of eta and mu: 24.67743312.
+  // Direct simulation: 24.68 (s.e. 0.03), tests/dynamics/trials_test.cpp. The digits: 24 panels of 16 nodes between
+  // edges of three generations, and 30 points a panel of eta and mu: 24.67743312.
   EXPECT_NEAR(result.from_start.value, 24.68, 0.09);
   EXPECT_NEAR(result.from_start.value / 24.67743312, 1, 1e-9);
   EXPECT_NEAR(result.steps.mean / result.from_start.value, 1, 1e-12);

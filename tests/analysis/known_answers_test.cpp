@@ -23,8 +23,9 @@ struct Row {
 
 class PublishedWheel : public testing::TestWithParam<Row> {};
 
-// physics.md, "Known answers": equal legs of 0.1519 m, `published`, eta ~ N(0.4, 0.1^2). The printed figures have three
-// digits; half a unit of the third is allowed beside the stated error.
+// Direct simulation of whole trials (tests/dynamics/trials_test.cpp does it again): equal legs of 0.1519 m,
+// `published`, eta ~ N(0.4, 0.1^2). The figures have three digits; half a unit of the third is allowed beside their
+// error.
 TEST_P(PublishedWheel, ExpectedStepsAreInsideTheStudysOwnInterval) {
   const Row row = GetParam();
   Setting setting = paper_setting(row.slope_deg, true);
@@ -40,7 +41,7 @@ INSTANTIATE_TEST_SUITE_P(KnownAnswers, PublishedWheel,
                          testing::Values(Row{7.02, 0.4, 0.1, 4.26, 0.0022}, Row{9.59, 0.4, 0.1, 6.17, 0.0018},
                                          Row{7.02, 0.3, 0.05, 1.30e3, 0.005}, Row{9.59, 0.3, 0.05, 4.66e4, 0.005}));
 
-// physics.md, `coulomb`: 24.68 steps (s.e. 0.03).
+// Direct simulation of whole trials: 24.68 steps (s.e. 0.03), likewise.
 TEST(KnownAnswers, CoulombOnAGentleSlope) {
   StudyOptions options;
   options.tolerance = 0.003;
@@ -48,7 +49,8 @@ TEST(KnownAnswers, CoulombOnAGentleSlope) {
   EXPECT_NEAR(result.from_start.value, 24.68, 3 * 0.03 + 0.5 * (result.from_start.upper - result.from_start.lower));
 }
 
-// physics.md, rough-terrain table: 60-digit values for a mean slope of 8 deg.
+// The wheel of Byl and Tedrake (IJRR 28, 2009) at a mean slope of 8 deg: its integral equation solved with numbers of
+// sixty digits. tests/markov/rough_terrain_test.cpp solves it once more, in double precision.
 struct Rough {
   double sd_deg, rate, from_quasi_stationary, from_fixed_point;
 };
@@ -103,7 +105,8 @@ TEST(KnownAnswers, RoughTerrainOnSampledCellsToOneInAThousand) {
   EXPECT_NEAR(steps / 4326.1846791959863, 1.0, 1e-3);
 }
 
-// physics.md: at mu ~ N(0.3, 0.03^2) the expected steps pass 1e7. Rarer still, the study keeps converging.
+// metastable steps --legs 0.1519 --friction 0.3,0.03 --method integrated: 1.5e7 steps. Rarer still, the study keeps
+// converging.
 TEST(KnownAnswers, RareFailuresAreSeen) {
   Setting setting = paper_setting(7.02, true);
   setting.friction = {0.3, 0.03};

@@ -53,7 +53,7 @@ TEST(PaperStudy, ReadingsAndLawsDiffer) {
   EXPECT_GT(rests.fig7[1][1].rest_share, 0.95);
   EXPECT_EQ(coulomb.fig7[1][1].rest_share, 0);
   EXPECT_EQ(coulomb.fig7[1][1].steady.size(), 200u * 4);
-  // Fig. 8 (physics: k = 1 and 4 under this reading), to the sampling error of 200 trials.
+  // Fig. 8 (energy_losses_test.cpp: spreads of 0.05 and 0.2), to the sampling error of 200 trials.
   EXPECT_NEAR(goes_on.fig8[0].tangential_net.mean, 0.066, 4 * goes_on.fig8[0].tangential_net.standard_error + 5e-4);
   EXPECT_NEAR(goes_on.fig8[3].normal.mean, 0.141, 4 * goes_on.fig8[3].normal.standard_error + 5e-4);
   // The first collision's speeds are the launch's.

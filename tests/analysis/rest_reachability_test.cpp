@@ -17,7 +17,10 @@ Setting coulomb(double slope_deg) {
   return setting;
 }
 
-// physics.md: with rebound_lost = 0 rest is unreachable at 7.02 and 9.59 deg, possible only below 3.47 deg.
+// With rebound_lost = 0 a collision leaves k = omega+^2/omega-^2 >= 0.54, whatever eta and mu are. At the fixed point
+// of that k, omega+^2 = k/(1 - k) times what a stance adds; it clears the barrier if k/(1 - k) 2 sin(gamma)
+// sin(alpha/2) >= 1 - cos(alpha/2 - gamma): from gamma = 3.47 deg on. At 7.02 and 9.59 deg rest would need k < 0.28 and
+// 0.17.
 TEST(RestReachability, CoulombNeverRestsOnThePapersRamps) {
   for (const double slope : {7.02, 9.59}) {
     const RestReachability reach = rest_reachability(coulomb(slope).problem());

@@ -17,7 +17,7 @@ TEST(Setting, DefaultsAreThePapers) {
   EXPECT_EQ(setting.describe(),
             "7.02 deg, legs 0.1524, 0.1524, 0.1514, 0.1514, 0.1516, 0.1508, 0.1524, 0.1528 m, law published, "
             "eta ~ N(0.4, 0.1^2), mu ~ N(0.4, 0.1^2), omega_0 ~ N(7.35, 0.19^2) rad/s");
-  EXPECT_EQ(setting.problem().last_event, 32);  // physics.md: the 32nd collision
+  EXPECT_EQ(setting.problem().last_event, 32);  // 31 chords of 0.1163 m fit on 3.66 m
   EXPECT_DOUBLE_EQ(paper_launch(9.59)->mean, 5.83);
   EXPECT_FALSE(paper_launch(8.0));
 }

@@ -14,7 +14,7 @@ inline Setting paper_setting(double slope_deg, bool equal_legs) {
   return setting;
 }
 
-/// physics.md, coulomb: 3.0 deg, equal legs 0.1519 m, omega_0 ~ N(4.5, 0.2^2), eta, mu ~ N(0.4, 0.1^2).
+/// `coulomb` at 3.0 deg, where it may rest: equal legs of 0.1519 m, omega_0 ~ N(4.5, 0.2^2), eta, mu ~ N(0.4, 0.1^2).
 inline Setting gentle_coulomb() {
   Setting setting;
   setting.slope_deg = 3.0;

@@ -38,7 +38,8 @@ WheelMap published(double slope, double friction, double sd) {
   return {even_wheel(), slope * degree, Law::published, ContactNoise::normal(0.4, 0.1, friction, sd)};
 }
 
-// physics, "Known answers": expected steps before failure; the half digit of the quoted value is allowed for.
+// metastable steps --legs 0.1519 --method integrated, with --slope 9.59 or --friction 0.3,0.05: 4.26, 6.17 and 1.30e3
+// steps; half a unit of the third digit is allowed for.
 TEST(Trials, ExpectedStepsOfThePublishedLaw) {
   const Moments flat = steps(published(7.02, 0.4, 0.1), launch_7, 100000);
   EXPECT_NEAR(flat.mean(), 4.26, 4 * flat.error() + 0.005);
@@ -57,7 +58,7 @@ TEST(Trials, ExpectedStepsOfTheCoulombLaw) {
   EXPECT_NEAR(m.mean(), 24.68, 4 * std::hypot(m.error(), 0.03));
 }
 
-// physics, "Known answers": the reading of Fig. 8, to its rounding and four standard errors.
+// The paper's Fig. 8 as tests/analysis/energy_losses_test.cpp reads it, to rounding and four standard errors.
 TEST(Trials, EnergyLossesOfFigure8) {
   struct Row {
     int k;

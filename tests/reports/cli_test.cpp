@@ -10,15 +10,16 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "reports/interrupt.h"
+#include "tests/reports/support.h"
 
 namespace metastable::reports {
 namespace {
+using test::read;
 
 struct Ran {
   int code = 0;
@@ -37,25 +38,12 @@ Ran metastable(std::vector<std::string> words) {
   return ran;
 }
 
-std::string content(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-class CommandLine : public testing::Test {
+class CommandLine : public test::InFolder {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) /
-              ("cli-" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
   std::string file(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name) << text;
     return (folder_ / name).string();
   }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
   std::vector<std::string> left_behind() const {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(folder_))
@@ -63,8 +51,6 @@ class CommandLine : public testing::Test {
     std::sort(names.begin(), names.end());
     return names;
   }
-
-  std::filesystem::path folder_;
 };
 
 const std::vector<std::string> quick{"--legs", "0.1519", "--cells", "32", "--samples", "256"};
@@ -80,7 +66,7 @@ TEST_F(CommandLine, CertifiedBoundsStandBesideTheEstimate) {
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_NE(ran.out.find("certificate"), std::string::npos);
   EXPECT_NE(ran.out.find("guaranteed"), std::string::npos);
-  const auto certificate = nlohmann::json::parse(content(path("c.json")))["certificate"];
+  const auto certificate = nlohmann::json::parse(read(path("c.json")))["certificate"];
   EXPECT_TRUE(certificate["exists"]);
   EXPECT_LT(certificate["expected_steps"]["lower"], 6.1746);
   EXPECT_GT(certificate["expected_steps"]["upper"], 6.1746);
@@ -119,7 +105,10 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"steps", "--method", "guess"}, "--method: 'guess'"},
       {{"steps", "--seed", "1", "--seed", "2"}, "--seed: given 2 times"},
       {{"steps", "--json", path("no/such/folder/x.json")}, "no/such/folder"},
-      {{"steps", "--config", path("missing.toml")}, "missing.toml"},
+      {{"steps", "--config", path("missing.toml")}, "missing.toml: cannot be read"},
+      {{"steps", "--config", path("")}, ": cannot be read"},
+      {{"steps", "--contact-list", path("missing.csv")}, "missing.csv: cannot be read"},
+      {{"steps", "--contact-list", path("")}, ": cannot be read"},
       {{"steps", "--config", file("key.toml", "slope = 7.02\nslop = 3\n")}, "key.toml:2: unknown key 'slop'"},
       {{"steps", "--config", file("toml.toml", "slope = = 3\n")}, "toml.toml:1"},
       {{"steps", "--contact-list", file("list.csv", "restitution,friction\n0.4,0.3\n1.4,0.3\n")},
@@ -129,6 +118,16 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"sweep"}, "no range given"},
       {{"sweep", "--slope", "5:12:0"}, "--slope: range 5:12:0"},
       {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")}, "slope: 25 deg"},
+      {{"sweep", "--slope", "7:8:1", "--initial-speed", "7,0.1", "--out", path("")}, "is a folder"},
+      {{"sweep", "--slope", "7:8:1", "--initial-speed", "7,0.1", "--out", path("no/s.csv")}, "no/s.csv"},
+      {{"report", "--out", file("report.csv", "")}, "report.csv"},
+      {{"verify", "--out", file("verify.csv", "")}, "verify.csv: Not a directory"},
+      {{"verify", "--export", file("chain.csv", "")}, "chain.csv: Not a directory"},
+      {{"study", "--out", file("study.csv", "")}, "study.csv"},
+      {{"study", "--data", path("none"), "--out", path("study")}, "none: there is no such folder"},
+      {{"describe", path("none"), "--out", path("described")}, "none: there is no such folder"},
+      {{"collisions", path("none")}, "none: there is no such folder"},
+      {{"coast-down", path(""), "--out", path("drum")}, ": cannot be read"},
       {{"diagnose"}, "DIR"},
       {{"diagnose", path("none")}, "none: there is no such folder"},
       {{"lessons", "--data", path("none"), "--out", path("lessons")}, "none: there is no such folder"},
@@ -198,7 +197,7 @@ TEST_F(CommandLine, ComparePrintsTheContrast) {
   ASSERT_EQ(ran.code, 0) << ran.err;
   EXPECT_NE(ran.out.find("9.59 deg takes"), std::string::npos);
   EXPECT_NE(ran.out.find("measured trials of 16 collisions"), std::string::npos);
-  const auto json = nlohmann::json::parse(content(path("c.json")));
+  const auto json = nlohmann::json::parse(read(path("c.json")));
   EXPECT_EQ(json.at("settings").size(), 2u);
   EXPECT_TRUE(json.at("contrasts")[0].at("ratio").at("value").is_number());
 }
@@ -207,7 +206,7 @@ TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
   const std::vector<std::string> words =
       with({"sweep", "--friction-sd", "0.1:0.2:0.05", "--friction-mean", "0.3,0.4"}, quick);
   ASSERT_EQ(metastable(with(words, {"--out", path("whole.csv")})).code, 0);
-  const std::string whole = content(path("whole.csv"));
+  const std::string whole = read(path("whole.csv"));
   EXPECT_TRUE(std::filesystem::exists(path("whole.svg")));
   // Cut in the middle of the fourth row.
   std::size_t at = 0;
@@ -216,7 +215,7 @@ TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
   const Ran resumed = metastable(with(words, {"--out", path("part.csv"), "--threads", "1"}));
   ASSERT_EQ(resumed.code, 0) << resumed.err;
   EXPECT_NE(resumed.out.find("taken over"), std::string::npos);
-  EXPECT_EQ(content(path("part.csv")), whole);
+  EXPECT_EQ(read(path("part.csv")), whole);
   EXPECT_FALSE(std::filesystem::exists(path("part.csv.partial")));
   // Nor does one over other contacts of as many pairs.
   const auto by_list = [&](const std::string& pairs) {
@@ -231,7 +230,7 @@ TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
   const Ran other = metastable(with({"sweep", "--friction-sd", "0.1,0.3"}, with(quick, {"--out", path("part.csv")})));
   EXPECT_EQ(other.code, 2);
   EXPECT_NE(other.err.find("another sweep"), std::string::npos);
-  EXPECT_EQ(content(path("part.csv")), whole);
+  EXPECT_EQ(read(path("part.csv")), whole);
 }
 
 TEST_F(CommandLine, SimulateWritesAnExperimentOnce) {
@@ -245,7 +244,7 @@ TEST_F(CommandLine, SimulateWritesAnExperimentOnce) {
   EXPECT_NE(again.err.find("already holds"), std::string::npos);
 }
 
-// The whole report, twice, on one thread and on two: the same bytes in every file.
+// What it understands gives the same trials on one thread and on two.
 TEST_F(CommandLine, RealityLeavesNothingBehindWhenItIsMisunderstood) {
   const auto refused = [&](std::vector<std::string> words) {
     words.insert(words.begin(), "simulate");
@@ -270,7 +269,7 @@ TEST_F(CommandLine, RealityLeavesNothingBehindWhenItIsMisunderstood) {
   two.insert(two.end(), {"--threads", "2"});
   EXPECT_EQ(metastable(one).code, 0);
   EXPECT_EQ(metastable(two).code, 0);
-  EXPECT_EQ(content(folder_ / "one" / "collisions.csv"), content(folder_ / "two" / "collisions.csv"));
+  EXPECT_EQ(read(folder_ / "one" / "collisions.csv"), read(folder_ / "two" / "collisions.csv"));
 }
 
 TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
@@ -284,7 +283,7 @@ TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
   const std::string free = file("free.csv", log);
   EXPECT_EQ(metastable({"coast-down", free, "--out", path("a")}).code, 0);
   EXPECT_EQ(metastable({"coast-down", free, "--nominal", path("a"), "--out", path("b")}).code, 0);
-  const std::string a = content(folder_ / "a" / "experiment.toml"), b = content(folder_ / "b" / "experiment.toml");
+  const std::string a = read(folder_ / "a" / "experiment.toml"), b = read(folder_ / "b" / "experiment.toml");
   EXPECT_EQ(a.substr(a.find("[loss]")), b.substr(b.find("[loss]")));
   EXPECT_EQ(metastable({"coast-down", free, free, "--out", path("c")}).err,
             "metastable: " + free + ": a log named so was there before\n");
@@ -295,6 +294,7 @@ TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
             "metastable: ACTION: 'shut' is none of 'make', 'answer', 'open'\n");
 }
 
+// The whole report, twice, on one thread and on two: the same bytes in every file.
 TEST_F(CommandLine, ReportIsTheSameBytesOnAnyNumberOfThreads) {
   const auto report = [&](const std::string& name, const std::string& threads) {
     return metastable(with({"report", "--out", path(name), "--threads", threads, "--energy-trials", "20"}, quick));
@@ -307,10 +307,10 @@ TEST_F(CommandLine, ReportIsTheSameBytesOnAnyNumberOfThreads) {
     if (!entry.is_regular_file()) continue;
     ++files;
     const auto relative = std::filesystem::relative(entry.path(), folder_ / "one");
-    EXPECT_EQ(content(entry.path()), content(folder_ / "two" / relative)) << relative;
+    EXPECT_EQ(read(entry.path()), read(folder_ / "two" / relative)) << relative;
   }
   EXPECT_EQ(files, 1u + 6 * 3 + 8);  // page; six tables three ways; figures
-  const std::string csv = content(folder_ / "one" / "tables" / "ramps.csv");
+  const std::string csv = read(folder_ / "one" / "tables" / "ramps.csv");
   for (const char* part : {"# seed: 1", "# version: ", "# settings: ", "infinite"})
     EXPECT_NE(csv.find(part), std::string::npos) << part;
 }
@@ -383,7 +383,7 @@ TEST_F(CommandLine, DiagnoseFindsWhatTheLaboratoryPutIn) {
   const Ran one = metastable({"diagnose", path("wheel"), "--catalogue", "leg_contact,slope_offset", "--threads", "1",
                               "--json", path("one.json"), "--out", path("page")});
   ASSERT_EQ(one.code, 0) << one.err;
-  const auto json = nlohmann::json::parse(content(path("one.json")));
+  const auto json = nlohmann::json::parse(read(path("one.json")));
   EXPECT_EQ(json.at("verdict"), "explained");
   EXPECT_EQ(json.at("cause_set"), std::vector<std::string>{"leg_contact"});
   EXPECT_EQ(json.at("causes").at(0).at("parameters").at("leg"), 3);
@@ -429,7 +429,7 @@ TEST_F(CommandLine, EffectsListsTheCatalogue) {
   ASSERT_EQ(ran.code, 0) << ran.err;
   EXPECT_NE(ran.out.find("leg_contact: one leg has another friction or restitution\n"), std::string::npos) << ran.out;
   EXPECT_NE(ran.out.find("0.1 to 5, none at 1"), std::string::npos) << ran.out;
-  EXPECT_EQ(nlohmann::json::parse(content(path("effects.json"))).at("schema"), 1);
+  EXPECT_EQ(nlohmann::json::parse(read(path("effects.json"))).at("schema"), 1);
 }
 
 }  // namespace

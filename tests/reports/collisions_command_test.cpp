@@ -1,61 +1,40 @@
 #include "reports/collisions_command.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
 #include "analysis/experiment.h"
 #include "analysis/input_error.h"
 #include "reports/simulate_command.h"
+#include "tests/reports/support.h"
 
 namespace metastable::reports {
 namespace {
 namespace fs = std::filesystem;
+using test::printed;
+using test::read;
 
-class CollisionsCommandTest : public testing::Test {
+class CollisionsCommandTest : public test::InFolder {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("metastable_collisions_" + std::to_string(::getpid()));
-    fs::remove_all(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   void simulate() const {
     SimulateRequest request;
     request.trials = 10;
     request.out = folder_.string();
     request.camera.emplace();
-    testing::internal::CaptureStdout();
-    run_simulate(request);
-    testing::internal::GetCapturedStdout();
+    printed([&] { run_simulate(request); });
   }
   std::string run(bool peak = false, int collisions = 16) const {
     CollisionsRequest request;
     request.finder.collisions = collisions;
     request.folder = folder_.string();
     request.peak = peak;
-    testing::internal::CaptureStdout();
-    try {
-      run_collisions(request);
-    } catch (...) {
-      testing::internal::GetCapturedStdout();
-      throw;
-    }
-    return testing::internal::GetCapturedStdout();
+    return printed([&] { run_collisions(request); });
   }
-  static std::string read(const fs::path& path) {
-    std::ostringstream text;
-    text << std::ifstream(path).rdbuf();
-    return text.str();
-  }
-
-  fs::path folder_;
 };
 
 TEST_F(CollisionsCommandTest, ComparesWithTheCollisionsThatAreThere) {

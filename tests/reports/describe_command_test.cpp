@@ -1,58 +1,40 @@
 #include "reports/describe_command.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include "analysis/input_error.h"
 #include "analysis/stand_in.h"
 #include "reports/simulate_command.h"
+#include "tests/reports/support.h"
 
 namespace metastable::reports {
 namespace {
 namespace fs = std::filesystem;
+using test::printed;
+using test::read;
 
-class DescribeCommandTest : public testing::Test {
+class DescribeCommandTest : public test::InFolder {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("metastable_describe_" + std::to_string(::getpid()));
-    fs::remove_all(folder_);
+    InFolder::SetUp();
     SimulateRequest request;
     request.setting = analysis::stand_in_setting();
     request.trials = 12;
-    request.out = (folder_ / "in").string();
-    testing::internal::CaptureStdout();
-    run_simulate(request);
-    testing::internal::GetCapturedStdout();
+    request.out = path("in");
+    printed([&] { run_simulate(request); });
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   std::string run(const std::string& out) const {
     DescribeRequest request;
-    request.folder = (folder_ / "in").string();
+    request.folder = path("in");
     request.out = out;
     request.against = {dynamics::Law::plastic};
     request.trials = 100;
-    testing::internal::CaptureStdout();
-    try {
-      run_describe(request);
-    } catch (...) {
-      testing::internal::GetCapturedStdout();
-      throw;
-    }
-    return testing::internal::GetCapturedStdout();
+    return printed([&] { run_describe(request); });
   }
-  static std::string read(const fs::path& path) {
-    std::ostringstream text;
-    text << std::ifstream(path).rdbuf();
-    return text.str();
-  }
-
-  fs::path folder_;
 };
 
 TEST_F(DescribeCommandTest, TablesOnTheTerminal) {

@@ -1,35 +1,23 @@
 #include "reports/output_file.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
-#include <sstream>
+#include <iterator>
 #include <string>
+
+#include "tests/reports/support.h"
 
 namespace metastable::reports {
 namespace {
 namespace fs = std::filesystem;
+using test::read;
 
-class OutputFileTest : public testing::Test {
+class OutputFileTest : public test::InFolder {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("metastable_output_" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  static std::string read(const fs::path& path) {
-    std::ostringstream text;
-    text << std::ifstream(path).rdbuf();
-    return text.str();
-  }
   std::size_t files() const {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
   }
-
-  fs::path folder_;
 };
 
 TEST_F(OutputFileTest, TargetAppearsOnlyOnCommit) {
