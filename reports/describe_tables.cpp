@@ -99,7 +99,8 @@ Table profiles_table(const analysis::Description& description, const Provenance&
         continue;
       }
       const analysis::SpeedSummary& s = c.profile[k];
-      row.insert(row.end(), {s.count, s.mean, s.count > 1 ? Cell(s.standard_error) : Cell("")});
+      row.insert(row.end(), {s.count, s.mean, s.standard_error});
+      if (s.count < 2) row.back() = "";
     }
     table.rows.push_back(std::move(row));
   }
