@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <numeric>
 
 #include "dynamics/truncated_normal.h"
@@ -162,6 +163,7 @@ class Ranker {
       : model_(model),
         recalibrated_(recalibrated),
         candidates_(candidates),
+        options_(options),
         threads_(options.threads),
         scan_(scan_effects(model, recalibrated, candidates, options.threads)),
         chance_(scan_, options.draws, options.seed),
@@ -173,7 +175,12 @@ class Ranker {
   void refit_unsettled();
   void decide_unsettled();
   void scan_pairs();
+  void scan_asked_pairs();
   void fit_pairs();
+  void reach(double share) {
+    share_ = share;
+    heartbeat();
+  }
   CauseRanking result() {
     return {std::move(scan_), std::move(singles_), std::move(pairs_), chance_.look_elsewhere(least_p_)};
   }
@@ -184,6 +191,11 @@ class Ranker {
     ScannedEffect second;
   };
 
+  // Before every fit, so that who waits can stop.
+  void heartbeat() const {
+    const std::lock_guard lock(speaking_);
+    if (options_.progress) options_.progress(share_);
+  }
   void fit_law(RankedCause& cause) const;
   void fit_effect(RankedCause& cause, const ScannedEffect& scanned) const;
   void take(RankedCause& cause, Fit better) const;
@@ -195,13 +207,16 @@ class Ranker {
   const TransitionModel& model_;
   const Fit& recalibrated_;
   const std::vector<const Candidate*>& candidates_;
+  const RankingOptions& options_;
   int threads_;
   EffectScan scan_;
   ChanceGains chance_;
   std::vector<RankedCause> singles_, pairs_;
   std::vector<Try> tries_;
   double least_p_ = 1;  // of the single effects as listed: chance is drawn for those
-  double top_ = 0;      // evidence of the best of them
+  double share_ = 0;
+  mutable std::mutex speaking_;
+  double top_ = 0;  // evidence of the best of them
 };
 
 // Chance of such a gain by one effect alone.
@@ -241,6 +256,7 @@ void Ranker::fit_singles() {
   double largest = 0;
   for (const ScannedEffect& effect : scan_.effects) largest = std::max(largest, effect.gain[effect.best]);
   markov::parallel_for(candidates_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
     const Candidate* candidate = candidates_[i];
     RankedCause& cause = singles_[i];
     cause.terms = {Term{candidate, candidate->variants[0], {}}};
@@ -267,6 +283,7 @@ void Ranker::fit_overlooked() {
   for (const RankedCause& cause : singles_)
     if (fitted(cause)) best = std::max(best, cause.evidence);
   markov::parallel_for(singles_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
     RankedCause& cause = singles_[i];
     if (cause.candidate_undecided() || fitted(cause) || cause.evidence < std::max(0.0, best - overlooked_margin))
       return;
@@ -305,6 +322,7 @@ void Ranker::take(RankedCause& cause, Fit better) const {
 void Ranker::refine_leaders() {
   const std::vector<std::size_t> strongest = leaders(true);
   markov::parallel_for(strongest.size(), threads_, [&](std::size_t k) {
+    heartbeat();
     RankedCause& cause = singles_[strongest[k]];
     if (cause.evidence < refined_share * top_ - refined_margin) return;
     Fit refined = cause.fit;
@@ -319,6 +337,7 @@ void Ranker::refit_unsettled() {
     return a.evidence < b.evidence;
   });
   markov::parallel_for(singles_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
     RankedCause& cause = singles_[i];
     if (&cause == &*best || cause.fit.converged || !fitted(cause) || !fitted(*best) ||
         cause.evidence < top_ - refit_margin)
@@ -364,6 +383,22 @@ void Ranker::scan_pairs() {
   }
 }
 
+// The pairs asked for, whatever the scores promise.
+void Ranker::scan_asked_pairs() {
+  for (auto [one, other] : options_.pairs) {
+    if (other->parameters.empty()) std::swap(one, other);  // another law has nothing to scan
+    const auto place = std::find(candidates_.begin(), candidates_.end(), one);
+    const auto leader = static_cast<std::size_t>(place - candidates_.begin());
+    RankedCause& first = singles_[leader];
+    if (first.candidate_undecided() || !other->undecidable.empty() || other->parameters.empty()) continue;
+    const bool tried = std::any_of(tries_.begin(), tries_.end(),
+                                   [&](const Try& t) { return t.leader == leader && t.second.candidate == other; });
+    if (tried) continue;
+    if (!fitted(first)) fit_effect(first, *find(scan_, one));
+    tries_.push_back({leader, scan_effects(model_, first.fit, {other}, threads_).effects.front()});
+  }
+}
+
 // What the two effects of a pair gain each by itself, summed.
 double Ranker::gain_alone(const RankedCause& pair) const {
   double alone = 0;
@@ -377,6 +412,7 @@ void Ranker::fit_pairs() {
   const double prior = pair_log_prior(candidates_.size());
   std::vector<RankedCause> tried(tries_.size());
   markov::parallel_for(tries_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
     const RankedCause& first = singles_[tries_[i].leader];
     RankedCause& pair = tried[i];
     pair = fit_cause(model_, first.fit, tries_[i].second);
@@ -419,22 +455,20 @@ const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector
 
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options) {
-  const auto progress = [&](double share) {
-    if (options.progress) options.progress(share);
-  };
   Ranker ranker(model, recalibrated, candidates, options);
-  progress(0.15);
+  ranker.reach(0.15);
   ranker.fit_singles();
   ranker.fit_overlooked();
-  progress(0.5);
+  ranker.reach(0.5);
   ranker.refine_leaders();
   ranker.refit_unsettled();
   ranker.decide_unsettled();
-  progress(0.6);
+  ranker.reach(0.6);
   ranker.scan_pairs();
-  progress(0.8);
+  ranker.scan_asked_pairs();
+  ranker.reach(0.8);
   ranker.fit_pairs();
-  progress(1);
+  ranker.reach(1);
   return ranker.result();
 }
 

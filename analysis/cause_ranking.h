@@ -35,7 +35,8 @@ struct RankingOptions {
   int threads = 0;
   int draws = 2000;
   std::uint64_t seed = 1;
-  std::function<void(double)> progress;  ///< share done
+  std::vector<std::pair<const Candidate*, const Candidate*>> pairs = {};  ///< tried in any case
+  std::function<void(double)> progress;  ///< share done; called from any thread, one at a time; may throw to stop
 };
 
 /// Evidence: the likelihood ratio averaged over an effect's variants and over a normal prior on its p parameters whose

@@ -245,20 +245,54 @@ std::vector<ProfilePoint> profiles(const TransitionModel& model, const std::vect
   return points;
 }
 
+// The one or two effects that an entry of the catalogue names. Throws for unknown ones.
+std::vector<std::string> effects_of(const std::string& entry) {
+  const auto plus = entry.find('+');
+  std::vector<std::string> ids{entry.substr(0, plus)};
+  if (plus != std::string::npos) ids.push_back(entry.substr(plus + 1));
+  for (const std::string& id : ids) dynamics::effect_info(id);
+  if (ids.front() == ids.back() && ids.size() == 2)
+    throw std::invalid_argument(fmt::format("effect: \"{}\" is not a pair of two effects", entry));
+  return ids;
+}
+
 void check(const DiagnosisOptions& options) {
   if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
   if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
   if (!(options.level > 0 && options.level < 0.5))
     throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
-  for (const std::string& id : options.catalogue) dynamics::effect_info(id);  // throws for unknown ones
+  for (const std::string& entry : options.catalogue) effects_of(entry);
 }
 
+// Pairs alone extend the whole catalogue; beside single effects they add theirs.
 std::vector<const Candidate*> wanted(const TransitionModel& model, const std::vector<std::string>& catalogue) {
+  std::vector<std::string> ids;
+  bool restricted = false;
+  for (const std::string& entry : catalogue) {
+    const std::vector<std::string> named = effects_of(entry);
+    restricted = restricted || named.size() == 1;
+    ids.insert(ids.end(), named.begin(), named.end());
+  }
   std::vector<const Candidate*> candidates;
   for (const Candidate& candidate : model.candidates())
-    if (catalogue.empty() || std::find(catalogue.begin(), catalogue.end(), candidate.id) != catalogue.end())
-      candidates.push_back(&candidate);
+    if (!restricted || std::find(ids.begin(), ids.end(), candidate.id) != ids.end()) candidates.push_back(&candidate);
   return candidates;
+}
+
+std::vector<std::pair<const Candidate*, const Candidate*>> wanted_pairs(const std::vector<const Candidate*>& candidates,
+                                                                        const std::vector<std::string>& catalogue) {
+  const auto find = [&](const std::string& id) {
+    const auto found =
+        std::find_if(candidates.begin(), candidates.end(), [&](const Candidate* c) { return c->id == id; });
+    return found == candidates.end() ? nullptr : *found;
+  };
+  std::vector<std::pair<const Candidate*, const Candidate*>> pairs;
+  for (const std::string& entry : catalogue) {
+    const std::vector<std::string> named = effects_of(entry);
+    const Candidate *one = find(named.front()), *other = find(named.back());
+    if (one && other && one != other) pairs.emplace_back(one, other);
+  }
+  return pairs;
 }
 
 // The model without anything fitted: nothing to project out.
@@ -439,11 +473,12 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   progress(0.1, "where the gap lies");
   d.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
 
-  CauseRanking ranking = rank_causes(
-      model, recalibrated, candidates,
-      {.threads = options.threads, .draws = options.draws, .seed = options.seed, .progress = [&](double share) {
-         progress(0.15 + 0.5 * share, "which effect");
-       }});
+  CauseRanking ranking = rank_causes(model, recalibrated, candidates,
+                                     {.threads = options.threads,
+                                      .draws = options.draws,
+                                      .seed = options.seed,
+                                      .pairs = wanted_pairs(candidates, options.catalogue),
+                                      .progress = [&](double share) { progress(0.15 + 0.5 * share, "which effect"); }});
   test_for_gap(d, ranking, candidates.size(), recalibrated);
   note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
   // What the data hold no information on is not decided, whatever its evidence.
@@ -466,7 +501,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const bool named = chosen.fit != &recalibrated;
   if (d.trials >= trials_for_folds(options.folds))
     d.shrinkage = gap_shrinkage(model, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
-                                options.threads, options.seed);
+                                options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
   // Even a cause that closes nearly all of a huge gap may leave a large one.
   if (named && !d.shrinkage.empty() &&
       d.shrinkage[0].with_effect >
@@ -477,6 +512,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
 
   progress(0.88, "steps before failure");
   d.steps = steps_before_failure(model, nominal, recalibrated, *chosen.fit, options.seed);
+  if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.empty())
+    d.shrinkage.push_back(rest_shrinkage(at_risk, rests, d.steps));
   d.profile = profiles(model, nominal, *chosen.fit, options.seed);
   progress(0.93, "what could not be seen");
   d.missing = missing_columns(model, recalibrated, candidates, options.threads, options.seed);

@@ -14,11 +14,13 @@ namespace metastable::analysis {
 
 struct DiagnosisOptions {
   std::uint64_t seed = 1;
-  int threads = 0;                     ///< the same bits on any number
-  std::vector<std::string> catalogue;  ///< ids to consider, those the model lacks left out; empty: all
-  int draws = 2000;                    ///< bootstrap draws of each chance level, >= 200; the map as given takes half
-  double level = 0.03;                 ///< of the test for a gap after recalibration, in (0, 0.5)
-  int folds = 5;                       ///< of the cross-validation by trial, >= 2
+  int threads = 0;  ///< the same bits on any number
+  /// Ids to consider, those the model lacks left out; none: all. A pair, "trial_drift+bounce", is tried in any case,
+  /// not only where the scores promise something.
+  std::vector<std::string> catalogue;
+  int draws = 2000;     ///< bootstrap draws of each chance level, >= 200; the map as given takes half
+  double level = 0.03;  ///< of the test for a gap after recalibration, in (0, 0.5)
+  int folds = 5;        ///< of the cross-validation by trial, >= 2
   /// Called now and then with the share done, 0..1, and what is being done; may throw to stop.
   std::function<void(double, const std::string&)> progress;
 };

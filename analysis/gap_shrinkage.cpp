@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <mutex>
 #include <numbers>
 #include <numeric>
 #include <stdexcept>
@@ -108,10 +109,11 @@ std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t se
 
 // The rival that does best on the trials counted; without any, `plain`.
 Fit best_rival(const TransitionModel& model, const std::vector<const Fit*>& rivals, const Fit& plain,
-               const FitOptions& options) {
+               const FitOptions& options, const std::function<void()>& heartbeat) {
   Fit chosen = plain;
   double best = -1e300;
   for (const Fit* rival : rivals) {
+    heartbeat();
     Fit tried = fit(model, rival->nuisance, rival->terms, options);
     std::size_t parameters = 0;
     for (const Term& term : rival->terms) parameters += term.values.size();
@@ -153,20 +155,26 @@ Flexible flexible_model(const Fit& chosen, const Eigen::MatrixXd& cells, const E
 }  // namespace
 
 std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& recalibrated,
-                                     const std::vector<const Fit*>& rivals, int folds, int threads,
-                                     std::uint64_t seed) {
+                                     const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
+                                     const std::function<void()>& heartbeat) {
   if (folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", folds));
   const std::size_t trials = model.trials();
   const Evaluation as_given = model.evaluate(nominal_values(model), {});
   const Eigen::MatrixXd cells = mean_columns(model);
   const std::vector<int> fold = folds_of_trials(trials, folds, seed);
   std::vector<HeldOut> held(trials);
+  std::mutex speaking;
+  const std::function<void()> speak = [&] {
+    const std::lock_guard lock(speaking);
+    if (heartbeat) heartbeat();
+  };
   markov::parallel_for(static_cast<std::size_t>(folds), threads, [&](std::size_t f) {
+    speak();
     FitOptions options;
     options.count.resize(trials);
     for (std::size_t t = 0; t < trials; ++t) options.count[t] = fold[t] != static_cast<int>(f);
     const Fit plain = fit(model, recalibrated.nuisance, {}, options);
-    const Fit chosen = best_rival(model, rivals, plain, options);
+    const Fit chosen = best_rival(model, rivals, plain, options, speak);
     const Eigen::VectorXd training = event_weights(model, options.count);
     const Flexible flexible = flexible_model(chosen, cells, training);
     const std::array<const Evaluation*, 3> models{&as_given, &plain.evaluation, &chosen.evaluation};
@@ -202,6 +210,34 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& re
     v[3] = h.crps_floor;
   }));
   return all;
+}
+
+Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure& steps) {
+  const double observed = rests / at_risk;
+  const double low = 1 / steps.observed_upper, high = 1 / steps.observed_lower;
+  const double given = 1 / steps.baseline, with = 1 / steps.with_effect;
+  Shrinkage s;
+  s.measure = "share of collisions that rest, all trials";
+  s.unit = "probability";
+  s.baseline = std::abs(given - observed);
+  s.recalibrated = std::abs(1 / steps.recalibrated - observed);
+  s.with_effect = std::abs(with - observed);
+  const bool inside = given > low && given < high;
+  s.baseline_lower = inside ? 0 : std::min(std::abs(given - low), std::abs(given - high));
+  s.baseline_upper = std::max(std::abs(given - low), std::abs(given - high));
+  // Mean absolute deviation of a Poisson count.
+  const double mean = with * at_risk, whole = std::floor(mean);
+  s.floor = mean > 0 ? 2 * std::exp((whole + 1) * std::log(mean) - mean - std::lgamma(whole + 1)) / at_risk : 0;
+  if (s.baseline_lower <= s.floor) return s;
+  const auto closed = [&](double share) {
+    const double gap = std::abs(given - share);
+    return (gap - std::abs(with - share)) / (gap - s.floor);
+  };
+  const double at_peak = closed(std::clamp(with, low, high));
+  s.closed = closed(observed);
+  s.closed_lower = std::min(closed(low), closed(high));
+  s.closed_upper = std::max({closed(low), closed(high), at_peak});
+  return s;
 }
 
 }  // namespace metastable::analysis

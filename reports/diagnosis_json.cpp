@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "dynamics/effect_catalogue.h"
@@ -121,6 +122,15 @@ Json shrinkage_json(const analysis::Shrinkage& s) {
           {"closed_interval_90", closed_interval}};
 }
 
+// Every key is there where nothing is known.
+analysis::Shrinkage unknown_shrinkage() {
+  analysis::Shrinkage s;
+  s.baseline = s.recalibrated = s.with_effect = s.floor = std::numeric_limits<double>::quiet_NaN();
+  s.baseline_lower = s.baseline_upper = s.baseline;
+  s.measure = "too few trials to hold any out";
+  return s;
+}
+
 Json steps_json(const analysis::StepsBeforeFailure& s) {
   return {{"observed", positive(s.observed)},
           {"observed_interval_90", {positive(s.observed_lower), positive(s.observed_upper)}},
@@ -171,7 +181,7 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   });
   const Named contact = named("contact_distribution", d.contact);
   json["contact"] = {{"parameters", contact.values}, {"interval_90", contact.intervals}};
-  json["shrinkage"] = d.shrinkage.empty() ? Json::object() : shrinkage_json(d.shrinkage.front());
+  json["shrinkage"] = shrinkage_json(d.shrinkage.empty() ? unknown_shrinkage() : d.shrinkage.front());
   json["shrinkage_by_measure"] = list_json(d.shrinkage, shrinkage_json);
   json["steps_before_failure"] = steps_json(d.steps);
   json["visibility"] = list_json(d.visible, visibility_json);

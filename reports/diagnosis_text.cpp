@@ -69,8 +69,10 @@ std::string diagnosis_text(const analysis::Diagnosis& d) {
       where.rows.empty() ? "\nWhere it lies, after recalibration: no cell is beyond chance\n" : part(where, most_cells);
 
   Table causes = causes_table(d);
-  std::erase_if(causes.rows,
-                [](const std::vector<Cell>& row) { return std::get<double>(row[1].value()) < shown_probability; });
+  const std::string nearest = d.causes.empty() ? "" : d.causes.front().name();
+  std::erase_if(causes.rows, [&](const std::vector<Cell>& row) {
+    return std::get<double>(row[1].value()) < shown_probability && std::get<std::string>(row[0].value()) != nearest;
+  });
   text += part(causes, most_causes);
 
   text += part(shrinkage_lines(d));

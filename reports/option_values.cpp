@@ -148,10 +148,12 @@ std::vector<std::string> catalogue_value(std::string_view name, const std::strin
   const auto take = [&ids](std::string_view word, const std::string& where) {
     const std::string id(trimmed(word));
     try {
-      dynamics::effect_info(id);
+      for (const std::string_view one : split(id, '+')) dynamics::effect_info(one);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument(fmt::format("{}: {}", where, error.what()));
     }
+    if (std::ranges::count(id, '+') > 1)
+      throw std::invalid_argument(fmt::format("{}: \"{}\" has more than two effects", where, id));
     if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
   };
   std::error_code too_long;  // a list of names need not be a possible path
@@ -165,6 +167,8 @@ std::vector<std::string> catalogue_value(std::string_view name, const std::strin
     if (ids.empty()) throw std::invalid_argument(fmt::format("{}: holds no effect", text));
     return ids;
   }
+  if (text.find_first_of("./") != std::string::npos)  // no effect is called so
+    throw std::invalid_argument(fmt::format("--{}: {}: no such file, nor a list of effects", name, text));
   for (const std::string_view word : split(text, ',')) take(word, fmt::format("--{}", name));
   return ids;
 }
