@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "analysis/effect_power.h"
@@ -23,7 +24,7 @@ std::string_view blind_kind_name(BlindKind kind);
 /// @throws std::invalid_argument for an unknown name
 BlindKind blind_kind(std::string_view name);
 
-/// How many cases of each kind.
+/// How many cases of each kind, none below 0.
 struct BlindSize {
   int per_effect_and_strength = 6;  ///< each effect at 1x, 2x and 4x
   int none = 300;
@@ -40,9 +41,9 @@ struct BlindTruth {
   std::optional<dynamics::OutsideEffect> outside;
   int strength = 0;  ///< 1, 2, 4; 0 where it is not defined (none, outside)
   double power = 0;  ///< expected 2 Delta log likelihood, true contact known
-  double left = 0;   ///< realised, after recalibration
+  double left = 0;   ///< realised, after recalibration; 0 until complete_truth()
   /// Of a pair, by effect: realised, after recalibration with the other effect in the model. Not sealed, for it follows
-  /// from the rest and the case; empty where it was not worked out.
+  /// from the rest and the case; empty until complete_pair().
   std::vector<double> left_by_effect = {};
   bool nominal_is_true = true;
   Spread restitution, friction;  ///< true
@@ -68,10 +69,18 @@ struct BlindPlan {
   std::vector<std::string> effects;  ///< ids; of `outside` the family
   int strength = 0;
 };
+/// @throws std::invalid_argument naming a count below 0
 std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed);
 
 /// Case `number` (from 1) of a plan. Sizes are found by a search on `power` for 16, 64, 256 (each effect of a pair for
 /// 64); an effect that cannot be made so strong within its range keeps its largest size, and truth.power tells.
+/// truth.left is not worked out: a case that is graded takes complete_truth() too.
 BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, const Power& power);
+
+/// Sets truth.left from the case's own files; a case without catalogue effects keeps 0. A fit: about a second.
+void complete_truth(BlindCase& made);
+/// Sets truth.left_by_effect of a pair; nothing for other kinds. Two fits.
+/// @param experiment  the case as it was written
+void complete_pair(BlindTruth& truth, const Experiment& experiment);
 
 }  // namespace metastable::analysis

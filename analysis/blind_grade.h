@@ -4,9 +4,11 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/blind_cases.h"
+#include "analysis/diagnosis.h"
 
 namespace metastable::analysis {
 
@@ -19,7 +21,7 @@ struct AnsweredParameter {
 
 /// What a diagnosis said, as far as it is graded.
 struct BlindAnswer {
-  std::string verdict;                                 ///< no_gap, recalibrate, explained, unexplained
+  Verdict verdict = Verdict::no_gap;
   std::vector<std::pair<std::string, double>> causes;  ///< by falling probability
   std::vector<std::string> cause_set;
   std::vector<AnsweredParameter> parameters;  ///< of the first cause
@@ -28,7 +30,7 @@ struct BlindAnswer {
     double p_adjusted = 1;
   };
   std::vector<Place> where;
-  std::optional<double> closed, closed_lower, closed_upper;  ///< 90 %
+  std::optional<double> closed_lower, closed_upper;  ///< share of the gap that was closed, 90 %
 };
 
 struct Proportion {
@@ -61,10 +63,13 @@ struct BlindGrades {
   std::map<std::string, std::vector<std::string>> alike;  ///< ambiguity groups: what shares the cause sets of an effect
 };
 
-/// @param truths, answers  the same length; nothing: not answered, counted as a failure of every measure it belongs to
+/// @param truths   whole: complete_truth() when the case was made, complete_pair() for pairs. An effect whose `left` is
+///                 below 9 counts as absorbed by recalibration, a pair without left_by_effect as not findable
+/// @param answers  one a truth; nothing: not answered, counted as a failure of every measure it belongs to
+/// @throws std::invalid_argument if they are not as many as the truths
 BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::optional<BlindAnswer>>& answers);
 
-/// Facets, and aspects written with a leading ':', in which an effect may rightly be found.
+/// Facets, and aspects written with a leading ':', in which an effect may rightly be found; empty for an unknown id.
 const std::vector<std::string>& rightful_places(const std::string& effect);
 
 }  // namespace metastable::analysis

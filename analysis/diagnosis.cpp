@@ -444,6 +444,13 @@ std::string verdict_name(Verdict verdict) {
   throw std::logic_error("verdict_name: unknown verdict");
 }
 
+Verdict verdict_from_name(std::string_view name) {
+  for (const Verdict verdict : {Verdict::no_gap, Verdict::recalibrate, Verdict::explained, Verdict::unexplained})
+    if (verdict_name(verdict) == name) return verdict;
+  throw std::invalid_argument(
+      fmt::format("verdict: \"{}\" is none of no_gap, recalibrate, explained, unexplained", name));
+}
+
 std::string Cause::name() const { return fmt::format("{}", fmt::join(effects, "+")); }
 
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "analysis/gap_cell.h"
@@ -27,6 +28,8 @@ struct DiagnosisOptions {
 
 enum class Verdict { no_gap, recalibrate, explained, unexplained };
 std::string verdict_name(Verdict verdict);
+/// @throws std::invalid_argument for an unknown name
+Verdict verdict_from_name(std::string_view name);
 
 /// One number with its 90 % interval.
 struct EstimatedParameter {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -98,6 +97,7 @@ std::vector<double> true_nuisances(const TransitionModel& model, const dynamics:
 }
 
 double expected_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects, int replicates) {
+  if (replicates < 1) throw std::invalid_argument(fmt::format("replicates: {} is below 1", replicates));
   double sum = 0;
   for (int r = 0; r < replicates; ++r) {
     RealityOptions reality = design.reality;
@@ -106,13 +106,10 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
     const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, reality);
     const RealityFiles made =
         reality_files(design.conditions, setup, run_laboratory(setup, 1), {.dropped = design.dropped});
-    const Experiment experiment = parse_experiment(
-        {"laboratory", made.files.experiment_toml, made.files.collisions_csv,
-         made.files.trials_csv.empty() ? std::nullopt : std::optional(made.files.trials_csv), std::nullopt});
+    const Experiment experiment = parse_experiment(source_of(made.files, "laboratory"));
     const auto model = wheel_transitions(experiment);
     const Setting& stated = design.conditions.front().setting;
-    const dynamics::NominalValues contact{stated.restitution.mean, stated.restitution.sd, stated.friction.mean,
-                                          stated.friction.sd, stated.wheel.leg_length};
+    const dynamics::NominalValues contact = stated_values(stated.restitution, stated.friction, stated.wheel.leg_length);
     sum += 2 * (log_likelihood(*model, true_nuisances(*model, contact_of(contact, effects)),
                                forms_of(effects, experiment)) -
                 log_likelihood(*model, true_nuisances(*model, contact), {}));

@@ -1,7 +1,7 @@
 #pragma once
 // How visible an effect is in an experiment: the strength of blind cases is defined by it.
 
-#include <optional>
+#include <string>
 #include <vector>
 
 #include "analysis/experiment.h"
@@ -22,7 +22,8 @@ struct FittedForm {
   Candidate candidate;
   std::vector<double> values;
 };
-/// @param stated  leg lengths for leg_lengths
+/// @param stated_legs  lengths [m], for leg_lengths
+/// @param ramp_length  [m], for stretches that end with the ramp
 /// @throws std::invalid_argument for contact_distribution, which is no candidate but the nuisances
 FittedForm fitted_form(const dynamics::Effect& effect, const std::vector<double>& stated_legs, double ramp_length);
 
@@ -31,7 +32,7 @@ std::vector<double> true_nuisances(const TransitionModel& model, const dynamics:
 
 /// Mean over `replicates` laboratory experiments with the effects of 2 log(likelihood with them / without), true
 /// contact known to both: about the effects' own noncentrality. Seeds follow design.reality.seed, apart from the case's
-/// own.
+/// own. @throws std::invalid_argument for replicates < 1
 double expected_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects, int replicates);
 
 /// 2 log(likelihood of the truth / of the best recalibrated model without the effects) on one experiment: what is left

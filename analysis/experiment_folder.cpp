@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "markov/parallel.h"
@@ -32,6 +33,14 @@ Nominal nominal(const Setting& setting) {
 }
 
 }  // namespace
+
+ExperimentSource source_of(const ExperimentFiles& files, const std::string& name) {
+  return {.folder = name,
+          .experiment_toml = files.experiment_toml,
+          .collisions_csv = files.collisions_csv,
+          .trials_csv = files.trials_csv.empty() ? std::nullopt : std::optional(files.trials_csv),
+          .angle_csv = {}};
+}
 
 std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const SimulationOptions& options) {
   if (options.trials < 1 || options.trials > 1000000)

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "analysis/experiment.h"
 #include "analysis/setting.h"
 #include "dynamics/trials.h"
 
@@ -34,8 +35,11 @@ struct SimulatedCondition {
 struct ExperimentFiles {
   std::string experiment_toml;
   std::string collisions_csv;
-  std::string trials_csv;
+  std::string trials_csv;  ///< empty: outcomes are not told, and there is no such file
 };
+/// The texts as the reader takes them. @param name  of the folder, for messages
+ExperimentSource source_of(const ExperimentFiles& files, const std::string& name);
+
 /// experiment.toml up to its [[condition]] tables, and one of those. Launches may be left unstated.
 std::string wheel_description(const Setting& setting, Spread restitution, Spread friction, const std::string& title,
                               const std::vector<std::string>& comment);

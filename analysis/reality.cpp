@@ -45,6 +45,11 @@ std::string angles(const std::string& id, const dynamics::LaboratoryTrial& trial
 
 }  // namespace
 
+dynamics::NominalValues stated_values(const Spread& restitution, const Spread& friction,
+                                      const std::vector<double>& leg_lengths) {
+  return {restitution.mean, restitution.sd, friction.mean, friction.sd, leg_lengths};
+}
+
 dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& conditions,
                                            const RealityOptions& options) {
   if (conditions.empty()) throw std::invalid_argument("laboratory: no condition");
@@ -100,6 +105,7 @@ const std::vector<std::string>& droppable() {
 
 RealityFiles reality_files(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
                            const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
+  if (conditions.empty()) throw std::invalid_argument("laboratory: no condition");
   for (const std::string& name : options.dropped)
     if (std::find(droppable().begin(), droppable().end(), name) == droppable().end()) {
       std::string known;

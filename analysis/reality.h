@@ -9,9 +9,14 @@
 #include "analysis/angle_recording.h"
 #include "analysis/experiment_folder.h"
 #include "analysis/setting.h"
+#include "dynamics/effect_catalogue.h"
 #include "dynamics/laboratory.h"
 
 namespace metastable::analysis {
+
+/// Contact and legs [m] as the catalogue of effects takes them.
+dynamics::NominalValues stated_values(const Spread& restitution, const Spread& friction,
+                                      const std::vector<double>& leg_lengths);
 
 /// One condition as the modeller states it.
 struct RealityCondition {
@@ -35,7 +40,8 @@ struct RealityOptions {
 };
 
 /// The laboratory of these conditions. Wheel and contact are those of the first.
-/// @throws std::invalid_argument for a setting the laboratory cannot take (correlation, list of pairs), naming it
+/// @throws std::invalid_argument where there is no condition, and naming a setting the laboratory cannot take
+/// (correlation, list of pairs) or an option out of range
 dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& conditions,
                                            const RealityOptions& options);
 /// All trials, in the order they were run. The same bits on any number of threads.
@@ -57,7 +63,7 @@ struct RealityFiles {
   ExperimentFiles files;
   std::optional<std::string> angle_csv;
 };
-/// @throws std::invalid_argument for an unknown name in `dropped`
+/// @throws std::invalid_argument for an unknown name in `dropped`, and where there is no condition
 RealityFiles reality_files(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
                            const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options);
 

@@ -20,8 +20,8 @@ Experiment laboratory_stand_in(const std::vector<dynamics::Effect>& effects, std
   options.threads = threads;
   const dynamics::LaboratorySetup setup = laboratory_setup(conditions, options);
   const auto run = run_laboratory(setup, threads);
-  const ExperimentFiles files = reality_files(conditions, setup, run, {.title = "laboratory"}).files;
-  return parse_experiment({"laboratory", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+  const RealityFiles made = reality_files(conditions, setup, run, {.title = "laboratory"});
+  return parse_experiment(source_of(made.files, "laboratory"));
 }
 
 std::vector<ChargeOnSticking> charge_on_sticking(std::uint64_t seed, int threads) {

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <chrono>
 #include <ctime>
 #include <filesystem>
@@ -27,7 +28,7 @@
 #include "reports/blind_tables.h"
 #include "reports/interrupt.h"
 #include "reports/output_file.h"
-#include "reports/page.h"
+#include "reports/page_folder.h"
 #include "reports/progress.h"
 #include "reports/seal.h"
 #include "reports/version.h"
@@ -62,12 +63,23 @@ struct Places {
   fs::path answer(int number) const { return answers / (name_of(number) + ".json"); }
 };
 
+// The number of a case by the name of its folder.
+int case_number(const fs::path& folder) {
+  const std::string name = folder.filename().string();
+  int number = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+  if (error != std::errc{} || number < 1 || name != name_of(number))
+    throw std::invalid_argument(
+        fmt::format("{}: holds a seal.txt, but its name is not that of a case (0001, 0002, ...)", folder.string()));
+  return number;
+}
+
 // The numbers of the cases that are complete, ascending.
 std::vector<int> case_numbers(const Places& places) {
   std::vector<int> numbers;
   if (fs::is_directory(places.cases))
     for (const auto& entry : fs::directory_iterator(places.cases))
-      if (fs::exists(entry.path() / "seal.txt")) numbers.push_back(std::stoi(entry.path().filename().string()));
+      if (fs::exists(entry.path() / "seal.txt")) numbers.push_back(case_number(entry.path()));
   std::sort(numbers.begin(), numbers.end());
   if (numbers.empty())
     throw std::invalid_argument(
@@ -166,14 +178,7 @@ void run_blind_make(const BlindRequest& request) {
       analysis::BlindCase made = analysis::blind_case(
           plan[i], number, seed,
           [](const auto& design, const auto& effects) { return analysis::expected_power(design, effects, 3); });
-      const analysis::ExperimentFiles& files = made.files.files;
-      const analysis::Experiment experiment = analysis::parse_experiment(
-          {name_of(number), files.experiment_toml, files.collisions_csv,
-           files.trials_csv.empty() ? std::nullopt : std::optional(files.trials_csv), std::nullopt});
-      const dynamics::NominalValues contact{made.truth.restitution.mean, made.truth.restitution.sd,
-                                            made.truth.friction.mean, made.truth.friction.sd,
-                                            experiment.wheel.leg_length};
-      if (!made.truth.effects.empty()) made.truth.left = analysis::power_left(experiment, contact, made.truth.effects);
+      analysis::complete_truth(made);
       write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
     }
     progress.advance();
@@ -278,11 +283,7 @@ void run_blind_open(const BlindRequest& request) {
   markov::parallel_for(reached.size(), request.threads, [&](std::size_t i) {
     analysis::BlindTruth& truth = reached[i];
     if (truth.kind != analysis::BlindKind::pair) return;
-    const analysis::Experiment experiment = analysis::read_experiment(places.case_folder(truth.number).string());
-    const dynamics::NominalValues contact{truth.restitution.mean, truth.restitution.sd, truth.friction.mean,
-                                          truth.friction.sd, experiment.wheel.leg_length};
-    for (std::size_t e = 0; e < truth.effects.size(); ++e)
-      truth.left_by_effect.push_back(analysis::power_left(experiment, contact, truth.effects, {truth.effects[1 - e]}));
+    analysis::complete_pair(truth, analysis::read_experiment(places.case_folder(truth.number)));
   });
 
   const analysis::BlindGrades grades = analysis::grade(reached, answers);
@@ -293,23 +294,16 @@ void run_blind_open(const BlindRequest& request) {
       fmt::format("{} cases, {} answered; record {}", numbers.size(), record.size(), record.back().chain), seed,
       version()};
   const fs::path out = request.out.empty() ? places.run / "report" : fs::path(request.out);
-  make_folder(out / "tables");
-  Page page;
+  PageFolder folder(out);
+  Page& page = folder.page();
   page.title = "Blind check of the diagnosis";
   page.intro = {
       "Cases from the virtual laboratory, which shares no formula with the models. Truths were sealed before "
       "the diagnosis saw the folders; seals and the record of answers were checked."};
   page.provenance = provenance;
   const std::vector<Table> tables = blind_tables(grades, reached, answers, provenance);
-  for (const Table& table : tables) {
-    const fs::path stem = out / "tables" / table.id;
-    write_file(stem.string() + ".csv", to_csv(table));
-    write_file(stem.string() + ".md", to_markdown(table));
-    const std::string href = "tables/" + table.id;
-    page.sections.push_back(
-        {table.id + "-section", table.title, "", {}, {{table, {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}}}}});
-  }
-  write_file(out / "index.html", render_page(page));
+  for (const Table& table : tables) folder.section(table.id + "-section", table.title, "", {}, {table});
+  folder.write_index();
   fmt::print("{}", to_markdown(tables.front()));
   fmt::print("\n{}\n", (out / "index.html").string());
 }

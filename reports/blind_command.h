@@ -11,7 +11,8 @@ void run_blind_make(const BlindRequest& request);
 /// Runs the diagnosis, as a program of its own, on the folders that have no answer yet; records digest and time.
 void run_blind_answer(const BlindRequest& request);
 /// Checks seals and record, grades, writes tables and a page. @throws std::invalid_argument for a truth or an answer
-/// that was changed, and for answers written after the truths were first opened
+/// that was changed, for answers written after the truths were first opened, and (as run_blind_answer() does) for a
+/// sealed folder whose name is not that of a case
 void run_blind_open(const BlindRequest& request);
 
 }  // namespace metastable::reports

@@ -68,11 +68,11 @@ analysis::BlindAnswer read_answer(const std::string& file, std::string_view text
   try {
     const ordered_json j = ordered_json::parse(text);
     analysis::BlindAnswer answer;
-    answer.verdict = j.at("verdict").get<std::string>();
-    if (answer.verdict != "no_gap" && answer.verdict != "recalibrate" && answer.verdict != "explained" &&
-        answer.verdict != "unexplained")
-      throw std::invalid_argument(fmt::format(
-          "{}: verdict: \"{}\" is none of no_gap, recalibrate, explained, unexplained", file, answer.verdict));
+    try {
+      answer.verdict = analysis::verdict_from_name(j.at("verdict").get<std::string>());
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: {}", file, error.what()));
+    }
     for (const ordered_json& cause : j.at("causes"))
       answer.causes.emplace_back(cause.at("effect").get<std::string>(), cause.at("probability").get<double>());
     answer.cause_set = j.at("cause_set").get<std::vector<std::string>>();
@@ -94,8 +94,6 @@ analysis::BlindAnswer read_answer(const std::string& file, std::string_view text
       answer.where.push_back(
           {w.at("facet").get<std::string>(), w.at("aspect").get<std::string>(), w.at("p_adjusted").get<double>()});
     const ordered_json& shrinkage = j.at("shrinkage");
-    if (shrinkage.contains("closed") && shrinkage.at("closed").is_number())
-      answer.closed = shrinkage.at("closed").get<double>();
     const ordered_json interval = shrinkage.value("closed_interval_90", ordered_json());
     if (interval.is_array() && interval.size() == 2 && interval[0].is_number() && interval[1].is_number()) {
       answer.closed_lower = interval[0].get<double>();

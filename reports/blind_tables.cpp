@@ -90,7 +90,7 @@ std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::
     for (const dynamics::Effect& effect : t.effects) what += (what.empty() ? "" : " ") + dynamics::effect_text(effect);
     if (what.empty()) what = t.nominal_is_true ? "nominal contact" : "other contact";
     cases.rows.push_back({t.number, std::string(analysis::blind_kind_name(t.kind)), what, t.strength, t.power, t.left,
-                          answers[i] ? answers[i]->verdict : "no answer",
+                          answers[i] ? analysis::verdict_name(answers[i]->verdict) : "no answer",
                           answers[i] ? list(answers[i]->cause_set) : ""});
   }
   tables.push_back(std::move(cases));

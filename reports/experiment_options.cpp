@@ -64,8 +64,7 @@ void simulate_reality(const Options& o, const SimulateRequest& plain) {
                                             {fmt::format("{}", plain.setting.slope_deg), plain.setting, plain.trials}};
   analysis::RealityOptions& reality = request.reality;
   const analysis::Setting& s = plain.setting;
-  const dynamics::NominalValues stated{s.restitution.mean, s.restitution.sd, s.friction.mean, s.friction.sd,
-                                       s.wheel.leg_length};
+  const dynamics::NominalValues stated = analysis::stated_values(s.restitution, s.friction, s.wheel.leg_length);
   for (const std::string& text : o.all("effect")) reality.effects.push_back(dynamics::effect_from_text(text, stated));
   for (const std::string& text : o.all("outside")) {
     const std::vector<std::string> parts = split(text, ':');

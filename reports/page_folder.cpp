@@ -6,14 +6,12 @@
 
 namespace metastable::reports {
 
-PageFolder::PageFolder(const std::filesystem::path& folder) : folder_(folder) {
-  make_folder(folder_ / "tables");
-  make_folder(folder_ / "figures");
-}
+PageFolder::PageFolder(const std::filesystem::path& folder) : folder_(folder) { make_folder(folder_ / "tables"); }
 
 void PageFolder::section(const std::string& id, const std::string& heading, const std::string& reading,
                          const std::vector<Figure>& figures, std::vector<Table> tables) {
   PageSection section{id, heading, reading, {}, {}};
+  if (!figures.empty()) make_folder(folder_ / "figures");
   for (const Figure& figure : figures) {
     const std::string svg = render_svg(figure);
     write_file(folder_ / "figures" / (figure.id + ".svg"), svg);

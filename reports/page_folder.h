@@ -15,7 +15,7 @@ namespace metastable::reports {
 /// comes last.
 class PageFolder {
  public:
-  /// Creates the folders. @throws OutputError
+  /// Creates the folder and the one of tables (that of figures comes with the first of them). @throws OutputError
   explicit PageFolder(const std::filesystem::path& folder);
 
   Page& page() { return page_; }  ///< for title, intro and provenance

@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
 #include <stdexcept>
 
 #include "analysis/experiment.h"
+#include "analysis/sized_effect.h"
 
 namespace metastable::analysis::test {
 namespace {
@@ -17,8 +19,7 @@ const dynamics::NominalValues paper{0.54, 0.045, 0.352, 0.043, dynamics::paper_l
 // A power that grows like the square of the distance from neutral.
 double square_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects) {
   const Setting& s = design.conditions.front().setting;
-  const dynamics::NominalValues stated{s.restitution.mean, s.restitution.sd, s.friction.mean, s.friction.sd,
-                                       s.wheel.leg_length};
+  const dynamics::NominalValues stated = stated_values(s.restitution, s.friction, s.wheel.leg_length);
   double sum = 0;
   for (const dynamics::Effect& effect : effects) {
     // The strength of a patch or a leg sits in one value; where and which it is does not count.
@@ -29,11 +30,7 @@ double square_power(const PowerDesign& design, const std::vector<dynamics::Effec
   return sum;
 }
 
-Experiment read(const BlindCase& made) {
-  const ExperimentFiles& f = made.files.files;
-  return parse_experiment({"case", f.experiment_toml, f.collisions_csv,
-                           f.trials_csv.empty() ? std::nullopt : std::optional(f.trials_csv), std::nullopt});
-}
+Experiment read(const BlindCase& made) { return parse_experiment(source_of(made.files.files, "case")); }
 
 TEST(BlindCases, PlanHasTheSizeAskedFor) {
   const std::vector<BlindPlan> plan = blind_plan({}, 3);
@@ -53,6 +50,44 @@ TEST(BlindCases, PlanHasTheSizeAskedFor) {
   EXPECT_EQ(effect.size(), 23U);
   EXPECT_GE(family.size(), 4U);
   EXPECT_EQ(blind_plan({}, 3)[17].effects, plan[17].effects);
+}
+
+// The contact is no candidate beside which another effect could be named, and slip_reversal has no size to balance.
+TEST(BlindCases, PairsAreOfAllEffectsThatHaveASizeAndAreNotTheContact) {
+  std::set<std::string> paired;
+  for (const BlindPlan& p : blind_plan({0, 0, 500, 0, 0}, 8)) paired.insert(p.effects.begin(), p.effects.end());
+  std::set<std::string> expected;
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) expected.insert(info.id);
+  EXPECT_EQ(expected.erase("contact_distribution") + expected.erase("slip_reversal"), 2U);
+  EXPECT_EQ(paired, expected);
+}
+
+TEST(BlindCases, APlanOfFewerThanNoCasesIsRefused) {
+  try {
+    blind_plan({.pairs = -1}, 1);
+    ADD_FAILURE();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "pairs: -1 is below 0");
+  }
+}
+
+// An effect that cannot be drawn would be counted as one that nobody finds.
+TEST(SizedEffect, EveryEffectOfTheCatalogueHasASize) {
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
+    BlindDice dice(4, 1);
+    const SizedEffect effect = sized_effect(info.id, paper, dice);
+    EXPECT_EQ(effect.at(effect.largest).id, info.id);  // and is in the catalogue's range
+    if (info.id == "slip_reversal") continue;          // there or not
+    EXPECT_GT(effect.start, 0) << info.id;
+    EXPECT_LE(effect.start, effect.largest) << info.id;
+    EXPECT_NE(effect.at(effect.start).values, effect.at(0).values) << info.id;
+    EXPECT_NE(effect.at(effect.largest).values, effect.at(effect.start).values) << info.id;
+    const auto columns = droppable();
+    for (const std::string& name : effect.needs)
+      EXPECT_NE(std::find(columns.begin(), columns.end(), name), columns.end()) << info.id << ' ' << name;
+  }
+  BlindDice dice(4, 1);
+  EXPECT_THROW(sized_effect("sloshing_fluid", paper, dice), std::logic_error);
 }
 
 TEST(BlindCases, SizesReachThePowerAskedFor) {
@@ -131,16 +166,36 @@ TEST(EffectPower, GrowsLikeTheSquareOfTheSize) {
 
 // An effect that the contact's means imitate leaves nothing once they are refitted.
 TEST(EffectPower, RecalibrationAbsorbsAShiftOfTheContact) {
-  const BlindCase made = blind_case({BlindKind::effect, {"contact_distribution"}, 4}, 3, 21,
-                                    [](const PowerDesign& design, const std::vector<dynamics::Effect>& effects) {
-                                      return expected_power(design, effects, 1);
-                                    });
-  const Experiment e = read(made);
-  const dynamics::NominalValues contact{made.truth.restitution.mean, made.truth.restitution.sd,
-                                        made.truth.friction.mean, made.truth.friction.sd, e.wheel.leg_length};
+  BlindCase made = blind_case({BlindKind::effect, {"contact_distribution"}, 4}, 3, 21,
+                              [](const PowerDesign& design, const std::vector<dynamics::Effect>& effects) {
+                                return expected_power(design, effects, 1);
+                              });
   EXPECT_GT(made.truth.power, 150);
-  EXPECT_LT(power_left(e, contact, made.truth.effects), 16);
+  EXPECT_EQ(made.truth.left, 0);
+  complete_truth(made);
+  EXPECT_NE(made.truth.left, 0);
+  EXPECT_LT(made.truth.left, 16);
 }
+
+// Beside its other effect in the model, each effect of a pair leaves what refitting cannot take up.
+TEST(EffectPower, OfAPairEachEffectIsWeighedBesideTheOther) {
+  BlindCase made = blind_case({BlindKind::pair, {"leg_contact", "contact_memory"}, 2}, 2, 21,
+                              [](const PowerDesign& design, const std::vector<dynamics::Effect>& effects) {
+                                return expected_power(design, effects, 1);
+                              });
+  complete_truth(made);
+  complete_pair(made.truth, read(made));
+  ASSERT_EQ(made.truth.left_by_effect.size(), 2U);
+  for (const double left : made.truth.left_by_effect) {
+    EXPECT_GT(left, 16);
+    EXPECT_LT(left, made.truth.left);
+  }
+  BlindTruth none;
+  complete_pair(none, read(made));
+  EXPECT_TRUE(none.left_by_effect.empty());
+}
+
+TEST(EffectPower, NeedsAReplicate) { EXPECT_THROW(expected_power({}, {}, 0), std::invalid_argument); }
 
 }  // namespace
 }  // namespace metastable::analysis::test

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,12 +33,7 @@ std::vector<Outcome> check(const std::vector<BlindPlan>& plans, std::uint64_t se
   };
   markov::parallel_for(plans.size(), 0, [&](std::size_t i) {
     const BlindCase one = blind_case(plans[i], static_cast<int>(i) + 1, seed, power);
-    const std::string& text = one.files.files.trials_csv;  // empty where outcomes were dropped
-    const Experiment experiment = parse_experiment({.folder = "case",
-                                                    .experiment_toml = one.files.files.experiment_toml,
-                                                    .collisions_csv = one.files.files.collisions_csv,
-                                                    .trials_csv = text.empty() ? std::nullopt : std::optional(text),
-                                                    .angle_csv = {}});
+    const Experiment experiment = parse_experiment(source_of(one.files.files, "case"));
     DiagnosisOptions options;
     options.threads = 1;
     options.draws = 1000;
@@ -64,10 +58,13 @@ std::vector<BlindPlan> plans_of(BlindKind kind, std::size_t count, std::uint64_t
 }
 
 TEST(BlindCheck, DoesNotCryWolf) {
-  int alarms = 0;
-  for (const Outcome& o : check(plans_of(BlindKind::none, 6, 90), 90))
+  int alarms = 0, cases = 0;
+  for (const Outcome& o : check(plans_of(BlindKind::none, 6, 90), 90)) {
+    ++cases;
     alarms += o.diagnosis.verdict == Verdict::explained || o.diagnosis.verdict == Verdict::unexplained;
-  EXPECT_LE(alarms, 1);  // two or more of 6 at 3 %: one seed in 80, and the seed is fixed
+  }
+  EXPECT_GT(cases, 0);
+  EXPECT_LE(alarms, cases / 6);  // two or more of 6 at 3 %: one seed in 80, and the seed is fixed
 }
 
 TEST(BlindCheck, HoldsTheCauseOfStrongEffects) {
@@ -83,7 +80,7 @@ TEST(BlindCheck, HoldsTheCauseOfStrongEffects) {
     if (!holds) missed += o.truth.effects[0].id + " ";
   }
   EXPECT_GT(cases, 0);
-  EXPECT_GE(held, cases - 1) << missed;
+  EXPECT_GE(held, std::max(1, cases - 1)) << missed;
 }
 
 TEST(BlindCheck, SeldomNamesACauseForWhatNoCatalogueHolds) {

@@ -30,7 +30,7 @@ BlindTruth truth(BlindKind kind, const std::vector<std::string>& ids, int streng
   return t;
 }
 
-BlindAnswer said(const std::string& verdict, const std::vector<std::string>& set = {}, double probability = 0.95) {
+BlindAnswer said(Verdict verdict, const std::vector<std::string>& set = {}, double probability = 0.95) {
   BlindAnswer a;
   a.verdict = verdict;
   a.cause_set = set;
@@ -53,11 +53,11 @@ void expect(const BlindGrades& grades, const std::string& measure, int right, in
 TEST(BlindGrade, FalseAlarms) {
   BlindTruth exact = truth(BlindKind::none, {}, 0), unlike = exact;
   unlike.nominal_is_true = false;
-  BlindAnswer placed = said("no_gap");
+  BlindAnswer placed = said(Verdict::no_gap);
   placed.where.push_back({"leg", "mean", 0.01});
-  const BlindGrades g = grade(
-      {exact, exact, exact, unlike, unlike, unlike},
-      {placed, said("recalibrate"), std::nullopt, said("recalibrate"), said("no_gap"), said("explained", {"bounce"})});
+  const BlindGrades g = grade({exact, exact, exact, unlike, unlike, unlike},
+                              {placed, said(Verdict::recalibrate), std::nullopt, said(Verdict::recalibrate),
+                               said(Verdict::no_gap), said(Verdict::explained, {"bounce"})});
   expect(g, "false alarms where there is no gap", 3, 6);
   expect(g, "  nominal contact true", 2, 3);
   expect(g, "  nominal contact not true", 1, 3);
@@ -67,13 +67,14 @@ TEST(BlindGrade, FalseAlarms) {
 TEST(BlindGrade, EffectsFoundAndNamed) {
   BlindTruth leg = truth(BlindKind::effect, {"leg_contact"}, 2), absorbed = truth(BlindKind::effect, {"bounce"}, 2);
   absorbed.left = 1;
-  BlindAnswer right = said("explained", {"leg_contact"});
+  BlindAnswer right = said(Verdict::explained, {"leg_contact"});
   right.where.push_back({"leg", "mean", 0.001});
   right.parameters.push_back({"leg_contact", "friction_ratio", 1.01, 0.98, 1.04});
   right.closed_lower = 0.9, right.closed_upper = 1.0;
-  const BlindGrades g = grade({leg, leg, leg, leg, absorbed, absorbed},
-                              {right, said("explained", {"leg_lengths", "leg_contact"}), said("explained", {"inertia"}),
-                               said("no_gap"), said("recalibrate"), said("explained", {"inertia"})});
+  const BlindGrades g =
+      grade({leg, leg, leg, leg, absorbed, absorbed},
+            {right, said(Verdict::explained, {"leg_lengths", "leg_contact"}), said(Verdict::explained, {"inertia"}),
+             said(Verdict::no_gap), said(Verdict::recalibrate), said(Verdict::explained, {"inertia"})});
   expect(g, "effect found, 2x", 5, 6);
   expect(g, "effect with power left found after recalibration, 2x", 3, 4);
   expect(g, "cause right up to stated ambiguity, 2x", 2, 3);
@@ -99,11 +100,12 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
   const BlindTruth full = truth(BlindKind::effect, {"leg_contact"}, 2);
   const BlindGrades g =
       grade({pair, pair, hidden, pair, outside, outside, outside, left, left, left, full},
-            {said("explained", {"trial_drift+inertia"}), said("explained", {"inertia"}),
-             said("explained", {"inertia+bounce"}), said("explained", {"bounce+inertia", "inertia+trial_drift"}),
-             said("unexplained"), said("explained", {"bounce"}), said("explained", {"bounce", "inertia"}),
-             said("unexplained"), said("explained", {"leg_lengths"}), said("explained", {"bounce"}),
-             said("explained", {"leg_contact", "leg_lengths"})});
+            {said(Verdict::explained, {"trial_drift+inertia"}), said(Verdict::explained, {"inertia"}),
+             said(Verdict::explained, {"inertia+bounce"}),
+             said(Verdict::explained, {"bounce+inertia", "inertia+trial_drift"}), said(Verdict::unexplained),
+             said(Verdict::explained, {"bounce"}), said(Verdict::explained, {"bounce", "inertia"}),
+             said(Verdict::unexplained), said(Verdict::explained, {"leg_lengths"}),
+             said(Verdict::explained, {"bounce"}), said(Verdict::explained, {"leg_contact", "leg_lengths"})});
   expect(g, "two effects: both named", 2, 4);
   expect(g, "  each with power left beside the other", 2, 3);
   expect(g, "two effects: no false third, up to stated ambiguity", 3, 4);
@@ -118,6 +120,7 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
 TEST(BlindGrade, EveryEffectHasRightfulPlaces) {
   for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())
     EXPECT_FALSE(rightful_places(info.id).empty()) << info.id;
+  EXPECT_TRUE(rightful_places("sloshing_fluid").empty());
   EXPECT_THROW(grade({BlindTruth{}}, {}), std::invalid_argument);
 }
 

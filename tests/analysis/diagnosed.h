@@ -38,12 +38,6 @@ inline Experiment wheel_design(std::size_t trials, std::size_t collisions, bool 
   return e;
 }
 
-inline std::vector<double> nominal(const TransitionModel& model) {
-  std::vector<double> values;
-  for (const Nuisance& n : model.nuisances()) values.push_back(n.nominal);
-  return values;
-}
-
 inline Term term(const TransitionModel& model, const std::string& id, std::vector<double> variant,
                  std::vector<double> values) {
   for (const Candidate& candidate : model.candidates())

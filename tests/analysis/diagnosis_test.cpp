@@ -14,7 +14,6 @@
 namespace metastable::analysis {
 namespace {
 
-using test::nominal;
 using test::term;
 
 DiagnosisOptions quick() {
@@ -29,7 +28,7 @@ std::unique_ptr<TransitionModel> data(
   const auto design = wheel_transitions(test::wheel_design(100, 14));
   std::vector<Term> terms;
   for (const auto& [id, sizes] : effects) terms.push_back(term(*design, id, sizes.first, sizes.second));
-  if (contact.empty()) contact = nominal(*design);
+  if (contact.empty()) contact = nominal_values(*design);
   return design->simulate(contact, terms, seed);
 }
 
@@ -59,14 +58,15 @@ TEST(Diagnosis, ItsProbabilitiesAgreeWithItsVerdict) {
   options.catalogue = {"leg_contact", "trial_drift", "air_drag", "sensor_bias", "inertia", "slope_offset"};
   for (const double torque : {0.0, 1e-4, 2e-4})
     for (std::uint64_t seed = 31; seed < 34; ++seed)
-      expect_probabilities_to_agree(diagnose(
-          *design->simulate(nominal(*design), std::vector{term(*design, "rolling_resistance", {}, {torque})}, seed),
-          options));
+      expect_probabilities_to_agree(
+          diagnose(*design->simulate(nominal_values(*design),
+                                     std::vector{term(*design, "rolling_resistance", {}, {torque})}, seed),
+                   options));
 }
 
 TEST(Diagnosis, CallsOtherContactParametersRecalibration) {
   const auto design = wheel_transitions(test::wheel_design(100, 14));
-  std::vector<double> contact = nominal(*design);
+  std::vector<double> contact = nominal_values(*design);
   contact[2] += 0.05;  // friction's mean
   const Diagnosis d = diagnose(*data({}, 22, contact), quick());
   EXPECT_EQ(d.verdict, Verdict::recalibrate);
@@ -188,13 +188,13 @@ TEST(Diagnosis, RefusesOptionsOutOfRange) {
 TEST(Diagnosis, NamesTheTorqueOnARotor) {
   const auto design = coast_down_transitions(test::coasting_rotor());
   const auto dragged =
-      design->simulate(nominal(*design), std::vector{term(*design, "rolling_resistance", {}, {0.02})}, 5);
+      design->simulate(nominal_values(*design), std::vector{term(*design, "rolling_resistance", {}, {0.02})}, 5);
   const Diagnosis d = diagnose(*dragged, quick());
   EXPECT_EQ(d.verdict, Verdict::explained);
   ASSERT_FALSE(d.causes.empty());
   EXPECT_EQ(d.causes[0].name(), "rolling_resistance");
   EXPECT_NEAR(d.causes[0].parameters[0][0].value, 0.02, 0.002);
-  const Diagnosis none = diagnose(*design->simulate(nominal(*design), {}, 6), quick());
+  const Diagnosis none = diagnose(*design->simulate(nominal_values(*design), {}, 6), quick());
   EXPECT_EQ(none.verdict, Verdict::no_gap);
 }
 

@@ -15,7 +15,7 @@ Diagnosis without_gap(std::size_t trials, std::size_t collisions, std::uint64_t 
   const auto design = wheel_transitions(test::wheel_design(trials, collisions));
   DiagnosisOptions options;
   options.draws = 300;
-  return diagnose(*design->simulate(test::nominal(*design), {}, seed), options);
+  return diagnose(*design->simulate(nominal_values(*design), {}, seed), options);
 }
 
 // Where chance was drawn from the trials' own scores, nearly every experiment of one to three trials had a gap, and
@@ -134,7 +134,7 @@ class Jagged : public TransitionModel {
 
 TEST(NotDecided, AnEffectWhoseLikelihoodFailsToMaximiseIsListedWithTheReason) {
   const auto design = wheel_transitions(test::wheel_design(50, 6));
-  const Jagged model(design->simulate(test::nominal(*design), {}, 5), "trial_drift");
+  const Jagged model(design->simulate(nominal_values(*design), {}, 5), "trial_drift");
   DiagnosisOptions options;
   options.draws = 200;
   options.catalogue = {"trial_drift", "leg_contact", "air_drag"};
@@ -163,7 +163,7 @@ TEST(MissingColumns, WithoutLegsNoEffectOfALegIsTold) {
   options.draws = 200;
   options.catalogue = {"leg_contact", "leg_lengths", "hub_eccentricity", "slope_offset", "sensor_bias"};
   const auto design = wheel_transitions(e);
-  const Diagnosis d = diagnose(*design->simulate(test::nominal(*design), {}, 4), options);
+  const Diagnosis d = diagnose(*design->simulate(nominal_values(*design), {}, 4), options);
   ASSERT_EQ(d.missing.size(), 2u);
   EXPECT_EQ(hidden_by(d, "leg"), (std::vector<std::string>{"leg_contact", "hub_eccentricity"}));
   EXPECT_EQ(hidden_by(d, "omega_plus_rad_s"),
@@ -185,7 +185,7 @@ TEST(MissingColumns, NothingIsSaidOfColumnsThatAreThere) {
   DiagnosisOptions options;
   options.draws = 200;
   options.catalogue = {"air_drag"};
-  EXPECT_TRUE(diagnose(*design->simulate(test::nominal(*design), {}, 4), options).missing.empty());
+  EXPECT_TRUE(diagnose(*design->simulate(nominal_values(*design), {}, 4), options).missing.empty());
 }
 
 }  // namespace

@@ -21,9 +21,9 @@ RealityFiles make(RealityOptions reality, FolderOptions folder) {
 }
 
 Experiment read(const RealityFiles& made) {
-  return parse_experiment({"lab", made.files.experiment_toml, made.files.collisions_csv,
-                           made.files.trials_csv.empty() ? std::nullopt : std::optional(made.files.trials_csv),
-                           made.angle_csv});
+  ExperimentSource source = source_of(made.files, "lab");
+  source.angle_csv = made.angle_csv;
+  return parse_experiment(source);
 }
 
 TEST(Reality, FolderIsReadBackByTheStrictReader) {
@@ -75,7 +75,9 @@ TEST(Reality, SameSeedSameBytesOnAnyNumberOfThreads) {
 TEST(Reality, CollisionsFoundInTheAngleAreTheTrueOnes) {
   const RealityFiles made = make({}, {.camera = CameraOptions{}});
   const Experiment truth = read(made);
-  const ExperimentSource source{"lab", made.files.experiment_toml, std::nullopt, made.files.trials_csv, made.angle_csv};
+  ExperimentSource source = source_of(made.files, "lab");
+  source.collisions_csv.reset();
+  source.angle_csv = made.angle_csv;
   const Experiment description = parse_description(source);
   std::size_t compared = 0;
   for (const MeasuredAngle& angle : parse_angles(source, description)) {
@@ -98,6 +100,7 @@ TEST(Reality, RefusesWhatTheLaboratoryDoesNotHave) {
   conditions[0].setting.correlation = 0;
   EXPECT_THROW(laboratory_setup(conditions, {.collisions = 0}), std::invalid_argument);
   EXPECT_THROW(laboratory_setup({}, {}), std::invalid_argument);
+  EXPECT_THROW(reality_files({}, {}, {}, {}), std::invalid_argument);
 }
 
 }  // namespace

@@ -11,8 +11,6 @@
 namespace metastable::analysis {
 namespace {
 
-using test::nominal;
-
 // The filter on one step without noise is the exact density of the landing: another route to the same number.
 TEST(WheelLikelihood, OneStepIsTheLandingDensity) {
   Experiment e = test::wheel_design(2, 2, false);
@@ -21,7 +19,7 @@ TEST(WheelLikelihood, OneStepIsTheLandingDensity) {
   e.trials[0].collisions[0].omega_minus = 5.3;
   e.trials[0].collisions[1].omega_minus = 5.5;
   const auto model = wheel_transitions(e);
-  const Evaluation evaluation = model->evaluate(nominal(*model), {});
+  const Evaluation evaluation = model->evaluate(nominal_values(*model), {});
   const dynamics::WheelMap map(dynamics::Wheel{}, 9.59 * std::numbers::pi / 180, dynamics::Law::published,
                                dynamics::ContactNoise::normal(0.54, 0.045, 0.352, 0.043));
   const std::vector<double> next{5.5 * 5.5};
@@ -41,7 +39,7 @@ TEST(WheelLikelihood, RestHasTheMapsProbability) {
   e.trials[1].collisions.push_back(
       {.number = 2, .leg = 1, .time = 0.2, .position = 0.116, .omega_minus = 5.5, .omega_plus = {}});
   const auto model = wheel_transitions(e);
-  const Evaluation evaluation = model->evaluate(nominal(*model), {});
+  const Evaluation evaluation = model->evaluate(nominal_values(*model), {});
   const dynamics::WheelMap map(dynamics::Wheel{}, 9.59 * std::numbers::pi / 180, dynamics::Law::published,
                                dynamics::ContactNoise::normal(0.54, 0.045, 0.352, 0.043));
   ASSERT_EQ(model->events()[0].kind, EventKind::rest);

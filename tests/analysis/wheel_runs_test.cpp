@@ -11,11 +11,9 @@
 namespace metastable::analysis {
 namespace {
 
-using test::nominal;
-
 TEST(WheelRuns, LegsThatWereNotNotedAreFoundFromTheStances) {
   const auto design = wheel_transitions(test::wheel_design(20, 10));
-  const auto data = design->simulate(nominal(*design), {}, 3);
+  const auto data = design->simulate(nominal_values(*design), {}, 3);
   Experiment e = test::wheel_design(20, 10);
   e.columns.leg = Presence::none;
   // The simulated speeds, without legs.

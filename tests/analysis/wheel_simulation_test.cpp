@@ -9,8 +9,6 @@
 namespace metastable::analysis {
 namespace {
 
-using test::nominal;
-
 struct Moments {
   double count = 0, mean = 0, square = 0;
 };
@@ -31,8 +29,8 @@ Moments moments(const TransitionModel& model, const Evaluation& e, EventKind kin
 TEST(WheelSimulation, ScoresOfItsOwnDataAreStandardNormal) {
   for (const bool speeds_after : {true, false}) {
     const auto design = wheel_transitions(test::wheel_design(150, 16, speeds_after));
-    const auto data = design->simulate(nominal(*design), {}, 5);
-    const Evaluation e = data->evaluate(nominal(*data), {});
+    const auto data = design->simulate(nominal_values(*design), {}, 5);
+    const Evaluation e = data->evaluate(nominal_values(*data), {});
     for (const EventKind kind : {EventKind::launch, speeds_after ? EventKind::collision : EventKind::step}) {
       const Moments m = moments(*data, e, kind);
       EXPECT_NEAR(m.mean, 0, 4 / std::sqrt(m.count));
@@ -47,10 +45,10 @@ TEST(WheelSimulation, ScoresOfItsOwnDataAreStandardNormal) {
 
 TEST(WheelSimulation, SameSeedSameData) {
   const auto design = wheel_transitions(test::wheel_design(6, 5));
-  const auto a = design->simulate(nominal(*design), {}, 9), b = design->simulate(nominal(*design), {}, 9),
-             c = design->simulate(nominal(*design), {}, 10);
-  EXPECT_EQ(a->evaluate(nominal(*a), {}).log_density, b->evaluate(nominal(*b), {}).log_density);
-  EXPECT_NE(a->evaluate(nominal(*a), {}).log_density, c->evaluate(nominal(*c), {}).log_density);
+  const auto a = design->simulate(nominal_values(*design), {}, 9), b = design->simulate(nominal_values(*design), {}, 9),
+             c = design->simulate(nominal_values(*design), {}, 10);
+  EXPECT_EQ(a->evaluate(nominal_values(*a), {}).log_density, b->evaluate(nominal_values(*b), {}).log_density);
+  EXPECT_NE(a->evaluate(nominal_values(*a), {}).log_density, c->evaluate(nominal_values(*c), {}).log_density);
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 namespace metastable::analysis {
 namespace {
 
-using test::nominal;
 using test::term;
 
 // Fitted effects find the sizes the data were drawn with.
@@ -27,17 +26,17 @@ TEST(WheelTransitions, FitsFindTheSizesOfEffects) {
                                 {"sensor_bias", {1, 1}, {0.02}}};
   for (const Case& one : cases) {
     const Term truth = term(*design, one.id, one.variant, one.values);
-    const auto data = design->simulate(nominal(*design), std::vector{truth}, 11);
+    const auto data = design->simulate(nominal_values(*design), std::vector{truth}, 11);
     Term start = term(*data, one.id, one.variant, one.values);
     for (double& value : start.values) value *= 0.9;
-    const Fit found = fit(*data, nominal(*data), {start});
+    const Fit found = fit(*data, nominal_values(*data), {start});
     EXPECT_TRUE(found.converged) << one.id << ' ' << found.reason;
     const Eigen::MatrixXd covariance = found.information.inverse();
     for (std::size_t p = 0; p < one.values.size(); ++p) {
-      const auto at = static_cast<Eigen::Index>(nominal(*data).size() + p);
+      const auto at = static_cast<Eigen::Index>(nominal_values(*data).size() + p);
       EXPECT_NEAR(found.terms[0].values[p], one.values[p], 4 * std::sqrt(covariance(at, at))) << one.id << ' ' << p;
     }
-    EXPECT_GT(found.penalised, fit(*data, nominal(*data), {}).penalised + 8) << one.id;
+    EXPECT_GT(found.penalised, fit(*data, nominal_values(*data), {}).penalised + 8) << one.id;
   }
 }
 

@@ -4,21 +4,18 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string>
 
 #include "analysis/experiment.h"
+#include "reports/blind_json.h"
+#include "tests/reports/support.h"
 
 namespace metastable::reports::test {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string text_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
 template <class F>
@@ -64,17 +61,17 @@ TEST_F(BlindRun, MakesAnswersAndOpens) {
   run_blind_make(request_);
   const fs::path cases = fs::path(request_.folder) / "cases";
   for (const char* name : {"0001", "0002", "0003"}) {
-    EXPECT_EQ(text_of(cases / name / "seal.txt").size(), 65U);
+    EXPECT_EQ(read(cases / name / "seal.txt").size(), 65U);
     EXPECT_GE(analysis::read_experiment(cases / name).trials.size(), 50U);
     EXPECT_TRUE(fs::exists(request_.folder + "-sealed/" + name + ".json"));
     // Nothing of the truth is in the folder the diagnosis sees.
-    EXPECT_EQ(text_of(cases / name / "experiment.toml").find("seed"), std::string::npos);
+    EXPECT_EQ(read(cases / name / "experiment.toml").find("seed"), std::string::npos);
   }
   // Cut short and taken up again: the same bytes.
-  const std::string before = text_of(cases / "0002" / "collisions.csv");
+  const std::string before = read(cases / "0002" / "collisions.csv");
   fs::remove_all(cases / "0002");
   run_blind_make(request_);
-  EXPECT_EQ(text_of(cases / "0002" / "collisions.csv"), before);
+  EXPECT_EQ(read(cases / "0002" / "collisions.csv"), before);
   BlindRequest other = request_;
   other.seed = 12;
   EXPECT_NE(message_of([&] { run_blind_make(other); }).find("belongs to a run of another seed or size"),
@@ -86,8 +83,31 @@ TEST_F(BlindRun, MakesAnswersAndOpens) {
   run_blind_open(request_);  // opening twice is no harm
   const fs::path report = fs::path(request_.folder) / "report";
   EXPECT_TRUE(fs::exists(report / "index.html"));
-  EXPECT_NE(text_of(report / "tables" / "blind-measures.csv").find("false alarms where there is no gap,0,2,0"),
+  EXPECT_NE(read(report / "tables" / "blind-measures.csv").find("false alarms where there is no gap,0,2,0"),
             std::string::npos);
+  for (const char* id : {"blind-measures", "blind-confusion", "blind-calibration", "blind-alike", "blind-cases"})
+    for (const char* form : {".csv", ".md", ".tex"})
+      EXPECT_TRUE(fs::exists(report / "tables" / (std::string(id) + form))) << id << form;
+  EXPECT_FALSE(fs::exists(report / "figures"));
+}
+
+TEST_F(BlindRun, RefusesASealedFolderThatIsNoCase) {
+  run_blind_make(request_);
+  const fs::path stray = fs::path(request_.folder) / "cases" / "0001 copy";
+  fs::create_directories(stray);
+  write(stray / "seal.txt", "");
+  for (const auto command : {run_blind_answer, run_blind_open})
+    EXPECT_EQ(message_of([&] { command(request_); }),
+              stray.string() + ": holds a seal.txt, but its name is not that of a case (0001, 0002, ...)");
+}
+
+TEST(BlindAnswer, VerdictsAreRead) {
+  const auto answer = [](const std::string& verdict) {
+    return R"({"verdict":")" + verdict + R"(","where":[],"causes":[],"cause_set":[],"shrinkage":{}})";
+  };
+  EXPECT_EQ(read_answer("a.json", answer("unexplained")).verdict, analysis::Verdict::unexplained);
+  EXPECT_EQ(message_of([&] { read_answer("a.json", answer("perhaps")); }),
+            "a.json: verdict: \"perhaps\" is none of no_gap, recalibrate, explained, unexplained");
 }
 
 TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
@@ -96,20 +116,20 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
   run_blind_answer(request_);
 
   const fs::path answer = fs::path(request_.folder) / "answers" / "0001.json";
-  const std::string said = text_of(answer);
+  const std::string said = read(answer);
   write(answer, said + " ");
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("the answer to case 1 was changed"), std::string::npos);
   write(answer, said);
 
   const fs::path truth = request_.folder + "-sealed/0003.json";
-  const std::string sealed = text_of(truth);
+  const std::string sealed = read(truth);
   write(truth, sealed + " ");
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("the seal of case 3 is broken"), std::string::npos);
   write(truth, sealed);
 
   // Two of three answered when the truths are opened: the third comes too late.
   const fs::path record = fs::path(request_.folder) / "answers" / "record.csv";
-  const std::string all = text_of(record);
+  const std::string all = read(record);
   write(record, all.substr(0, all.rfind('\n', all.size() - 2) + 1));
   run_blind_open(request_);
   EXPECT_NE(message_of([&] { run_blind_answer(request_); }).find("was opened"), std::string::npos);
