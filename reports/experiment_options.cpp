@@ -270,28 +270,30 @@ Command study() {
 }
 
 Command diagnose() {
-  return {"diagnose",
-          "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
-          [](Options& o) {
-            o.add_place("DIR", "Experiment folder");
-            o.add("catalogue", "FILE|ID,ID,...", "",
-                  "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects')");
-            o.add_seed();
-            o.add_threads();
-            o.add("json", "FILE|-", "", "Write the results as JSON");
-            o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
-          },
-          [](const Options& o, const std::string& line) {
-            DiagnoseRequest request;
-            request.folder = o.text("DIR");
-            if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
-            request.options.seed = o.seed();
-            request.options.threads = o.threads();
-            request.json = o.text("json");
-            request.out = o.text("out");
-            request.command = line;
-            run_diagnose(request);
-          }};
+  return {
+      "diagnose", "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
+      [](Options& o) {
+        o.add_place("DIR", "Experiment folder");
+        o.add(
+            "catalogue", "FILE|ID,ID,...", "",
+            "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects'); a pair, "
+            "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");
+        o.add_seed();
+        o.add_threads();
+        o.add("json", "FILE|-", "", "Write the results as JSON");
+        o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
+      },
+      [](const Options& o, const std::string& line) {
+        DiagnoseRequest request;
+        request.folder = o.text("DIR");
+        if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
+        request.options.seed = o.seed();
+        request.options.threads = o.threads();
+        request.json = o.text("json");
+        request.out = o.text("out");
+        request.command = line;
+        run_diagnose(request);
+      }};
 }
 
 Command lessons() {

@@ -322,6 +322,72 @@ std::string latex_number(double value, const Column& column) {
   return fmt::format("${}{}{}$", d.negative ? "-" : "", d.mantissa, power);
 }
 
+constexpr std::size_t latex_page = 45;          // rows of a page; longer tables break
+constexpr std::size_t latex_wrapped_page = 20;  // where text wraps
+constexpr std::size_t latex_word = 12;          // characters of a heading's line, if it has spaces
+constexpr std::size_t latex_wrapped = 24;       // characters beyond which text is wrapped
+constexpr std::size_t latex_many_columns = 6;   // beyond, smaller type
+constexpr std::size_t latex_very_many_columns = 8;
+constexpr double latex_share = 0.6;  // of the line, for all columns of wrapped text
+
+// How a table fits a page.
+struct LatexLayout {
+  std::string packages = "booktabs", columns;
+  std::vector<bool> wrapped;  // by column
+  std::string_view size = "\\small";
+  bool is_long = false;
+};
+
+LatexLayout latex_layout(const Table& table) {
+  LatexLayout layout;
+  std::vector<bool>& wrapped = layout.wrapped;
+  wrapped.resize(table.columns.size());
+  for (const auto& row : table.rows)
+    for (std::size_t j = 0; j < row.size(); ++j)
+      if (const auto* text = std::get_if<std::string>(&row[j].value()))
+        wrapped[j] = wrapped[j] || (is_text(table, j) && text->size() > latex_wrapped);
+  const auto count = std::ranges::count(wrapped, true);
+  for (std::size_t j = 0; j < table.columns.size(); ++j)
+    layout.columns += wrapped[j] ? fmt::format(">{{\\raggedright\\arraybackslash}}p{{{:.2g}\\linewidth}}",
+                                               latex_share / static_cast<double>(count + 1))
+                                 : std::string(1, is_text(table, j) ? 'l' : 'r');
+  layout.is_long = table.rows.size() > (count > 0 ? latex_wrapped_page : latex_page);
+  if (count > 0) layout.packages += ",array";
+  if (layout.is_long) layout.packages += ",longtable";
+  if (table.columns.size() > latex_very_many_columns)
+    layout.size = "\\tiny\\setlength{\\tabcolsep}{2pt}";
+  else if (table.columns.size() > latex_many_columns)
+    layout.size = "\\scriptsize\\setlength{\\tabcolsep}{3pt}";
+  return layout;
+}
+
+// Names of effects and parameters may break after an underscore or a plus.
+std::string breakable(const std::string& text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    out += text[i];
+    if (text[i] == '+' || (text[i] == '_' && i > 0 && text[i - 1] == '\\')) out += "\\allowbreak{}";
+  }
+  return out;
+}
+
+// Long names in several lines, units below. Braces: a [ right after \\ would be read as its optional argument.
+std::string latex_heading(const Column& column, bool text) {
+  std::string lines;
+  std::size_t length = 0;
+  for (std::size_t from = 0; from < column.name.size();) {
+    const std::size_t to = std::min(column.name.find(' ', from), column.name.size());
+    const std::string word = column.name.substr(from, to - from);
+    if (length > 0) lines += length + 1 + word.size() > latex_word ? "\\\\{}" : " ";
+    length = length > 0 && length + 1 + word.size() <= latex_word ? length + 1 + word.size() : word.size();
+    lines += escape_latex(word);
+    from = to + 1;
+  }
+  if (!column.unit.empty()) lines += "\\\\{}[" + escape_latex(column.unit) + "]";
+  if (lines.find("\\\\") == std::string::npos) return "{" + lines + "}";
+  return fmt::format("\\begin{{tabular}}[b]{{@{{}}{}@{{}}}}{}\\end{{tabular}}", text ? 'l' : 'r', lines);
+}
+
 }  // namespace
 
 std::vector<std::string> provenance_lines(const Provenance& provenance) {
@@ -434,43 +500,43 @@ std::string to_markdown(const Table& table) {
 
 std::string to_latex(const Table& table) {
   validate(table);
+  const LatexLayout layout = latex_layout(table);
   const std::vector<std::string> provenance = provenance_lines(table.provenance);
-  std::string out = "% Needs \\usepackage{booktabs}.\n";
+  std::string out = fmt::format("% Needs \\usepackage{{{}}}.\n", layout.packages);
   for (const std::string& line : provenance) append_comment(out, "% ", line);
+  const std::string title = fmt::format("\\caption{{{}}}\n\\label{{tab:{}}}", escape_latex(table.title), table.id);
   // A wide table spans both columns of a two-column paper; in one column the two are the same.
-  const std::string_view environment = table.columns.size() > 4 ? "table*" : "table";
-  out += fmt::format("\\begin{{{}}}[htbp]\n\\centering\\small\n", environment);
-  out += fmt::format("\\caption{{{}}}\n\\label{{tab:{}}}\n\\begin{{tabular}}{{", escape_latex(table.title), table.id);
-  for (std::size_t j = 0; j < table.columns.size(); ++j) out += is_text(table, j) ? 'l' : 'r';
-  out += "}\n\\toprule\n";
+  const std::string_view environment = layout.is_long ? "longtable" : table.columns.size() > 4 ? "table*" : "table";
+  if (layout.is_long)
+    out += fmt::format("{{{}\n\\begin{{longtable}}{{{}}}\n{} \\\\\n", layout.size, layout.columns, title);
+  else
+    out += fmt::format("\\begin{{{}}}[htbp]\n\\centering{}\n{}\n\\begin{{tabular}}{{{}}}\n", environment, layout.size,
+                       title, layout.columns);
+  out += "\\toprule\n";
 
   const auto append_row = [&](const std::vector<std::string>& cells) {
     out += fmt::format("{} \\\\\n", fmt::join(cells, " & "));
   };
   std::vector<std::string> cells;
-  // Units below their names. Braces: a [ right after \\ would be read as its optional argument.
-  for (std::size_t j = 0; j < table.columns.size(); ++j) {
-    const Column& column = table.columns[j];
-    cells.push_back(column.unit.empty()
-                        ? "{" + escape_latex(column.name) + "}"
-                        : fmt::format("\\begin{{tabular}}[b]{{@{{}}{}@{{}}}}{}\\\\{{}}[{}]\\end{{tabular}}",
-                                      is_text(table, j) ? 'l' : 'r', escape_latex(column.name),
-                                      escape_latex(column.unit)));
-  }
+  for (std::size_t j = 0; j < table.columns.size(); ++j)
+    cells.push_back(latex_heading(table.columns[j], is_text(table, j)));
   append_row(cells);
-  out += "\\midrule\n";
+  out += layout.is_long ? "\\midrule\n\\endhead\n" : "\\midrule\n";
   for (const auto& row : table.rows) {
     cells.clear();
     for (std::size_t j = 0; j < row.size(); ++j) {
-      const std::string text = show(row[j], table.columns[j], escape_latex, latex_number);
+      std::string text = show(row[j], table.columns[j], escape_latex, latex_number);
+      if (layout.wrapped[j]) text = breakable(text);
       cells.push_back(text.starts_with('[') || text.starts_with('*') ? "{" + text + "}" : text);
     }
     append_row(cells);
   }
-  out += "\\bottomrule\n\\end{tabular}\n\n\\medskip\n\\begin{minipage}{\\linewidth}\\footnotesize\n";
+  out += layout.is_long ? "\\bottomrule\n\\end{longtable}}\n\n" : "\\bottomrule\n\\end{tabular}\n\n\\medskip\n";
+  out += "\\noindent\\begin{minipage}{\\linewidth}\\footnotesize\n";
   for (const std::string& note : table.notes) out += escape_latex(note) + "\\par\n";
   for (const std::string& line : provenance) out += escape_latex(line) + "\\par\n";
-  out += fmt::format("\\end{{minipage}}\n\\end{{{}}}\n", environment);
+  out += "\\end{minipage}\n";
+  if (!layout.is_long) out += fmt::format("\\end{{{}}}\n", environment);
   return out;
 }
 

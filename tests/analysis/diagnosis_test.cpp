@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "analysis/cause_ranking.h"
@@ -129,6 +130,22 @@ TEST(Diagnosis, SaysUnexplainedWhenTheCatalogueLacksTheCause) {
   const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.5}}}}, 25), options);
   EXPECT_EQ(d.verdict, Verdict::unexplained);
   EXPECT_TRUE(d.cause_set.empty());
+}
+
+// A pair that nothing promises is tried where it is asked for; alone it extends the whole catalogue.
+TEST(Diagnosis, TriesThePairsAskedFor) {
+  const auto experiment = data({{"leg_contact", {{3, 0}, {1.5}}}}, 28);
+  DiagnosisOptions options = quick();
+  options.catalogue = {"leg_contact", "trial_drift", "trial_drift+leg_contact"};
+  const Diagnosis d = diagnose(*experiment, options);
+  const auto pair =
+      std::find_if(d.causes.begin(), d.causes.end(), [](const Cause& c) { return c.effects.size() == 2; });
+  ASSERT_NE(pair, d.causes.end());
+  EXPECT_EQ(pair->name(), "trial_drift+leg_contact");
+  EXPECT_GE(pair->gain, d.causes[0].gain - 1e-6);
+  EXPECT_EQ(d.causes[0].name(), "leg_contact");
+  options.catalogue = {"trial_drift+trial_drift"};
+  EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
 }
 
 // Noise of the contact that grows with speed: two effects on its mean that cancel one another take its shape.

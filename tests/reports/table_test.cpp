@@ -89,11 +89,28 @@ TEST(Table, Latex) {
       "{law} & \\begin{tabular}[b]{@{}r@{}}slope\\\\{}[deg]\\end{tabular} & {steps} & {cells} \\\\\n\\midrule\n"
       "published & 7.02 & $1.23 \\times 10^{6}$ ($1.20 \\times 10^{6}$ to $1.30 \\times 10^{6}$) & 200 \\\\\n"
       "coulomb, ''smooth'' & 9.59 & infinite & $-$400 \\\\\n"
-      "\\bottomrule\n\\end{tabular}\n\n\\medskip\n\\begin{minipage}{\\linewidth}\\footnotesize\n"
+      "\\bottomrule\n\\end{tabular}\n\n\\medskip\n\\noindent\\begin{minipage}{\\linewidth}\\footnotesize\n"
       "First step counted.\\par\n"
       "command: metastable report\\par\nsettings: law = published\\par\nsettings: cells = 200\\par\nseed: 1\\par\n"
       "version: 0.1.0\\par\n"
       "\\end{minipage}\n\\end{table}\n");
+}
+
+// Long tables break over pages, long text over lines, long headings too.
+TEST(Table, LatexFitsThePage) {
+  Table table{.id = "t", .title = "T", .columns = {{"cause"}, {"observed, low 90 %"}}};
+  const std::string name = "speed_dependent_restitution+leg_contact";
+  for (int k = 0; k < 21; ++k) table.rows.push_back({name, 1.5});
+  const std::string latex = to_latex(table);
+  EXPECT_TRUE(latex.starts_with("% Needs \\usepackage{booktabs,array,longtable}.\n")) << latex;
+  EXPECT_NE(latex.find("\\begin{longtable}{>{\\raggedright\\arraybackslash}p{0.3\\linewidth}r}"), std::string::npos);
+  EXPECT_NE(latex.find("observed,\\\\{}low 90 \\%"), std::string::npos) << latex;
+  EXPECT_NE(latex.find("speed\\_\\allowbreak{}dependent\\_\\allowbreak{}restitution+\\allowbreak{}leg"),
+            std::string::npos);
+  EXPECT_NE(latex.find("\\endhead\n"), std::string::npos);
+  EXPECT_EQ(latex.find("{tabular}{"), std::string::npos);
+  table.rows.resize(20);
+  EXPECT_NE(to_latex(table).find("\\begin{tabular}{>{"), std::string::npos);
 }
 
 TEST(Table, LatexEscapesSpecialsAndGreek) {
