@@ -45,6 +45,7 @@ struct Grade {
   std::string measure;
   Proportion proportion;
   double aim_low = 0, aim_high = 1;  ///< the share asked for
+  double most_upper = 1;             ///< the most that the upper end of its interval may be
 };
 
 struct CalibrationBin {

@@ -257,7 +257,9 @@ void run_blind_open(const BlindRequest& request) {
   for (const RecordedAnswer& entry : record) {
     const fs::path path = places.answer(entry.number);
     const std::optional<std::string> text = file_text(path);
-    if (!text || sha256(*text) != entry.digest)
+    if (!text)
+      throw std::invalid_argument(fmt::format("{}: the answer to case {} is missing", path.string(), entry.number));
+    if (sha256(*text) != entry.digest)
       throw std::invalid_argument(
           fmt::format("{}: the answer to case {} was changed since it was recorded", path.string(), entry.number));
     given[entry.number] = read_answer(path.string(), *text);

@@ -5,29 +5,30 @@
 namespace metastable::reports {
 namespace {
 
+std::string mean_size(double size) { return size > 0 ? fmt::format("{:.2f}", size) : "no case"; }
+
 Table measures(const analysis::BlindGrades& grades, const Provenance& provenance) {
-  Table table{
-      .id = "blind-measures",
-      .title = "Blind check: what was asked for and what came out",
-      .notes = {"Shares with Wilson's 95 % interval. met: the share reaches the aim; "
-                "open: it falls short, but its interval does not exclude the aim.",
-                fmt::format(
-                    "Mean size of the 95 % set: {:.2f} at 1x (aim at most 3), {:.2f} at 2x (at most 1.7); 0: none.",
-                    grades.mean_set_size_1x, grades.mean_set_size_2x)},
-      .columns = {{"measure"}, {"right"}, {"of"}, {"share"}, {"aim"}, {"verdict"}},
-      .provenance = provenance};
+  Table table{.id = "blind-measures",
+              .title = "Blind check: what was asked for and what came out",
+              .notes = {"Shares with Wilson's 95 % interval. met: the share reaches the aim; "
+                        "open: it falls short, but its interval does not exclude the aim.",
+                        fmt::format("Mean size of the 95 % set: {} at 1x (aim at most 3), {} at 2x (at most 1.7).",
+                                    mean_size(grades.mean_set_size_1x), mean_size(grades.mean_set_size_2x))},
+              .columns = {{"measure"}, {"right"}, {"of"}, {"share"}, {"aim"}, {"verdict"}},
+              .provenance = provenance};
   for (const analysis::Grade& grade : grades.grades) {
     const auto [low, high] = analysis::wilson(grade.proportion);
-    const std::string aim = grade.aim_low > 0 && grade.aim_high < 1
-                                ? fmt::format("{:.0f} to {:.0f} %", 100 * grade.aim_low, 100 * grade.aim_high)
-                            : grade.aim_low > 0 ? fmt::format("at least {:.0f} %", 100 * grade.aim_low)
-                                                : fmt::format("at most {:.0f} %", 100 * grade.aim_high);
+    std::string aim = grade.aim_low > 0 && grade.aim_high < 1
+                          ? fmt::format("{:.0f} to {:.0f} %", 100 * grade.aim_low, 100 * grade.aim_high)
+                      : grade.aim_low > 0 ? fmt::format("at least {:.0f} %", 100 * grade.aim_low)
+                                          : fmt::format("at most {:.0f} %", 100 * grade.aim_high);
+    if (grade.most_upper < 1) aim += fmt::format(", its interval at most {:.0f} %", 100 * grade.most_upper);
     if (grade.proportion.of == 0) {
       table.rows.push_back({grade.measure, 0, 0, "", aim, "no case"});
       continue;
     }
     const double share = static_cast<double>(grade.proportion.right) / grade.proportion.of;
-    const bool met = share >= grade.aim_low && share <= grade.aim_high;
+    const bool met = share >= grade.aim_low && share <= grade.aim_high && high <= grade.most_upper;
     const bool possible = high >= grade.aim_low && low <= grade.aim_high;
     table.rows.push_back({grade.measure, grade.proportion.right, grade.proportion.of, Estimate{share, low, high}, aim,
                           met        ? "met"

@@ -110,6 +110,17 @@ TEST(BlindAnswer, VerdictsAreRead) {
             "a.json: verdict: \"perhaps\" is none of no_gap, recalibrate, explained, unexplained");
 }
 
+// No alarm in two cases is not enough to say that there are at most 9 % of them.
+TEST(BlindTables, AFewCasesMeetNoBound) {
+  analysis::BlindGrades grades;
+  grades.grades = {{"false alarms", {0, 2}, 0, 0.05, 0.09}, {"found", {2, 2}, 0.85, 1}};
+  const Table table = blind_tables(grades, {}, {}, {})[0];
+  EXPECT_EQ(std::get<std::string>(table.rows[0][4].value()), "at most 5 %, its interval at most 9 %");
+  EXPECT_EQ(std::get<std::string>(table.rows[0][5].value()), "open");
+  EXPECT_EQ(std::get<std::string>(table.rows[1][5].value()), "met");
+  EXPECT_NE(table.notes[1].find("no case at 1x"), std::string::npos);
+}
+
 TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
   run_blind_make(request_);
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("no case is answered"), std::string::npos);
@@ -119,6 +130,8 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
   const std::string said = read(answer);
   write(answer, said + " ");
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("the answer to case 1 was changed"), std::string::npos);
+  fs::remove(answer);
+  EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("the answer to case 1 is missing"), std::string::npos);
   write(answer, said);
 
   const fs::path truth = request_.folder + "-sealed/0003.json";
