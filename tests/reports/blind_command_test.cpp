@@ -9,6 +9,7 @@
 
 #include "analysis/experiment.h"
 #include "reports/blind_json.h"
+#include "reports/blind_tables.h"
 #include "tests/reports/support.h"
 
 namespace metastable::reports::test {
