@@ -119,7 +119,7 @@ RankedCause fit_cause(const TransitionModel& model, const Fit& base, const Scann
   for (const std::size_t variant : leading_variants(scanned)) {
     std::vector<Term> terms = base.terms;
     terms.push_back(term_at(scanned, variant));
-    Fit tried = fit(model, base.nuisance, terms);
+    Fit tried = best_fit(model, base.nuisance, terms);
     if (tried.penalised < base.penalised) {  // a bad start: from nothing instead
       for (std::size_t p = 0; p < terms.back().values.size(); ++p) {
         const FreeParameter& parameter = scanned.candidate->parameters[p];
@@ -145,6 +145,13 @@ double earned(const TransitionModel& model, const Fit& pair, const Fit& first, c
   const double beyond = std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +
                         std::max(0.0, now.stances - tolerated * std::max(0.0, before.stances));
   return std::max(0.0, std::min(all, beyond));
+}
+
+// A hypothesis whose likelihood is not finite anywhere the fit began.
+void give_up(RankedCause& cause) {
+  cause.not_decided = cause.fit.reason.empty() ? "its likelihood is not finite" : cause.fit.reason;
+  cause.gain = 0;
+  cause.evidence = -std::numeric_limits<double>::infinity();
 }
 
 bool fitted(const RankedCause& cause) { return !cause.fit.nuisance.empty(); }
@@ -246,6 +253,7 @@ void Ranker::fit_law(RankedCause& cause) const {
 void Ranker::fit_effect(RankedCause& cause, const ScannedEffect& scanned) const {
   cause = fit_cause(model_, recalibrated_, scanned);
   cause.gain = gain(cause.fit);
+  if (!std::isfinite(cause.gain)) return give_up(cause);
   // At the optimum up to what the differences resolve: small gains that the scores confirm are decided.
   if (cause.gain < small_gain && scanned.gain[scanned.best] < small_gain) cause.not_decided.clear();
   cause.p_value = p_value(scanned.candidate, cause.gain);
@@ -268,7 +276,9 @@ void Ranker::fit_singles() {
     if (candidate->parameters.empty()) return fit_law(cause);
     const ScannedEffect& scanned = *find(scan_, candidate);
     const double promised = scanned.gain[scanned.best];
-    if (promised >= least_promise && promised >= promise_share * largest - promise_margin)
+    // Where the model knows better starts than the scores, the scores do not decide.
+    if (!model_.starts(std::vector{term_at(scanned, scanned.best)}).empty() ||
+        (promised >= least_promise && promised >= promise_share * largest - promise_margin))
       return fit_effect(cause, scanned);
     cause.gain = promised;
     cause.evidence = log_evidence(scanned, promised);
@@ -353,7 +363,7 @@ void Ranker::refit_unsettled() {
 // A fit that did not settle is decided where all it could still rise leaves it far behind, or is next to nothing.
 void Ranker::decide_unsettled() {
   for (RankedCause& cause : singles_)
-    if (!cause.candidate_undecided() && fitted(cause) &&
+    if (!cause.candidate_undecided() && fitted(cause) && std::isfinite(cause.evidence) &&
         (cause.evidence + rise_weight * cause.fit.promised < top_ - far_behind ||
          cause.fit.promised < next_to_nothing + share_of_gain * cause.gain))
       cause.not_decided.clear();
@@ -417,6 +427,7 @@ void Ranker::fit_pairs() {
     RankedCause& pair = tried[i];
     pair = fit_cause(model_, first.fit, tries_[i].second);
     pair.gain = gain(pair.fit);
+    if (!std::isfinite(pair.gain)) return give_up(pair);
     const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
     pair.evidence = first.evidence + log_evidence(tries_[i].second, second) + prior;
     pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));

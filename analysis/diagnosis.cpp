@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <tuple>
 
 #include "analysis/cause_ranking.h"
 #include "analysis/diagnosis_sentences.h"
@@ -151,6 +152,24 @@ Cause describe(const TransitionModel& model, const RankedCause& ranked) {
   return cause;
 }
 
+// A number moved by one nuisance alone: between its values at that one's ends, inside its bounds.
+void keep_positive(const TransitionModel& model, const Fit& fit, const Eigen::MatrixXd& covariance,
+                   const Eigen::VectorXd& slope, std::size_t number, EstimatedParameter& estimate) {
+  if ((slope.array() != 0).count() != 1) return;
+  Eigen::Index p = 0;
+  slope.cwiseAbs().maxCoeff(&p);
+  const Nuisance& n = model.nuisances()[static_cast<std::size_t>(p)];
+  const double half = score_90 * std::sqrt(std::max(0.0, covariance(p, p)));
+  const auto at = [&](double value) {
+    std::vector<double> moved = fit.nuisance;
+    moved[static_cast<std::size_t>(p)] = std::clamp(value, n.lower, n.upper);
+    return model.report_nuisances(moved)[number].second;
+  };
+  const double here = fit.nuisance[static_cast<std::size_t>(p)];
+  std::tie(estimate.lower, estimate.upper) = std::minmax({at(here - half), at(here + half)});
+}
+
+// By the slopes of the reported numbers, unless those take a positive one below zero.
 std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit) {
   const Eigen::MatrixXd covariance =
       fit.information.ldlt().solve(Eigen::MatrixXd::Identity(fit.information.rows(), fit.information.cols()));
@@ -166,6 +185,7 @@ std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, 
     }
     const double half = score_90 * std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
     all.push_back({here[k].first, here[k].second, here[k].second - half, here[k].second + half, true});
+    if (here[k].second > 0 && all.back().lower < 0) keep_positive(model, fit, covariance, slope, k, all.back());
   }
   return all;
 }
@@ -341,7 +361,12 @@ std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& 
     else
       d.not_decided.push_back(describe(model, cause));
   }
-  for (const RankedCause& pair : ranking.pairs) ordered.push_back(&pair);
+  for (const RankedCause& pair : ranking.pairs) {
+    if (std::isfinite(pair.evidence))
+      ordered.push_back(&pair);
+    else
+      d.not_decided.push_back(describe(model, pair));
+  }
   std::stable_sort(ordered.begin(), ordered.end(),
                    [](const RankedCause* a, const RankedCause* b) { return a->evidence > b->evidence; });
   return ordered;
@@ -360,7 +385,12 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
   Chosen chosen{&best.fit};
   d.left = gap_map(model, best.fit, options.draws, options.seed + 1);
   const Fit& exact = exact_part(ranking.singles, best.terms, recalibrated);
-  const PhaseGain gained = phase_gain(model, best.fit, exact);
+  PhaseGain gained = phase_gain(model, best.fit, exact);
+  if (model.refits_noise()) {  // how large the effect is beside the noise that it leaves, not beside what swallowed it
+    Fit without;
+    without.evaluation = model.evaluate(best.fit.nuisance, {});
+    gained = phase_gain(model, best.fit, without);
+  }
   const double all = best.fit.log_likelihood - recalibrated.log_likelihood;
   if (all > 0) chosen.bent = std::clamp((best.fit.log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
   const double tolerated = model_error * model_error;
@@ -466,13 +496,14 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   for (const Event& e : model.events()) d.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
   for (std::size_t c = 0; c < model.conditions(); ++c) d.condition_names.push_back(model.condition_name(c));
   d.notes = model.notes();
+  d.refitted = model.recalibrated();
 
   progress(0, "the model as given");
   const std::vector<double> nominal = nominal_values(model);
   const Fit as_given = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
   const Fit given = unfitted(model, nominal);
   d.as_given = gap_map(model, given, options.draws / 2, options.seed);
-  const Fit recalibrated = fit(model, nominal, {});
+  const Fit recalibrated = best_fit(model, nominal, {});
   d.contact = contact_estimates(model, recalibrated);
   const double recalibration_gain = 2 * (recalibrated.penalised - given.log_likelihood);
   d.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
@@ -506,6 +537,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   }
   progress(0.7, "how far it shrinks");
   const bool named = chosen.fit != &recalibrated;
+  if (named) d.size = model.size_in_words(chosen.fit->terms);
   if (d.trials >= trials_for_folds(options.folds))
     d.shrinkage = gap_shrinkage(model, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
                                 options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });

@@ -115,6 +115,8 @@ struct NextExperiment {
 struct Diagnosis {
   Verdict verdict = Verdict::no_gap;
   std::vector<std::string> sentences;  ///< the verdict in plain words
+  std::string refitted;                ///< what a recalibration refits (TransitionModel::recalibrated)
+  std::string size;                    ///< of the likeliest cause beside the nominal model, a sentence; or empty
   /// p-values by chance, none below 1e-12: of the model as given (twice the smaller of the next two); of as large a
   /// gain by recalibration; of a gap after it (the smallest of the tests below, shared out over them, with one of
   /// pairs); of the best single effect, with the look elsewhere; of the largest cell of the map.

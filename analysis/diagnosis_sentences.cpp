@@ -31,7 +31,8 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
       s.push_back("No gap beyond chance: the data agree with the model as given.");
       break;
     case Verdict::recalibrate:
-      s.push_back("There is a gap as given, and other contact parameters remove it: no missing physics shows.");
+      s.push_back(
+          fmt::format("There is a gap as given, and other {} remove it: no missing physics shows.", d.refitted));
       break;
     case Verdict::explained:
       if (d.cause_set.size() == 1)
@@ -44,6 +45,7 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
         s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(d.causes.front()),
                                 d.causes.front().probability));
       }
+      if (!d.size.empty()) s.push_back(d.size);
       if (const auto left = std::count_if(d.left.cells.begin(), d.left.cells.end(),
                                           [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
         s.push_back(

@@ -9,6 +9,7 @@
 
 #include "analysis/effect_scan.h"
 #include "analysis/map_cells.h"
+#include "analysis/median.h"
 #include "analysis/random.h"
 #include "dynamics/truncated_normal.h"
 
@@ -78,16 +79,21 @@ struct Columns {
 EventKind phase_of(EventKind kind) { return is_contact(kind) ? EventKind::collision : kind; }
 
 // [rad/s] by phase, contacts as collisions: what a unit of score is in the middle of its distribution. Where a cell's
-// events are far out it is more there, and would exaggerate the shift that brought them out.
+// events are far out it is more there, and would exaggerate the shift that brought them out. Where none is in the
+// middle: the usual one.
 std::map<EventKind, double> units_of_score(const std::vector<Event>& events, const Evaluation& evaluation) {
   std::map<EventKind, std::pair<double, double>> sums;  // and their number
-  for (std::size_t i = 0; i < events.size(); ++i)
+  std::map<EventKind, std::vector<double>> all;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    all[phase_of(events[i].kind)].push_back(evaluation.unit[i]);
     if (std::abs(evaluation.score[i]) < central_score) {
       auto& [sum, number] = sums[phase_of(events[i].kind)];
       sum += evaluation.unit[i];
       ++number;
     }
+  }
   std::map<EventKind, double> units;
+  for (auto& [phase, some] : all) units[phase] = median(std::move(some));
   for (const auto& [phase, sum] : sums) units[phase] = sum.first / sum.second;
   return units;
 }

@@ -56,7 +56,8 @@ class Cutter {
     groups("leg", members, where, [](const Event& e) {
       return e.leg ? std::optional(std::pair{*e.leg, fmt::format("leg {}", *e.leg)}) : std::nullopt;
     });
-    ranges("position", members, where, 6, "m", [](const Event& e) { return std::optional(e.position); });
+    ranges("position", members, where, 6, model_.position_unit(),
+           [](const Event& e) { return std::optional(e.position); });
     groups("collision", members, where, [](const Event& e) { return collisions(e.number); });
     ranges("trial", members, where, 6, "",
            [](const Event& e) { return std::optional(static_cast<double>(e.trial + 1)); });
@@ -100,7 +101,7 @@ class Cutter {
   }
   template <class Value>
   void ranges(const char* facet, const std::vector<std::size_t>& members, const std::string& where, int parts,
-              const char* unit, Value value) {
+              const std::string& unit, Value value) {
     std::vector<double> all;
     for (const std::size_t i : members)
       if (const auto v = value(model_.events()[i])) all.push_back(*v);
@@ -116,7 +117,7 @@ class Cutter {
       const double from = at == 0 ? low : cuts[static_cast<std::size_t>(at) - 1];
       const double to = static_cast<std::size_t>(at) == cuts.size() ? high : cuts[static_cast<std::size_t>(at)];
       return std::pair{static_cast<int>(at),
-                       fmt::format("{} {:.3g} to {:.3g}{}{}", facet, from, to, *unit ? " " : "", unit)};
+                       fmt::format("{} {:.3g} to {:.3g}{}{}", facet, from, to, unit.empty() ? "" : " ", unit)};
     });
   }
 

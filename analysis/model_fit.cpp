@@ -195,8 +195,10 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   result.evaluation = point.evaluate();
   double best = counted(result.evaluation, weights) + point.log_prior();
   const double start = best;
-  result.converged = slots.empty();
-  for (int iteration = 0; iteration < options.most_iterations && !slots.empty(); ++iteration) {
+  const bool finite = std::isfinite(best);
+  result.converged = slots.empty() && finite;
+  if (!finite) result.reason = "its likelihood is not finite";
+  for (int iteration = 0; finite && iteration < options.most_iterations && !slots.empty(); ++iteration) {
     result.derivatives = differences(point, result.evaluation, steps);
     result.information = information(result.derivatives, result.evaluation, weights);
     const Eigen::VectorXd gradient = penalised_gradient(slots, weights, steps, result);
@@ -244,6 +246,24 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   result.log_likelihood = counted(result.evaluation, weights);
   result.penalised = best;
   return result;
+}
+
+Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+             const FitOptions& options) {
+  Fit best = fit(model, nuisance, terms, options);
+  const std::vector<Start> starts = model.starts(terms);
+  for (const Start& start : starts) {
+    std::vector<Term> moved = terms;
+    for (std::size_t i = 0; i < moved.size(); ++i) moved[i].values = start.values[i];
+    Fit tried = fit(model, start.nuisance, moved, options);
+    if (tried.penalised > best.penalised || !std::isfinite(best.penalised)) best = std::move(tried);
+  }
+  if (!starts.empty() && !best.converged && std::isfinite(best.penalised)) {  // the last stretch of the way
+    FitOptions longer = options;
+    longer.most_iterations *= 3;
+    best = fit(model, best.nuisance, best.terms, longer);
+  }
+  return best;
 }
 
 }  // namespace metastable::analysis

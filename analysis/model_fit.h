@@ -37,9 +37,14 @@ struct FitOptions {
 
 /// Maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
 /// dz/d(speed), log density = log phi(z) + log J, and the information is the sum of z' z'^T + (log J)' (log J)'^T,
-/// which no outlying observation inflates. Starts from the given values; parameters stay inside their bounds.
+/// which no outlying observation inflates. Starts from the given values; parameters stay inside their bounds. A
+/// likelihood that is not finite there: not converged, with that reason.
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
         const FitOptions& options = {});
+
+/// The better of the fits from the given values and from the starts that the model offers (TransitionModel::starts).
+Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+             const FitOptions& options = {});
 
 /// Derivatives at a point with respect to the free parameters of `terms` only.
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,

@@ -30,7 +30,7 @@ struct Event {
   std::size_t condition = 0;  ///< index
   int number = 1;             ///< of the collision in its trial, from 1
   std::optional<int> leg = {};
-  double position = 0;                        ///< [m]
+  double position = 0;                        ///< [TransitionModel::position_unit()]
   std::optional<double> since_previous = {};  ///< collision [s]
   double speed = 0;                           ///< given, the condition of the density [rad/s]
   std::optional<bool> rested = {};            ///< after this collision; none: not known, or no collision
@@ -87,6 +87,12 @@ struct Term {
   std::vector<double> values;
 };
 
+/// Where a fit may start.
+struct Start {
+  std::vector<double> nuisance;
+  std::vector<std::vector<double>> values;  ///< by term
+};
+
 class TransitionModel {
  public:
   virtual ~TransitionModel() = default;
@@ -99,10 +105,20 @@ class TransitionModel {
   /// from the event's own speed alone.
   virtual bool time_tells() const = 0;
   virtual std::string condition_name(std::size_t condition) const = 0;
+  /// Of Event::position.
+  virtual std::string position_unit() const { return "m"; }
+  /// What a recalibration refits, in words that "remove" can follow.
+  virtual std::string recalibrated() const { return "contact parameters"; }
   virtual const std::vector<Nuisance>& nuisances() const = 0;
   virtual const std::vector<Candidate>& candidates() const = 0;
   /// Densities with these nuisances and effects. Values outside a model's reach give a very small density, never a NaN.
   virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const = 0;
+  /// Whether a recalibration refits the noise of every step, so that it takes up part of a large gap.
+  virtual bool refits_noise() const { return false; }
+  /// Starts that the data themselves suggest for a fit of these terms, tried beside the usual one. By default none.
+  virtual std::vector<Start> starts(std::span<const Term> terms) const;
+  /// How large effects are beside what the nominal model states, a sentence. By default none.
+  virtual std::string size_in_words(std::span<const Term> terms) const;
   /// [events] Probability of coming to rest after each event's collision, given what was measured before it; 0 for
   /// events of no collision. By default 0 throughout.
   virtual std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const Term> terms) const;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 
@@ -12,6 +13,8 @@
 
 namespace metastable::reports {
 namespace {
+
+constexpr double clearly = 5;  // standard errors from which on a loss proportional to omega is there
 
 // Even or odd blocks: what one half says can be checked on the other.
 void keep(analysis::CoastDownRun& run, const std::string& which) {
@@ -49,11 +52,13 @@ void run_coast_down(const CoastDownRequest& request) {
   analysis::RevolutionLoss nominal;
   std::string origin;
   if (request.nominal.empty()) {
-    const analysis::LossFit fit = analysis::fit_loss(runs, request.linear);
+    analysis::LossFit fit = analysis::fit_loss(runs, true);
+    const bool linear = request.linear || std::abs(fit.loss.linear) > clearly * fit.linear_error;
+    if (!linear) fit = analysis::fit_loss(runs, false);
     nominal = fit.loss;
     origin = "nominal loss fitted robustly to these runs";
     fmt::print("loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}", nominal.constant, fit.constant_error);
-    if (request.linear) fmt::print(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error);
+    if (linear) fmt::print(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error);
     fmt::print(" + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; {} of {} transitions beyond five of those\n",
                nominal.quadratic, fit.quadratic_error, nominal.noise_sd, fit.outliers, fit.transitions);
   } else {

@@ -151,7 +151,7 @@ Command coast_down() {
         o.add("block", "N", "50", "Revolutions of a block, which serves as a trial");
         o.add("blocks", "all|odd|even", "all", "Which blocks: one half to fit a nominal loss, the other to check it");
         o.add("nominal", "DIR", "", "Take the nominal loss of this experiment folder (default: fitted to the logs)");
-        o.add_flag("linear", "Fit a loss proportional to omega too, beside the constant and the quadratic one");
+        o.add_flag("linear", "Fit a loss proportional to omega even where it is within five standard errors of none");
         o.add("rotor-inertia", "KGM2", "", "Of the drum [kg m^2]: turns losses into torques");
         o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
       },

@@ -98,7 +98,7 @@ struct BlindRequest {
 struct CoastDownRequest {
   std::vector<std::string> logs;
   analysis::CoastDownOptions options;
-  bool linear = false;  ///< a term proportional to omega is fitted too
+  bool linear = false;  ///< a term proportional to omega is fitted even where none is clearly there
   std::string nominal;  ///< folder whose [loss] is taken; "": fitted to the logs
   std::string blocks = "all";
   std::optional<double> rotor_inertia;
