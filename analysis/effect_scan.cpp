@@ -94,7 +94,8 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   const Eigen::MatrixXd held_stretch = held.slope + z.asDiagonal() * held.change;
   const Eigen::MatrixXd cross =
       held.change.transpose() * all.change + held_stretch.transpose() * stretch;  // [held x columns]
-  const Eigen::MatrixXd weights = fit.information.ldlt().solve(cross);
+  Eigen::MatrixXd weights = cross;
+  if (columns > 0) weights = fit.information.ldlt().solve(cross);  // Eigen's solve refers to a first element
   scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch - cross.transpose() * weights;
   const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
