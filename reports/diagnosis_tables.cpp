@@ -80,6 +80,7 @@ Table data_table(const Diagnosis& d) {
 Table gap_table(const Diagnosis& d) {
   return {.id = "gap",
           .title = "Is there a gap?",
+          .notes = {"The chance levels are not followed below 10⁻¹²: a p of one or two of those is at most that."},
           .columns = {{"model"}, {"against"}, {"p", "", NumberFormat::significant, 2}},
           .rows = {{"as given", "anything, the launch and the contact included", d.p_as_given},
                    {"as given", "other contact parameters", d.p_recalibration},
