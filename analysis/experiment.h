@@ -9,7 +9,7 @@
 
 #include "analysis/setting.h"
 #include "dynamics/contact_law.h"
-#include "dynamics/trials.h"
+#include "dynamics/outcome.h"
 #include "dynamics/wheel.h"
 
 namespace metastable::analysis {

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "analysis/metastability.h"
+#include "analysis/estimate.h"
 
 namespace metastable::analysis {
 

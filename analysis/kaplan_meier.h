@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/metastability.h"
+#include "analysis/estimate.h"
 
 namespace metastable::analysis {
 

@@ -9,17 +9,11 @@
 #include <string_view>
 #include <vector>
 
+#include "analysis/estimate.h"
 #include "analysis/problem.h"
 #include "markov/draws.h"
 
 namespace metastable::analysis {
-
-/// A positive number with its 95 % interval; value and upper end may be +infinity.
-struct Estimate {
-  double value = 0;
-  double lower = 0;
-  double upper = 0;
-};
 
 /// How rows are made.
 enum class Method {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "analysis/metastability.h"
+#include "analysis/estimate.h"
 
 namespace metastable::analysis {
 

@@ -15,7 +15,7 @@
 #include "dynamics/laboratory_changes.h"
 #include "dynamics/outside_effect.h"
 #include "dynamics/rolling_motion.h"
-#include "dynamics/trials.h"
+#include "dynamics/outcome.h"
 
 namespace metastable::dynamics {
 

@@ -4,12 +4,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynamics/outcome.h"
 #include "dynamics/truncated_normal.h"
 #include "dynamics/wheel_map.h"
 
 namespace metastable::dynamics {
-
-enum class Outcome { rest, end_of_ramp, max_collisions };
 
 /// One collision of a trial.
 struct TrialCollision {

@@ -114,8 +114,8 @@ std::optional<Figure> legs_figure(const analysis::Description& description, cons
                              (static_cast<double>(i) - 0.5 * static_cast<double>(description.conditions.size() - 1)));
       const Estimate mean = mean_interval(s);
       series.y.push_back(mean.value);
-      series.lower.push_back(mean.low);
-      series.upper.push_back(mean.high);
+      series.lower.push_back(mean.lower);
+      series.upper.push_back(mean.upper);
     }
     if (!series.x.empty()) figure.series.push_back(std::move(series));
   }

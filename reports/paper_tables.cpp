@@ -82,7 +82,7 @@ Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& s
     table.rows.push_back(std::move(row));
   };
   // Figures first: at 7.02 deg with sds of 0.1.
-  const auto plain = [](const Estimate& e) { return fmt::format("{:.3f} ({:.3f} to {:.3f})", e.value, e.low, e.high); };
+  const auto plain = [](const Estimate& e) { return fmt::format("{:.3f} ({:.3f} to {:.3f})", e.value, e.lower, e.upper); };
   add("steady speed [rad/s]", [&](const VariantStudy& s) {
     const std::vector<double>& means = s.fig7[1][1].trial_means;
     if (means.size() < 2) return std::string("none gets there");

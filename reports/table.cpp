@@ -75,7 +75,7 @@ std::string full_precision(double number) {
 bool has_nan(const Cell::Value& value) {
   if (const double* number = std::get_if<double>(&value)) return std::isnan(*number);
   if (const Estimate* e = std::get_if<Estimate>(&value)) {
-    return std::isnan(e->value) || std::isnan(e->low) || std::isnan(e->high);
+    return std::isnan(e->value) || std::isnan(e->lower) || std::isnan(e->upper);
   }
   return false;
 }
@@ -127,7 +127,7 @@ std::string show(const Cell& cell, const Column& column, Escape escape, Number n
     }
     std::string operator()(double value) const { return number(value, column); }
     std::string operator()(const Estimate& e) const {
-      return number(e.value, column) + " (" + number(e.low, column) + escape(" to ") + number(e.high, column) + ")";
+      return number(e.value, column) + " (" + number(e.lower, column) + escape(" to ") + number(e.upper, column) + ")";
     }
     std::string operator()(Infinite) const { return std::string(infinite_word); }
   };
@@ -157,7 +157,7 @@ void append_csv_cell(std::vector<std::string>& fields, const Cell& cell, bool wi
     void operator()(std::int64_t whole) const { fields.push_back(fmt::format("{}", whole)); }
     void operator()(double number) const { fields.push_back(full_precision(number)); }
     void operator()(const Estimate& e) const {
-      for (const double number : {e.value, e.low, e.high}) fields.push_back(full_precision(number));
+      for (const double number : {e.value, e.lower, e.upper}) fields.push_back(full_precision(number));
     }
     void operator()(Infinite) const { fields.emplace_back(infinite_word); }
   };

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "analysis/estimate.h"
 #include "analysis/interval_95.h"
 
 namespace metastable::reports {
@@ -23,12 +24,8 @@ struct Provenance {
 /// out.
 std::vector<std::string> provenance_lines(const Provenance& provenance);
 
-/// A value with its 95 % interval. Ends may be infinite.
-struct Estimate {
-  double value = 0;
-  double low = 0;
-  double high = 0;
-};
+/// Ends may be infinite.
+using analysis::Estimate;
 /// Normal 95 % interval.
 inline Estimate with_error(double value, double standard_error) {
   const double half = analysis::normal_95 * standard_error;

@@ -23,7 +23,7 @@ std::string cell_text(const Cell& cell, const Column& column) {
     std::string operator()(std::int64_t whole) const { return fmt::format("{}", whole); }
     std::string operator()(double number) const { return format_number(number, column.format, column.digits); }
     std::string operator()(const Estimate& e) const {
-      return fmt::format("{} ({} to {})", (*this)(e.value), (*this)(e.low), (*this)(e.high));
+      return fmt::format("{} ({} to {})", (*this)(e.value), (*this)(e.lower), (*this)(e.upper));
     }
     std::string operator()(Infinite) const { return "infinite"; }
   };

@@ -1,0 +1,8 @@
+#pragma once
+// How a trial ends.
+
+namespace metastable::dynamics {
+
+enum class Outcome { rest, end_of_ramp, max_collisions };
+
+}  // namespace metastable::dynamics
