@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/transition_model.h"
+#include "analysis/diagnosis/transition_model.h"
 
 namespace metastable::analysis::test {
 

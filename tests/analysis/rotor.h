@@ -1,7 +1,7 @@
 #pragma once
 // A rotor coasting down, for the tests of the diagnosis.
 
-#include "analysis/experiment.h"
+#include "analysis/experiment/experiment.h"
 
 namespace metastable::analysis::test {
 

@@ -1,7 +1,7 @@
 #pragma once
 // Settings that several tests share.
 
-#include "analysis/setting.h"
+#include "analysis/study/setting.h"
 
 namespace metastable::analysis {
 

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "markov/elimination.h"
+#include "markov/chain/elimination.h"
 
 namespace {
 

@@ -6,11 +6,11 @@
 #include <numeric>
 #include <vector>
 
-#include "analysis/metastability.h"
-#include "analysis/setting.h"
-#include "markov/first_passage.h"
-#include "markov/integrated.h"
-#include "markov/solver.h"
+#include "analysis/study/metastability.h"
+#include "analysis/study/setting.h"
+#include "markov/chain/solver.h"
+#include "markov/passage/first_passage.h"
+#include "markov/rows/integrated.h"
 
 namespace {
 

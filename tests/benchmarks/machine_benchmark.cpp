@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "markov/grid.h"
+#include "markov/rows/grid.h"
 
 #ifdef METASTABLE_AVX2
 #define METASTABLE_WIDE __attribute__((target_clones("avx2", "default")))

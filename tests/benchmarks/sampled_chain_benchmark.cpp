@@ -2,8 +2,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "analysis/setting.h"
-#include "markov/discretization.h"
+#include "analysis/study/setting.h"
+#include "markov/rows/discretization.h"
 
 namespace {
 

@@ -4,12 +4,12 @@
 #include <numbers>
 #include <vector>
 
-#include "analysis/metastability.h"
-#include "analysis/setting.h"
-#include "dynamics/wheel.h"
-#include "markov/chain.h"
-#include "markov/solver.h"
-#include "markov/sparse_solver.h"
+#include "analysis/study/metastability.h"
+#include "analysis/study/setting.h"
+#include "dynamics/wheel/wheel.h"
+#include "markov/chain/chain.h"
+#include "markov/chain/solver.h"
+#include "markov/chain/sparse_solver.h"
 
 int main() {
   const metastable::dynamics::Wheel wheel;

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "dynamics/contact_law.h"
-#include "dynamics/wheel_map.h"
+#include "dynamics/return_map/wheel_map.h"
+#include "dynamics/wheel/contact_law.h"
 
 namespace metastable::dynamics::test {
 

@@ -5,9 +5,9 @@
 #include <string_view>
 #include <vector>
 
-#include "analysis/angle_file.h"
-#include "analysis/experiment.h"
-#include "analysis/input_error.h"
+#include "analysis/experiment/experiment.h"
+#include "analysis/experiment/input_error.h"
+#include "analysis/motion_capture/angle_file.h"
 
 namespace metastable::fuzz {
 namespace {

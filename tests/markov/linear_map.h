@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "markov/node_rows.h"
-#include "markov/solver.h"
+#include "markov/chain/solver.h"
+#include "markov/rows/node_rows.h"
 
 namespace metastable::markov::testing {
 

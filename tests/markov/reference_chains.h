@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "markov/chain.h"
+#include "markov/chain/chain.h"
 
 namespace metastable::markov::reference {
 

@@ -1,0 +1,219 @@
+#include "analysis/blind/blind_cases.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "analysis/blind/blind_dice.h"
+#include "analysis/blind/sized_effect.h"
+#include "analysis/experiment/stand_in.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, BlindKind>, 5> kinds{{{"none", BlindKind::none},
+                                                                       {"effect", BlindKind::effect},
+                                                                       {"pair", BlindKind::pair},
+                                                                       {"outside", BlindKind::outside},
+                                                                       {"left_out", BlindKind::left_out}}};
+
+// The nuisances of every model, which recalibration removes: no candidate that could be left out or paired.
+constexpr std::string_view recalibration = "contact_distribution";
+// There or not: it cannot be made as visible as another effect beside it.
+constexpr std::string_view without_size = "slip_reversal";
+
+// The size whose power is `target`. Powers grow like a power of a small size, mostly its square: secant steps in
+// logarithms, inside the bracket known so far.
+double find_size(const SizedEffect& effect, double target,
+                 const std::function<double(const dynamics::Effect&)>& power) {
+  double size = std::min(effect.start * std::sqrt(target / 16), effect.largest);
+  double low = 0, high = effect.largest, exponent = 2;
+  double last_size = 0, last_power = 0;
+  for (int i = 0; i < 8; ++i) {
+    const double now = power(effect.at(size));
+    if (std::abs(now / target - 1) < 0.1) break;
+    if (now < target && size == effect.largest) break;
+    (now < target ? low : high) = size;
+    if (now > 0 && last_power > 0 && size != last_size)
+      exponent = std::clamp(std::log(now / last_power) / std::log(size / last_size), 0.7, 3.0);
+    last_size = size;
+    last_power = now;
+    double next = now > 0.02 * target ? size * std::pow(target / now, 1 / exponent) : 3 * size;
+    next = std::min(next, effect.largest);
+    if (next <= low || (next >= high && high < effect.largest)) next = (low + high) / 2;
+    size = next;
+  }
+  return size;
+}
+
+Setting base_setting() {
+  Setting setting = stand_in_setting();
+  // Both stated, so that the folder alone says what `coulomb` would be.
+  setting.wheel.inertia = 0.0320723;  // M (mean L)^2
+  setting.wheel.radius_of_gyration = 0.05;
+  return setting;
+}
+
+std::vector<RealityCondition> draw_conditions(const Setting& base, BlindDice& dice) {
+  std::vector<RealityCondition> conditions = stand_in_conditions(base);
+  const double few = dice.uniform();
+  if (few < 0.35) conditions.erase(conditions.begin() + dice.whole(0, 2));
+  if (few < 0.1) conditions.erase(conditions.begin() + dice.whole(0, 1));
+  const int trials = dice.whole(50, 150), count = static_cast<int>(conditions.size());
+  for (int c = 0; c < count; ++c) {
+    conditions[static_cast<std::size_t>(c)].trials = trials / count + (c < trials % count ? 1 : 0);
+    conditions[static_cast<std::size_t>(c)].setting.first_landing_leg = dice.whole(0, 7);
+  }
+  return conditions;
+}
+
+std::vector<std::string> draw_dropped(const std::set<std::string>& needed, BlindDice& dice) {
+  std::vector<std::string> dropped;
+  if (dice.chance(0.5)) return dropped;
+  for (const std::string& name : droppable())
+    if (dice.chance(0.2) && !needed.contains(name)) dropped.push_back(name);
+  return dropped;
+}
+
+}  // namespace
+
+std::string_view blind_kind_name(BlindKind kind) { return kinds[static_cast<std::size_t>(kind)].first; }
+
+BlindKind blind_kind(std::string_view name) {
+  for (const auto& [known, kind] : kinds)
+    if (known == name) return kind;
+  throw std::invalid_argument(fmt::format("kind: \"{}\" is none of none, effect, pair, outside, left_out", name));
+}
+
+std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
+  for (const auto& [name, count] :
+       {std::pair<std::string_view, int>{"per_effect_and_strength", size.per_effect_and_strength},
+        {"none", size.none},
+        {"pairs", size.pairs},
+        {"outside", size.outside},
+        {"left_out_per_effect", size.left_out_per_effect}})
+    if (count < 0) throw std::invalid_argument(fmt::format("{}: {} is below 0", name, count));
+  BlindDice dice(seed, 0);
+  std::vector<BlindPlan> plan(static_cast<std::size_t>(size.none), BlindPlan{BlindKind::none, {}, 0});
+  std::vector<std::string> paired;
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
+    for (const int strength : {1, 2, 4})
+      plan.insert(plan.end(), static_cast<std::size_t>(size.per_effect_and_strength),
+                  BlindPlan{BlindKind::effect, {info.id}, strength});
+    if (info.id == recalibration) continue;
+    plan.insert(plan.end(), static_cast<std::size_t>(size.left_out_per_effect),
+                BlindPlan{BlindKind::left_out, {info.id}, 2});
+    if (info.id != without_size) paired.push_back(info.id);
+  }
+  for (int p = 0; p < size.pairs; ++p) {
+    std::vector<std::string> two;
+    while (two.size() < 2) {
+      const std::string& id = paired[static_cast<std::size_t>(dice.whole(0, static_cast<int>(paired.size()) - 1))];
+      if (two.empty() || two.front() != id) two.push_back(id);
+    }
+    plan.push_back({BlindKind::pair, two, 2});
+  }
+  const auto& outside = dynamics::outside_effects();
+  for (int o = 0; o < size.outside; ++o)
+    plan.push_back({BlindKind::outside, {outside[static_cast<std::size_t>(o) % outside.size()].id}, 0});
+  for (std::size_t i = plan.size(); i > 1; --i)
+    std::swap(plan[i - 1], plan[static_cast<std::size_t>(dice.whole(0, static_cast<int>(i) - 1))]);
+  return plan;
+}
+
+BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, const Power& power) {
+  BlindDice dice(seed, static_cast<std::uint64_t>(number));
+  BlindCase made;
+  BlindTruth& truth = made.truth;
+  truth.number = number;
+  truth.kind = plan.kind;
+  truth.strength = plan.strength;
+  truth.seed = dice.word();
+  truth.restitution = {dice.uniform(0.5, 0.58), dice.uniform(0.035, 0.06)};
+  truth.friction = {dice.uniform(0.33, 0.38), dice.uniform(0.035, 0.05)};
+  Setting base = base_setting();
+  base.restitution = truth.restitution;
+  base.friction = truth.friction;
+  const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, base.wheel.leg_length);
+  PowerDesign design;
+  design.conditions = draw_conditions(base, dice);
+  design.reality.sensor_noise = truth.noise = dice.uniform(0.003, 0.02);
+  design.reality.shuffled = dice.chance(0.5);
+  design.reality.flight = false;  // the models know no flight: it would be an effect of its own
+  design.reality.seed = truth.seed;
+  design.reality.threads = 1;
+  std::vector<SizedEffect> sized;
+  std::set<std::string> needed;
+  if (plan.kind != BlindKind::outside)
+    for (const std::string& id : plan.effects) {
+      sized.push_back(sized_effect(id, contact, dice));
+      needed.insert(sized.back().needs.begin(), sized.back().needs.end());
+    }
+  design.dropped = draw_dropped(needed, dice);
+  constexpr std::array<double, 5> targets{0, 16, 64, 0, 256};
+  for (const SizedEffect& one : sized) {
+    const double size = find_size(one, targets.at(static_cast<std::size_t>(plan.strength)),
+                                  [&](const dynamics::Effect& effect) { return power(design, {effect}); });
+    truth.effects.push_back(one.at(size));
+  }
+  if (!truth.effects.empty()) truth.power = power(design, truth.effects);
+  if (plan.kind == BlindKind::outside) {
+    const dynamics::OutsideInfo& info = dynamics::outside_info(plan.effects.front());
+    truth.outside = {info.id, info.upper * dice.uniform(0.35, 0.8)};
+    design.reality.outside = {*truth.outside};
+  }
+
+  // What the modeller believes: the truth, or something near it. A shape of the noise that no one states.
+  FolderOptions folder;
+  folder.title = fmt::format("Blind case {}", number);
+  folder.dropped = design.dropped;
+  const bool recalibrated = plan.kind == BlindKind::effect && plan.effects.front() == recalibration;
+  truth.nominal_is_true = dice.chance(0.5) || recalibrated;
+  folder.restitution = truth.restitution;
+  folder.friction = truth.friction;
+  if (!truth.nominal_is_true) {
+    folder.restitution->mean += dice.uniform(-0.03, 0.03);
+    folder.restitution->sd *= std::exp(dice.uniform(-0.25, 0.25));
+    folder.friction->mean += dice.uniform(-0.02, 0.02);
+    folder.friction->sd *= std::exp(dice.uniform(-0.25, 0.25));
+    for (Spread* spread : {&*folder.restitution, &*folder.friction}) {
+      spread->mean = std::round(spread->mean * 1000) / 1000;
+      spread->sd = std::round(spread->sd * 1000) / 1000;
+    }
+  }
+  if (dice.chance(0.5)) truth.skewness = dice.uniform(-0.8, 0.8);
+  if (truth.skewness != 0) truth.nominal_is_true = false;  // no model of the contact states a skewness
+  design.reality.restitution_skewness = truth.skewness;
+  design.reality.effects = truth.effects;
+  const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.reality);
+  made.files = reality_files(design.conditions, setup, run_laboratory(setup, 1), folder);
+  if (plan.kind == BlindKind::left_out) {
+    truth.left_out = plan.effects;
+    for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())
+      if (info.id != plan.effects.front()) made.catalogue.push_back(info.id);
+  }
+  return made;
+}
+
+void complete_truth(BlindCase& made) {
+  BlindTruth& truth = made.truth;
+  if (truth.effects.empty()) return;
+  const Experiment experiment = parse_experiment(source_of(made.files.files, fmt::format("case {}", truth.number)));
+  truth.left = power_left(experiment, stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length),
+                          truth.effects);
+}
+
+void complete_pair(BlindTruth& truth, const Experiment& experiment) {
+  truth.left_by_effect.clear();
+  if (truth.kind != BlindKind::pair) return;
+  const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length);
+  for (const std::size_t other : {1, 0})
+    truth.left_by_effect.push_back(power_left(experiment, contact, truth.effects, {truth.effects.at(other)}));
+}
+
+}  // namespace metastable::analysis

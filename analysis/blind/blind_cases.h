@@ -1,0 +1,86 @@
+#pragma once
+// Blind cases: experiments from the laboratory whose truth is sealed until the diagnosis has answered.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "analysis/blind/effect_power.h"
+
+namespace metastable::analysis {
+
+/// What a case is about.
+enum class BlindKind {
+  none,      ///< no gap but what recalibration removes; nuisances varied
+  effect,    ///< one effect of the catalogue
+  pair,      ///< two
+  outside,   ///< an effect that no catalogue holds
+  left_out,  ///< one effect, and a catalogue without it
+};
+std::string_view blind_kind_name(BlindKind kind);
+/// @throws std::invalid_argument for an unknown name
+BlindKind blind_kind(std::string_view name);
+
+/// How many cases of each kind, none below 0.
+struct BlindSize {
+  int per_effect_and_strength = 6;  ///< each effect at 1x, 2x and 4x
+  int none = 300;
+  int pairs = 50;
+  int outside = 50;
+  int left_out_per_effect = 3;
+};
+
+/// The sealed truth of a case.
+struct BlindTruth {
+  int number = 0;  ///< from 1
+  BlindKind kind = BlindKind::none;
+  std::vector<dynamics::Effect> effects;
+  std::optional<dynamics::OutsideEffect> outside;
+  int strength = 0;  ///< 1, 2, 4; 0 where it is not defined (none, outside)
+  double power = 0;  ///< expected 2 Delta log likelihood, true contact known
+  double left = 0;   ///< realised, after recalibration; 0 until complete_truth()
+  /// Of a pair, by effect: realised, after recalibration with the other effect in the model. Not sealed, for it follows
+  /// from the rest and the case; empty until complete_pair().
+  std::vector<double> left_by_effect = {};
+  bool nominal_is_true = true;
+  Spread restitution, friction;  ///< true
+  double skewness = 0;
+  double noise = 0;  ///< of reported speeds [rad/s]
+  std::uint64_t seed = 0;
+  std::vector<std::string> left_out;  ///< of the catalogue
+};
+
+/// A case as it is written: public files, and the truth.
+struct BlindCase {
+  BlindTruth truth;
+  RealityFiles files;
+  std::vector<std::string> catalogue;  ///< ids the diagnosis may use; empty: all
+};
+
+/// Expected 2 Delta log likelihood of effects in a design (expected_power(), or a stand-in in tests).
+using Power = std::function<double(const PowerDesign&, const std::vector<dynamics::Effect>&)>;
+
+/// What each case of a run is, without its data: kinds, effects and strengths in an order drawn from the seed.
+struct BlindPlan {
+  BlindKind kind;
+  std::vector<std::string> effects;  ///< ids; of `outside` the family
+  int strength = 0;
+};
+/// @throws std::invalid_argument naming a count below 0
+std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed);
+
+/// Case `number` (from 1) of a plan. Sizes are found by a search on `power` for 16, 64, 256 (each effect of a pair for
+/// 64); an effect that cannot be made so strong within its range keeps its largest size, and truth.power tells.
+/// truth.left is not worked out: a case that is graded takes complete_truth() too.
+BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, const Power& power);
+
+/// Sets truth.left from the case's own files; a case without catalogue effects keeps 0. A fit: about a second.
+void complete_truth(BlindCase& made);
+/// Sets truth.left_by_effect of a pair; nothing for other kinds. Two fits.
+/// @param experiment  the case as it was written
+void complete_pair(BlindTruth& truth, const Experiment& experiment);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,76 @@
+#pragma once
+// Grading of blind answers against their truths.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/blind/blind_cases.h"
+#include "analysis/diagnosis/diagnosis.h"
+
+namespace metastable::analysis {
+
+/// A fitted parameter of an answer's leading cause.
+struct AnsweredParameter {
+  std::string effect, name;
+  double value = 0;
+  std::optional<double> lower, upper;  ///< 90 %
+};
+
+/// What a diagnosis said, as far as it is graded.
+struct BlindAnswer {
+  Verdict verdict = Verdict::no_gap;
+  std::vector<std::pair<std::string, double>> causes;  ///< by falling probability
+  std::vector<std::string> cause_set;
+  std::vector<AnsweredParameter> parameters;  ///< of the first cause
+  struct Place {
+    std::string facet, aspect;
+    double p_adjusted = 1;
+  };
+  std::vector<Place> where;
+  std::optional<double> closed_lower, closed_upper;  ///< share of the gap that was closed, 90 %
+};
+
+struct Proportion {
+  int right = 0, of = 0;
+  void count(bool is_right) { right += is_right, ++of; }
+};
+/// Wilson's 95 % interval of a proportion; {0, 1} of nothing.
+std::pair<double, double> wilson(const Proportion& proportion);
+
+/// One line of the table of measures.
+struct Grade {
+  std::string measure;
+  Proportion proportion;
+  double aim_low = 0, aim_high = 1;  ///< the share asked for
+  double most_upper = 1;             ///< the most that the upper end of its interval may be
+};
+
+struct CalibrationBin {
+  double from = 0, to = 0;
+  int count = 0;
+  double mean_probability = 0;
+  Proportion right;
+};
+
+struct BlindGrades {
+  std::vector<Grade> grades;
+  double mean_set_size_1x = 0, mean_set_size_2x = 0;  ///< of explained effect cases; 0: none
+  std::vector<CalibrationBin> calibration;            ///< probability of the first cause against how often it is right
+  /// Truth (an effect, or none, outside, ...) to what was answered (first cause, or the verdict), counts.
+  std::map<std::string, std::map<std::string, int>> confusion;
+  std::map<std::string, std::vector<std::string>> alike;  ///< ambiguity groups: what shares the cause sets of an effect
+};
+
+/// @param truths   whole: complete_truth() when the case was made, complete_pair() for pairs. An effect whose `left` is
+///                 below 9 counts as absorbed by recalibration, a pair without left_by_effect as not findable
+/// @param answers  one a truth; nothing: not answered, counted as a failure of every measure it belongs to
+/// @throws std::invalid_argument if they are not as many as the truths
+BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::optional<BlindAnswer>>& answers);
+
+/// Facets, and aspects written with a leading ':', in which an effect may rightly be found; empty for an unknown id.
+const std::vector<std::string>& rightful_places(const std::string& effect);
+
+}  // namespace metastable::analysis

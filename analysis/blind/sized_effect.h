@@ -1,0 +1,26 @@
+#pragma once
+// The effects of blind cases as functions of one size each.
+
+#include <functional>
+#include <set>
+#include <string>
+
+#include "analysis/blind/blind_dice.h"
+#include "dynamics/wheel/effect_catalogue.h"
+
+namespace metastable::analysis {
+
+/// An effect as a function of its size: the rest of it (which leg, where, which sign) is drawn once.
+struct SizedEffect {
+  std::function<dynamics::Effect(double)> at;  ///< of a size in [0, largest]; at 0 the effect is neutral
+  double start = 0;                            ///< where a search for a power of 16 begins, in (0, largest]
+  double largest = 0;                          ///< end of the range
+  std::set<std::string> needs = {};            ///< columns and statements without which nobody can tell it
+};
+
+/// @param id     of the catalogue. slip_reversal is there or not: it is the same at every size
+/// @param truth  contact and legs to which the effect is added
+/// @throws std::logic_error naming an id for which nothing says how it is drawn
+SizedEffect sized_effect(const std::string& id, const dynamics::NominalValues& truth, BlindDice& dice);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,486 @@
+#include "analysis/diagnosis/cause_ranking.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <numeric>
+
+#include "dynamics/wheel/truncated_normal.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+// The prior.
+constexpr double expected_gain = 36;  // of an effect before its size is known
+constexpr double pair_prior = 0.05;   // odds of two effects to one
+
+// Which hypotheses are fitted; the others are weighed by what their scores promise. These save time, and decide only
+// where scores promise far too little. Gains are 2 Delta log likelihood, evidence is a log Bayes factor.
+constexpr double least_promise = 2;         // gain by the scores, for a fit
+constexpr double promise_share = 0.2;       // of the largest promised gain, less
+constexpr double promise_margin = 40;       //   this much
+constexpr double overlooked_margin = 12;    // evidence by the scores below the best fitted one, for a fit after all
+constexpr std::size_t most_variants = 3;    // of one effect that are fitted:
+constexpr double variant_gain = 8;          //   those that promise this much
+constexpr double variant_share = 0.8;       //   and this share of the best variant's gain
+constexpr std::size_t most_leaders = 3;     // single effects that are refined, and that pairs are built on
+constexpr double leader_evidence = 2;       // of such an effect
+constexpr double refined_share = 0.7;       // of the best evidence, less
+constexpr double refined_margin = 10;       //   this much, for an effect worth refining
+constexpr double refit_margin = 60;         // evidence below the best, for a fit that did not settle to be tried again
+constexpr double least_pair_evidence = -4;  // promised beyond the first effect's, for a pair worth fitting
+constexpr std::size_t most_partners = 3;    // of one leader that are fitted
+
+// How fits are run.
+constexpr double furthest_start = 0.25;  // share of a parameter's range
+constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
+constexpr int refinements = 3;           // of a variant, each with half the moves
+constexpr int refining_steps = 4;        // of the fit at each move
+constexpr double worth_moving = 0.2;     // rise of the log likelihood
+constexpr int law_steps = 12;            // of another law's fit, from either start
+constexpr int more_law_steps = 60;       // where it may still come near
+constexpr double law_hopeless = -100;    // log likelihood below the recalibrated model's that no more steps make good
+
+// When a fit that did not settle is decided all the same.
+constexpr double law_refuted = -30;     // gain of another law: so far below that what it could still rise is nothing
+constexpr double small_gain = 10;       // by fit and by scores: at the optimum up to what differences resolve
+constexpr double rise_weight = 3;       // of the rise that the slope still promises, as evidence, and
+constexpr double far_behind = 12;       //   evidence below the best that it leaves
+constexpr double next_to_nothing = 2;   // promised rise of the log likelihood, plus
+constexpr double share_of_gain = 1e-3;  //   this share of the gain
+
+// Log of the mean likelihood ratio over variants and sizes. `gain` is the fitted one of the best variant.
+double log_evidence(const ScannedEffect& scanned, double gain) {
+  const auto parameters = static_cast<double>(scanned.candidate->parameters.size());
+  const double g = expected_gain / std::max(1.0, parameters), shrink = g / (1 + g);
+  const double best = scanned.gain[scanned.best];
+  double sum = 0;
+  for (std::size_t v = 0; v < scanned.gain.size(); ++v) {
+    const double share = v == scanned.best || !(best > 0) ? 1 : scanned.gain[v] / best;
+    sum += std::exp(0.5 * shrink * gain * (std::min(1.0, share) - 1));
+  }
+  return 0.5 * shrink * gain + std::log(sum / static_cast<double>(scanned.gain.size())) -
+         0.5 * parameters * std::log1p(g);
+}
+
+Term term_at(const ScannedEffect& scanned, std::size_t variant) {
+  Term term{scanned.candidate, scanned.candidate->variants[variant], {}};
+  for (std::size_t p = 0; p < scanned.candidate->parameters.size(); ++p) {
+    const FreeParameter& parameter = scanned.candidate->parameters[p];
+    // Far from the neutral value the scores say little.
+    const double reach = furthest_start * (parameter.upper - parameter.lower);
+    const double step = std::clamp(scanned.start[variant][static_cast<Eigen::Index>(p)], -reach, reach);
+    term.values.push_back(std::clamp(parameter.neutral + step, parameter.lower, parameter.upper));
+  }
+  return term;
+}
+
+// Variants worth a full fit.
+std::vector<std::size_t> leading_variants(const ScannedEffect& scanned) {
+  std::vector<std::size_t> order(scanned.gain.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return scanned.gain[a] > scanned.gain[b]; });
+  std::vector<std::size_t> leading;
+  for (const std::size_t v : order)
+    if (leading.empty() || (leading.size() < most_variants && scanned.gain[v] > variant_gain &&
+                            scanned.gain[v] > variant_share * scanned.gain[order[0]]))
+      leading.push_back(v);
+  return leading;
+}
+
+// Moves the last term's variant between the list's values as long as the likelihood rises, halving the moves.
+void refine_variant(const TransitionModel& model, Fit& best) {
+  const std::vector<double> spacing = best.terms.back().candidate->refine;
+  double share = 0.5;
+  for (int round = 0; round < refinements; ++round, share /= 2)
+    for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
+      if (spacing[entry] == 0) continue;
+      for (const double sign : {1.0, -1.0}) {
+        std::vector<Term> terms = best.terms;
+        terms.back().variant[entry] += sign * share * spacing[entry];
+        Fit tried =
+            fit(model, best.nuisance, terms, {.count = {}, .refit_nuisances = true, .most_iterations = refining_steps});
+        if (!(tried.penalised > best.penalised + worth_moving)) continue;
+        const bool was_converged = best.converged;
+        best = std::move(tried);
+        best.converged = best.converged || was_converged;
+        break;
+      }
+    }
+}
+
+// The best fit of `base` with one more effect.
+RankedCause fit_cause(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned) {
+  RankedCause cause;
+  bool first = true;
+  for (const std::size_t variant : leading_variants(scanned)) {
+    std::vector<Term> terms = base.terms;
+    terms.push_back(term_at(scanned, variant));
+    Fit tried = best_fit(model, base.nuisance, terms);
+    if (tried.penalised < base.penalised) {  // a bad start: from nothing instead
+      for (std::size_t p = 0; p < terms.back().values.size(); ++p) {
+        const FreeParameter& parameter = scanned.candidate->parameters[p];
+        terms.back().values[p] = parameter.try_at != 0 ? parameter.try_at * small_start : parameter.neutral;
+      }
+      Fit again = fit(model, base.nuisance, terms);
+      if (again.penalised > tried.penalised) tried = std::move(again);
+    }
+    if (first || tried.penalised > cause.fit.penalised) cause.fit = std::move(tried);
+    first = false;
+  }
+  cause.terms = cause.fit.terms;
+  if (!cause.fit.converged) cause.not_decided = cause.fit.reason;
+  return cause;
+}
+
+// What a second effect gained beyond the model error of the first. `exact`: the part of the first that has none.
+double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact) {
+  const PhaseGain before = phase_gain(model, first, exact), now = phase_gain(model, pair, first);
+  const double tolerated = model_error * model_error;
+  // Only what the second effect gained by itself: one phase may have paid for the other.
+  const double all = now.collisions + now.stances;
+  const double beyond = std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +
+                        std::max(0.0, now.stances - tolerated * std::max(0.0, before.stances));
+  return std::max(0.0, std::min(all, beyond));
+}
+
+// A hypothesis whose likelihood is not finite anywhere the fit began.
+void give_up(RankedCause& cause) {
+  cause.not_decided = cause.fit.reason.empty() ? "its likelihood is not finite" : cause.fit.reason;
+  cause.gain = 0;
+  cause.evidence = -std::numeric_limits<double>::infinity();
+}
+
+bool fitted(const RankedCause& cause) { return !cause.fit.nuisance.empty(); }
+
+const ScannedEffect* find(const EffectScan& scan, const Candidate* candidate) {
+  for (const ScannedEffect& effect : scan.effects)
+    if (effect.candidate == candidate) return &effect;
+  return nullptr;
+}
+
+// The ranking in its steps, in the order in which they are taken.
+class Ranker {
+ public:
+  Ranker(const TransitionModel& model, const Fit& recalibrated, const std::vector<const Candidate*>& candidates,
+         const RankingOptions& options)
+      : model_(model),
+        recalibrated_(recalibrated),
+        candidates_(candidates),
+        options_(options),
+        threads_(options.threads),
+        scan_(scan_effects(model, recalibrated, candidates, options.threads)),
+        chance_(scan_, options.draws, options.seed),
+        singles_(candidates.size()) {}
+
+  void fit_singles();
+  void fit_overlooked();
+  void refine_leaders();
+  void refit_unsettled();
+  void decide_unsettled();
+  void scan_pairs();
+  void scan_asked_pairs();
+  void fit_pairs();
+  void reach(double share) {
+    share_ = share;
+    heartbeat();
+  }
+  CauseRanking result() {
+    return {std::move(scan_), std::move(singles_), std::move(pairs_), chance_.look_elsewhere(least_p_)};
+  }
+
+ private:
+  struct Try {
+    std::size_t leader;
+    ScannedEffect second;
+  };
+
+  // Before every fit, so that who waits can stop.
+  void heartbeat() const {
+    const std::lock_guard lock(speaking_);
+    if (options_.progress) options_.progress(share_);
+  }
+  void fit_law(RankedCause& cause) const;
+  void fit_effect(RankedCause& cause, const ScannedEffect& scanned) const;
+  void take(RankedCause& cause, Fit better) const;
+  double gain_alone(const RankedCause& pair) const;
+  double gain(const Fit& fit) const { return 2 * (fit.penalised - recalibrated_.penalised); }
+  double p_value(const Candidate* candidate, double gain) const;
+  std::vector<std::size_t> leaders(bool to_refine) const;
+
+  const TransitionModel& model_;
+  const Fit& recalibrated_;
+  const std::vector<const Candidate*>& candidates_;
+  const RankingOptions& options_;
+  int threads_;
+  EffectScan scan_;
+  ChanceGains chance_;
+  std::vector<RankedCause> singles_, pairs_;
+  std::vector<Try> tries_;
+  double least_p_ = 1;  // of the single effects as listed: chance is drawn for those
+  double share_ = 0;
+  mutable std::mutex speaking_;
+  double top_ = 0;  // evidence of the best of them
+};
+
+// Chance of such a gain by one effect alone.
+double Ranker::p_value(const Candidate* candidate, double gain) const {
+  if (candidate->parameters.empty()) return 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, gain)));
+  return chance_.p_value(candidate, gain);
+}
+
+// Another law has nothing to scan. Contact parameters that suit one law mislead under the other: the nominal ones are a
+// start, too.
+void Ranker::fit_law(RankedCause& cause) const {
+  const auto from = [&](const std::vector<double>& nuisance, int iterations) {
+    return fit(model_, nuisance, cause.terms, {.count = {}, .refit_nuisances = true, .most_iterations = iterations});
+  };
+  cause.fit = from(nominal_values(model_), law_steps);
+  Fit other = from(recalibrated_.nuisance, law_steps);
+  if (other.penalised > cause.fit.penalised) cause.fit = std::move(other);
+  if (!cause.fit.converged && cause.fit.penalised - recalibrated_.penalised > law_hopeless)
+    cause.fit = from(cause.fit.nuisance, more_law_steps);
+  cause.gain = gain(cause.fit);
+  // Far below and hardly rising any more: decided against.
+  if (!cause.fit.converged && cause.gain > law_refuted) cause.not_decided = cause.fit.reason;
+  cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
+  cause.evidence = 0.5 * cause.gain;
+}
+
+void Ranker::fit_effect(RankedCause& cause, const ScannedEffect& scanned) const {
+  cause = fit_cause(model_, recalibrated_, scanned);
+  cause.gain = gain(cause.fit);
+  if (!std::isfinite(cause.gain)) return give_up(cause);
+  // At the optimum up to what the differences resolve: small gains that the scores confirm are decided.
+  if (cause.gain < small_gain && scanned.gain[scanned.best] < small_gain) cause.not_decided.clear();
+  cause.p_value = p_value(scanned.candidate, cause.gain);
+  cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
+}
+
+void Ranker::fit_singles() {
+  double largest = 0;
+  for (const ScannedEffect& effect : scan_.effects) largest = std::max(largest, effect.gain[effect.best]);
+  markov::parallel_for(candidates_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
+    const Candidate* candidate = candidates_[i];
+    RankedCause& cause = singles_[i];
+    cause.terms = {Term{candidate, candidate->variants[0], {}}};
+    if (!candidate->undecidable.empty()) {
+      cause.not_decided = candidate->undecidable;
+      cause.evidence = -std::numeric_limits<double>::infinity();
+      return;
+    }
+    if (candidate->parameters.empty()) return fit_law(cause);
+    const ScannedEffect& scanned = *find(scan_, candidate);
+    const double promised = scanned.gain[scanned.best];
+    // Where the model knows better starts than the scores, the scores do not decide.
+    if (!model_.starts(std::vector{term_at(scanned, scanned.best)}).empty() ||
+        (promised >= least_promise && promised >= promise_share * largest - promise_margin))
+      return fit_effect(cause, scanned);
+    cause.gain = promised;
+    cause.evidence = log_evidence(scanned, promised);
+    cause.terms = {term_at(scanned, scanned.best)};
+    cause.p_value = p_value(candidate, promised);
+  });
+}
+
+// Scores promise too much now and then: whoever would come near the fitted ones is fitted after all.
+void Ranker::fit_overlooked() {
+  double best = 0;
+  for (const RankedCause& cause : singles_)
+    if (fitted(cause)) best = std::max(best, cause.evidence);
+  markov::parallel_for(singles_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
+    RankedCause& cause = singles_[i];
+    if (cause.candidate_undecided() || fitted(cause) || cause.evidence < std::max(0.0, best - overlooked_margin))
+      return;
+    fit_effect(cause, *find(scan_, candidates_[i]));
+  });
+  for (const RankedCause& cause : singles_)
+    if (!cause.candidate_undecided()) {
+      least_p_ = std::min(least_p_, cause.p_value);
+      top_ = std::max(top_, cause.evidence);
+    }
+}
+
+// The strongest fitted effects, by falling evidence. `to_refine`: of those with variants between the listed ones.
+std::vector<std::size_t> Ranker::leaders(bool to_refine) const {
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < singles_.size(); ++i)
+    if (singles_[i].evidence > leader_evidence && fitted(singles_[i]) &&
+        (!to_refine || !singles_[i].terms[0].candidate->refine.empty()))
+      all.push_back(i);
+  std::sort(all.begin(), all.end(),
+            [&](std::size_t a, std::size_t b) { return singles_[a].evidence > singles_[b].evidence; });
+  if (all.size() > most_leaders) all.resize(most_leaders);
+  return all;
+}
+
+// A better fit of the same effect: the likelihoods of its other variants, and so its prior, stay what they were.
+void Ranker::take(RankedCause& cause, Fit better) const {
+  const double now = gain(better);
+  cause.evidence += 0.5 * (now - cause.gain);
+  cause.gain = now;
+  cause.fit = std::move(better);
+  cause.terms = cause.fit.terms;
+}
+
+// The p-value stays that of the listed variants: chance has not been drawn between them.
+void Ranker::refine_leaders() {
+  const std::vector<std::size_t> strongest = leaders(true);
+  markov::parallel_for(strongest.size(), threads_, [&](std::size_t k) {
+    heartbeat();
+    RankedCause& cause = singles_[strongest[k]];
+    if (cause.evidence < refined_share * top_ - refined_margin) return;
+    Fit refined = cause.fit;
+    refine_variant(model_, refined);
+    take(cause, std::move(refined));
+  });
+}
+
+// Where a fit did not settle near the top: once more, from the nuisances that suit the leader.
+void Ranker::refit_unsettled() {
+  const auto best = std::max_element(singles_.begin(), singles_.end(), [](const RankedCause& a, const RankedCause& b) {
+    return a.evidence < b.evidence;
+  });
+  markov::parallel_for(singles_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
+    RankedCause& cause = singles_[i];
+    if (&cause == &*best || cause.fit.converged || !fitted(cause) || !fitted(*best) ||
+        cause.evidence < top_ - refit_margin)
+      return;
+    Fit again = fit(model_, best->fit.nuisance, cause.terms);
+    if (!(again.penalised > cause.fit.penalised)) return;
+    take(cause, std::move(again));
+    cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
+    if (cause.fit.converged) cause.not_decided.clear();
+  });
+}
+
+// A fit that did not settle is decided where all it could still rise leaves it far behind, or is next to nothing.
+void Ranker::decide_unsettled() {
+  for (RankedCause& cause : singles_)
+    if (!cause.candidate_undecided() && fitted(cause) && std::isfinite(cause.evidence) &&
+        (cause.evidence + rise_weight * cause.fit.promised < top_ - far_behind ||
+         cause.fit.promised < next_to_nothing + share_of_gain * cause.gain))
+      cause.not_decided.clear();
+}
+
+double pair_log_prior(std::size_t candidates) {
+  return std::log(pair_prior / std::max(1.0, 0.5 * static_cast<double>(candidates - 1)));
+}
+
+// What the leaders leave, scanned again.
+void Ranker::scan_pairs() {
+  const double prior = pair_log_prior(candidates_.size());
+  for (const std::size_t leader : leaders(false)) {
+    const RankedCause& first = singles_[leader];
+    std::vector<const Candidate*> others;
+    for (const Candidate* other : candidates_)
+      if (other != first.terms[0].candidate) others.push_back(other);
+    const EffectScan scan = scan_effects(model_, first.fit, others, threads_);
+    std::vector<std::pair<double, const ScannedEffect*>> promising;
+    for (const ScannedEffect& effect : scan.effects) {
+      const double promised = log_evidence(effect, effect.gain[effect.best]);
+      if (promised + prior > least_pair_evidence) promising.emplace_back(promised, &effect);
+    }
+    std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    for (std::size_t k = 0; k < std::min(most_partners, promising.size()); ++k)
+      tries_.push_back({leader, *promising[k].second});
+  }
+}
+
+// The pairs asked for, whatever the scores promise.
+void Ranker::scan_asked_pairs() {
+  for (auto [one, other] : options_.pairs) {
+    if (other->parameters.empty()) std::swap(one, other);  // another law has nothing to scan
+    const auto place = std::find(candidates_.begin(), candidates_.end(), one);
+    const auto leader = static_cast<std::size_t>(place - candidates_.begin());
+    RankedCause& first = singles_[leader];
+    if (first.candidate_undecided() || !other->undecidable.empty() || other->parameters.empty()) continue;
+    const bool tried = std::any_of(tries_.begin(), tries_.end(),
+                                   [&](const Try& t) { return t.leader == leader && t.second.candidate == other; });
+    if (tried) continue;
+    if (!fitted(first)) fit_effect(first, *find(scan_, one));
+    tries_.push_back({leader, scan_effects(model_, first.fit, {other}, threads_).effects.front()});
+  }
+}
+
+// What the two effects of a pair gain each by itself, summed.
+double Ranker::gain_alone(const RankedCause& pair) const {
+  double alone = 0;
+  for (const RankedCause& cause : singles_)
+    for (const Term& term : pair.terms)
+      if (cause.terms[0].candidate == term.candidate) alone += std::max(0.0, cause.gain);
+  return alone;
+}
+
+void Ranker::fit_pairs() {
+  const double prior = pair_log_prior(candidates_.size());
+  std::vector<RankedCause> tried(tries_.size());
+  markov::parallel_for(tries_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
+    const RankedCause& first = singles_[tries_[i].leader];
+    RankedCause& pair = tried[i];
+    pair = fit_cause(model_, first.fit, tries_[i].second);
+    pair.gain = gain(pair.fit);
+    if (!std::isfinite(pair.gain)) return give_up(pair);
+    const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
+    pair.evidence = first.evidence + log_evidence(tries_[i].second, second) + prior;
+    pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
+    pair.together = pair.gain / std::max(1.0, gain_alone(pair));
+  });
+  // The same pair from either side counts once, the better fit.
+  for (RankedCause& pair : tried) {
+    const auto same = std::find_if(pairs_.begin(), pairs_.end(), [&](const RankedCause& other) {
+      return other.terms[0].candidate == pair.terms[1].candidate && other.terms[1].candidate == pair.terms[0].candidate;
+    });
+    if (same == pairs_.end())
+      pairs_.push_back(std::move(pair));
+    else if (pair.evidence > same->evidence)
+      *same = std::move(pair);
+  }
+}
+
+}  // namespace
+
+PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse) {
+  PhaseGain gain;
+  for (std::size_t i = 0; i < model.events().size(); ++i)
+    (model.events()[i].kind == EventKind::stance ? gain.stances : gain.collisions) +=
+        2 * (better.evaluation.log_density[i] - worse.evaluation.log_density[i]);
+  return gain;
+}
+
+const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<Term>& terms,
+                      const Fit& recalibrated) {
+  for (const Term& term : terms)
+    for (const RankedCause& cause : singles)
+      if (term.candidate->exact && cause.terms[0].candidate == term.candidate && !cause.fit.nuisance.empty())
+        return cause.fit;
+  return recalibrated;
+}
+
+CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
+                         const std::vector<const Candidate*>& candidates, const RankingOptions& options) {
+  Ranker ranker(model, recalibrated, candidates, options);
+  ranker.reach(0.15);
+  ranker.fit_singles();
+  ranker.fit_overlooked();
+  ranker.reach(0.5);
+  ranker.refine_leaders();
+  ranker.refit_unsettled();
+  ranker.decide_unsettled();
+  ranker.reach(0.6);
+  ranker.scan_pairs();
+  ranker.scan_asked_pairs();
+  ranker.reach(0.8);
+  ranker.fit_pairs();
+  ranker.reach(1);
+  return ranker.result();
+}
+
+}  // namespace metastable::analysis

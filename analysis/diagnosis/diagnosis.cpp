@@ -1,0 +1,567 @@
+#include "analysis/diagnosis/diagnosis.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <tuple>
+
+#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/diagnosis_sentences.h"
+#include "analysis/diagnosis/gap_map.h"
+#include "analysis/diagnosis/gap_shrinkage.h"
+#include "analysis/diagnosis/missing_columns.h"
+#include "analysis/diagnosis/too_few.h"
+#include "analysis/diagnosis/visibility.h"
+#include "dynamics/wheel/effect_catalogue.h"
+
+namespace metastable::analysis {
+namespace {
+
+// The test for a gap.
+constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes
+constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide one another; hardly ever used up
+constexpr double recalibration_level = 0.02;
+constexpr double least_p_value = 1e-12;  // smaller ones are beyond what chance levels can say
+
+// What the best hypothesis may leave before none of all is believed.
+constexpr double left_over_level = 0.003;  // of the map's p-value
+constexpr double left_over_square = 15;    // of a cell's statistic, beyond the model error
+constexpr double least_left_over = 0.05;   // held-out gap that counts as one [nats a collision]
+constexpr double left_over_errors = 6;     // squared model errors of the gap as given that count as none, held out
+constexpr double largest_log_odds = 300;   // of none: their exponential stays finite
+constexpr double certain = 1e6;            // odds of none where a test decides against all that were fitted
+
+// Odds and sets.
+constexpr double none_prior = 0.01;      // odds of none to a gap where nothing is left over
+constexpr double set_share = 0.95;       // of what the effects share that the set holds
+constexpr double least_of_first = 0.05;  // one less likely than this share of the first is not named for completeness
+
+constexpr std::size_t most_rivals = 3;  // hypotheses that compete in each fold of the cross-validation:
+constexpr double rival_evidence = 4;    //   those no further behind the best. Saves time
+// A recalibration that did not settle is mentioned beyond this rise that its slope still promises.
+constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likelihood; of the largest gain found
+
+constexpr double score_90 = 1.6448536269514722, score_95 = 1.96;  // half-widths of two-sided intervals
+
+constexpr int longest_profile = 40;          // collisions
+constexpr std::uint64_t profile_rounds = 4;  // simulated experiments that its means are taken over
+constexpr double least_profile_trials = 3;
+
+// P of as large a quadratic form of the nuisances' scores by chance: the prior shrinks each direction of the
+// information.
+double recalibration_p_value(const TransitionModel& model, const Fit& as_given, double gain) {
+  const Eigen::Index size = as_given.information.rows();
+  Eigen::MatrixXd root_prior = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index p = 0; p < size; ++p) root_prior(p, p) = model.nuisances()[static_cast<std::size_t>(p)].prior_sd;
+  // In units of the prior: eigenvalues l of the information; a direction's share of chance gain is l/(1+l) chi^2_1.
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(root_prior * as_given.information * root_prior).eigenvalues();
+  double mean = 0, variance = 0;
+  for (const double one : eigenvalues) {
+    const double l = std::max(0.0, one - 1);  // the prior is part of the information
+    const double weight = l / (1 + l);
+    mean += weight;
+    variance += 2 * weight * weight;
+  }
+  if (!(mean > 0)) return 1;
+  // Satterthwaite: a chi-squared of the same mean and variance.
+  const double scale = variance / (2 * mean), degrees = mean / scale;
+  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), std::max(0.0, gain) / scale));
+}
+
+// Two effects may hide one another from the scores of each alone: the best pair's gain, for all pairs there are.
+double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit& recalibrated) {
+  double least = 1;
+  if (!ranking.scan.trials_suffice) return least;
+  const double pairs = 0.5 * static_cast<double>(effects) * (static_cast<double>(effects) - 1);
+  for (const RankedCause& pair : ranking.pairs) {
+    if (!pair.fit.converged) continue;
+    double parameters = 0, looks = pairs;  // variants among them
+    for (const Term& term : pair.terms) {
+      parameters += static_cast<double>(term.values.size());
+      looks *= static_cast<double>(term.candidate->variants.size());
+    }
+    const double gain = std::max(0.0, pair.gain - 2 * recalibrated.promised);
+    least =
+        std::min(least, looks * boost::math::cdf(boost::math::complement(boost::math::chi_squared(parameters), gain)));
+  }
+  return least;
+}
+
+std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixXd& covariance, Eigen::Index first) {
+  const std::vector<double>& variant = term.variant;
+  const std::vector<Named> here = term.candidate->report(variant, term.values);
+  std::vector<EstimatedParameter> all;
+  for (const Named& one : here) all.push_back({one.first, one.second, one.second, one.second, false});
+  const auto count = term.values.size();
+  if (count == 1) {  // reported numbers are monotone in the one value: its ends are theirs
+    const FreeParameter& p = term.candidate->parameters[0];
+    const double half = score_90 * std::sqrt(std::max(0.0, covariance(first, first)));
+    for (const double end : {-half, half}) {
+      const auto there = term.candidate->report(variant, {std::clamp(term.values[0] + end, p.lower, p.upper)});
+      for (std::size_t k = 0; k < all.size(); ++k) {
+        all[k].lower = std::min(all[k].lower, there[k].second);
+        all[k].upper = std::max(all[k].upper, there[k].second);
+        all[k].fitted = all[k].fitted || there[k].second != here[k].second;
+      }
+    }
+    return all;
+  }
+  // By the slopes of the reported numbers.
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    Eigen::VectorXd slope(static_cast<Eigen::Index>(count));
+    for (std::size_t p = 0; p < count; ++p) {
+      std::vector<double> moved = term.values;
+      const double step = term.candidate->parameters[p].step;
+      moved[p] += step;
+      slope[static_cast<Eigen::Index>(p)] = (term.candidate->report(variant, moved)[k].second - here[k].second) / step;
+    }
+    const auto block = covariance.block(first, first, slope.size(), slope.size());
+    const double half = score_90 * std::sqrt(std::max(0.0, slope.dot(block * slope)));
+    all[k].lower -= half;
+    all[k].upper += half;
+    all[k].fitted = half > 0;
+  }
+  return all;
+}
+
+Cause describe(const TransitionModel& model, const RankedCause& ranked) {
+  Cause cause;
+  for (const Term& term : ranked.terms) cause.effects.push_back(term.candidate->id);
+  cause.gain = ranked.gain;
+  cause.p_value = ranked.p_value;
+  cause.evidence = ranked.evidence;
+  cause.not_decided = ranked.not_decided;
+  if (ranked.fit.information.rows() == 0) {
+    cause.parameters.resize(ranked.terms.size());
+    return cause;
+  }
+  Eigen::MatrixXd steadied = ranked.fit.information;
+  steadied.diagonal().array() += 1e-12;
+  const Eigen::MatrixXd covariance = steadied.ldlt().solve(Eigen::MatrixXd::Identity(steadied.rows(), steadied.cols()));
+  auto first = static_cast<Eigen::Index>(model.nuisances().size());
+  for (const Term& term : ranked.terms) {
+    cause.parameters.push_back(estimates(term, covariance, first));
+    first += static_cast<Eigen::Index>(term.values.size());
+  }
+  return cause;
+}
+
+// A number moved by one nuisance alone: between its values at that one's ends, inside its bounds.
+void keep_positive(const TransitionModel& model, const Fit& fit, const Eigen::MatrixXd& covariance,
+                   const Eigen::VectorXd& slope, std::size_t number, EstimatedParameter& estimate) {
+  if ((slope.array() != 0).count() != 1) return;
+  Eigen::Index p = 0;
+  slope.cwiseAbs().maxCoeff(&p);
+  const Nuisance& n = model.nuisances()[static_cast<std::size_t>(p)];
+  const double half = score_90 * std::sqrt(std::max(0.0, covariance(p, p)));
+  const auto at = [&](double value) {
+    std::vector<double> moved = fit.nuisance;
+    moved[static_cast<std::size_t>(p)] = std::clamp(value, n.lower, n.upper);
+    return model.report_nuisances(moved)[number].second;
+  };
+  const double here = fit.nuisance[static_cast<std::size_t>(p)];
+  std::tie(estimate.lower, estimate.upper) = std::minmax({at(here - half), at(here + half)});
+}
+
+// By the slopes of the reported numbers, unless those take a positive one below zero.
+std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit) {
+  const Eigen::MatrixXd covariance =
+      fit.information.ldlt().solve(Eigen::MatrixXd::Identity(fit.information.rows(), fit.information.cols()));
+  std::vector<EstimatedParameter> all;
+  const std::vector<Named> here = model.report_nuisances(fit.nuisance);
+  for (std::size_t k = 0; k < here.size(); ++k) {
+    Eigen::VectorXd slope(covariance.rows());
+    for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
+      std::vector<double> moved = fit.nuisance;
+      moved[p] += model.nuisances()[p].step;
+      slope[static_cast<Eigen::Index>(p)] =
+          (model.report_nuisances(moved)[k].second - here[k].second) / model.nuisances()[p].step;
+    }
+    const double half = score_90 * std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
+    all.push_back({here[k].first, here[k].second, here[k].second - half, here[k].second + half, true});
+    if (here[k].second > 0 && all.back().lower < 0) keep_positive(model, fit, covariance, slope, k, all.back());
+  }
+  return all;
+}
+
+StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std::vector<double>& nominal,
+                                        const Fit& recalibrated, const Fit& chosen, std::uint64_t seed) {
+  StepsBeforeFailure steps;
+  const auto [at_risk, rests] = model.rests();
+  if (at_risk > 0) {
+    // Rests are counts: exact limits of a Poisson mean.
+    const auto limit = [](double degrees, double p) {
+      return degrees > 0 ? boost::math::quantile(boost::math::chi_squared(degrees), p) / 2 : 0.0;
+    };
+    const double most = limit(2 * rests + 2, 0.95), least = limit(2 * rests, 0.05);
+    const double infinity = std::numeric_limits<double>::infinity();
+    steps.observed = rests > 0 ? at_risk / rests : infinity;
+    steps.observed_lower = at_risk / most;
+    steps.observed_upper = least > 0 ? at_risk / least : infinity;
+  }
+  steps.baseline = model.expected_steps(nominal, {}, seed);
+  steps.recalibrated = model.expected_steps(recalibrated.nuisance, {}, seed);
+  steps.with_effect = model.expected_steps(chosen.nuisance, chosen.terms, seed);
+  return steps;
+}
+
+// Mean speed before each collision, by condition.
+std::vector<ProfilePoint> profiles(const TransitionModel& model, const std::vector<double>& nominal, const Fit& chosen,
+                                   std::uint64_t seed) {
+  struct Sum {
+    double count = 0, sum = 0, squares = 0;
+  };
+  const auto gather = [&](const TransitionModel& m, std::vector<std::vector<Sum>>& sums) {
+    const Event* previous = nullptr;
+    for (const Event& e : m.events()) {
+      const bool before = e.kind == EventKind::collision || e.kind == EventKind::step || e.kind == EventKind::rest ||
+                          e.kind == EventKind::survival;
+      if (!before || e.number > longest_profile) continue;
+      if (previous && previous->trial == e.trial && previous->number == e.number) continue;
+      previous = &e;
+      auto& of = sums[e.condition];
+      if (of.size() < static_cast<std::size_t>(e.number)) of.resize(static_cast<std::size_t>(e.number));
+      Sum& s = of[static_cast<std::size_t>(e.number) - 1];
+      s.count += 1;
+      s.sum += e.speed;
+      s.squares += e.speed * e.speed;
+    }
+  };
+  std::vector<std::vector<Sum>> measured(model.conditions()), given(model.conditions()), with(model.conditions());
+  gather(model, measured);
+  for (std::uint64_t round = 0; round < profile_rounds; ++round) {
+    gather(*model.simulate(nominal, {}, seed + round), given);
+    gather(*model.simulate(chosen.nuisance, chosen.terms, seed + round), with);
+  }
+  std::vector<ProfilePoint> points;
+  for (std::size_t c = 0; c < measured.size(); ++c)
+    for (std::size_t k = 0; k < measured[c].size(); ++k) {
+      const Sum& m = measured[c][k];
+      if (m.count < least_profile_trials) continue;
+      const auto mean = [](const Sum& s) { return s.count > 0 ? s.sum / s.count : 0.0; };
+      const auto sd = [&](const Sum& s) {
+        return s.count > 1 ? std::sqrt(std::max(0.0, s.squares / s.count - mean(s) * mean(s)) * s.count / (s.count - 1))
+                           : 0;
+      };
+      ProfilePoint p;
+      p.condition = c;
+      p.collision = static_cast<int>(k) + 1;
+      p.trials = static_cast<std::size_t>(m.count);
+      p.measured = mean(m);
+      p.measured_error = sd(m) / std::sqrt(m.count);
+      if (k < given[c].size()) p.baseline = mean(given[c][k]);
+      if (k < with[c].size()) {
+        p.with_effect = mean(with[c][k]);
+        p.band = score_95 * sd(with[c][k]) / std::sqrt(m.count);
+      }
+      points.push_back(p);
+    }
+  return points;
+}
+
+// The one or two effects that an entry of the catalogue names. Throws for unknown ones.
+std::vector<std::string> effects_of(const std::string& entry) {
+  const auto plus = entry.find('+');
+  std::vector<std::string> ids{entry.substr(0, plus)};
+  if (plus != std::string::npos) ids.push_back(entry.substr(plus + 1));
+  for (const std::string& id : ids) dynamics::effect_info(id);
+  if (ids.front() == ids.back() && ids.size() == 2)
+    throw std::invalid_argument(fmt::format("effect: \"{}\" is not a pair of two effects", entry));
+  return ids;
+}
+
+void check(const DiagnosisOptions& options) {
+  if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
+  if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
+  if (!(options.level > 0 && options.level < 0.5))
+    throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
+  for (const std::string& entry : options.catalogue) effects_of(entry);
+}
+
+// Pairs alone extend the whole catalogue; beside single effects they add theirs.
+std::vector<const Candidate*> wanted(const TransitionModel& model, const std::vector<std::string>& catalogue) {
+  std::vector<std::string> ids;
+  bool restricted = false;
+  for (const std::string& entry : catalogue) {
+    const std::vector<std::string> named = effects_of(entry);
+    restricted = restricted || named.size() == 1;
+    ids.insert(ids.end(), named.begin(), named.end());
+  }
+  std::vector<const Candidate*> candidates;
+  for (const Candidate& candidate : model.candidates())
+    if (!restricted || std::find(ids.begin(), ids.end(), candidate.id) != ids.end()) candidates.push_back(&candidate);
+  return candidates;
+}
+
+std::vector<std::pair<const Candidate*, const Candidate*>> wanted_pairs(const std::vector<const Candidate*>& candidates,
+                                                                        const std::vector<std::string>& catalogue) {
+  const auto find = [&](const std::string& id) {
+    const auto found =
+        std::find_if(candidates.begin(), candidates.end(), [&](const Candidate* c) { return c->id == id; });
+    return found == candidates.end() ? nullptr : *found;
+  };
+  std::vector<std::pair<const Candidate*, const Candidate*>> pairs;
+  for (const std::string& entry : catalogue) {
+    const std::vector<std::string> named = effects_of(entry);
+    const Candidate *one = find(named.front()), *other = find(named.back());
+    if (one && other && one != other) pairs.emplace_back(one, other);
+  }
+  return pairs;
+}
+
+// The model without anything fitted: nothing to project out.
+Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
+  Fit given;
+  given.nuisance = nominal;
+  given.evaluation = model.evaluate(nominal, {});
+  given.log_likelihood = given.evaluation.total();
+  return given;
+}
+
+// The tests for a gap, together.
+void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated) {
+  d.p_effects = std::max(least_p_value, ranking.p_value);
+  d.p_where = std::max(least_p_value, d.recalibrated.p_value);
+  d.p_recalibration = std::max(least_p_value, d.p_recalibration);
+  const double pairs = std::max(least_p_value, pairs_p_value(ranking, candidates, recalibrated));
+  d.p_value =
+      std::min({1.0, d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects), pairs / share_for_pairs});
+  d.p_as_given = std::min(1.0, 2 * std::min(d.p_recalibration, d.p_value));
+}
+
+void note_what_is_rough(Diagnosis& d, const CauseRanking& ranking, const Fit& recalibrated, double largest_gain) {
+  // Where the model is far off its likelihood is rough; what the fit missed is said where it is not next to nothing.
+  for (const RankedCause& cause : ranking.singles) largest_gain = std::max(largest_gain, cause.gain);
+  if (!recalibrated.converged && recalibrated.promised > settled_rise + settled_share * largest_gain)
+    d.notes.push_back(
+        fmt::format("the recalibrated parameters did not settle ({}): by its slope the likelihood could rise by {:.2g} "
+                    "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
+                    recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
+  if (!ranking.scan.trials_suffice)
+    d.notes.push_back(fmt::format(
+        "{} {} of {:.2g} transitions: chance levels come from the model's information alone; from {} trials "
+        "of {} transitions on, from the trials' own scatter",
+        d.trials, d.trials == 1 ? "trial" : "trials",
+        static_cast<double>(d.events) / static_cast<double>(std::max<std::size_t>(1, d.trials)), enough_trials,
+        enough_transitions));
+}
+
+// All hypotheses by falling evidence; those that are not decided go to the diagnosis.
+std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking) {
+  std::vector<const RankedCause*> ordered;
+  for (const RankedCause& cause : ranking.singles) {
+    if (cause.not_decided.empty())
+      ordered.push_back(&cause);
+    else
+      d.not_decided.push_back(describe(model, cause));
+  }
+  for (const RankedCause& pair : ranking.pairs) {
+    if (std::isfinite(pair.evidence))
+      ordered.push_back(&pair);
+    else
+      d.not_decided.push_back(describe(model, pair));
+  }
+  std::stable_sort(ordered.begin(), ordered.end(),
+                   [](const RankedCause* a, const RankedCause* b) { return a->evidence > b->evidence; });
+  return ordered;
+}
+
+// The best hypothesis, and what speaks against it.
+struct Chosen {
+  const Fit* fit = nullptr;  // the recalibrated model where no hypothesis is worth having
+  double none = 0;           // odds that it is none of the catalogue
+  double bent = 1;           // share of its gain that an error of form may bend
+};
+
+// What the best hypothesis leaves on the map: judged beyond its own model error.
+Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking, const RankedCause& best,
+              const Fit& recalibrated, const DiagnosisOptions& options) {
+  Chosen chosen{&best.fit};
+  d.left = gap_map(model, best.fit, options.draws, options.seed + 1);
+  const Fit& exact = exact_part(ranking.singles, best.terms, recalibrated);
+  PhaseGain gained = phase_gain(model, best.fit, exact);
+  if (model.refits_noise()) {  // how large the effect is beside the noise that it leaves, not beside what swallowed it
+    Fit without;
+    without.evaluation = model.evaluate(best.fit.nuisance, {});
+    gained = phase_gain(model, best.fit, without);
+  }
+  const double all = best.fit.log_likelihood - recalibrated.log_likelihood;
+  if (all > 0) chosen.bent = std::clamp((best.fit.log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
+  const double tolerated = model_error * model_error;
+  const double beyond = d.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
+  if (d.left.p_value < left_over_level && beyond > left_over_square)
+    chosen.none = std::exp(std::min(largest_log_odds, 0.5 * (beyond - left_over_square)));
+  d.together = best.together;
+  if (d.together > most_together) chosen.none = std::max(chosen.none, certain);
+  return chosen;
+}
+
+// Those that compete on the trials held out.
+std::vector<const Fit*> rivals(const std::vector<const RankedCause*>& ordered) {
+  std::vector<const Fit*> all;
+  for (const RankedCause* cause : ordered) {
+    if (all.size() == most_rivals || cause->evidence < ordered.front()->evidence - rival_evidence) break;
+    if (!cause->fit.nuisance.empty()) all.push_back(&cause->fit);
+  }
+  return all;
+}
+
+// Probabilities over everything; the prior gives a gap even odds, shared by the effects. Returns the share of the
+// effects together.
+double share_probabilities(Diagnosis& d, const TransitionModel& model, const std::vector<const RankedCause*>& ordered,
+                           std::size_t candidates, bool gap, double none) {
+  const double top = ordered.empty() ? 0 : std::max(0.0, ordered.front()->evidence);
+  const double effects = std::max<double>(1, static_cast<double>(candidates));
+  const double weight_null = std::exp(-top);
+  double given_gap = 0;
+  for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
+  // The tests decide whether there is a gap, because their levels are calibrated and the evidence's are not: where both
+  // disagree, the odds of a gap go no further than even.
+  const double even = weight_null / (1 + none_prior + none);
+  double share = 1;
+  if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
+  const double weight_none = (none + none_prior) * (given_gap > 0 ? share * given_gap : even);
+  const double sum = weight_null + share * given_gap + weight_none;
+  d.p_none = weight_none / sum;
+  (d.p_recalibration < recalibration_level ? d.p_recalibrate : d.p_no_gap) = weight_null / sum;
+  for (const RankedCause* cause : ordered) {
+    Cause one = describe(model, *cause);
+    one.probability = share * std::exp(cause->evidence - top) / effects / sum;
+    d.causes.push_back(std::move(one));
+  }
+  return share * given_gap / sum;
+}
+
+void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) {
+  if (!gap) {
+    d.verdict = d.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
+    if (d.verdict == Verdict::recalibrate) d.cause_set = {"contact_distribution"};
+    return;
+  }
+  if (none >= 1) {
+    d.verdict = Verdict::unexplained;
+    return;
+  }
+  d.verdict = Verdict::explained;
+  double covered = 0;
+  for (const Cause& cause : d.causes) {
+    if (covered >= set_share * share_of_effects || cause.probability < least_of_first * d.causes.front().probability)
+      break;
+    d.cause_set.push_back(cause.name());
+    covered += cause.probability;
+  }
+}
+
+}  // namespace
+
+std::string verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::no_gap:
+      return "no_gap";
+    case Verdict::recalibrate:
+      return "recalibrate";
+    case Verdict::explained:
+      return "explained";
+    case Verdict::unexplained:
+      return "unexplained";
+  }
+  throw std::logic_error("verdict_name: unknown verdict");
+}
+
+Verdict verdict_from_name(std::string_view name) {
+  for (const Verdict verdict : {Verdict::no_gap, Verdict::recalibrate, Verdict::explained, Verdict::unexplained})
+    if (verdict_name(verdict) == name) return verdict;
+  throw std::invalid_argument(
+      fmt::format("verdict: \"{}\" is none of no_gap, recalibrate, explained, unexplained", name));
+}
+
+std::string Cause::name() const { return fmt::format("{}", fmt::join(effects, "+")); }
+
+Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options) {
+  check(options);
+  const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
+  const auto progress = [&](double share, const char* doing) {
+    if (options.progress) options.progress(share, doing);
+  };
+
+  Diagnosis d;
+  d.trials = model.trials();
+  d.events = model.events().size();
+  for (const Event& e : model.events()) d.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
+  for (std::size_t c = 0; c < model.conditions(); ++c) d.condition_names.push_back(model.condition_name(c));
+  d.notes = model.notes();
+  d.refitted = model.recalibrated();
+
+  progress(0, "the model as given");
+  const std::vector<double> nominal = nominal_values(model);
+  const Fit as_given = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
+  const Fit given = unfitted(model, nominal);
+  d.as_given = gap_map(model, given, options.draws / 2, options.seed);
+  const Fit recalibrated = best_fit(model, nominal, {});
+  d.contact = contact_estimates(model, recalibrated);
+  const double recalibration_gain = 2 * (recalibrated.penalised - given.log_likelihood);
+  d.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
+
+  progress(0.1, "where the gap lies");
+  d.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
+
+  CauseRanking ranking = rank_causes(model, recalibrated, candidates,
+                                     {.threads = options.threads,
+                                      .draws = options.draws,
+                                      .seed = options.seed,
+                                      .pairs = wanted_pairs(candidates, options.catalogue),
+                                      .progress = [&](double share) { progress(0.15 + 0.5 * share, "which effect"); }});
+  test_for_gap(d, ranking, candidates.size(), recalibrated);
+  note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
+  // What the data hold no information on is not decided, whatever its evidence.
+  d.visible = visibility(ranking.scan, candidates);
+  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
+    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && d.visible[i].smallest == 0)
+      ranking.singles[i].not_decided = d.visible[i].undecidable;
+  const std::vector<const RankedCause*> ordered = hypotheses(d, model, ranking);
+  const bool gap = d.p_value < options.level;
+
+  Chosen chosen{&recalibrated};
+  if (gap && !ordered.empty() && ordered.front()->evidence > 0 && !ordered.front()->fit.nuisance.empty()) {
+    progress(0.68, "what is left");
+    chosen = choose(d, model, ranking, *ordered.front(), recalibrated, options);
+  } else {
+    d.left = d.recalibrated;
+    if (gap) chosen.none = certain;  // cells of the map stand out, and no effect does
+  }
+  progress(0.7, "how far it shrinks");
+  const bool named = chosen.fit != &recalibrated;
+  if (named) d.size = model.size_in_words(chosen.fit->terms);
+  if (d.trials >= trials_for_folds(options.folds))
+    d.shrinkage = gap_shrinkage(model, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
+                                options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
+  // Even a cause that closes nearly all of a huge gap may leave a large one.
+  if (named && !d.shrinkage.empty() &&
+      d.shrinkage[0].with_effect >
+          least_left_over + model_error * model_error * left_over_errors * chosen.bent * d.shrinkage[0].baseline)
+    chosen.none = std::max(chosen.none, certain);
+  const double share_of_effects = share_probabilities(d, model, ordered, candidates.size(), gap, chosen.none);
+  give_verdict(d, gap, chosen.none, share_of_effects);
+
+  progress(0.88, "steps before failure");
+  d.steps = steps_before_failure(model, nominal, recalibrated, *chosen.fit, options.seed);
+  if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.empty())
+    d.shrinkage.push_back(rest_shrinkage(at_risk, rests, d.steps));
+  d.profile = profiles(model, nominal, *chosen.fit, options.seed);
+  progress(0.93, "what could not be seen");
+  d.missing = missing_columns(model, recalibrated, candidates, options.threads, options.seed);
+  d.not_possible = too_few(model, d, options);
+  if (d.verdict == Verdict::explained && d.cause_set.size() > 1 && ordered.size() > 1)
+    d.next = next_experiments(model, ordered[0]->fit, ordered[1]->terms, options.threads, options.seed);
+  progress(1, "done");
+  d.sentences = sentences(d);
+  return d;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,150 @@
+#pragma once
+// The sim-to-real gap of one experiment: is there one, where, which unmodelled effect causes it, how far it shrinks.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "analysis/diagnosis/gap_cell.h"
+#include "analysis/diagnosis/transition_model.h"
+
+namespace metastable::analysis {
+
+struct DiagnosisOptions {
+  std::uint64_t seed = 1;
+  int threads = 0;  ///< the same bits on any number
+  /// Ids to consider, those the model lacks left out; none: all. A pair, "trial_drift+bounce", is tried in any case,
+  /// not only where the scores promise something.
+  std::vector<std::string> catalogue;
+  int draws = 2000;     ///< bootstrap draws of each chance level, >= 200; the map as given takes half
+  double level = 0.03;  ///< of the test for a gap after recalibration, in (0, 0.5)
+  int folds = 5;        ///< of the cross-validation by trial, >= 2
+  /// Called now and then with the share done, 0..1, and what is being done; may throw to stop.
+  std::function<void(double, const std::string&)> progress;
+};
+
+enum class Verdict { no_gap, recalibrate, explained, unexplained };
+std::string verdict_name(Verdict verdict);
+/// @throws std::invalid_argument for an unknown name
+Verdict verdict_from_name(std::string_view name);
+
+/// One number with its 90 % interval.
+struct EstimatedParameter {
+  std::string name;
+  double value = 0, lower = 0, upper = 0;
+  bool fitted = true;  ///< false: chosen from a list (a leg, an interval), without interval
+};
+
+/// One hypothesis about the cause: an effect, or two at once.
+struct Cause {
+  std::vector<std::string> effects;  ///< one or two ids
+  double probability = 0;            ///< over all causes, "no_gap", "recalibration" and "none_of_these"
+  double gain = 0;                   ///< 2 Delta log likelihood over the recalibrated model
+  double p_value = 1;                ///< of the gain by chance, for this effect alone (RankedCause::p_value)
+  double evidence = 0;               ///< log Bayes factor against the recalibrated model
+  std::vector<std::vector<EstimatedParameter>> parameters;  ///< by effect
+  std::string not_decided;   ///< why, if the fit failed or the data cannot tell; empty otherwise
+  std::string name() const;  ///< "a" or "a+b"
+};
+
+/// What the data could have seen of one effect.
+struct Visibility {
+  std::string effect;
+  std::string parameter;
+  double smallest = 0;  ///< size seen with 2 Delta log likelihood 16 (found in most experiments like this one)
+  std::vector<std::pair<std::string, double>>
+      alike;  ///< other effects with the share of its information they imitate, > 0.5
+  std::string undecidable;
+  double times_more = 0;  ///< data needed to see the effect at the end of its range, as a multiple of these
+};
+
+/// A statement that these data do not allow.
+struct NotPossible {
+  std::string statement, because;
+  std::optional<std::size_t>
+      trials;               ///< like these that would do; nothing: no number worth naming, or not their number
+  bool of_the_gap = false;  ///< one of the questions asked of the gap, not of one effect or of the rests
+};
+
+/// An effect that a missing column hides.
+struct HiddenEffect {
+  std::string effect, parameter;
+  std::optional<double> smallest;          ///< visible size without the column; nothing: it cannot be told at all
+  double smallest_with_it = 0;             ///< and with it
+  std::vector<std::string> not_told_from;  ///< effects that look alike for lack of it
+};
+struct MissingColumn {
+  std::string column;
+  std::vector<HiddenEffect> effects;  ///< empty: next to nothing is lost
+};
+
+/// A measure of the gap under the models compared, held out, and on data of the last model itself.
+struct Shrinkage {
+  std::string measure, unit;
+  double baseline = 0, recalibrated = 0, with_effect = 0, floor = 0;
+  /// (baseline - with_effect) / (baseline - floor); nothing where the denominator's interval covers zero.
+  std::optional<double> closed, closed_lower, closed_upper;  ///< 90 % interval over trials
+  double baseline_lower = 0, baseline_upper = 0;             ///< 90 %
+};
+
+struct StepsBeforeFailure {
+  double observed = 0, observed_lower = 0,
+         observed_upper = 0;  ///< collisions at risk by rests, exact 90 %; 0: not known
+  double baseline = 0, recalibrated = 0, with_effect = 0;
+};
+
+/// Mean speed before each collision, measured and simulated.
+struct ProfilePoint {
+  std::size_t condition = 0;
+  int collision = 1;
+  std::size_t trials = 0;
+  double measured = 0, measured_error = 0;  ///< mean, standard error [rad/s]
+  double baseline = 0, with_effect = 0;     ///< simulated means [rad/s]
+  double band = 0;                          ///< half-width of the 95 % band of the mean of as many trials [rad/s]
+};
+
+/// An experiment that would tell the remaining causes apart.
+struct NextExperiment {
+  std::string change;
+  double separation = 0;  ///< 2 Delta log likelihood expected between the two leading causes, at the fitted size
+};
+
+struct Diagnosis {
+  Verdict verdict = Verdict::no_gap;
+  std::vector<std::string> sentences;  ///< the verdict in plain words
+  std::string refitted;                ///< what a recalibration refits (TransitionModel::recalibrated)
+  std::string size;                    ///< of the likeliest cause beside the nominal model, a sentence; or empty
+  /// p-values by chance, none below 1e-12: of the model as given (twice the smaller of the next two); of as large a
+  /// gain by recalibration; of a gap after it (the smallest of the tests below, shared out over them, with one of
+  /// pairs); of the best single effect, with the look elsewhere; of the largest cell of the map.
+  double p_as_given = 1, p_recalibration = 1, p_value = 1, p_effects = 1, p_where = 1;
+  GapMap as_given, recalibrated, left;  ///< maps under the nominal, the refitted, and the chosen model
+  std::vector<Cause> causes;            ///< by falling probability; singles, then pairs that were tried among them
+  std::vector<Cause> not_decided;
+  std::vector<std::string> cause_set;  ///< names; empty if unexplained or no gap
+  /// Probabilities. A gap has at least even odds where the tests find one, and at most even odds where they do not.
+  double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
+  double together = 1;  ///< of the best hypothesis, if a pair: its gain over the sum of its effects' (cause_ranking.h)
+  std::vector<EstimatedParameter> contact;  ///< recalibrated
+  std::vector<Shrinkage> shrinkage;         ///< log score first, then CRPS; empty: too few trials
+  StepsBeforeFailure steps;
+  std::vector<Visibility> visible;
+  std::vector<MissingColumn> missing;
+  std::vector<NotPossible> not_possible;
+  std::vector<NextExperiment> next;
+  std::vector<ProfilePoint> profile;
+  std::vector<std::string> condition_names;
+  std::vector<std::string> notes;
+  std::size_t trials = 0, collisions = 0, events = 0;
+};
+
+/// Compares the trials with their nominal model and with every effect that the model knows: fits, chance levels,
+/// probabilities and a verdict. The same seed gives the same bits. Seconds to minutes: some hundred fits, each of many
+/// evaluations of all events.
+/// @throws std::invalid_argument for options out of range and unknown ids; what options.progress throws
+Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options = {});
+
+}  // namespace metastable::analysis

@@ -1,0 +1,120 @@
+#include "analysis/diagnosis/diagnosis_sentences.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/diagnosis/cause_ranking.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::size_t most_parameters = 3;  // of an effect that a sentence names
+constexpr double shown_level = 0.05;        // of a cell, for a sentence
+constexpr double worth_naming = 10;         // gain of the nearest effect where none explains the gap
+
+std::string with_parameters(const Cause& cause) {
+  std::string text;
+  for (std::size_t e = 0; e < cause.effects.size(); ++e) {
+    text += (e ? " and " : "") + cause.effects[e];
+    std::vector<std::string> inside;
+    for (const EstimatedParameter& p : cause.parameters[e]) inside.push_back(fmt::format("{} {:.3g}", p.name, p.value));
+    if (!inside.empty() && inside.size() <= most_parameters) text += fmt::format(" ({})", fmt::join(inside, ", "));
+  }
+  return text;
+}
+
+void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
+  switch (d.verdict) {
+    case Verdict::no_gap:
+      s.push_back("No gap beyond chance: the data agree with the model as given.");
+      break;
+    case Verdict::recalibrate:
+      s.push_back(
+          fmt::format("There is a gap as given, and other {} remove it: no missing physics shows.", d.refitted));
+      break;
+    case Verdict::explained:
+      if (d.cause_set.size() == 1)
+        s.push_back(fmt::format("There is a gap that recalibration does not remove, and one cause explains it: {}.",
+                                with_parameters(d.causes.front())));
+      else {
+        s.push_back(fmt::format(
+            "There is a gap that recalibration does not remove. These data cannot tell {} causes apart: {}.",
+            d.cause_set.size(), fmt::join(d.cause_set, ", ")));
+        s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(d.causes.front()),
+                                d.causes.front().probability));
+      }
+      if (!d.size.empty()) s.push_back(d.size);
+      if (const auto left = std::count_if(d.left.cells.begin(), d.left.cells.end(),
+                                          [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
+        s.push_back(
+            fmt::format("It leaves {} {} of the map beyond chance, by no more than the {:.0f} % of its own size "
+                        "that the form of a cause is allowed to be off.",
+                        left, left == 1 ? "cell" : "cells", 100 * model_error));
+      break;
+    case Verdict::unexplained:
+      s.push_back("There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
+      if (d.together > most_together)
+        s.push_back(fmt::format(
+            "The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: two "
+            "causes would add up, these bend each other into the shape of something else.",
+            d.causes.front().name(), d.together));
+      else if (!d.causes.empty() && d.causes.front().gain > worth_naming)
+        s.push_back(
+            fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.", d.causes.front().name()));
+      break;
+  }
+}
+
+void say_where(std::vector<std::string>& s, const Diagnosis& d) {
+  const GapMap& map = d.verdict == Verdict::unexplained ? d.left : d.recalibrated;
+  if (d.verdict == Verdict::explained || d.verdict == Verdict::unexplained) {
+    const auto largest = std::min_element(map.cells.begin(), map.cells.end(), [](const GapCell& a, const GapCell& b) {
+      return std::abs(a.statistic) > std::abs(b.statistic);
+    });
+    if (largest != map.cells.end() && largest->p_adjusted < shown_level)
+      s.push_back(fmt::format("It shows most in the {} of {} ({:+.2g} {}).", largest->aspect, largest->at,
+                              largest->size, largest->unit));
+  }
+}
+
+void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
+  if (!d.shrinkage.empty() && d.shrinkage[0].closed && d.verdict != Verdict::no_gap) {
+    const Shrinkage& log_score = d.shrinkage[0];
+    s.push_back(
+        fmt::format("Held out, {:.0f} % of the gap closes (90 %: {:.0f} to {:.0f} %), from {:.2g} to {:.2g} nats a "
+                    "collision.",
+                    100 * *log_score.closed, 100 * *log_score.closed_lower, 100 * *log_score.closed_upper,
+                    log_score.baseline, log_score.with_effect));
+  }
+}
+
+void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
+  for (const MissingColumn& missing : d.missing) {
+    std::vector<std::string> hidden;
+    for (const HiddenEffect& effect : missing.effects)
+      if (!effect.smallest) hidden.push_back(effect.effect);
+    if (!hidden.empty())
+      s.push_back(fmt::format("Without {}, {} cannot be told; what they do may show under other names.", missing.column,
+                              fmt::join(hidden, ", ")));
+  }
+  std::vector<std::string> too_few;
+  for (const NotPossible& n : d.not_possible)
+    if (n.of_the_gap)
+      too_few.push_back(n.trials ? fmt::format("{} ({} trials would do)", n.statement, *n.trials) : n.statement);
+  if (!too_few.empty()) s.push_back(fmt::format("Too few trials to say {}.", fmt::join(too_few, ", ")));
+}
+
+}  // namespace
+
+std::vector<std::string> sentences(const Diagnosis& d) {
+  std::vector<std::string> all;
+  say_verdict(all, d);
+  say_where(all, d);
+  say_what_closes(all, d);
+  say_what_is_hidden(all, d);
+  return all;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,198 @@
+#include "analysis/diagnosis/effect_scan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+#include "analysis/statistics/random.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double largest_step = 0.1;  // of a difference, in standard errors
+constexpr double far_out = 0.03;      // share of the draws beyond which a tail follows its law instead of their count
+
+// Gain of the score `u` with information `info`; one parameter at its lower bound gains only upwards.
+double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,
+                     Eigen::VectorXd* start) {
+  if (u.size() == 1) {
+    if (!(info(0, 0) > 0)) return 0;
+    const FreeParameter& p = candidate.parameters[0];
+    const double step = u[0] / info(0, 0);
+    if (start) *start = Eigen::VectorXd::Constant(1, step);
+    const bool blocked = (p.lower >= p.neutral && u[0] < 0) || (p.upper <= p.neutral && u[0] > 0);
+    return blocked ? 0 : u[0] * step;
+  }
+  Eigen::MatrixXd steadied = info;
+  steadied.diagonal() *= 1 + 1e-8;
+  const Eigen::VectorXd step = steadied.ldlt().solve(u);
+  if (start) *start = step;
+  const double gain = u.dot(step);
+  return std::isfinite(gain) && gain > 0 ? gain : 0;
+}
+
+}  // namespace
+
+EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
+                        int threads) {
+  EffectScan scan;
+  struct Work {
+    std::size_t effect, variant;
+    Eigen::Index first;
+    std::vector<Term> terms;
+  };
+  std::vector<Work> work;
+  Eigen::Index columns = 0;
+  for (const Candidate* candidate : candidates) {
+    if (candidate->parameters.empty() || !candidate->undecidable.empty()) continue;
+    ScannedEffect effect;
+    effect.candidate = candidate;
+    for (std::size_t v = 0; v < candidate->variants.size(); ++v) {
+      Term term{candidate, candidate->variants[v], {}};
+      for (const FreeParameter& p : candidate->parameters) term.values.push_back(p.neutral);
+      effect.first.push_back(columns);
+      Work one{scan.effects.size(), v, columns, fit.terms};
+      one.terms.push_back(term);
+      work.push_back(one);
+      columns += static_cast<Eigen::Index>(candidate->parameters.size());
+    }
+    scan.effects.push_back(std::move(effect));
+  }
+  const auto events = static_cast<Eigen::Index>(model.events().size());
+  Derivatives all{Eigen::MatrixXd(events, columns), Eigen::MatrixXd(events, columns)};
+  markov::parallel_for(work.size(), threads, [&](std::size_t i) {
+    const Work& one = work[i];
+    // Only the new term's parameters are moved, by a small share of what the data resolve.
+    const std::size_t count = one.terms.back().values.size();
+    for (std::size_t p = 0; p < count; ++p) {
+      const auto column = one.first + static_cast<Eigen::Index>(p);
+      double step = one.terms.back().candidate->parameters[p].step;
+      for (int attempt = 0; attempt < 2; ++attempt) {
+        std::vector<Term> moved = one.terms;
+        moved.back().values[p] += step;
+        const Evaluation there = model.evaluate(fit.nuisance, moved);
+        for (Eigen::Index k = 0; k < events; ++k) {
+          const auto event = static_cast<std::size_t>(k);
+          all.slope(k, column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
+          all.change(k, column) = (there.score[event] - fit.evaluation.score[event]) / step;
+        }
+        const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(column).squaredNorm()));
+        if (step < largest_step * resolved) break;
+        step = 0.5 * largest_step * resolved;
+      }
+    }
+  });
+
+  // Efficient scores and information: what the fitted parameters could take up is projected out.
+  const Eigen::Map<const Eigen::VectorXd> z(fit.evaluation.score.data(), events);
+  const Eigen::MatrixXd stretch = all.slope + z.asDiagonal() * all.change;
+  const Derivatives& held = fit.derivatives;
+  const Eigen::MatrixXd held_stretch = held.slope + z.asDiagonal() * held.change;
+  const Eigen::MatrixXd cross =
+      held.change.transpose() * all.change + held_stretch.transpose() * stretch;  // [held x columns]
+  Eigen::MatrixXd weights = cross;
+  if (columns > 0) weights = fit.information.ldlt().solve(cross);  // Eigen's solve refers to a first element
+  scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch - cross.transpose() * weights;
+  const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
+  scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
+  for (Eigen::Index k = 0; k < events; ++k)
+    scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
+  scan.trials_suffice = model.trials() >= enough_trials && model.events().size() >= enough_transitions * model.trials();
+  // At the fit the nuisances' scores and their prior's balance: the plain sum of the slopes is efficient already.
+  const Eigen::VectorXd total = all.slope.colwise().sum();
+
+  for (ScannedEffect& effect : scan.effects) {
+    const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
+    for (const Eigen::Index first : effect.first) {
+      Eigen::VectorXd start;
+      effect.gain.push_back(promised_gain(*effect.candidate, total.segment(first, count),
+                                          scan.information.block(first, first, count, count), &start));
+      effect.start.push_back(start.size() == count ? start : Eigen::VectorXd::Zero(count));
+    }
+    effect.best =
+        static_cast<std::size_t>(std::max_element(effect.gain.begin(), effect.gain.end()) - effect.gain.begin());
+  }
+  return scan;
+}
+
+namespace {
+
+// Scores whose rows, multiplied by independent standard normals and summed, are a draw of chance.
+Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
+  // Around their mean, so that a gap does not count as chance.
+  const Eigen::RowVectorXd mean = scan.by_trial.colwise().mean();
+  Eigen::MatrixXd rows = scan.by_trial.rowwise() - mean;
+  if (scan.trials_suffice) return rows;
+  // Trials that scatter more than their transitions would by themselves widen it.
+  const double trials = static_cast<double>(rows.rows());
+  const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
+  const Eigen::ArrayXd own = scan.information.diagonal().array().max(1e-300);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> split(scan.information);
+  rows = split.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * split.eigenvectors().transpose() *
+         (scatter / own).max(1).sqrt().matrix().asDiagonal();
+  return rows;
+}
+
+}  // namespace
+
+ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) {
+  if (draws < 1) throw std::invalid_argument(fmt::format("draws: {} is below 1", draws));
+  const Eigen::MatrixXd rows = rows_of_chance(scan);
+  std::vector<std::vector<double>> gains(scan.effects.size());  // by effect and draw
+  for (int draw = 0; draw < draws; ++draw) {
+    const Eigen::VectorXd score = rows.transpose() * normal_multipliers(seed, static_cast<std::uint64_t>(draw),
+                                                                        DrawStream::chance_of_effects, rows.rows());
+    for (std::size_t e = 0; e < scan.effects.size(); ++e) {
+      const ScannedEffect& effect = scan.effects[e];
+      const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
+      double largest = 0;
+      for (const Eigen::Index first : effect.first)
+        largest = std::max(largest, promised_gain(*effect.candidate, score.segment(first, count),
+                                                  scan.information.block(first, first, count, count), nullptr));
+      gains[e].push_back(largest);
+    }
+  }
+  for (std::size_t e = 0; e < gains.size(); ++e) {
+    const Candidate* effect = scan.effects[e].candidate;
+    effects_.push_back({effect, static_cast<double>(effect->parameters.size()), gains[e]});
+    std::sort(effects_[e].sorted.begin(), effects_[e].sorted.end(), std::greater<>());
+  }
+  for (int draw = 0; draw < draws; ++draw) {
+    double least = 1;
+    for (std::size_t e = 0; e < gains.size(); ++e)
+      least = std::min(least, effects_[e].p_value(gains[e][static_cast<std::size_t>(draw)]));
+    least_.push_back(least);
+  }
+  std::sort(least_.begin(), least_.end());
+}
+
+double ChanceGains::p_value(const Candidate* effect, double gain) const {
+  for (const ByChance& one : effects_)
+    if (one.effect == effect) return one.p_value(gain);
+  throw std::invalid_argument("ChanceGains::p_value: the effect was not scanned");
+}
+
+double ChanceGains::ByChance::p_value(double gain) const {
+  const auto draws = static_cast<double>(sorted.size());
+  const auto more = static_cast<double>(
+      std::lower_bound(sorted.begin(), sorted.end(), gain, [](double s, double g) { return s >= g; }) - sorted.begin());
+  const double counted = (more + 1) / (draws + 1);
+  // Beyond the largest few per cent the tail is taken as chi-squared.
+  const double anchor = sorted[static_cast<std::size_t>(far_out * draws)];
+  if (gain <= anchor || anchor <= 0) return counted;
+  return std::min(1.0, far_out * std::pow(gain / anchor, degrees / 2 - 1) * std::exp(-(gain - anchor) / 2));
+}
+
+double ChanceGains::look_elsewhere(double p) const {
+  const auto draws = static_cast<double>(least_.size());
+  const auto fewer = static_cast<double>(std::upper_bound(least_.begin(), least_.end(), p) - least_.begin());
+  const double anchor = least_[static_cast<std::size_t>(far_out * draws)];
+  if (p >= anchor) return (fewer + 1) / (draws + 1);
+  return std::min(1.0, far_out * p / anchor);
+}
+
+}  // namespace metastable::analysis

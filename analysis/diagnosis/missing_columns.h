@@ -1,0 +1,19 @@
+#pragma once
+// What columns that were not measured hide: the same design with and without each, by the information it holds.
+
+#include <cstdint>
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+#include "analysis/diagnosis/model_fit.h"
+
+namespace metastable::analysis {
+
+/// Effects that a missing column hides or makes much harder to see, and those that look alike for lack of it. Both
+/// designs with data drawn from the recalibrated model, so that a gap does not blur the comparison.
+/// @param candidates  to be compared; of each a few variants stand for all
+std::vector<MissingColumn> missing_columns(const TransitionModel& model, const Fit& recalibrated,
+                                           const std::vector<const Candidate*>& candidates, int threads,
+                                           std::uint64_t seed);
+
+}  // namespace metastable::analysis

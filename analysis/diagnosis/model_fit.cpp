@@ -1,0 +1,269 @@
+#include "analysis/diagnosis/model_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is the optimum
+// Where no step rises: a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
+// what differences do not resolve.
+constexpr double unresolved = 0.5, unresolved_share = 1e-4;
+constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
+
+// All parameters of a hypothesis as one vector.
+class Point {
+ public:
+  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<Term> terms, bool with_nuisances)
+      : model_(model), nuisance_(std::move(nuisance)), terms_(std::move(terms)) {
+    if (with_nuisances)
+      for (std::size_t i = 0; i < nuisance_.size(); ++i) {
+        const Nuisance& n = model.nuisances()[i];
+        slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n.nominal, n.prior_sd});
+      }
+    for (Term& term : terms_)
+      for (std::size_t i = 0; i < term.values.size(); ++i) {
+        const FreeParameter& p = term.candidate->parameters[i];
+        slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, 0, 0});
+      }
+  }
+  Point(const Point&) = delete;
+  Point& operator=(const Point&) = delete;
+
+  struct Slot {
+    double* value;
+    double step, largest_step, lower, upper, nominal, prior_sd;  // prior_sd 0: none
+  };
+  std::vector<Slot>& slots() { return slots_; }
+  const std::vector<double>& nuisance() const { return nuisance_; }
+  const std::vector<Term>& terms() const { return terms_; }
+  Evaluation evaluate() const { return model_.evaluate(nuisance_, terms_); }
+  double log_prior() const {
+    double sum = 0;
+    for (const Slot& s : slots_)
+      if (s.prior_sd > 0) sum -= 0.5 * std::pow((*s.value - s.nominal) / s.prior_sd, 2);
+    return sum;
+  }
+
+ private:
+  const TransitionModel& model_;
+  std::vector<double> nuisance_;
+  std::vector<Term> terms_;
+  std::vector<Slot> slots_;
+};
+
+// `steps`: what was gone in each parameter.
+Derivatives differences(Point& point, const Evaluation& here, std::vector<double>& steps) {
+  const auto events = static_cast<Eigen::Index>(here.score.size());
+  auto& slots = point.slots();
+  Derivatives d{Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())),
+                Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size()))};
+  for (std::size_t p = 0; p < slots.size(); ++p) {
+    const double value = *slots[p].value;
+    const double step = value + slots[p].step <= slots[p].upper ? slots[p].step : -slots[p].step;
+    *slots[p].value = value + step;
+    steps[p] = step;
+    const Evaluation moved = point.evaluate();
+    *slots[p].value = value;
+    for (Eigen::Index i = 0; i < events; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      // Events at the floor of the density have no slope there.
+      d.slope(i, static_cast<Eigen::Index>(p)) =
+          std::clamp((moved.log_density[k] - here.log_density[k]) / step, -1e9, 1e9);
+      d.change(i, static_cast<Eigen::Index>(p)) = std::clamp((moved.score[k] - here.score[k]) / step, -1e9, 1e9);
+    }
+  }
+  return d;
+}
+
+double counted(const Evaluation& e, const Eigen::VectorXd& weights) {
+  return Eigen::Map<const Eigen::VectorXd>(e.log_density.data(), weights.size()).dot(weights);
+}
+
+Eigen::VectorXd picked(const Eigen::VectorXd& all, const std::vector<Eigen::Index>& part) {
+  Eigen::VectorXd some(static_cast<Eigen::Index>(part.size()));
+  for (std::size_t a = 0; a < part.size(); ++a) some[static_cast<Eigen::Index>(a)] = all[part[a]];
+  return some;
+}
+
+Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::VectorXd& gradient,
+                             const std::vector<Eigen::Index>& part) {
+  const auto size = static_cast<Eigen::Index>(part.size());
+  Eigen::MatrixXd block(size, size);
+  for (Eigen::Index a = 0; a < size; ++a)
+    for (Eigen::Index b = 0; b < size; ++b)
+      block(a, b) = information(part[static_cast<std::size_t>(a)], part[static_cast<std::size_t>(b)]);
+  block.diagonal() *= 1 + 1e-9;
+  return block.ldlt().solve(picked(gradient, part));
+}
+
+// Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does.
+bool search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::VectorXd& step,
+            const Eigen::VectorXd& weights, double& best, Evaluation& evaluation) {
+  auto& slots = point.slots();
+  std::vector<double> before;
+  for (const Eigen::Index p : part) before.push_back(*slots[static_cast<std::size_t>(p)].value);
+  double share = 1;
+  for (int halving = 0; halving < 7; ++halving, share /= 2) {
+    for (std::size_t a = 0; a < part.size(); ++a) {
+      const Point::Slot& s = slots[static_cast<std::size_t>(part[a])];
+      *s.value = std::clamp(before[a] + share * step[static_cast<Eigen::Index>(a)], s.lower, s.upper);
+    }
+    Evaluation tried = point.evaluate();
+    const double value = counted(tried, weights) + point.log_prior();
+    if (value > best) {
+      best = value;
+      evaluation = std::move(tried);
+      return true;
+    }
+  }
+  for (std::size_t a = 0; a < part.size(); ++a) *slots[static_cast<std::size_t>(part[a])].value = before[a];
+  return false;
+}
+
+// Gradient of the penalised likelihood at the point where result.derivatives were taken over `steps`. The prior goes
+// into the information, too, and the slots get the steps of their next differences.
+Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen::VectorXd& weights,
+                                   const std::vector<double>& steps, Fit& result) {
+  Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const auto p = static_cast<Eigen::Index>(k);
+    Point::Slot& s = slots[k];
+    double& resolved = result.information(p, p);
+    if (resolved > 0) s.step = std::min(s.largest_step, difference_share / std::sqrt(resolved));
+    // A forward difference is the slope half a step on: taken back by the curvature, which matters along ridges.
+    gradient[p] += 0.5 * steps[k] * resolved;
+    if (s.prior_sd > 0) {
+      gradient[p] -= (*s.value - s.nominal) / (s.prior_sd * s.prior_sd);
+      resolved += 1 / (s.prior_sd * s.prior_sd);
+    }
+  }
+  return gradient;
+}
+
+// Indices of the parameters that may move: one held at a bound by the gradient stays there.
+struct FreeParts {
+  std::vector<Eigen::Index> all, of_nuisances, of_terms;
+};
+
+FreeParts free_parts(const std::vector<Point::Slot>& slots, const Eigen::VectorXd& gradient,
+                     const Eigen::MatrixXd& information) {
+  FreeParts parts;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const auto p = static_cast<Eigen::Index>(k);
+    const Point::Slot& s = slots[k];
+    const bool held = (*s.value <= s.lower && gradient[p] <= 0) || (*s.value >= s.upper && gradient[p] >= 0);
+    if (held || !(information(p, p) > 0)) continue;
+    parts.all.push_back(p);
+    (s.prior_sd > 0 ? parts.of_nuisances : parts.of_terms).push_back(p);
+  }
+  return parts;
+}
+
+}  // namespace
+
+Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.events().size()));
+  if (!count.empty())
+    for (std::size_t i = 0; i < model.events().size(); ++i)
+      weights[static_cast<Eigen::Index>(i)] = count[model.events()[i].trial] ? 1 : 0;
+  return weights;
+}
+
+Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, const Eigen::VectorXd& weights) {
+  const Eigen::Map<const Eigen::VectorXd> z(here.score.data(), weights.size());
+  const Eigen::MatrixXd stretch = columns.slope + z.asDiagonal() * columns.change;
+  return columns.change.transpose() * weights.asDiagonal() * columns.change +
+         stretch.transpose() * weights.asDiagonal() * stretch;
+}
+
+Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
+                        const std::vector<Term>& terms, const Evaluation& here, bool with_nuisances) {
+  Point point(model, nuisance, terms, with_nuisances);
+  std::vector<double> steps(point.slots().size());
+  return differences(point, here, steps);
+}
+
+Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+        const FitOptions& options) {
+  Point point(model, nuisance, terms, options.refit_nuisances);
+  auto& slots = point.slots();
+  const Eigen::VectorXd weights = event_weights(model, options.count);
+  std::vector<double> steps(slots.size());
+  Fit result;
+  result.evaluation = point.evaluate();
+  double best = counted(result.evaluation, weights) + point.log_prior();
+  const double start = best;
+  const bool finite = std::isfinite(best);
+  result.converged = slots.empty() && finite;
+  if (!finite) result.reason = "its likelihood is not finite";
+  for (int iteration = 0; finite && iteration < options.most_iterations && !slots.empty(); ++iteration) {
+    result.derivatives = differences(point, result.evaluation, steps);
+    result.information = information(result.derivatives, result.evaluation, weights);
+    const Eigen::VectorXd gradient = penalised_gradient(slots, weights, steps, result);
+    const FreeParts parts = free_parts(slots, gradient, result.information);
+    if (parts.all.empty()) {
+      result.converged = true;
+      break;
+    }
+    // All parameters together; where that fails, the effects' and the nuisances' by themselves.
+    const double before = best;
+    double promised = 0;
+    bool better = false;
+    for (const auto* part : {&parts.all, &parts.of_terms, &parts.of_nuisances}) {
+      if (part->empty()) continue;
+      const Eigen::VectorXd step = gauss_newton(result.information, gradient, *part);
+      const double rise = 0.5 * step.dot(picked(gradient, *part));
+      if (part == &parts.all) {
+        promised = rise;
+        if (!(promised > worth_a_step)) break;
+      }
+      if (rise > worth_a_step) better = search(point, *part, step, weights, best, result.evaluation);
+      if (better) break;
+    }
+    result.promised = promised;
+    if (!(promised > worth_a_step)) {
+      result.converged = std::isfinite(promised);
+      if (!result.converged) result.reason = "its information matrix is singular";
+      break;
+    }
+    if (!better) {
+      // At the optimum, up to what the differences resolve.
+      result.converged = promised < unresolved + unresolved_share * (best - start);
+      if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
+      break;
+    }
+    if (best - before < worth_a_step) {
+      result.converged = true;
+      break;
+    }
+  }
+  if (!result.converged && result.reason.empty())
+    result.reason = "the likelihood was still rising after " + std::to_string(options.most_iterations) + " steps";
+  result.nuisance = point.nuisance();
+  result.terms = point.terms();
+  result.log_likelihood = counted(result.evaluation, weights);
+  result.penalised = best;
+  return result;
+}
+
+Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+             const FitOptions& options) {
+  Fit best = fit(model, nuisance, terms, options);
+  const std::vector<Start> starts = model.starts(terms);
+  for (const Start& start : starts) {
+    std::vector<Term> moved = terms;
+    for (std::size_t i = 0; i < moved.size(); ++i) moved[i].values = start.values[i];
+    Fit tried = fit(model, start.nuisance, moved, options);
+    if (tried.penalised > best.penalised || !std::isfinite(best.penalised)) best = std::move(tried);
+  }
+  if (!starts.empty() && !best.converged && std::isfinite(best.penalised)) {  // the last stretch of the way
+    FitOptions longer = options;
+    longer.most_iterations *= 3;
+    best = fit(model, best.nuisance, best.terms, longer);
+  }
+  return best;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,60 @@
+#pragma once
+// Fitting a transition model: nuisances and effects by penalised maximum likelihood.
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "analysis/diagnosis/transition_model.h"
+
+namespace metastable::analysis {
+
+/// Change of every event's log density and score with each parameter, by differences.
+struct Derivatives {
+  Eigen::MatrixXd slope;   ///< [events x parameters] of the log density
+  Eigen::MatrixXd change;  ///< [events x parameters] of the normal score
+};
+
+/// A fitted hypothesis.
+struct Fit {
+  std::vector<double> nuisance;
+  std::vector<Term> terms;
+  double log_likelihood = 0;    ///< of the events counted, without the prior
+  double penalised = 0;         ///< with the nuisances' prior
+  Evaluation evaluation;        ///< of all events, counted or not
+  Derivatives derivatives;      ///< at the optimum: nuisances first, then the terms' free parameters in order
+  Eigen::MatrixXd information;  ///< of the counted events, with the prior
+  bool converged = true;
+  double promised = 0;  ///< rise that the last step could have brought, to first order
+  std::string reason;   ///< why it did not converge
+};
+
+struct FitOptions {
+  std::vector<char> count;  ///< by trial: 0 leaves its events out; empty: all
+  bool refit_nuisances = true;
+  int most_iterations = 25;
+};
+
+/// Maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
+/// dz/d(speed), log density = log phi(z) + log J, and the information is the sum of z' z'^T + (log J)' (log J)'^T,
+/// which no outlying observation inflates. Starts from the given values; parameters stay inside their bounds. A
+/// likelihood that is not finite there: not converged, with that reason.
+Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+        const FitOptions& options = {});
+
+/// The better of the fits from the given values and from the starts that the model offers (TransitionModel::starts).
+Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+             const FitOptions& options = {});
+
+/// Derivatives at a point with respect to the free parameters of `terms` only.
+Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
+                        const std::vector<Term>& terms, const Evaluation& here, bool with_nuisances);
+
+/// The information of columns: sum over counted events of change change^T + (slope + z change)(...)^T.
+/// @param weights  by event, 1 or 0
+Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, const Eigen::VectorXd& weights);
+
+/// 1 or 0 an event. @param count  by trial; empty: all ones
+Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count);
+
+}  // namespace metastable::analysis

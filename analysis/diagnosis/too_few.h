@@ -1,0 +1,16 @@
+#pragma once
+// Statements for which an experiment has too few trials, collisions or rests, and how many would do.
+
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+
+namespace metastable::analysis {
+
+/// Trials that the held-out measures need: two a fold.
+inline std::size_t trials_for_folds(int folds) { return 2 * static_cast<std::size_t>(folds); }
+
+/// @param d  complete but for `not_possible`
+std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& d, const DiagnosisOptions& options);
+
+}  // namespace metastable::analysis

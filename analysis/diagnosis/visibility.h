@@ -1,0 +1,21 @@
+#pragma once
+// What an experiment could see of each effect, what looks alike in it, and which experiment would see more.
+
+#include <cstdint>
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+#include "analysis/diagnosis/effect_scan.h"
+
+namespace metastable::analysis {
+
+/// Smallest size of each effect that stands out, from the information at the fit (nuisances projected out), and the
+/// effects that imitate it: share of its information along its own direction that the other's parameters explain.
+std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<const Candidate*>& candidates);
+
+/// Changes of the experiment (TransitionModel::alternatives) by what they would tell between the fitted cause and its
+/// rival, best first: the gain of the fitted size that the rival and the nuisances cannot take up.
+std::vector<NextExperiment> next_experiments(const TransitionModel& model, const Fit& cause,
+                                             const std::vector<Term>& rival, int threads, std::uint64_t seed);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,269 @@
+#include "analysis/experiment/coast_down.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+#include <stdexcept>
+
+#include "analysis/experiment/input_error.h"
+#include "analysis/statistics/median.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr int least_block = 10;                          // revolutions
+constexpr std::size_t around = 5;                        // periods on either side that a period is compared with
+constexpr double missed_from = 1.5, double_below = 0.6;  // of the median period
+constexpr double huber = 1.345;                          // 95 % efficiency under normal noise
+constexpr std::array<const char*, 5> columns{"time_us", "drum_speed_km_h", "drum_revolutions", "wheel_speed_km_h",
+                                             "wheel_revolutions"};
+
+std::vector<double> running_median(const std::vector<double>& values, std::size_t reach) {
+  std::vector<double> medians;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const std::size_t from = k < reach ? 0 : k - reach, to = std::min(values.size(), k + reach + 1);
+    medians.push_back(
+        median({values.begin() + static_cast<std::ptrdiff_t>(from), values.begin() + static_cast<std::ptrdiff_t>(to)}));
+  }
+  return medians;
+}
+
+// By how much a period is off the line between its neighbours, relative; 0 beside split and joint periods.
+std::vector<double> bends(const std::vector<double>& periods, const std::vector<double>& medians) {
+  const auto whole = [&](std::size_t k) {
+    return periods[k] < missed_from * medians[k] && periods[k] >= double_below * medians[k];
+  };
+  std::vector<double> off(periods.size(), 0.0);
+  for (std::size_t k = 1; k + 1 < periods.size(); ++k)
+    if (whole(k - 1) && whole(k) && whole(k + 1))
+      off[k] = std::abs(1 - (periods[k - 1] + periods[k + 1]) / (2 * periods[k]));
+  return off;
+}
+
+}  // namespace
+
+void CoastDownOptions::validate() const {
+  if (!(stop > 0) || !std::isfinite(stop))
+    throw std::invalid_argument(fmt::format("stop: {} rad/s is outside (0, inf)", stop));
+  if (block < least_block || block > 100000)
+    throw std::invalid_argument(fmt::format("block: {} is outside {}..100000", block, least_block));
+}
+
+CounterLog parse_counter_log(const std::string& file, std::string_view text) {
+  Defects defects;
+  CounterLog log;
+  double last_time = 0, last_drum = 0, last_wheel = 0;
+  bool begun = false;
+  std::size_t number = 0;
+  while (!text.empty()) {
+    ++number;
+    const auto feed = text.find('\n');
+    std::string_view line = text.substr(0, feed);
+    text = feed == std::string_view::npos ? std::string_view{} : text.substr(feed + 1);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    const std::string_view whole = line;
+    std::array<double, 5> values{};
+    std::size_t read = 0;
+    bool fine = true;
+    const auto column = [&] { return static_cast<std::size_t>(line.data() - whole.data()) + 1; };
+    for (; read < values.size(); ++read) {
+      const auto comma = line.find(',');
+      const std::string_view field = line.substr(0, comma);
+      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), values[read]);
+      if (error != std::errc{} || end != field.data() + field.size() || !std::isfinite(values[read])) {
+        defects.add(file, {number, column()}, fmt::format("{}: {} is not a number", columns[read], shown_text(field)));
+        fine = false;
+        break;
+      }
+      const bool counter = read == 2 || read == 4;
+      if (values[read] < 0 || (counter && values[read] != std::floor(values[read]))) {
+        defects.add(file, {number, column()},
+                    fmt::format("{}: {} is {}", columns[read], values[read],
+                                values[read] < 0 ? "outside [0, inf)" : "no whole number"));
+        fine = false;
+        break;
+      }
+      if (comma == std::string_view::npos) {
+        line = {};
+        ++read;
+        break;
+      }
+      line.remove_prefix(comma + 1);
+      if (read + 1 == values.size()) {
+        defects.add(file, {number, column()}, "more than five fields");
+        fine = false;
+      }
+    }
+    if (fine && read < values.size()) {
+      defects.add(file, {number, 1}, fmt::format("{} fields where five are expected", read));
+      fine = false;
+    }
+    if (!fine) continue;
+    const double time = values[0] * 1e-6;
+    if (begun && (time < last_time || values[2] < last_drum || values[4] < last_wheel)) {
+      const std::size_t which = time < last_time ? 0 : values[2] < last_drum ? 2 : 4;
+      defects.add(file, {number, 1}, fmt::format("{}: falls to {}", columns[which], values[which]));
+      continue;
+    }
+    if (begun && values[2] > last_drum) {
+      if (!log.time.empty() && time <= log.time.back()) {
+        defects.add(file, {number, 1}, "time_us: two drum revolutions end at the same time");
+        continue;
+      }
+      log.time.push_back(time);
+      log.skipped.push_back(static_cast<int>(std::min(values[2] - last_drum, 1e9)) - 1);
+    }
+    begun = true;
+    last_time = time;
+    last_drum = values[2];
+    last_wheel = values[4];
+  }
+  defects.check();
+  if (log.time.size() < 20)
+    throw InputError({fmt::format("{}: {} drum revolutions are too few, 20 are needed", file, log.time.size())});
+  return log;
+}
+
+CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options) {
+  options.validate();
+  if (log.time.size() < least_block)
+    throw std::invalid_argument(
+        fmt::format("{}: {} ticks are too few, {} are needed", log.name, log.time.size(), least_block));
+  if (log.skipped.size() != log.time.size())
+    throw std::invalid_argument(
+        fmt::format("{}: skipped has {} entries for {} ticks", log.name, log.skipped.size(), log.time.size()));
+  std::vector<double> periods;
+  for (std::size_t k = 1; k < log.time.size(); ++k) periods.push_back(log.time[k] - log.time[k - 1]);
+  const std::vector<double> medians = running_median(periods, around);
+
+  CoastDownRun run;
+  run.name = log.name;
+  constexpr double turn = 2 * std::numbers::pi;
+  const double shortest = *std::min_element(medians.begin(), medians.end());
+  run.top = turn / shortest;
+  if (!(run.top > options.stop))
+    throw std::invalid_argument(fmt::format("{}: the top speed, {:.3g} rad/s, is not above the stop, {:.3g} rad/s",
+                                            log.name, run.top, options.stop));
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < medians.size(); ++k)
+    if (medians[k] <= shortest * 1.005) first = k + 1;
+  std::size_t end = first;
+  while (end < medians.size() && turn / medians[end] >= options.stop) ++end;
+  run.revolutions = end - first;
+
+  const std::vector<double> off = bends(periods, medians);
+  const std::vector<double> usual = running_median(off, 25);
+  bool displaced_before = false;
+  std::vector<Revolution> block;
+  std::size_t kept = 0;
+  const auto close = [&] {
+    if (block.size() >= least_block) {
+      kept += block.size();
+      run.blocks.push_back(block);
+    }
+    block.clear();
+  };
+  for (std::size_t k = first; k < end; ++k) {
+    const double ratio = periods[k] / medians[k];
+    const bool displaced = off[k] > std::max(2e-4, 8 * median_deviation_to_sd * usual[k]);
+    bool defect = true;
+    if (log.skipped[k + 1] > 0) {
+      run.missed += static_cast<std::size_t>(log.skipped[k + 1]);
+    } else if (ratio >= missed_from) {
+      run.missed += static_cast<std::size_t>(std::lround(ratio)) - 1;
+    } else if (ratio < double_below) {
+      ++run.doubled;
+      if (k + 1 < end && ratio + periods[k + 1] / medians[k + 1] < 1.4) ++k;  // the revolution's other part
+    } else if (displaced) {
+      if (!displaced_before) ++run.displaced;  // one tick bends the periods around it
+    } else {
+      defect = false;
+    }
+    displaced_before = displaced;
+    if (defect) {
+      close();
+      continue;
+    }
+    block.push_back({log.time[k + 1], turn / periods[k]});
+    if (static_cast<int>(block.size()) == options.block) close();
+  }
+  close();
+  run.left_out = run.revolutions - kept;
+  if (run.blocks.empty())
+    throw std::invalid_argument(fmt::format("{}: no {} revolutions without a defect", log.name, least_block));
+  return run;
+}
+
+LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear) {
+  std::vector<double> omega, lost;
+  for (const CoastDownRun& run : runs)
+    for (const auto& block : run.blocks)
+      for (std::size_t k = 1; k < block.size(); ++k) {
+        omega.push_back(block[k - 1].omega);
+        lost.push_back(block[k - 1].omega * block[k - 1].omega - block[k].omega * block[k].omega);
+      }
+  LossFit fit;
+  fit.transitions = omega.size();
+  if (omega.size() < 20)
+    throw std::invalid_argument(fmt::format("loss: {} transitions are too few, 20 are needed", omega.size()));
+  const auto rows = static_cast<Eigen::Index>(omega.size());
+  const Eigen::Map<const Eigen::VectorXd> w(omega.data(), rows), y(lost.data(), rows);
+  Eigen::MatrixXd terms(rows, linear ? 3 : 2);
+  terms.col(0).setOnes();
+  terms.col(1) = w.array().square();
+  if (linear) terms.col(2) = w;
+  Eigen::VectorXd weight = Eigen::VectorXd::Ones(rows), value, residual;
+  Eigen::MatrixXd normal;
+  double scale = 0;
+  for (int i = 0; i < 200; ++i) {
+    normal = terms.transpose() * weight.asDiagonal() * terms;
+    const Eigen::VectorXd next = normal.ldlt().solve(terms.transpose() * weight.cwiseProduct(y));
+    residual = y - terms * next;
+    std::vector<double> sizes(omega.size());
+    for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] = std::abs(residual[static_cast<Eigen::Index>(k)]);
+    scale = median_deviation_to_sd * median(sizes);
+    const bool settled = i > 0 && (next - value).norm() <= 1e-12 * next.norm();
+    value = next;
+    if (settled || scale == 0) break;
+    for (Eigen::Index k = 0; k < rows; ++k) weight[k] = std::min(1.0, huber * scale / std::abs(residual[k]));
+  }
+  fit.loss = {value[0], linear ? value[2] : 0, value[1], scale};
+  const Eigen::MatrixXd covariance = scale * scale / 0.95 * (terms.transpose() * terms).inverse();
+  fit.constant_error = std::sqrt(covariance(0, 0));
+  fit.quadratic_error = std::sqrt(covariance(1, 1));
+  if (linear) fit.linear_error = std::sqrt(covariance(2, 2));
+  fit.outliers = static_cast<std::size_t>((residual.array().abs() > 5 * scale).count());
+  return fit;
+}
+
+ExperimentFiles coast_down_files(const std::vector<CoastDownRun>& runs, const RevolutionLoss& nominal,
+                                 std::optional<double> rotor_inertia, const std::string& title,
+                                 const std::vector<std::string>& comment) {
+  ExperimentFiles files;
+  std::string& toml = files.experiment_toml;
+  for (const std::string& line : comment) toml += "# " + line + "\n";
+  toml += fmt::format("title = {}\nsystem = \"coast_down\"\n", toml_text(title));
+  if (rotor_inertia) toml += fmt::format("\n[rotor]\ninertia_kg_m2 = {}\n", *rotor_inertia);
+  toml += fmt::format("\n[loss]\nconstant = {}\nlinear = {}\nquadratic = {}\nnoise_sd = {}\n", nominal.constant,
+                      nominal.linear, nominal.quadratic, nominal.noise_sd);
+  files.collisions_csv = "condition,trial,collision,time_s,omega_minus_rad_s\n";
+  std::size_t trial = 0;
+  for (const CoastDownRun& run : runs) {
+    toml += fmt::format("\n[[condition]]\nid = {}\n", toml_text(run.name));
+    for (const auto& block : run.blocks) {
+      ++trial;
+      for (std::size_t k = 0; k < block.size(); ++k)
+        fmt::format_to(std::back_inserter(files.collisions_csv), "{},{},{},{:.6f},{:.9g}\n", run.name, trial, k + 1,
+                       block[k].time, block[k].omega);
+    }
+  }
+  return files;
+}
+
+}  // namespace metastable::analysis

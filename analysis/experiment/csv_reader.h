@@ -1,0 +1,76 @@
+#pragma once
+// CSV files with a header (RFC 4180), read strictly: whatever is not understood is a defect with its line and column.
+
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "analysis/experiment/input_error.h"
+
+namespace metastable::analysis {
+
+/// A column that a file may or must have.
+struct CsvColumn {
+  std::string_view name;
+  bool required = false;  ///< must be in the header, and filled in every row
+};
+
+/// Walks through the records of a CSV text once, in order. Line ends LF or CRLF, an optional byte order mark, an
+/// optional line end after the last record; fields in double quotes may hold commas, line ends and doubled quotes.
+/// Defects: a quote inside an unquoted field, text after a closing quote, an unclosed quote, control characters, a
+/// carriage return alone, an empty line, too few or too many fields, a column that is missing, unknown or named twice.
+/// One pass, O(bytes); only quoted fields with doubled quotes are copied.
+class CsvReader {
+ public:
+  /// Reads the header. @param file name for messages; @param text, defects must outlive the reader
+  /// @param columns  all columns the file may have; members below name them by their index
+  CsvReader(std::string file, std::string_view text, std::span<const CsvColumn> columns, Defects& defects);
+
+  bool has(std::size_t column) const { return position_[column].has_value(); }
+  /// Goes to the next record that has as many fields as the header; defective ones are reported and skipped. False at
+  /// the end of the text, and at once if a required column is missing.
+  bool next();
+  /// Whether every record so far had as many fields as the header, and no required column is missing.
+  bool complete() const { return complete_; }
+  std::size_t line() const { return line_; }  ///< where the record begins
+
+  /// The field as it is; empty if the column is absent.
+  std::string_view text(std::size_t column) const;
+  /// A finite number >= least; nothing if the column is absent or the field empty. False: it is none, reported.
+  bool read(std::size_t column, double least, std::optional<double>& value);
+  /// A whole number in [least, most], likewise ("3.0" is one, as tools write that know floating point only).
+  bool read(std::size_t column, std::int64_t least, std::int64_t most, std::optional<std::int64_t>& value);
+  /// Reports a defect of this record's field ("COLUMN: what").
+  void refuse(std::size_t column, std::string_view what);
+
+ private:
+  struct Field {
+    std::string_view text;
+    std::size_t offset = 0;  // in the file's text
+  };
+
+  bool record();  // false: nothing left. fields_ empty: defective, reported
+  bool quoted_field(Field& field);
+  void skip_line();
+  Place place(std::size_t offset) const;
+  void report(std::size_t offset, std::string_view what) { defects_.add(file_, place(offset), what); }
+
+  std::string file_;
+  std::string_view text_;
+  std::span<const CsvColumn> columns_;
+  Defects& defects_;
+  std::vector<std::optional<std::size_t>> position_;  // of each column among the fields
+  std::size_t width_ = 0;
+  bool usable_ = false, complete_ = true;
+  std::vector<Field> fields_;
+  std::deque<std::string> unescaped_;
+  std::size_t at_ = 0, begin_ = 0;        // offsets: next byte, this record
+  std::size_t line_ = 0, next_line_ = 1;  // numbers: this record's, the next one's
+};
+
+}  // namespace metastable::analysis

@@ -1,0 +1,70 @@
+#pragma once
+// Experiments run in the virtual laboratory, and their folders.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/experiment/angle_recording.h"
+#include "analysis/experiment/experiment_folder.h"
+#include "analysis/study/setting.h"
+#include "dynamics/laboratory/laboratory.h"
+#include "dynamics/wheel/effect_catalogue.h"
+
+namespace metastable::analysis {
+
+/// Contact and legs [m] as the catalogue of effects takes them.
+dynamics::NominalValues stated_values(const Spread& restitution, const Spread& friction,
+                                      const std::vector<double>& leg_lengths);
+
+/// One condition as the modeller states it.
+struct RealityCondition {
+  std::string id;
+  Setting setting;  ///< the nominal model
+  int trials = 50;  ///< 1 .. 100000
+};
+
+/// How reality departs from the nominal model.
+struct RealityOptions {
+  std::vector<dynamics::Effect> effects = {};
+  std::vector<dynamics::OutsideEffect> outside = {};
+  double restitution_skewness = 0;
+  double sensor_noise = 0;  ///< of every reported speed [rad/s]
+  double smoothing = 0;     ///< [s], [0, 0.1]
+  bool flight = true;
+  bool shuffled = false;  ///< conditions take turns at random instead of one after the other
+  int collisions = 16;    ///< most of a trial
+  std::uint64_t seed = 1;
+  int threads = 0;
+};
+
+/// The laboratory of these conditions. Wheel and contact are those of the first.
+/// @throws std::invalid_argument where there is no condition, and naming a setting the laboratory cannot take
+/// (correlation, list of pairs) or an option out of range
+dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& conditions,
+                                           const RealityOptions& options);
+/// All trials, in the order they were run. The same bits on any number of threads.
+std::vector<dynamics::LaboratoryTrial> run_laboratory(const dynamics::LaboratorySetup& setup, int threads);
+
+/// What a folder tells of an experiment.
+struct FolderOptions {
+  std::string title = {};
+  std::vector<std::string> comment = {};  ///< first lines of experiment.toml, each behind "# "
+  /// Columns and statements left out: leg, time_s, position_m, omega_plus_rad_s, outcome, initial_speed_rad_s, noise.
+  std::vector<std::string> dropped = {};
+  std::optional<Spread> restitution = {}, friction = {};  ///< stated; default: those of the first condition's setting
+  std::optional<CameraOptions> camera = {};               ///< angle.csv too
+};
+/// Names that FolderOptions::dropped may hold.
+const std::vector<std::string>& droppable();
+
+struct RealityFiles {
+  ExperimentFiles files;
+  std::optional<std::string> angle_csv;
+};
+/// @throws std::invalid_argument for an unknown name in `dropped`, and where there is no condition
+RealityFiles reality_files(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
+                           const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options);
+
+}  // namespace metastable::analysis

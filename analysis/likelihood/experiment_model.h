@@ -1,0 +1,14 @@
+#pragma once
+// The transition model that belongs to an experiment.
+
+#include <memory>
+
+#include "analysis/diagnosis/transition_model.h"
+#include "analysis/experiment/experiment.h"
+
+namespace metastable::analysis {
+
+/// wheel_transitions() or coast_down_transitions(). @throws std::invalid_argument as these
+std::unique_ptr<TransitionModel> transition_model(const Experiment& experiment);
+
+}  // namespace metastable::analysis

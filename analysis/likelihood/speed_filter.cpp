@@ -1,0 +1,156 @@
+#include "analysis/likelihood/speed_filter.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "dynamics/wheel/truncated_normal.h"
+
+namespace metastable::analysis {
+namespace {
+
+using dynamics::ExtendedWheel;
+using dynamics::Extension;
+using dynamics::normal_cdf;
+using dynamics::normal_density;
+using dynamics::StepContext;
+
+constexpr double log_sqrt_two_pi = 0.91893853320467274178;
+// Noise that a collision's density is blurred by [rad/s]; less than this is half a per cent of its variance.
+constexpr double least_blur = 0.012;
+
+struct Node {  // of Gauss-Hermite's rule for the standard normal
+  double score, weight;
+};
+constexpr std::array<Node, 3> three_nodes{
+    {{-1.7320508075688772, 1.0 / 6}, {0, 2.0 / 3}, {1.7320508075688772, 1.0 / 6}}};
+
+double log_normal(double z) { return -0.5 * z * z - log_sqrt_two_pi; }
+
+double square(double v) { return v * v; }
+
+}  // namespace
+
+double score_of_probability(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
+
+SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack)
+    : extension_(extension),
+      tilt_(tilt),
+      noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
+      slack2_(slack * slack),
+      blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
+
+SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {
+  const double mean = condition.initial_speed->mean + extension_.launch_shift;
+  const double sd = std::max(0.01, condition.initial_speed->sd + extension_.launch_widening);
+  const double seen = reported - extension_.bias_before, total = std::sqrt(sd * sd + noise2_);
+  const double z = (seen - mean) / total, gain = sd * sd / (total * total);
+  mean_ = mean + gain * (seen - mean);
+  variance_ = gain * noise2_;
+  return {log_normal(z) - std::log(total), z, total};
+}
+
+void SpeedFilter::start(double reported) {
+  mean_ = reported - extension_.bias_before;
+  variance_ = noise2_;
+}
+
+SpeedFilter::Out SpeedFilter::collision(const ExtendedWheel& wheel, const StepContext& context, double reported) {
+  const double seen = std::max(1e-3, reported - extension_.bias_after);
+  const Out out = transition(wheel, context, seen, 1, std::sqrt(noise2_ + square(seen / mean_) * variance_));
+  update(out, seen);
+  return out;
+}
+
+SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepContext& context, double reported) {
+  const double seen = reported - extension_.bias_before;
+  const auto next = wheel.next(context, mean_);
+  if (!next) {
+    start(reported);
+    return {least_log_density, -8, 0.1};
+  }
+  const double slope = mean_ / *next, predicted = slope * slope * variance_;
+  const double total = std::sqrt(predicted + noise2_), z = (seen - *next) / total;
+  const double gain = predicted / (predicted + noise2_);
+  mean_ = *next + gain * (seen - *next);
+  variance_ = (1 - gain) * predicted;
+  return {log_normal(z) - std::log(total), z, total};
+}
+
+SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext& context, double reported) {
+  const double seen = std::max(1e-3, reported - extension_.bias_before);
+  const auto plus = wheel.back(context, seen);
+  if (!plus) {
+    start(reported);
+    return {least_log_density, -8, 0.1};
+  }
+  // d omega+ / d next omega-: without torques seen / plus, which they change.
+  const double step = 1e-4 * seen;
+  const auto faster = wheel.back(context, seen + step), slower = wheel.back(context, seen - step);
+  const double rate = faster && slower ? (*faster - *slower) / (2 * step) : seen / *plus;
+  Out out =
+      transition(wheel, context, *plus, rate, std::sqrt(noise2_ * rate * rate + square(*plus / mean_) * variance_));
+  // It did go on: omega+ was beyond the barrier, of which the noise of the reported speed tells only so much.
+  const double beyond = (*plus - wheel.barrier(context)) / std::max(1e-3, std::sqrt(noise2_ + slack2_) * rate);
+  if (beyond < 8)
+    out.log_density = std::max(least_log_density, out.log_density + std::log(std::max(1e-300, normal_cdf(beyond))));
+  update(out, seen);
+  return out;
+}
+
+double SpeedFilter::chance_below(const ExtendedWheel& wheel, const StepContext& context, double bound) const {
+  return conditional(tilt_.below(wheel.after_collision(context, mean_, bound).below));
+}
+
+SpeedFilter::Out SpeedFilter::rest(const ExtendedWheel& wheel, const StepContext& context, double bound, bool rested) {
+  const double given = chance_below(wheel, context, bound);
+  Out out;
+  out.log_density = std::max(least_log_density, rested ? std::log(given) : std::log1p(-given));
+  if (rested) out.score = score_of_probability(given / 2);
+  out.unit = 0.3;
+  return out;
+}
+
+// P of less than a score given the previous collision's.
+double SpeedFilter::conditional(double below) const {
+  if (extension_.memory == 0 || !previous_) return std::clamp(below, 1e-300, 1.0);
+  const double rho = extension_.memory;
+  return std::max(1e-300, normal_cdf((score_of_probability(below) - rho * *previous_) / std::sqrt(1 - rho * rho)));
+}
+
+SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepContext& context, double plus,
+                                         double rate, double blur) {
+  double density = 0, below = 0;
+  const auto add = [&](double at, double weight) {
+    if (at <= 0) return;
+    const dynamics::SpeedDensity d = wheel.after_collision(context, mean_, at);
+    density += weight * d.density * std::exp(tilt_.log_density(d.below));
+    below += weight * tilt_.below(d.below);
+  };
+  if (!blurred_) {
+    add(plus, 1);
+  } else {
+    for (const Node& node : three_nodes) add(plus + node.score * blur, node.weight);
+  }
+  Out out;
+  out.log_density = density > 0 ? std::max(least_log_density, std::log(density * rate)) : least_log_density;
+  const double z = score_of_probability(below);
+  out.score = z;
+  out.unit = density > 0 ? std::clamp(normal_density(z) / (density * rate), 1e-4, 2.0) : 0.3;
+  if (const double rho = extension_.memory; rho != 0 && previous_) {
+    const double left = std::sqrt(1 - rho * rho);
+    out.score = (z - rho * *previous_) / left;
+    out.log_density += log_normal(out.score) - log_normal(z) - std::log(left);
+  }
+  previous_ = z;
+  return out;
+}
+
+// The prior that the transition gives, taken as normal around what was seen.
+void SpeedFilter::update(const Out& out, double seen) {
+  const double prior = out.unit * out.unit, gain = noise2_ / (noise2_ + prior);
+  mean_ = std::max(1e-2, seen - gain * std::clamp(out.score, -4.0, 4.0) * out.unit);
+  variance_ = gain * prior;
+}
+
+}  // namespace metastable::analysis

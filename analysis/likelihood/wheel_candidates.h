@@ -1,0 +1,33 @@
+#pragma once
+// The catalogue's effects on the wheel, as they are fitted. One entry an effect.
+
+#include <functional>
+#include <vector>
+
+#include "analysis/diagnosis/transition_model.h"
+#include "dynamics/wheel/extended_wheel.h"
+
+namespace metastable::analysis {
+
+/// What the data allow, for the choice of variants and for saying what cannot be told.
+struct WheelDesign {
+  int legs = 8;
+  bool legs_known = true, speeds_after = true;
+  bool launches_stated = true, noise_stated = true;
+  std::vector<double> leg_lengths;  ///< stated [m]
+  double furthest = 1.8;            ///< landing foot [m]
+  double ramp_length = 3.66;        ///< [m]
+  dynamics::Law law = dynamics::Law::published;
+};
+
+/// A candidate, and what its variant and values do to the wheel.
+struct WheelCandidate {
+  Candidate candidate;
+  std::function<void(dynamics::Extension&, const std::vector<double>& variant, const std::vector<double>& values)>
+      apply;
+};
+
+/// All but contact_distribution, which is the recalibration; in the order of the catalogue.
+std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design);
+
+}  // namespace metastable::analysis

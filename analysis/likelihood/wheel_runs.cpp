@@ -1,0 +1,247 @@
+#include "analysis/likelihood/wheel_runs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "analysis/statistics/median.h"
+
+namespace metastable::analysis {
+namespace {
+
+using dynamics::ExtendedWheel;
+
+constexpr double assumed_noise = 0.01;     // sd of reported speeds where neither text nor stances say it [rad/s]
+constexpr std::size_t least_stances = 20;  // to take the noise from them
+constexpr double two_speeds = 1.2;         // sd of a stance's residual, in noises: of two speeds, one damped to 0.65
+constexpr double rounding = 1e-5;          // residuals below are those of printed digits [rad/s]
+
+std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
+
+// Legs that were not noted: the stances tell them where omega_plus is there, because the legs' lengths differ.
+void find_legs(WheelRuns& measured, bool column) {
+  if (column || measured.wheel.equal_legs()) {
+    measured.legs_known = column;
+    return;
+  }
+  measured.legs_known = measured.speeds_after;
+  const int legs = measured.wheel.legs();
+  const std::vector<ExtendedWheel> stated = stated_wheels(measured);
+  std::size_t found = 0;
+  for (WheelRun& run : measured.runs) {
+    std::vector<double> misfit(static_cast<std::size_t>(legs));
+    for (int first = 0; first < legs && measured.speeds_after; ++first)
+      for (std::size_t k = 0; k + 1 < run.collisions.size(); ++k) {
+        if (!run.collisions[k].after) continue;
+        const auto next =
+            stated[run.condition].next({.leg = (first + static_cast<int>(k)) % legs}, *run.collisions[k].after);
+        const double miss = next ? run.collisions[k + 1].before - *next : 1;
+        misfit[static_cast<std::size_t>(first)] += std::min(1.0, miss * miss);
+      }
+    const auto best = std::min_element(misfit.begin(), misfit.end());
+    double second = std::numeric_limits<double>::infinity();
+    for (auto m = misfit.begin(); m != misfit.end(); ++m)
+      if (m != best) second = std::min(second, *m);
+    const double steps = static_cast<double>(run.collisions.size());
+    const double variance = std::max({2 * measured.noise * measured.noise, *best / steps, 1e-8});
+    found += (second - *best) / (2 * variance) > 3;
+    for (std::size_t k = 0; k < run.collisions.size(); ++k)
+      run.collisions[k].context.leg =
+          static_cast<int>((static_cast<std::size_t>(best - misfit.begin()) + k) % static_cast<std::size_t>(legs));
+  }
+  measured.legs_known =
+      measured.speeds_after && static_cast<double>(found) >= 0.9 * static_cast<double>(measured.runs.size());
+  if (measured.legs_known) {
+    measured.notes.push_back("leg is missing: found for each trial from its stances, whose legs differ in length");
+    return;
+  }
+  // The least next speed, just over the top, differs between legs.
+  double sum = 0, squares = 0;
+  for (int leg = 0; leg < legs; ++leg) {
+    const ExtendedWheel& wheel = stated.front();
+    const double least = wheel.next({.leg = leg}, 1.001 * wheel.barrier({.leg = leg})).value_or(0);
+    sum += least / legs;
+    squares += least * least / legs;
+  }
+  measured.slack = std::sqrt(std::max(0.0, squares - sum * sum));
+  measured.notes.push_back(
+      "leg is missing: legs of the mean length are taken, and no effect of a single leg can be told");
+  for (WheelRun& run : measured.runs)
+    for (RunCollision& m : run.collisions) m.context.leg = 0;
+  std::fill(measured.wheel.leg_length.begin(), measured.wheel.leg_length.end(), measured.wheel.mean_leg_length());
+}
+
+// Positions and times that were not measured follow from the geometry.
+void complete_contexts(WheelRuns& measured) {
+  const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
+  for (WheelRun& run : measured.runs) {
+    const ExtendedWheel& stated = wheels[run.condition];
+    double position = 0;
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+      RunCollision& m = run.collisions[k];
+      if (k > 0) {
+        const RunCollision& previous = run.collisions[k - 1];
+        position += stated.advance(previous.context.leg);
+        if (!m.context.since_previous) {
+          const auto from = previous.after ? previous.after : stated.back(previous.context, m.before);
+          if (from && *from > 0) m.context.since_previous = stated.duration(previous.context, *from);
+        }
+      }
+      if (std::isnan(m.context.position)) m.context.position = position;
+    }
+  }
+}
+
+// What the stances miss the model's next speed by [rad/s].
+std::vector<double> stance_residuals(const WheelRuns& measured) {
+  std::vector<double> residual;
+  const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
+  for (const WheelRun& run : measured.runs) {
+    const ExtendedWheel& stated = wheels[run.condition];
+    for (std::size_t k = 0; k + 1 < run.collisions.size(); ++k)
+      if (run.collisions[k].after)
+        if (const auto next = stated.next(run.collisions[k].context, *run.collisions[k].after))
+          residual.push_back(run.collisions[k + 1].before - *next);
+  }
+  return residual;
+}
+
+void estimate_noise(WheelRuns& measured) {
+  measured.noise_stated = measured.noise > 0;
+  if (measured.noise_stated) return;
+  std::vector<double> residual;
+  if (measured.speeds_after) residual = stance_residuals(measured);
+  if (residual.size() < least_stances) {
+    measured.noise = assumed_noise;
+    measured.notes.push_back(fmt::format("no sensor noise is stated: {} rad/s assumed", assumed_noise));
+    return;
+  }
+  const double middle = median(residual);
+  for (double& r : residual) r = std::abs(r - middle);
+  const double deviation = median(residual);
+  measured.noise = std::max(1e-4, median_deviation_to_sd * deviation / two_speeds);
+  measured.exact_stances = std::abs(middle) < rounding && deviation < rounding;
+  if (measured.exact_stances) {
+    measured.notes.push_back("the stances repeat the model to rounding, as simulated ones do: they are left out");
+    return;
+  }
+  measured.notes.push_back(
+      fmt::format("no sensor noise is stated: {:.2g} rad/s taken from the stances", measured.noise));
+}
+
+}  // namespace
+
+std::vector<ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dynamics::ContactSpread& contact,
+                                           const dynamics::Extension& extension) {
+  constexpr double degree = std::numbers::pi / 180;
+  std::vector<ExtendedWheel> all;
+  all.reserve(measured.conditions.size());
+  for (const Condition& c : measured.conditions)
+    all.emplace_back(measured.wheel, c.slope_deg * degree, measured.law, contact, extension);
+  return all;
+}
+
+WheelRuns wheel_runs(const Experiment& experiment) {
+  if (experiment.system != System::rimless_wheel)
+    throw std::invalid_argument("wheel_runs: the experiment is a coast-down");
+  if (experiment.contact.law == dynamics::Law::plastic)
+    throw std::invalid_argument(
+        "contact.law: plastic has no restitution and no friction, hence no spread to compare trials with "
+        "(published or coulomb is needed)");
+  WheelRuns measured;
+  measured.wheel = experiment.wheel;
+  measured.law = experiment.contact.law;
+  measured.conditions = experiment.conditions;
+  measured.noise = experiment.sensor.noise_sd.value_or(0);
+  bool leg_column = true;
+  const double count = static_cast<double>(experiment.trials.size());
+  for (std::size_t t = 0; t < experiment.trials.size(); ++t) {
+    const MeasuredTrial& trial = experiment.trials[t];
+    WheelRun run;
+    run.condition = trial.condition;
+    run.outcome = trial.outcome;
+    for (std::size_t k = 0; k < trial.collisions.size(); ++k) {
+      const MeasuredCollision& c = trial.collisions[k];
+      RunCollision m;
+      m.context.leg = c.leg.value_or(0);
+      leg_column = leg_column && c.leg;
+      m.context.position = c.position.value_or(std::numeric_limits<double>::quiet_NaN());
+      if (k > 0 && c.time && trial.collisions[k - 1].time)
+        m.context.since_previous = *c.time - *trial.collisions[k - 1].time;
+      m.context.run_share = count > 1 ? static_cast<double>(t) / (count - 1) : 0;
+      m.before = c.omega_minus;
+      m.after = c.omega_plus;
+      if (c.omega_plus && *c.omega_plus > 0) measured.speeds_after = true;
+      run.collisions.push_back(m);
+    }
+    measured.runs.push_back(std::move(run));
+  }
+  find_legs(measured, leg_column);
+  complete_contexts(measured);
+  estimate_noise(measured);
+  for (WheelRun& run : measured.runs) mark_jam(measured, run);
+  if (experiment.columns.time == Presence::none)
+    measured.notes.push_back(
+        "time_s is missing: times between collisions are those of the model's stance; ramp_vibration rests on them");
+  if (experiment.columns.position == Presence::none)
+    measured.notes.push_back(
+        "position_m is missing: positions follow from the legs' lengths; slope_profile and friction_patch rest on "
+        "them");
+  if (!measured.speeds_after)
+    measured.notes.push_back("omega_plus_rad_s is missing: collision and stance cannot be told apart");
+  if (!experiment.columns.outcomes)
+    measured.notes.push_back("trials.csv is missing: whether trials came to rest is not known");
+  return measured;
+}
+
+double jam_bound(const WheelRuns& measured) { return std::max(2e-3, 4 * measured.noise); }
+
+void mark_jam(const WheelRuns& measured, WheelRun& run) {
+  std::optional<double>& after = run.collisions.back().after;
+  if (after && *after < jam_bound(measured) && run.outcome.value_or(dynamics::Outcome::rest) == dynamics::Outcome::rest)
+    after = 0;
+}
+
+std::vector<Event> wheel_events(const WheelRuns& measured) {
+  std::vector<Event> events;
+  for (std::size_t t = 0; t < measured.runs.size(); ++t) {
+    const WheelRun& run = measured.runs[t];
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+      const RunCollision& m = run.collisions[k];
+      Event event;
+      event.trial = t;
+      event.condition = run.condition;
+      event.number = static_cast<int>(k) + 1;
+      if (measured.legs_known) event.leg = m.context.leg;
+      event.position = m.context.position;
+      event.since_previous = m.context.since_previous;
+      event.speed = m.before;
+      const auto add = [&](EventKind kind) {
+        event.kind = kind;
+        events.push_back(event);
+      };
+      if (k == 0 && measured.conditions[run.condition].initial_speed) add(EventKind::launch);
+      const bool last = k + 1 == run.collisions.size();
+      const bool after = m.after && *m.after > 0;
+      if (!last)
+        event.rested = false;
+      else if (run.outcome)
+        event.rested = *run.outcome == dynamics::Outcome::rest;
+      if (after) add(EventKind::collision);
+      if (!last) {
+        if (after) event.speed = *m.after;
+        if (after) event.rested.reset();
+        if (!after || !measured.exact_stances) add(after ? EventKind::stance : EventKind::step);
+      } else if (!after && run.outcome) {
+        add(*run.outcome == dynamics::Outcome::rest ? EventKind::rest : EventKind::survival);
+      }
+    }
+  }
+  return events;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,64 @@
+#pragma once
+// A wheel's measured trials as runs of collisions whose legs, positions, times and sensor noise are all known or
+// completed, and the list of their transitions.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/diagnosis/transition_model.h"
+#include "analysis/experiment/experiment.h"
+#include "dynamics/wheel/extended_wheel.h"
+
+namespace metastable::analysis {
+
+/// One collision and what a step from it depends on.
+struct RunCollision {
+  dynamics::StepContext context;
+  double before = 0;            ///< reported omega- [rad/s]
+  std::optional<double> after;  ///< reported omega+ [rad/s]
+};
+
+/// One trial.
+struct WheelRun {
+  std::size_t condition = 0;  ///< index
+  std::vector<RunCollision> collisions;
+  std::optional<dynamics::Outcome> outcome;
+};
+
+/// All trials, in the order they were run, and what is known of wheel and sensors.
+struct WheelRuns {
+  dynamics::Wheel wheel;  ///< as stated; legs of mean length where it is not known which leg landed
+  dynamics::Law law = dynamics::Law::published;
+  std::vector<Condition> conditions;
+  std::vector<WheelRun> runs;
+  double noise = 0;                ///< sd of reported speeds [rad/s], stated, taken from the stances or assumed
+  double slack = 0;                ///< sd of a stance's outcome because its leg is not known [rad/s]
+  bool noise_stated = true;        ///< noise is the experiment's own
+  bool legs_known = true;          ///< by the column, or found
+  bool speeds_after = false;       ///< omega+ is there
+  bool exact_stances = false;      ///< they repeat the model to rounding, and say nothing
+  std::vector<std::string> notes;  ///< what was assumed, a sentence each
+};
+
+/// The wheel with this contact and these effects, on the ramp of each condition.
+/// @throws std::invalid_argument as dynamics::ExtendedWheel
+std::vector<dynamics::ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dynamics::ContactSpread& contact,
+                                                     const dynamics::Extension& extension);
+
+/// Reads an experiment. A missing leg is found from the stances where omega_plus is there, else legs of mean length are
+/// taken; missing positions and times follow from the geometry.
+/// @throws std::invalid_argument for a coast-down and for `plastic`
+WheelRuns wheel_runs(const Experiment& experiment);
+
+/// An omega+ below this is that of a foot that jammed, seen through the noise [rad/s].
+double jam_bound(const WheelRuns& measured);
+
+/// The last collision's omega+ becomes 0 where it is below jam_bound and the wheel is not known to have gone on.
+void mark_jam(const WheelRuns& measured, WheelRun& run);
+
+/// Their transitions: per trial launch (where one is stated), then collision and stance, or step, and rest or survival
+/// where the outcome is known.
+std::vector<Event> wheel_events(const WheelRuns& measured);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,249 @@
+#include "analysis/likelihood/wheel_transitions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <stdexcept>
+
+#include "analysis/likelihood/wheel_candidates.h"
+#include "analysis/likelihood/wheel_columns.h"
+#include "analysis/likelihood/wheel_hypothesis.h"
+#include "analysis/likelihood/wheel_likelihood.h"
+#include "analysis/likelihood/wheel_runs.h"
+#include "analysis/likelihood/wheel_simulation.h"
+
+namespace metastable::analysis {
+namespace {
+
+// Legs that were neither noted nor found follow from the stated first one, where the transitions bear that out.
+WheelRuns runs_with_legs(const Experiment& experiment) {
+  constexpr double clearly = 3;  // in log likelihood
+  WheelRuns measured = wheel_runs(experiment);
+  if (measured.legs_known || experiment.wheel.equal_legs()) return measured;
+  WheelRuns stated = wheel_runs(with_legs_from_the_first(experiment));
+  const NominalContact& c = experiment.contact;
+  const WheelHypothesis nominal{
+      .contact = {c.restitution.mean, std::max(0.01, c.restitution.sd), c.friction.mean, std::max(0.01, c.friction.sd)},
+      .tilt = ScoreTilt(0, 0),
+      .extension = {}};
+  const double with = wheel_likelihood(stated, wheel_events(stated), nominal).total();
+  if (!(with > wheel_likelihood(measured, wheel_events(measured), nominal).total() + clearly)) return measured;
+  stated.notes.insert(stated.notes.begin(),
+                      "leg is missing: taken from each condition's first_landing_leg, which the transitions bear out");
+  return stated;
+}
+
+class WheelTransitions : public TransitionModel {
+ public:
+  explicit WheelTransitions(const Experiment& experiment);
+
+  const std::vector<Event>& events() const override { return events_; }
+  std::size_t trials() const override { return measured_.runs.size(); }
+  std::size_t conditions() const override { return measured_.conditions.size(); }
+  int legs() const override { return measured_.legs_known ? measured_.wheel.legs() : 0; }
+  // Times that were not measured follow from the speeds, and from the leg where it is known.
+  bool time_tells() const override { return measured_.legs_known || experiment_.columns.time != Presence::none; }
+  std::string condition_name(std::size_t condition) const override { return measured_.conditions.at(condition).id; }
+  const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
+  const std::vector<Candidate>& candidates() const override { return candidates_; }
+  const std::vector<std::string>& notes() const override { return measured_.notes; }
+  Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const override;
+  std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const Term> terms) const override;
+  std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
+                                            std::uint64_t seed) const override;
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
+                                                                                     std::uint64_t seed) const override;
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(std::span<const double> nuisance,
+                                                                                  std::uint64_t seed) const override;
+  std::pair<double, double> rests() const override;
+  double expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
+                        std::uint64_t seed) const override;
+  std::vector<Named> report_nuisances(std::span<const double> nuisance) const override;
+
+ private:
+  WheelHypothesis hypothesis(std::span<const double> nuisance, std::span<const Term> terms) const;
+  void set_up_parameters();
+  void name_what_is_too_few();
+
+  Experiment experiment_;  // as it was read
+  WheelRuns measured_;
+  std::vector<Event> events_;
+  std::vector<Nuisance> nuisances_;
+  std::vector<WheelCandidate> effects_;
+  std::vector<Candidate> candidates_;
+};
+
+WheelTransitions::WheelTransitions(const Experiment& experiment)
+    : experiment_(experiment), measured_(runs_with_legs(experiment)), events_(wheel_events(measured_)) {
+  if (events_.size() < 2 || std::none_of(events_.begin(), events_.end(), [](const Event& e) {
+        return e.kind == EventKind::collision || e.kind == EventKind::step;
+      }))
+    throw std::invalid_argument(
+        "collisions.csv: no trial has two collisions or omega_plus_rad_s: there is no transition");
+  set_up_parameters();
+  name_what_is_too_few();
+}
+
+void WheelTransitions::set_up_parameters() {
+  const NominalContact& c = experiment_.contact;
+  // Spreads are fitted by their logarithms.
+  nuisances_ = {
+      {"restitution_mean", c.restitution.mean, 0.08, 1e-4, 0.02, 0.98},
+      {"log restitution_sd", std::log(std::max(0.01, c.restitution.sd)), 0.4, 1e-3, std::log(0.005), std::log(0.4)},
+      {"friction_mean", c.friction.mean, 0.08, 1e-4, 0.02, 1.5},
+      {"log friction_sd", std::log(std::max(0.01, c.friction.sd)), 0.4, 1e-3, std::log(0.005), std::log(0.5)},
+      {"skew", 0, 0.06, 1e-3, -0.5, 0.5},
+      {"tails", 0, 0.06, 1e-3, -0.4, 0.4}};
+  // Where nobody stated the noise, the stances say it only together with the effects that act in them.
+  if (!measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances)
+    nuisances_.push_back({"log noise_sd", std::log(measured_.noise), 0.5, 1e-3, std::log(1e-4), 0});
+  WheelDesign design;
+  design.legs = measured_.wheel.legs();
+  design.legs_known = measured_.legs_known;
+  design.speeds_after = measured_.speeds_after;
+  design.launches_stated = std::any_of(measured_.conditions.begin(), measured_.conditions.end(),
+                                       [](const Condition& one) { return one.initial_speed.has_value(); });
+  design.noise_stated = measured_.noise_stated;
+  design.leg_lengths = measured_.wheel.leg_length;
+  design.law = measured_.law;
+  design.furthest = 0.1;
+  for (const WheelRun& run : measured_.runs)
+    design.furthest = std::max(design.furthest, run.collisions.back().context.position);
+  design.ramp_length = 0;
+  for (const Condition& one : measured_.conditions) design.ramp_length = std::max(design.ramp_length, one.ramp_length);
+  effects_ = wheel_candidates(design);
+  for (const WheelCandidate& effect : effects_) candidates_.push_back(effect.candidate);
+}
+
+// Effects between trials, launches or collisions need some of them, whatever their size.
+void WheelTransitions::name_what_is_too_few() {
+  std::size_t launches = 0, successive = 0, away = 0;
+  for (const Event& e : events_) {
+    launches += e.kind == EventKind::launch;
+    const bool contact = e.kind == EventKind::collision || e.kind == EventKind::step;
+    successive += contact && e.number > 1;
+    away += contact && e.position > 0;
+  }
+  const auto needs = [this](const char* effect, std::size_t least, std::size_t here, const char* of_what) {
+    for (Candidate& c : candidates_)
+      if (c.id == effect && c.undecidable.empty() && here < least)
+        c.undecidable = fmt::format("it needs {} {}, and there {} {}", least, of_what, here == 1 ? "is" : "are", here);
+  };
+  // A mean and a spread, or a trend, and as many again to judge them by.
+  needs("initial_speed", 5, launches, "launches where a launch speed is stated");
+  needs("trial_spread", 5, measured_.runs.size(), "trials");
+  needs("trial_drift", 3, measured_.runs.size(), "trials");
+  needs("contact_memory", 2, successive, "collisions with one before them in their trial");
+  needs("ramp_vibration", 2, successive, "collisions with one before them in their trial");
+  needs("slope_profile", 2, away, "collisions away from the start");
+  needs("friction_patch", 2, away, "collisions away from the start");
+}
+
+WheelHypothesis WheelTransitions::hypothesis(std::span<const double> nuisance, std::span<const Term> terms) const {
+  WheelHypothesis h{.contact = {nuisance[0], std::exp(nuisance[1]), nuisance[2], std::exp(nuisance[3])},
+                    .tilt = ScoreTilt(nuisance[4], nuisance[5]),
+                    .extension = {}};
+  if (nuisance.size() > 6) h.noise = std::exp(nuisance[6]);
+  for (const Term& term : terms)
+    for (const WheelCandidate& effect : effects_)
+      if (effect.candidate.id == term.candidate->id) effect.apply(h.extension, term.variant, term.values);
+  return h;
+}
+
+Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::span<const Term> terms) const {
+  return wheel_likelihood(measured_, events_, hypothesis(nuisance, terms));
+}
+
+std::vector<double> WheelTransitions::rest_chances(std::span<const double> nuisance,
+                                                   std::span<const Term> terms) const {
+  return wheel_rest_chances(measured_, events_, hypothesis(nuisance, terms));
+}
+
+std::unique_ptr<TransitionModel> WheelTransitions::simulate(std::span<const double> nuisance,
+                                                            std::span<const Term> terms, std::uint64_t seed) const {
+  auto copy = std::make_unique<WheelTransitions>(*this);
+  copy->measured_.runs = simulated_runs(measured_, hypothesis(nuisance, terms), seed);
+  copy->events_ = wheel_events(copy->measured_);
+  return copy;
+}
+
+std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTransitions::alternatives(
+    std::span<const double> nuisance, std::uint64_t seed) const {
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
+  const auto add = [&](std::string words, const std::function<void(WheelTransitions&)>& change) {
+    WheelTransitions changed = *this;
+    change(changed);
+    all.emplace_back(std::move(words), changed.simulate(nuisance, {}, seed));
+  };
+  add("the same experiment once more", [](WheelTransitions&) {});
+  const double steepest = dynamics::steepest_slope(measured_.wheel.legs()) * 180 / std::numbers::pi;
+  for (const double by : {-2.0, 2.0})
+    if (std::all_of(measured_.conditions.begin(), measured_.conditions.end(),
+                    [&](const Condition& c) { return c.slope_deg + by > 1 && c.slope_deg + by < steepest; }))
+      add(fmt::format("slopes {} by 2 deg", by < 0 ? "flatter" : "steeper"), [by](WheelTransitions& w) {
+        for (Condition& c : w.measured_.conditions) c.slope_deg += by;
+      });
+  for (const double by : {-1.0, 1.0})
+    add(fmt::format("launches {} by 1 rad/s", by < 0 ? "slower" : "faster"), [by](WheelTransitions& w) {
+      for (Condition& c : w.measured_.conditions)
+        if (c.initial_speed) c.initial_speed->mean = std::max(1.0, c.initial_speed->mean + by);
+      for (WheelRun& run : w.measured_.runs)
+        run.collisions.front().before = std::max(1.0, run.collisions.front().before + by);
+    });
+  if (!measured_.speeds_after)
+    add("the speed after each collision measured as well", [](WheelTransitions& w) {
+      w.measured_.speeds_after = true;
+      w.measured_.noise = std::max(w.measured_.noise, imagined_noise);
+      for (WheelRun& run : w.measured_.runs)
+        for (RunCollision& m : run.collisions) m.after = m.before;  // a value to be drawn anew
+    });
+  add("trials of twice as many collisions", [](WheelTransitions& w) {
+    for (WheelRun& run : w.measured_.runs) {
+      const auto count = run.collisions.size();
+      run.collisions.resize(2 * count, run.collisions.back());
+    }
+  });
+  return all;
+}
+
+std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTransitions::completed(
+    std::span<const double> nuisance, std::uint64_t seed) const {
+  std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> all;
+  for (const auto& [column, experiment] : completed_experiments(experiment_))
+    if (!(column == "leg" && measured_.legs_known))
+      all.emplace_back(column, WheelTransitions(experiment).simulate(nuisance, {}, seed));
+  return all;
+}
+
+std::pair<double, double> WheelTransitions::rests() const {
+  double at_risk = 0, rested = 0;
+  for (const WheelRun& run : measured_.runs) {
+    if (!run.outcome) return {0, 0};
+    at_risk += static_cast<double>(run.collisions.size());
+    rested += *run.outcome == dynamics::Outcome::rest;
+  }
+  return {at_risk, rested};
+}
+
+double WheelTransitions::expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
+                                        std::uint64_t seed) const {
+  return simulated_steps(measured_, hypothesis(nuisance, terms), seed);
+}
+
+std::vector<Named> WheelTransitions::report_nuisances(std::span<const double> nuisance) const {
+  return {{"restitution_mean", nuisance[0]},
+          {"restitution_sd", std::exp(nuisance[1])},
+          {"friction_mean", nuisance[2]},
+          {"friction_sd", std::exp(nuisance[3])}};
+}
+
+}  // namespace
+
+std::unique_ptr<TransitionModel> wheel_transitions(const Experiment& experiment) {
+  return std::make_unique<WheelTransitions>(experiment);
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,19 @@
+#pragma once
+// The rimless wheel's measured trials as transitions.
+
+#include <memory>
+
+#include "analysis/diagnosis/transition_model.h"
+#include "analysis/experiment/experiment.h"
+
+namespace metastable::analysis {
+
+/// One-step densities of the wheel's trials under the nominal law with its (eta, mu), effects of the catalogue in
+/// between. With omega_plus, collision and stance are separate events; sensor noise is carried along by a Gaussian
+/// filter on the speed (exact while the noise is small beside the spread of a collision). Recalibration refits the
+/// contact's means and sds and a smooth change of shape (ScoreTilt). What was not measured is completed as wheel_runs()
+/// says.
+/// @throws std::invalid_argument for a coast-down, for `plastic`, and for an experiment without a transition
+std::unique_ptr<TransitionModel> wheel_transitions(const Experiment& experiment);
+
+}  // namespace metastable::analysis

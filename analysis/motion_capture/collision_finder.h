@@ -1,0 +1,58 @@
+#pragma once
+// From the wheel's angle over time to its collisions (the paper's Sec. III).
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/experiment/angle_recording.h"
+#include "analysis/motion_capture/stance_fit.h"
+#include "dynamics/return_map/wheel_map.h"
+
+namespace metastable::analysis {
+
+struct FinderOptions {
+  int window = 0;          ///< of the Savitzky-Golay filter [samples], odd, 5..10001; 0: 50 ms, at least 5 samples
+  double rise = 0.4;       ///< of a peak above both sides [rad/s], > 0
+  int collisions = 16;     ///< most collisions of a trial, >= 1
+  double fit_span = 0.08;  ///< of the stance fit on either side of a collision [s], > 0
+  /// @throws std::invalid_argument naming the option and its range
+  void validate() const;
+};
+
+struct FoundCollision {
+  int number = 0;         ///< from 1
+  double peak_time = 0;   ///< of the largest smoothed speed [s]
+  double peak = 0;        ///< that speed [rad/s]: the paper's omega_minus
+  double peak_angle = 0;  ///< of the wheel then [rad]
+  /// The stance motion fitted to the samples before and after the drop, extrapolated to the collision. Nothing: too few
+  /// samples, or the fit did not settle.
+  std::optional<StanceFit> fit;
+  double apex_time = 0;  ///< of the smallest smoothed speed before the next collision, mid-stance [s]
+  double apex = 0;       ///< that speed [rad/s]
+  int bounces = 0;       ///< peaks between this collision and the next (or the end)
+};
+
+/// What a collisions.csv says of it: the fit, or the peak where there is no fit or `peak` is wanted.
+double reported_speed(const FoundCollision& collision, bool peak);  ///< omega_minus [rad/s]
+double reported_time(const FoundCollision& collision);              ///< [s]; of the peak where there is no fit
+
+struct FoundTrial {
+  std::vector<FoundCollision> collisions;
+  /// Why there are fewer than asked for; empty if there are not.
+  std::string stopped;
+};
+
+/// Differentiates with a third-degree Savitzky-Golay filter, takes all peaks that rise by `rise` above both sides, the
+/// first as the first collision, then the one whose angle is closest to each further leg angle (within half a leg angle
+/// of it); other peaks in between are bounces. The search ends where no peak lies there.
+/// @param map  wheel and slope, for the stance motion; the contact law matters only through its inertia
+/// @param first_landing_leg  that lands at collision 1
+/// @throws std::invalid_argument for rates outside 60..1000 Hz or fewer samples than the window; options out of range
+FoundTrial find_collisions(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg,
+                           const FinderOptions& options);
+
+/// The window that `options` mean at a sampling rate [Hz].
+int smoothing_window(const FinderOptions& options, double rate);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,109 @@
+#include "analysis/motion_capture/stance_fit.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "dynamics/wheel/stance_motion.h"
+
+namespace metastable::analysis {
+namespace {
+
+using Parameters = Eigen::Vector4d;  // time, angle, omega_minus, omega_plus
+
+class Residuals {
+ public:
+  Residuals(std::span<const double> time, std::span<const double> angle, const dynamics::Stance& before,
+            const dynamics::Stance& after)
+      : time_(time), angle_(angle), before_(before), after_(after) {}
+
+  Eigen::VectorXd operator()(const Parameters& p) const {
+    Eigen::VectorXd residual(static_cast<Eigen::Index>(time_.size()));
+    // Outwards from the collision, each sample from its neighbour, so that every stretch is integrated once.
+    const auto first_after =
+        static_cast<std::size_t>(std::upper_bound(time_.begin(), time_.end(), p(0)) - time_.begin());
+    dynamics::StanceState state{before_.end_angle, p(2)};
+    double now = p(0);
+    for (std::size_t i = first_after; i-- > 0; now = time_[i]) {
+      state = dynamics::stance_motion(before_.pendulum, state, time_[i] - now);
+      residual(static_cast<Eigen::Index>(i)) = p(1) + state.angle - before_.end_angle - angle_[i];
+    }
+    state = {after_.start_angle, p(3)};
+    now = p(0);
+    for (std::size_t i = first_after; i < time_.size(); now = time_[i], ++i) {
+      state = dynamics::stance_motion(after_.pendulum, state, time_[i] - now);
+      if (state.angle < after_.start_angle) state = {after_.start_angle, 0};  // fallen back onto both feet
+      residual(static_cast<Eigen::Index>(i)) = p(1) + state.angle - after_.start_angle - angle_[i];
+    }
+    return residual;
+  }
+
+ private:
+  std::span<const double> time_, angle_;
+  const dynamics::Stance &before_, &after_;
+};
+
+// From one guess; the second: the sum of squares.
+std::optional<std::pair<StanceFit, double>> descend(const Residuals& residuals, StanceFit guess, double earliest,
+                                                    double latest) {
+  constexpr std::array<double, 4> increment{1e-6, 1e-6, 1e-5, 1e-5};
+  Parameters p(guess.time, guess.angle, guess.omega_minus, guess.omega_plus);
+  Eigen::VectorXd r = residuals(p);
+  double damping = 1e-3;
+  for (int step = 0; step < 50; ++step) {
+    Eigen::MatrixXd jacobian(r.size(), 4);
+    for (int k = 0; k < 4; ++k) {
+      Parameters up = p, down = p;
+      up(k) += increment[static_cast<std::size_t>(k)];
+      down(k) -= increment[static_cast<std::size_t>(k)];
+      jacobian.col(k) = (residuals(up) - residuals(down)) / (2 * increment[static_cast<std::size_t>(k)]);
+    }
+    const Eigen::Matrix4d normal = jacobian.transpose() * jacobian;
+    const Eigen::Vector4d gradient = jacobian.transpose() * r;
+    Parameters change = Parameters::Zero();
+    bool better = false;
+    for (; !better && damping < 1e9; damping *= better ? 0.1 : 10) {
+      Eigen::Matrix4d damped = normal;
+      damped.diagonal() = (1 + damping) * normal.diagonal().array() + 1e-12 * normal.diagonal().maxCoeff();
+      change = -damped.ldlt().solve(gradient);
+      const Parameters candidate = p + change;
+      if (!candidate.allFinite() || !(candidate(0) >= earliest && candidate(0) <= latest)) continue;
+      const Eigen::VectorXd next = residuals(candidate);
+      if (!(next.squaredNorm() <= r.squaredNorm())) continue;
+      better = true;
+      p = candidate;
+      r = next;
+    }
+    const bool settled = std::abs(change(0)) < 1e-8 && std::abs(change(2)) < 1e-7 && std::abs(change(3)) < 1e-7;
+    if (better && !settled) continue;
+    if (!better && !(gradient.norm() <= 1e-6 * (1 + normal.diagonal().norm()))) return std::nullopt;
+    const double freedom = std::max<double>(1, static_cast<double>(r.size()) - 4);
+    return std::pair(StanceFit{p(0), p(1), p(2), std::max(0.0, p(3)), std::sqrt(r.squaredNorm() / freedom)},
+                     r.squaredNorm());
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<StanceFit> fit_collision(std::span<const double> time, std::span<const double> angle,
+                                       const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess) {
+  constexpr std::size_t least = 3;
+  if (time.size() < 2 * least) return std::nullopt;
+  const double earliest = time[least - 1], latest = time[time.size() - least];
+  if (!(guess.time >= earliest && guess.time <= latest)) return std::nullopt;
+  const Residuals residuals(time, angle, before, after);
+  // A wheel that falls back has minima of its own: one for stopping dead, one for a small hop.
+  std::optional<std::pair<StanceFit, double>> best;
+  for (const double omega_plus : {guess.omega_plus, 0.6, 0.1}) {
+    guess.omega_plus = omega_plus;
+    const auto fit = descend(residuals, guess, earliest, latest);
+    if (fit && (!best || fit->second < best->second)) best = fit;
+  }
+  if (!best) return std::nullopt;
+  return best->first;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,29 @@
+#pragma once
+// One collision seen by a camera: the stance motions before and after it, joined at a kink, fitted to angle samples.
+
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include "dynamics/return_map/wheel_map.h"
+
+namespace metastable::analysis {
+
+struct StanceFit {
+  double time = 0;         ///< of the collision [s]
+  double angle = 0;        ///< of the wheel then [rad]
+  double omega_minus = 0;  ///< [rad/s]
+  double omega_plus = 0;   ///< [rad/s]
+  double residual_sd = 0;  ///< of the samples [rad]
+};
+
+/// Least squares of time, angle, omega_minus and omega_plus: before the collision the stance motion of `before`
+/// backwards from its end, after it that of `after` onwards from its start; a wheel that falls back lies still on both
+/// feet (omega_plus is 0 where it never left them). Levenberg-Marquardt from `guess` and from small omega_plus, the
+/// best of them; nothing if fewer than three samples lie on either side, the time leaves the samples, or it does not
+/// settle within 50 steps.
+/// @param time, angle  samples around one collision and no other [s], [rad]
+std::optional<StanceFit> fit_collision(std::span<const double> time, std::span<const double> angle,
+                                       const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess);
+
+}  // namespace metastable::analysis

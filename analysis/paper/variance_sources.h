@@ -1,0 +1,24 @@
+#pragma once
+// The paper's three hypotheses as variance shares: launch speed, leg lengths, restitution and friction.
+
+#include <array>
+
+#include "analysis/statistics/sobol_indices.h"
+#include "analysis/study/setting.h"
+
+namespace metastable::analysis {
+
+constexpr std::array<const char*, 4> variance_sources = {"launch speed", "leg lengths", "restitution", "friction"};
+
+struct VarianceSources {
+  SobolResult
+      steady_speed;   ///< mean speed before collisions 13 to 16 [rad/s], where nothing rests and x' < 0 is set to 0
+  SobolResult steps;  ///< steps before failure, at most those on the ramp; first order: of the expected steps
+};
+
+/// Trials of `setting` with every source random: launch as set; each leg N(mean, sd^2); eta and mu of every collision,
+/// independent (a list of pairs or a correlation is refused: std::invalid_argument).
+/// @param leg_sd  sd of a leg's length [m] about the setting's mean; the paper's legs: 0.000687
+VarianceSources variance_of_trials(const Setting& setting, double leg_sd, const SobolOptions& options);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,42 @@
+#pragma once
+// From standard errors of parameters to an interval of the expected steps.
+
+#include <vector>
+
+#include "analysis/sensitivity/parameter.h"
+#include "analysis/sensitivity/sensitivity.h"
+#include "analysis/study/metastability.h"
+
+namespace metastable::analysis {
+
+/// What is known of a parameter: its standard error, > 0, in parameter_unit(). Errors are independent of each other.
+struct StandardError {
+  Parameter parameter = Parameter::slope;
+  double value = 0;
+};
+
+/// @throws std::invalid_argument naming the parameter: a standard error that is negative or not finite, given twice, or
+/// of a parameter that does not matter() to the setting
+void check_standard_errors(const Setting& setting, const std::vector<StandardError>& errors);
+
+/// What the parameters' standard errors alone make of a number of expected steps.
+struct Propagated {
+  double log_sd = 0;  ///< standard error of ln(expected steps)
+  Estimate interval;  ///< the value with its 95 % interval, numerical error left out
+  struct Share {
+    Parameter parameter;
+    double share;  ///< of the variance of ln(expected steps)
+  };
+  std::vector<Share> shares;  ///< falling
+};
+
+/// Delta method in ln(steps): variance = sum of (derivative * standard error)^2. First order: trust it while the
+/// interval is not much wider than a factor of two.
+Propagated propagate(double steps, const Sensitivities& sensitivities, const std::vector<StandardError>& errors);
+
+/// The same for the ratio `of` / `against` of two settings' expected steps. The slopes were measured one by one; all
+/// other parameters are the same wheel and contact on both ramps, and what they do to both cancels.
+Propagated propagate_ratio(double ratio, const Sensitivities& of, const Sensitivities& against,
+                           const std::vector<StandardError>& errors);
+
+}  // namespace metastable::analysis

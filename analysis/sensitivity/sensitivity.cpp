@@ -1,0 +1,169 @@
+#include "analysis/sensitivity/sensitivity.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "analysis/sensitivity/pathwise.h"
+#include "analysis/statistics/t_interval.h"
+#include "analysis/study/exact_rows.h"
+#include "analysis/study/pilot.h"
+#include "markov/parallel.h"
+#include "markov/passage/adjoint.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr Parameter all_parameters[] = {
+    Parameter::slope,        Parameter::restitution_mean,  Parameter::restitution_sd, Parameter::friction_mean,
+    Parameter::friction_sd,  Parameter::leg_length,        Parameter::inertia,        Parameter::ramp_stiffness,
+    Parameter::contact_mass, Parameter::radius_of_gyration};
+
+// Steps, in parts of the width over which the parameter changes what happens.
+constexpr double pathwise_step = 1e-3;
+constexpr double integrated_step = 2e-3;
+
+double width(const Setting& setting, Parameter parameter) {
+  const bool eta = parameter == Parameter::restitution_mean || parameter == Parameter::restitution_sd;
+  const bool mu = parameter == Parameter::friction_mean || parameter == Parameter::friction_sd;
+  if (eta && setting.restitution.sd > 0) return setting.restitution.sd;
+  if (mu && setting.friction.sd > 0) return setting.friction.sd;
+  return 0.1 * parameter_value(setting, parameter);
+}
+
+Setting moved(const Setting& setting, const Sensitivity& one, double by) {
+  Setting result = setting;
+  if (one.leg)
+    result.wheel.leg_length[static_cast<std::size_t>(*one.leg)] += by;
+  else
+    set_parameter(result, one.parameter, one.value + by);
+  return result;
+}
+
+// Those that can be moved to both sides: a constant at the end of its range cannot.
+std::vector<Sensitivity> candidates(const Setting& setting, bool legs) {
+  std::vector<Sensitivity> list;
+  const auto at_end = [](const Spread& spread, double upper) {
+    return spread.sd == 0 && (spread.mean <= 0 || spread.mean >= upper);
+  };
+  for (const Parameter parameter : all_parameters) {
+    if (!matters(setting, parameter) || !(width(setting, parameter) > 0)) continue;
+    if (parameter == Parameter::restitution_mean && at_end(setting.restitution, 1)) continue;
+    if (parameter == Parameter::friction_mean && at_end(setting.friction, INFINITY)) continue;
+    list.push_back({parameter, {}, parameter_value(setting, parameter), 0, 0});
+  }
+  if (legs)
+    for (int leg = 0; leg < setting.wheel.legs(); ++leg)
+      list.push_back({Parameter::leg_length, leg, setting.wheel.leg_length[static_cast<std::size_t>(leg)], 0, 0});
+  return list;
+}
+
+std::vector<Sensitivity> by_paths(const Setting& setting, const Metastability& study, const StudyOptions& options) {
+  std::vector<Sensitivity> list = candidates(setting, !setting.wheel.equal_legs());
+  std::vector<Neighbours> neighbours;
+  for (const Sensitivity& one : list) {
+    const double step = pathwise_step * width(setting, one.parameter);
+    neighbours.push_back({moved(setting, one, -step), moved(setting, one, step), 2 * step});
+  }
+  // As deep into the tails as the study had to go.
+  StudyOptions own = options;
+  while (own.tail > 1e-300 && std::log(study.failure_rate.value) < 0.6 * std::log(own.tail))
+    own.tail = std::max(1e-300, own.tail * own.tail * own.tail);
+  const std::optional<Pilot> pilot = solve_pilot(setting.problem(), own);
+  if (!pilot) throw markov::ConvergenceError("sensitivities", 1, "no draw came to rest");
+  const markov::StateSpace coarse = pilot->graded(study.cells / 2), fine = coarse.halved();
+  const auto replicates = static_cast<std::size_t>(options.replicates);
+  std::vector<std::vector<double>> on_coarse(replicates), on_fine(replicates);
+  markov::parallel_for(replicates, options.threads, [&](std::size_t r) {
+    const markov::DrawOptions draws = draw_options(own, study.samples, static_cast<int>(r));
+    on_coarse[r] = pathwise_slopes(setting, neighbours, coarse, draws);
+    on_fine[r] = pathwise_slopes(setting, neighbours, fine, draws);
+  });
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    std::vector<double> extrapolated;
+    double correction = 0;
+    for (std::size_t r = 0; r < replicates; ++r) {
+      const double third = (on_fine[r][i] - on_coarse[r][i]) / 3;
+      extrapolated.push_back(on_fine[r][i] + third);
+      list[i].derivative += extrapolated.back() / static_cast<double>(replicates);
+      correction += third / static_cast<double>(replicates);
+    }
+    list[i].error = t_interval(extrapolated).half_width + std::abs(correction);
+  }
+  return list;
+}
+
+// Differences of exact rows on nodes that move with the lowest state of a survivor: the densities begin there, and
+// nodes that stood still would lose what lies between.
+class IntegratedRows {
+ public:
+  IntegratedRows(const Setting& setting, const ExactRows& rows, std::size_t panels)
+      : setting_(setting), rows_(rows), panels_(panels) {
+    const markov::SampledChain here = chain(setting);
+    adjoint_ = markov::adjoint(markov::ChainSolver(here.chain), here.launch);
+  }
+
+  // d ln M by the central difference of step `step`.
+  double difference(const Sensitivity& one, double step) const {
+    const markov::SampledChain low = chain(moved(setting_, one, -step)), high = chain(moved(setting_, one, step));
+    return markov::steps_change(adjoint_, low.chain, low.launch, high.chain, high.launch) / (2 * step * adjoint_.steps);
+  }
+
+ private:
+  markov::SampledChain chain(const Setting& near) const {
+    const Problem problem = near.problem();
+    const dynamics::WheelMap here = setting_.map();
+    std::vector<double> shift;
+    for (int p = 0; p < problem.map.phases(); ++p)
+      shift.push_back(problem.map.state_interval(p).first - here.state_interval(p).first);
+    return rows_.chain(problem, rows_.space(panels_, shift)).chain;
+  }
+
+  const Setting& setting_;
+  const ExactRows& rows_;
+  std::size_t panels_;
+  markov::Adjoint adjoint_;
+};
+
+std::vector<Sensitivity> by_rows(const Setting& setting, const Metastability& study, const StudyOptions& options) {
+  const Problem problem = setting.problem();
+  const ExactRows rows(problem, options.tolerance, options.threads);
+  const std::size_t panels = std::max<std::size_t>(2, study.cells / rows.coarsest());
+  const IntegratedRows fine(setting, rows, panels), coarse(setting, rows, panels / 2);
+  std::vector<Sensitivity> list = candidates(setting, !setting.wheel.equal_legs());
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (options.progress)
+      options.progress(static_cast<double>(i) / static_cast<double>(list.size()), sensitivity_name(list[i]));
+    const double step = integrated_step * width(setting, list[i].parameter);
+    const double one = fine.difference(list[i], step), two = fine.difference(list[i], 2 * step);
+    list[i].derivative = one + (one - two) / 3;
+    list[i].error = std::abs(one - two) / 3 + std::abs(one - coarse.difference(list[i], step));
+  }
+  return list;
+}
+
+}  // namespace
+
+std::string sensitivity_name(const Sensitivity& one) {
+  return one.leg ? fmt::format("leg {}", *one.leg) : std::string(parameter_name(one.parameter));
+}
+
+Sensitivities sensitivities(const Setting& setting, const Metastability& study, const StudyOptions& options) {
+  if (std::isinf(study.from_start.value)) return {{}, "the expected steps are infinite or not resolved"};
+  const dynamics::ContactNoise noise = setting.noise();
+  const bool constant =
+      noise.is_empirical() ? noise.pairs().size() == 1 : noise.restitution().constant() && noise.friction().constant();
+  if (constant || setting.law == dynamics::Law::plastic)
+    return {{}, "without noise the steps are a staircase in every parameter"};
+  Sensitivities result;
+  result.ranked =
+      study.method == Method::integrated ? by_rows(setting, study, options) : by_paths(setting, study, options);
+  std::stable_sort(result.ranked.begin(), result.ranked.end(), [](const Sensitivity& a, const Sensitivity& b) {
+    return std::abs(a.elasticity()) > std::abs(b.elasticity());
+  });
+  return result;
+}
+
+}  // namespace metastable::analysis

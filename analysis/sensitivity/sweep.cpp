@@ -1,0 +1,78 @@
+#include "analysis/sensitivity/sweep.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+
+#include "markov/chain/chain.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+std::vector<double> axis_values(double first, double last, double step) {
+  if (!(step > 0) || !(last >= first) || !std::isfinite(first) || !std::isfinite(last))
+    throw std::invalid_argument(fmt::format("range {}:{}:{}: needs first <= last and step > 0", first, last, step));
+  const double count = std::floor((last - first) / step + 1e-3);
+  if (count >= 100000)
+    throw std::invalid_argument(fmt::format("range {}:{}:{}: more than 100000 values", first, last, step));
+  std::vector<double> values;
+  // Rounded to the decimals a reader typed, so that 5:12:0.25 gives 5.25 and not 5.2500000000000004.
+  for (double i = 0; i <= count; ++i) values.push_back(std::stod(fmt::format("{:.12g}", first + i * step)));
+  return values;
+}
+
+std::size_t sweep_size(const std::vector<Axis>& axes) {
+  std::size_t size = 1;
+  for (const Axis& axis : axes) size *= axis.values.size();
+  return size;
+}
+
+Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::size_t index, std::vector<double>* at) {
+  Setting setting = base;
+  std::vector<double> place(axes.size());
+  for (std::size_t a = axes.size(); a-- > 0;) {
+    place[a] = axes[a].values[index % axes[a].values.size()];
+    index /= axes[a].values.size();
+    set_parameter(setting, axes[a].parameter, place[a]);
+  }
+  if (at != nullptr) *at = std::move(place);
+  return setting;
+}
+
+void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
+           const std::function<void(std::size_t, const SweepPoint&)>& done) {
+  const std::size_t size = sweep_size(axes);
+  if (begin >= size) return;
+  StudyOptions single = options;
+  single.threads = 1;
+  single.brief = true;
+  single.progress = nullptr;
+  std::mutex mutex;
+  std::map<std::size_t, SweepPoint> waiting;  // finished before an earlier point
+  std::size_t next = begin;
+  bool stopped = false;  // done() threw: later points are not reported
+  markov::parallel_for(size - begin, options.threads, [&](std::size_t k) {
+    SweepPoint point;
+    const Setting setting = sweep_setting(base, axes, begin + k, &point.at);
+    try {
+      point.study = study(setting.problem(), single);
+    } catch (const markov::ConvergenceError& error) {  // the other points are worth having
+      point.study.status = Status::solver_failed;
+      point.study.message = error.what();
+      point.failure = std::current_exception();
+    }
+    const std::scoped_lock lock(mutex);
+    waiting.emplace(begin + k, std::move(point));
+    while (!stopped && !waiting.empty() && waiting.begin()->first == next) {
+      stopped = true;
+      done(next++, waiting.begin()->second);
+      stopped = false;
+      waiting.erase(waiting.begin());
+    }
+  });
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,47 @@
+#pragma once
+// Expected steps over a grid of settings.
+
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/sensitivity/parameter.h"
+#include "analysis/study/metastability.h"
+#include "analysis/study/setting.h"
+
+namespace metastable::analysis {
+
+struct Axis {
+  Parameter parameter = Parameter::slope;
+  std::vector<double> values;  ///< ascending, not empty
+};
+
+/// Values first, first + step, ..., up to last (with a rounding allowance of a thousandth of a step).
+/// @throws std::invalid_argument for step <= 0, last < first or more than 100000 values
+std::vector<double> axis_values(double first, double last, double step);
+
+/// One point of a sweep.
+struct SweepPoint {
+  std::vector<double> at;  ///< one value per axis
+  Metastability study;
+  std::exception_ptr failure = {};  ///< set when a solver did not converge here (study.status is then solver_failed)
+};
+
+/// Number of points of the product of the axes.
+std::size_t sweep_size(const std::vector<Axis>& axes);
+
+/// The setting of point `index` (last axis fastest) and its coordinates.
+/// A launch that depends on the slope comes from `base`: sweeps keep base.initial_speed.
+Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::size_t index,
+                      std::vector<double>* at = nullptr);
+
+/// Studies points begin .. end-1 in brief (StudyOptions::brief), calling done(index, point) for each in this order, one
+/// call at a time (from whichever thread finished it); done may throw to stop. A point whose solver does not converge
+/// has the status solver_failed and its message, and no numbers. Points run side by side on the options' threads, each
+/// single-threaded: the numbers do not depend on that.
+void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
+           const std::function<void(std::size_t, const SweepPoint&)>& done);
+
+}  // namespace metastable::analysis

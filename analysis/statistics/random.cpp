@@ -1,0 +1,41 @@
+#include "analysis/statistics/random.h"
+
+#include <Random123/philox.h>
+
+#include <cmath>
+
+#include "dynamics/wheel/truncated_normal.h"
+
+namespace metastable::analysis {
+namespace {
+
+// Second words of the Philox keys: "mult", "shri", "fold".
+constexpr std::uint64_t multiplier_key = 0x6d756c74, weight_key = 0x73687269, fold_key = 0x666f6c64;
+
+r123::Philox4x64::ctr_type words(const r123::Philox4x64::ctr_type& counter, std::uint64_t seed, std::uint64_t key) {
+  return r123::Philox4x64()(counter, {{seed, key}});
+}
+
+}  // namespace
+
+Eigen::VectorXd normal_multipliers(std::uint64_t seed, std::uint64_t draw, DrawStream stream, Eigen::Index count) {
+  Eigen::VectorXd multipliers(count);
+  for (Eigen::Index t = 0; t < count; t += 4) {
+    const auto bits =
+        words({{draw, static_cast<std::uint64_t>(t), static_cast<std::uint64_t>(stream), 0}}, seed, multiplier_key);
+    for (Eigen::Index i = 0; i < 4 && t + i < count; ++i)
+      multipliers[t + i] = dynamics::normal_quantile(unit_interval(bits[static_cast<std::size_t>(i)]));
+  }
+  return multipliers;
+}
+
+double exponential_weight(std::uint64_t seed, std::uint64_t draw, std::uint64_t trial) {
+  const auto stream = static_cast<std::uint64_t>(DrawStream::held_out_weights);
+  return -std::log(unit_interval(words({{draw, trial, stream, 0}}, seed, weight_key)[0]));
+}
+
+std::uint64_t shuffling_key(std::uint64_t seed, std::uint64_t trial) {
+  return words({{trial, static_cast<std::uint64_t>(DrawStream::folds), 0, 0}}, seed, fold_key)[0];
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,43 @@
+#pragma once
+// Which exact rows a problem gets: densities on nodes, or collocation.
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "analysis/study/problem.h"
+#include "markov/rows/node_rows.h"
+
+namespace metastable::analysis {
+
+/// Densities of the landing (markov/rows/integrated.h) are fast, but `published` alone has smooth ones, and theirs keep
+/// an error that more nodes do not remove: measured, up to 6e-6 of the expected steps where an eta near 0 is not rare,
+/// 1e-7 with the paper's eta. Every other noise, and tolerances below 2e-5, get collocation
+/// (markov/rows/collocation.h).
+class ExactRows {
+ public:
+  /// @throws std::invalid_argument where the map tells neither (names the sampled method)
+  ExactRows(const Problem& problem, double tolerance, int threads);
+
+  bool collocated() const { return collocated_; }
+  /// Of the expected steps, relative, however many the nodes.
+  double error() const;
+  /// Is rest out of the reach of doubles?
+  bool unresolved() const { return ranges_.empty(); }
+  /// Nodes of the coarsest space, per phase.
+  std::size_t coarsest() const;
+  /// coarsest() times `panels` nodes a phase; phase p moved by shift[p], if given.
+  markov::NodeSpace space(std::size_t panels, const std::vector<double>& shift = {}) const;
+  markov::IntegratedChain chain(const Problem& problem, const markov::NodeSpace& space) const;
+  /// Where one event from `state` at `phase` leads.
+  markov::Launch row(const Problem& problem, const markov::NodeSpace& space, double state, int phase) const;
+
+ private:
+  bool collocated_ = false;
+  int threads_ = 1;
+  double error_ = 0;
+  std::vector<std::pair<double, double>> ranges_;
+  std::vector<std::vector<double>> edges_;  // if collocated
+};
+
+}  // namespace metastable::analysis

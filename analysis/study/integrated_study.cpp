@@ -1,0 +1,202 @@
+#include "analysis/study/integrated_study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "analysis/study/chain_summary.h"
+#include "analysis/study/exact_rows.h"
+#include "analysis/study/rest_reachability.h"
+#include "markov/chain/solver.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::size_t first_panels = 1;
+constexpr double safety = 2;  // of the error over the changes it is told from
+
+struct Level {
+  markov::NodeSpace space;
+  markov::IntegratedChain integrated;
+  double from_start = 0, failure_rate = 0, worst_start = 0;
+};
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+// Nothing if the nodes are too few to lead to rest, or so few that interpolation makes nonsense of it.
+std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::size_t panels) {
+  Level level{rows.space(panels), {}};
+  level.integrated = rows.chain(problem, level.space);
+  const markov::SampledChain& sampled = level.integrated.chain;
+  const markov::Reachability reach = markov::classify(sampled.chain);
+  if (std::find(reach.must_rest.begin(), reach.must_rest.end(), 0) != reach.must_rest.end()) return std::nullopt;
+  try {
+    const markov::ChainSolver solver(sampled.chain);
+    const std::vector<double> mean = markov::mean_first_passage(solver);
+    level.from_start = 1 + dot(sampled.launch.after, mean);
+    level.failure_rate = markov::quasi_stationary(solver).failure_rate;
+    int worst = 0;
+    for (int p = 1; p < level.space.phases(); ++p)
+      if (mean[static_cast<std::size_t>(p) * level.space.nodes()] <
+          mean[static_cast<std::size_t>(worst) * level.space.nodes()])
+        worst = p;
+    const double lowest = problem.map.state_interval(worst).first;
+    level.worst_start = 1 + dot(rows.row(problem, level.space, lowest, worst).after, mean);
+  } catch (const markov::ConvergenceError&) {
+    if (rows.collocated()) return std::nullopt;
+    throw;
+  }
+  if (!(level.from_start >= 1 && level.worst_start >= 1 && level.failure_rate > 0)) return std::nullopt;
+  return level;
+}
+
+// The error left in one result after each refinement. Two levels may agree by chance, and the corner of the density
+// leaves an error that comes and goes with the nodes: so never less than the last change, and the one before has its
+// say. `rows` is the rows' own, which no node removes.
+class ErrorLeft {
+ public:
+  explicit ErrorLeft(double rows) : rows_(rows) {}
+  void refine(double fine, double coarse) {
+    const double change = std::abs(std::log(fine) - std::log(coarse));
+    error_ = rows_ + safety * std::sqrt(change * std::max(change, before_));
+    before_ = change;
+  }
+  double error() const { return error_; }
+
+ private:
+  double rows_, before_ = 0, error_ = 0;
+};
+
+// 1, 2, 3, 4, 6, 8, 12, 16, ...
+std::size_t more(std::size_t panels) {
+  const bool power = (panels & (panels - 1)) == 0;
+  return panels == 1 ? 2 : power ? panels + panels / 2 : panels / 3 * 4;
+}
+
+Estimate estimate(double value, double error) { return {value, value * std::exp(-error), value * std::exp(error)}; }
+
+struct MeanSd {
+  double mean = 0, sd = 0;
+};
+
+// Of the observable at the nodes first .. last - 1.
+MeanSd observe(const Problem& problem, const markov::NodeSpace& space, const std::vector<double>& mass,
+               std::size_t first, std::size_t last) {
+  double total = 0, one = 0, two = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    const double value = problem.observable(space.node(i));
+    total += mass[i];
+    one += mass[i] * value;
+    two += mass[i] * value * value;
+  }
+  one /= total;
+  return {one, std::sqrt(std::max(0.0, two / total - one * one))};
+}
+
+// The summary of the chain, with the observable at the nodes in place of the cells' midpoints.
+void describe(const Problem& problem, const Level& level, const StudyOptions& options, Metastability& result) {
+  const markov::SampledChain& sampled = level.integrated.chain;
+  summarize(problem, level.space.cells(), sampled, options, result);
+  const markov::ChainSolver solver(sampled.chain);
+  const std::vector<double> nu = markov::quasi_stationary(solver).distribution;
+  const std::size_t n = level.space.nodes();
+  for (std::size_t p = 0; p < result.quasi_stationary.size(); ++p) {
+    const MeanSd phase = observe(problem, level.space, nu, p * n, (p + 1) * n);
+    result.quasi_stationary[p].mean = phase.mean;
+    result.quasi_stationary[p].sd = phase.sd;
+  }
+  const MeanSd all = observe(problem, level.space, nu, 0, nu.size());
+  result.observable_mean = all.mean;
+  result.observable_sd = all.sd;
+  const std::vector<double> again = markov::stationary_with_restart(solver, sampled.launch.after);
+  const MeanSd restarted = observe(problem, level.space, again, 0, again.size());
+  result.restart_mean = restarted.mean;
+  result.restart_sd = restarted.sd;
+}
+
+Metastability unresolved(const Problem& problem) {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  Metastability result;
+  result.method = Method::integrated;
+  result.status = Status::rest_unresolved;
+  result.phases = problem.map.phases();
+  result.message = "rest is possible, but only by noise beyond probabilities of 1e-300";
+  result.from_start = result.from_quasi_stationary = result.worst_start = {infinite, 1.0, infinite};
+  result.failure_rate = {0, 0, 1};
+  return result;
+}
+
+}  // namespace
+
+Metastability integrated_study(const Problem& problem, const StudyOptions& options) {
+  const auto tell = [&](double done, const std::string& what) {
+    if (options.progress) options.progress(done, what);
+  };
+  const RestReachability reach = rest_reachability(problem);
+  if (!reach.certain) {
+    StudyOptions sampled = options;
+    sampled.method = Method::sampled;
+    return study(problem, sampled);
+  }
+  tell(0, "pilot");
+  const ExactRows rows(problem, options.tolerance, options.threads);
+  if (rows.unresolved()) return unresolved(problem);
+
+  const bool free = options.cells == 0;
+  const std::size_t most =
+      (problem.map.phases() > 1 ? options.largest_cells / 2 : options.largest_cells) / rows.coarsest();
+  const std::size_t given = (options.cells + rows.coarsest() - 1) / rows.coarsest();
+  std::size_t panels = free ? first_panels : std::max<std::size_t>(1, given / 2);
+  std::optional<Level> coarse, fine;
+  ErrorLeft steps_error(rows.error()), rate_error(rows.error()), worst_error(rows.error());
+  double done = 0.02, error = 0;
+  for (;;) {
+    tell(done, fmt::format("{} nodes", panels * rows.coarsest()));
+    coarse = std::move(fine);
+    fine = solve(problem, rows, panels);
+    done += 0.5 * (0.95 - done);
+    bool met = false;
+    if (coarse && fine) {
+      steps_error.refine(fine->from_start, coarse->from_start);
+      rate_error.refine(fine->failure_rate, coarse->failure_rate);
+      worst_error.refine(fine->worst_start, coarse->worst_start);
+      error = std::max(steps_error.error(), rate_error.error());
+      met = error <= options.tolerance;
+    }
+    const bool last = free ? met || more(panels) > std::max<std::size_t>(most, 4)
+                           : panels >= given && (given == 1 || coarse || !fine);
+    if (last) break;
+    panels = free ? more(panels) : std::max(given, panels + 1);
+  }
+  if (!fine || !coarse)
+    throw markov::ConvergenceError("integrated rows", 1,
+                                   fmt::format("{} nodes are too few to lead to rest", panels * rows.coarsest()));
+
+  Metastability result;
+  result.method = Method::integrated;
+  result.cells = fine->space.nodes();
+  result.from_start = estimate(fine->from_start, steps_error.error());
+  result.failure_rate = estimate(fine->failure_rate, rate_error.error());
+  result.from_quasi_stationary = estimate(1 / fine->failure_rate, rate_error.error());
+  result.worst_start = estimate(fine->worst_start, worst_error.error());
+  result.discretization_error = error;
+  result.safe_state = reach.safe_state;
+  if (result.discretization_error > options.tolerance) {
+    result.status = free ? Status::tolerance_not_met : Status::fixed_resolution;
+    if (free)
+      result.message = fmt::format("tolerance {} not met: the error left is {:.2g} at {} nodes", options.tolerance,
+                                   result.discretization_error, result.cells);
+  }
+  tell(0.96, "summary");
+  describe(problem, *fine, options, result);
+  return result;
+}
+
+}  // namespace metastable::analysis

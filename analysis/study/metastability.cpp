@@ -1,0 +1,298 @@
+#include "analysis/study/metastability.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "analysis/statistics/t_interval.h"
+#include "analysis/study/chain_summary.h"
+#include "analysis/study/integrated_study.h"
+#include "analysis/study/pilot.h"
+#include "analysis/study/rest_reachability.h"
+#include "markov/parallel.h"
+#include "markov/rows/chain_pool.h"
+#include "markov/rows/discretization.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr std::size_t first_cells = 128;
+constexpr std::size_t first_samples = 4096;
+constexpr int sizes = 3;  // cell sizes a ladder holds: cells, cells / 2, cells / 4
+// The extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
+constexpr double change_over_error = 3;
+
+// Error of order 2 in the cell size removed.
+double extrapolate(double fine, double coarse) { return fine + (fine - coarse) / 3; }
+
+// Nested cells for the whole range, coarsest first.
+std::vector<markov::StateSpace> nested(markov::StateSpace coarsest) {
+  std::vector<markov::StateSpace> spaces{std::move(coarsest)};
+  while (spaces.size() < sizes) spaces.push_back(spaces.back().halved());
+  return spaces;
+}
+
+// Everything sampled at one resolution: the chain of all replicates' draws per cell size, and each replicate's answer.
+struct Ladder {
+  std::vector<markov::StateSpace> spaces;
+  std::vector<markov::SampledChain> pooled;        // per cell size, coarsest first
+  std::vector<std::vector<ChainSteps>> replicate;  // per cell size, per replicate
+  bool rest_resolved = true;
+};
+
+class Study {
+ public:
+  Study(const Problem& problem, const StudyOptions& options) : problem_(problem), options_(options) {}
+
+  Metastability run() {
+    const RestReachability reach = rest_reachability(problem_);
+    Metastability result = reach.certain ? finite() : infinite_case();
+    result.safe_state = reach.safe_state;
+    return result;
+  }
+
+ private:
+  Metastability finite() {
+    for (;;) {
+      tell(0, "pilot");
+      const std::optional<Pilot> pilot = solve_pilot(problem_, options_);
+      if (pilot) {
+        std::optional<Metastability> result = refine(*pilot);
+        if (result) return *std::move(result);
+      }
+      // Rest is possible, but no draw came to it, or hardly: look deeper into the tails, as far as doubles go.
+      if (!can_look_deeper()) return unresolved();
+      options_.tail = std::max(1e-300, options_.tail * options_.tail * options_.tail);
+    }
+  }
+
+  bool can_look_deeper() const { return options_.weighting == markov::Weighting::weighted && options_.tail > 1e-300; }
+
+  // All replicates at one resolution, in batches of as many as there are threads; sums run in replicate order.
+  Ladder climb(const Pilot& pilot, std::size_t cells, std::size_t samples, double work_before, double work_after) {
+    Ladder ladder{nested(pilot.graded(cells >> (sizes - 1))), {}, {}};
+    std::vector<markov::ChainPool> pools(sizes);
+    const auto replicates = static_cast<std::size_t>(options_.replicates);
+    const auto threads = static_cast<std::size_t>(markov::thread_count(options_.threads));
+    const std::size_t batch = std::min(threads, replicates);
+    const int inner = static_cast<int>(std::max<std::size_t>(1, threads / batch));
+    std::vector<std::vector<ChainSteps>> steps(sizes, std::vector<ChainSteps>(replicates));
+    for (std::size_t first = 0; first < replicates; first += batch) {
+      tell(work_before + (work_after - work_before) * static_cast<double>(first) / static_cast<double>(replicates),
+           fmt::format("{} cells, {} samples", cells, samples));
+      const std::size_t count = std::min(batch, replicates - first);
+      std::vector<std::vector<markov::SampledChain>> chains(count);
+      parallel(count, [&](std::size_t k) {
+        const auto draws = draw_options(options_, samples, static_cast<int>(first + k));
+        for (const markov::StateSpace& space : ladder.spaces)
+          chains[k].push_back(
+              markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = inner}));
+        for (std::size_t s = 0; s < sizes; ++s) {
+          if (rests(chains[k][s]))
+            steps[s][first + k] = chain_steps(problem_.map, ladder.spaces[s], chains[k][s], {draws});
+          else
+            steps[s][first + k].from_start = infinite;
+        }
+      });
+      for (std::vector<markov::SampledChain>& one : chains)
+        for (std::size_t s = 0; s < sizes; ++s) pools[s].add(one[s]);
+    }
+    for (const markov::ChainPool& pool : pools) {
+      ladder.pooled.push_back(pool.mean());
+      ladder.rest_resolved = ladder.rest_resolved && rests(ladder.pooled.back());
+    }
+    for (const std::vector<ChainSteps>& size : steps)
+      for (const ChainSteps& one : size) ladder.rest_resolved = ladder.rest_resolved && std::isfinite(one.from_start);
+    ladder.replicate = std::move(steps);
+    return ladder;
+  }
+
+  std::optional<Metastability> refine(const Pilot& pilot) {
+    const bool free_cells = options_.cells == 0, free_samples = options_.samples == 0;
+    std::size_t cells = free_cells ? first_cells : (options_.cells + 3) / 4 * 4;
+    std::size_t samples = free_samples ? first_samples : options_.samples;
+    const std::size_t most_cells = problem_.map.phases() > 1 ? options_.largest_cells / 2 : options_.largest_cells;
+    for (double done = 0;;) {
+      const double next = free_cells || free_samples ? done + 0.5 * (1 - done) : 0.95;
+      const Ladder ladder = climb(pilot, cells, samples, done, next);
+      done = next;
+      if (!ladder.rest_resolved) return std::nullopt;
+      Metastability result = assess(ladder, cells, samples);
+      // A failure this rare may hang on noise rarer than the draws reach.
+      if (can_look_deeper() && std::log(result.failure_rate.value) < 0.6 * std::log(options_.tail)) return std::nullopt;
+      // What is read off the finest chain as it is must be within the tolerance too.
+      const double unextrapolated = std::abs(std::log(result.from_start.value / result.steps.mean));
+      const double change = change_over_error * result.discretization_error;
+      const double half = std::hypot(result.discretization_error, result.sampling_error);
+      const auto within = [&](double error) { return std::max(error, unextrapolated) <= options_.tolerance; };
+      const bool met = within(change + result.sampling_error);
+      bool refined = false;
+      if (!met && free_cells && (change > options_.tolerance / 3 || unextrapolated > options_.tolerance) &&
+          cells < most_cells) {
+        cells *= 2;
+        refined = true;
+      }
+      if (!met && free_samples && result.sampling_error > options_.tolerance / 2 &&
+          samples < options_.largest_samples) {
+        samples *= 4;
+        refined = true;
+      }
+      if (refined) continue;
+      if (within(half)) {
+        result.status = Status::converged;
+      } else if (!free_cells && !free_samples) {
+        result.status = Status::fixed_resolution;
+      } else {
+        result.status = Status::tolerance_not_met;
+        result.message = fmt::format(
+            "tolerance {} not met: the interval's half-width is {:.2g} (discretization {:.2g}, sampling {:.2g}) at {} "
+            "cells and {} samples",
+            options_.tolerance, half, result.discretization_error, result.sampling_error, cells, samples);
+      }
+      tell(0.96, "summary");
+      summarize(problem_, ladder.spaces.back(), ladder.pooled.back(), options_, result);
+      return result;
+    }
+  }
+
+  // Expected steps with their errors from the ladder.
+  Metastability assess(const Ladder& ladder, std::size_t cells, std::size_t samples) const {
+    std::vector<markov::DrawOptions> draws;
+    for (int r = 0; r < options_.replicates; ++r) draws.push_back(draw_options(options_, samples, r));
+    std::vector<ChainSteps> pooled;
+    for (std::size_t s = 0; s < sizes; ++s)
+      pooled.push_back(chain_steps(problem_.map, ladder.spaces[s], ladder.pooled[s], draws));
+
+    Metastability result;
+    result.cells = cells;
+    result.samples = samples;
+    result.replicates = options_.replicates;
+    const auto estimate = [&](double ChainSteps::*which, double& discretization, double& sampling) {
+      std::vector<double> log_replicate;
+      for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
+        log_replicate.push_back(
+            extrapolate(std::log(ladder.replicate[2][r].*which), std::log(ladder.replicate[1][r].*which)));
+      const double fine = std::log(pooled[2].*which), middle = std::log(pooled[1].*which),
+                   coarse = std::log(pooled[0].*which);
+      const double extrapolated = extrapolate(fine, middle), before = extrapolate(middle, coarse);
+      discretization = std::abs(extrapolated - before) / change_over_error;
+      sampling = t_interval(log_replicate).half_width;
+      const double half = std::hypot(discretization, sampling);
+      return Estimate{std::exp(extrapolated), std::exp(extrapolated - half), std::exp(extrapolated + half)};
+    };
+    result.steps.mean = pooled.back().from_start;
+    double unused_d = 0, unused_s = 0;
+    result.from_start = estimate(&ChainSteps::from_start, result.discretization_error, result.sampling_error);
+    result.from_quasi_stationary = estimate(&ChainSteps::from_quasi_stationary, unused_d, unused_s);
+    result.worst_start = estimate(&ChainSteps::worst_start, unused_d, unused_s);
+    const Estimate& quasi = result.from_quasi_stationary;
+    result.failure_rate = {1 / quasi.value, 1 / quasi.upper, 1 / quasi.lower};
+    for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
+      result.replicate_log_steps.push_back(
+          extrapolate(std::log(ladder.replicate[2][r].from_start), std::log(ladder.replicate[1][r].from_start)));
+    return result;
+  }
+
+  // Rest is out of reach for some launches: no first passage, but a stationary regime.
+  Metastability infinite_case() {
+    Metastability result;
+    result.status = Status::rest_unreachable;
+    result.message = "infinite: rest is unreachable";
+    result.cells = options_.cells == 0 ? 4 * first_cells : options_.cells;
+    result.samples = options_.samples == 0 ? 4 * first_samples : options_.samples;
+    result.replicates = 1;
+    tell(0.1, "stationary distribution");
+    const markov::StateSpace space = markov::covering_space(problem_.map, problem_.launch, result.cells, options_.seed);
+    const markov::SampledChain sampled =
+        markov::discretize(problem_.map, space, problem_.launch,
+                           {.draws = draw_options(options_, result.samples, 0), .threads = options_.threads});
+    tell(0.7, "summary");
+    summarize_endless(problem_, space, sampled, options_, result);
+    return result;
+  }
+
+  Metastability unresolved() const {
+    Metastability result;
+    result.status = Status::rest_unresolved;
+    result.samples = options_.samples == 0 ? first_samples : options_.samples;
+    result.cells = options_.cells == 0 ? first_cells : options_.cells;
+    result.replicates = options_.replicates;
+    result.phases = problem_.map.phases();
+    result.message = options_.weighting == markov::Weighting::plain
+                         ? "rest is possible, but no plain draw came to it: use weighted draws"
+                         : "rest is possible, but only by noise beyond probabilities of 1e-300";
+    result.from_start = result.from_quasi_stationary = result.worst_start = {infinite, 1.0, infinite};
+    result.failure_rate = {0, 0, 1};
+    result.sampling_error = infinite;
+    return result;
+  }
+
+  void parallel(std::size_t count, const std::function<void(std::size_t)>& work) const {
+    markov::parallel_for(count, options_.threads, work);
+  }
+  void tell(double done, const std::string& what) const {
+    if (options_.progress) options_.progress(done, what);
+  }
+
+  const Problem& problem_;
+  StudyOptions options_;
+};
+
+}  // namespace
+
+void StudyOptions::validate() const {
+  if (cells != 0 && (cells < 8 || cells > 4096))
+    throw std::invalid_argument(fmt::format("cells: {} is outside 8..4096", cells));
+  if (samples != 0 && (samples < 16 || samples > (1u << 24)))
+    throw std::invalid_argument(fmt::format("samples: {} is outside 16..{}", samples, 1u << 24));
+  if (!(tolerance > 0 && tolerance < 1))
+    throw std::invalid_argument(fmt::format("tolerance: {} is outside (0, 1)", tolerance));
+  if (threads < 0 || threads > 1024)
+    throw std::invalid_argument(fmt::format("threads: {} is outside 0..1024", threads));
+  if (replicates < 2 || replicates > 64)
+    throw std::invalid_argument(fmt::format("replicates: {} is outside 2..64", replicates));
+  if (!(tail >= 1e-300 && tail <= 1e-3))
+    throw std::invalid_argument(fmt::format("tail: {} is outside [1e-300, 1e-3]", tail));
+  if (!(mixing_distance > 0 && mixing_distance < 1))
+    throw std::invalid_argument(fmt::format("mixing distance: {} is outside (0, 1)", mixing_distance));
+  if (eigenvalues < 1 || eigenvalues > 64)
+    throw std::invalid_argument(fmt::format("eigenvalues: {} is outside 1..64", eigenvalues));
+}
+
+Metastability study(const Problem& problem, const StudyOptions& options) {
+  options.validate();
+  if (options.method == Method::integrated) return integrated_study(problem, options);
+  return Study(problem, options).run();
+}
+
+std::string_view method_name(Method method) { return method == Method::sampled ? "sampled" : "integrated"; }
+
+Method method_from_name(std::string_view name) {
+  for (const Method method : {Method::sampled, Method::integrated})
+    if (name == method_name(method)) return method;
+  throw std::invalid_argument(fmt::format("method: '{}' is neither 'sampled' nor 'integrated'", name));
+}
+
+std::string status_text(Status status) {
+  switch (status) {
+    case Status::converged:
+      return "converged";
+    case Status::tolerance_not_met:
+      return "tolerance_not_met";
+    case Status::fixed_resolution:
+      return "fixed_resolution";
+    case Status::rest_unreachable:
+      return "rest_unreachable";
+    case Status::solver_failed:
+      return "solver_failed";
+    case Status::rest_unresolved:
+      return "rest_unresolved";
+  }
+  throw std::logic_error("unknown status");
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,126 @@
+#pragma once
+// The metastability study of one setting: expected steps before failure and what goes with them, with their errors.
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "analysis/statistics/estimate.h"
+#include "analysis/study/problem.h"
+#include "markov/rows/draws.h"
+
+namespace metastable::analysis {
+
+/// How rows are made.
+enum class Method {
+  sampled,     ///< by draws of the noise in every cell
+  integrated,  ///< from the landing's density on Gauss-Legendre nodes (integrated_study.h)
+};
+
+struct StudyOptions {
+  Method method = Method::sampled;
+  std::size_t cells = 0;    ///< per phase, 8 .. 4096; 0: refined until the tolerance is met
+  std::size_t samples = 0;  ///< draws per cell and replicate, 16 .. 2^24; 0: raised until the tolerance is met
+  double tolerance = 0.01;  ///< wanted relative half-width of the 95 % interval of the expected steps, (0, 1)
+  std::uint64_t seed = 1;
+  int threads = 0;     ///< 0: all cores. Results do not depend on it
+  int replicates = 8;  ///< independent randomisations behind the interval, 2 .. 64
+  markov::Sequence sequence = markov::Sequence::sobol;
+  markov::Weighting weighting = markov::Weighting::weighted;
+  double tail = 1e-30;  ///< tail probability the weighted draws reach; deepened by itself where failures are that rare
+  double mixing_distance = 0.05;  ///< total variation distance that counts as mixed
+  int eigenvalues = 6;            ///< how many moduli to report
+  bool brief = false;             ///< leave out seconds, metres, spectrum, mixing and violated assumptions (sweeps do)
+  std::size_t largest_cells = 1024;        ///< refinement stops here
+  std::size_t largest_samples = 1u << 18;  ///< and here
+  /// Called now and then with the work done so far in [0, 1] and what is being done; may throw to stop.
+  std::function<void(double, const std::string&)> progress = {};
+  void validate() const;
+};
+
+enum class Status {
+  converged,          ///< tolerance met
+  tolerance_not_met,  ///< refinement stopped at its largest size; the interval says how far it got
+  fixed_resolution,   ///< tolerance not met, but cells and samples were both given: nothing was refined
+  rest_unreachable,   ///< expected steps are infinite
+  solver_failed,      ///< only in sweeps: a solver did not converge at this point, see the message
+  rest_unresolved,    ///< rest is possible, but beyond the draws: expected steps exceed from_start.lower
+};
+
+/// Total of something accumulated until rest.
+struct Accumulated {
+  double mean = 0, sd = 0;
+  std::vector<double> quantile;  ///< at Metastability::levels
+};
+
+/// What survivors look like at one phase (one landing leg).
+struct PhaseDistribution {
+  std::vector<double> edges;  ///< of the cells, in state units; cells + 1
+  std::vector<double> mass;   ///< sums to one
+  double mean = 0, sd = 0;    ///< of the observable
+};
+
+struct Share {
+  std::string name;
+  double quasi_stationary = 0;  ///< of collisions in the metastable regime
+  double until_rest =
+      0;  ///< of all collisions from the launch to rest (to the end of `survival` where some never rest)
+};
+
+struct Metastability {
+  Status status = Status::converged;
+  std::string message;  ///< one sentence when there is something to say beside the numbers, empty otherwise
+  Method method = Method::sampled;
+  std::size_t cells = 0, samples = 0;
+  int replicates = 0, phases = 1, period = 1;
+
+  Estimate from_start;                      ///< expected steps before failure, from the launch
+  Estimate from_quasi_stationary;           ///< the same from the metastable regime = 1 / failure_rate
+  Estimate worst_start;                     ///< from the slowest survivor of a step
+  Estimate failure_rate;                    ///< 1 - lambda_1 per step
+  double discretization_error = 0;          ///< relative, of from_start: a third of the extrapolation's last change
+  double sampling_error = 0;                ///< relative 95 % half-width of from_start over replicates
+  std::vector<double> replicate_log_steps;  ///< ln(expected steps from the launch), extrapolated
+
+  static constexpr double levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
+  Accumulated steps;                   ///< the last step counted
+  std::optional<Accumulated> seconds;  ///< from collision 1 to the last collision
+  std::optional<Accumulated> metres;   ///< from the first foot to the last
+  std::vector<double> survival;     ///< P(steps > n), n = 0, 1, ...: up to 64 values, or to the course's end if longer
+  std::optional<double> reach_end;  ///< probability of surviving the last event of the course
+
+  std::vector<double> eigenvalue_moduli;            ///< per step, falling; lambda_1 alone for a map without noise
+  double mixing_steps = 0;                          ///< spectral, 1 / ln(lambda_1 / |lambda_2|)
+  std::optional<int> total_variation_steps;         ///< from the launch to within mixing_distance
+  std::vector<PhaseDistribution> quasi_stationary;  ///< per phase
+  double observable_mean = 0, observable_sd = 0;    ///< over all phases (equal shares)
+  double restart_mean = 0, restart_sd = 0;          ///< stationary, with a new launch after each rest
+  std::vector<Share> violations;
+
+  /// State below which a launch may come to rest, when faster ones never do; and the check of the primary solver:
+  std::optional<double> safe_state;
+  double solver_disagreement = 0;  ///< relative difference of the launch's expected steps, elimination against KLU
+};
+
+/// Pilot grid, graded cells, replicated draws, three cell sizes, refinement until the tolerance is met.
+///
+/// Expected steps and the failure rate are extrapolated (Richardson, order 2, in the logarithm) from the two finest
+/// cell sizes of the chain of all replicates' draws; everything else is read off that chain at the finest size.
+/// interval_95: t-interval over the replicates' extrapolations and, as an independent error, a third of the difference
+/// of the last two extrapolations of all draws.
+/// Method::integrated: integrated_study().
+/// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails
+Metastability study(const Problem& problem, const StudyOptions& options);
+
+/// "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.
+std::string status_text(Status status);
+/// "sampled", "integrated".
+std::string_view method_name(Method method);
+/// @throws std::invalid_argument naming the two
+Method method_from_name(std::string_view name);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,85 @@
+#include "analysis/study/setting.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "dynamics/return_map/trials.h"
+
+namespace metastable::analysis {
+
+dynamics::ContactNoise Setting::noise() const {
+  if (!pairs.empty()) return dynamics::ContactNoise::empirical(pairs);
+  return dynamics::ContactNoise::normal(restitution.mean, restitution.sd, friction.mean, friction.sd, correlation);
+}
+
+dynamics::TruncatedNormal Setting::launch() const {
+  if (!(initial_speed.mean >= 0))
+    throw std::invalid_argument(fmt::format("initial speed: mean {} rad/s is below 0", initial_speed.mean));
+  try {
+    return dynamics::TruncatedNormal(initial_speed.mean, initial_speed.sd, 0.0);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(fmt::format("initial speed: {}", error.what()));
+  }
+}
+
+dynamics::WheelMap Setting::map() const {
+  return dynamics::WheelMap(wheel, slope_deg * std::numbers::pi / 180.0, law, noise(), rebound_lost);
+}
+
+Problem Setting::problem() const {
+  const dynamics::WheelMap wheel_map = map();
+  if (!(ramp_length > 0)) throw std::invalid_argument(fmt::format("ramp length: {} m is not above 0", ramp_length));
+  if (first_landing_leg < 0 || first_landing_leg >= wheel.legs())
+    throw std::invalid_argument(
+        fmt::format("first landing leg: {} is outside 0..{}", first_landing_leg, wheel.legs() - 1));
+  const dynamics::TruncatedNormal speed = launch();
+  const auto state = [speed](double score) {
+    const double omega = speed.at_score(score);
+    return omega * omega;
+  };
+  Problem problem{
+      wheel_map, {state, first_landing_leg % wheel_map.phases()}, [](double x) { return std::sqrt(x); }, {}};
+  if (std::isfinite(ramp_length))
+    problem.last_event = dynamics::last_collision_on_ramp(wheel_map, first_landing_leg, ramp_length);
+  return problem;
+}
+
+std::string Setting::describe() const {
+  std::string legs;
+  if (wheel.equal_legs()) {
+    legs = fmt::format("{} legs of {} m", wheel.legs(), wheel.leg_length.front());
+  } else {
+    legs = fmt::format("legs {} m", fmt::join(wheel.leg_length, ", "));
+  }
+  std::string contact = pairs.empty() ? fmt::format("eta ~ N({}, {}^2), mu ~ N({}, {}^2)", restitution.mean,
+                                                    restitution.sd, friction.mean, friction.sd)
+                                      : fmt::format("(eta, mu) from a list of {} pairs", pairs.size());
+  if (pairs.empty() && correlation != 0) contact += fmt::format(", correlation {}", correlation);
+  const dynamics::ContactModel model = dynamics::contact_model(wheel, law, rebound_lost);
+  std::string law_text = fmt::format("law {}", dynamics::law_name(law));
+  if (law != dynamics::Law::published) law_text += fmt::format(" (r_g = {} m)", model.radius_of_gyration);
+  if (law == dynamics::Law::coulomb && rebound_lost != 0) law_text += fmt::format(", rebound lost {}", rebound_lost);
+  std::string text = fmt::format("{} deg, {}, {}, {}, omega_0 ~ N({}, {}^2) rad/s", slope_deg, legs, law_text, contact,
+                                 initial_speed.mean, initial_speed.sd);
+  // The rest where it is not the paper's.
+  const Setting paper;
+  if (wheel.hub_mass != paper.wheel.hub_mass) text += fmt::format(", M = {} kg", wheel.hub_mass);
+  if (wheel.inertia) text += fmt::format(", I = {} kg m^2", *wheel.inertia);
+  if (wheel.ramp_stiffness != paper.wheel.ramp_stiffness) text += fmt::format(", K_r = {} N/m", wheel.ramp_stiffness);
+  if (wheel.contact_mass) text += fmt::format(", m_c = {} kg", *wheel.contact_mass);
+  if (wheel.gravity != paper.wheel.gravity) text += fmt::format(", g = {} m/s^2", wheel.gravity);
+  if (ramp_length != paper.ramp_length) text += fmt::format(", ramp {} m", ramp_length);
+  if (first_landing_leg != 0) text += fmt::format(", leg {} lands first", first_landing_leg);
+  return text;
+}
+
+std::optional<Spread> paper_launch(double slope_deg) {
+  if (std::abs(slope_deg - 7.02) < 1e-9) return Spread{7.35, 0.19};
+  if (std::abs(slope_deg - 9.59) < 1e-9) return Spread{5.83, 0.28};
+  return std::nullopt;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,48 @@
+#pragma once
+// One setting: a wheel, a ramp, a contact law with its noise, a launch. Defaults are the paper's.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/study/problem.h"
+#include "dynamics/return_map/wheel_map.h"
+
+namespace metastable::analysis {
+
+/// Mean and sd of the normal before truncation.
+struct Spread {
+  double mean = 0;
+  double sd = 0;
+};
+
+/// Everything that fixes the chain of one wheel on one ramp.
+struct Setting {
+  dynamics::Wheel wheel;
+  double slope_deg = 7.02;    ///< gamma [deg], in (0, alpha/2)
+  double ramp_length = 3.66;  ///< [m], > 0
+  dynamics::Law law = dynamics::Law::published;
+  double rebound_lost = 0;               ///< share of the rebound's energy lost in hops, `coulomb` only
+  Spread restitution{0.4, 0.1};          ///< eta, truncated to [0, 1]
+  Spread friction{0.4, 0.1};             ///< mu, truncated to [0, inf)
+  double correlation = 0;                ///< of the normal scores of eta and mu
+  std::vector<dynamics::Contact> pairs;  ///< not empty: an empirical list instead of the normals
+  Spread initial_speed{7.35, 0.19};      ///< omega_0 just before collision 1 [rad/s], truncated at 0
+  int first_landing_leg = 0;
+
+  dynamics::ContactNoise noise() const;
+  dynamics::TruncatedNormal launch() const;
+  /// @throws std::invalid_argument, one line naming the quantity, its value and its range
+  dynamics::WheelMap map() const;
+  /// The generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on the
+  /// ramp.
+  Problem problem() const;
+  /// One line that names every quantity, for captions and provenance.
+  std::string describe() const;
+};
+
+/// Launch speeds the paper measured: N(7.35, 0.19^2) at 7.02 deg and N(5.83, 0.28^2) at 9.59 deg (fast start) [rad/s];
+/// nothing for other slopes.
+std::optional<Spread> paper_launch(double slope_deg);
+
+}  // namespace metastable::analysis

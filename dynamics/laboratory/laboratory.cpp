@@ -1,0 +1,344 @@
+#include "dynamics/laboratory/laboratory.h"
+
+#include <Random123/philox.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include "dynamics/laboratory/impulse_collision.h"
+
+namespace metastable::dynamics {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr double reference_speed = 5;  // [rad/s] of the catalogue's power laws
+constexpr double plank = 0.31;         // [m]
+constexpr double slosh_time = 0.15;    // [s]
+constexpr double lead = 0.3;           // [s] of motion kept before collision 1
+
+enum class Stream : std::uint64_t { trial = 100, contact = 101, sensor = 102 };
+
+// Three standard normal scores and a uniform of one event of one trial.
+struct Draws {
+  std::array<double, 3> score;
+  double uniform;
+};
+Draws draws(std::uint64_t seed, std::uint64_t trial, std::uint64_t event, Stream stream) {
+  const r123::Philox4x64::ctr_type counter{{trial, event, static_cast<std::uint64_t>(stream), 0}};
+  const auto bits = r123::Philox4x64()(counter, r123::Philox4x64::key_type{{seed, 0}});
+  const auto uniform = [](std::uint64_t word) { return (static_cast<double>(word >> 12) + 0.5) * 0x1p-52; };
+  return {{normal_quantile(uniform(bits[0])), normal_quantile(uniform(bits[1])), normal_quantile(uniform(bits[2]))},
+          uniform(bits[3])};
+}
+
+// Mean 0, sd 1 and the given skewness at a standard normal score: a shifted lognormal (mirrored, if negative).
+double skewed(double skewness, double score) {
+  if (skewness == 0) return score;
+  // skewness = (w + 2) sqrt(w - 1) with w = exp(s^2).
+  const double target = std::abs(skewness);
+  double low = 1, high = 3;
+  for (int i = 0; i < 60; ++i) {
+    const double w = (low + high) / 2;
+    ((w + 2) * std::sqrt(w - 1) < target ? low : high) = w;
+  }
+  const double w = low, s = std::sqrt(std::log(w));
+  const double sign = skewness > 0 ? 1 : -1;
+  return sign * (std::exp(s * sign * score - s * s / 2) - 1) / std::sqrt(w - 1);
+}
+
+NominalValues stated(const LaboratorySetup& setup) {
+  return {setup.restitution_mean, setup.restitution_sd, setup.friction_mean, setup.friction_sd, setup.wheel.leg_length};
+}
+
+Wheel with_legs(Wheel wheel, const std::vector<double>& lengths) {
+  wheel.leg_length = lengths;
+  return wheel;
+}
+
+void require(bool fine, const char* name, double value, const char* range) {
+  if (!fine) throw std::invalid_argument(fmt::format("laboratory: {}: {} is outside {}", name, value, range));
+}
+
+}  // namespace
+
+Laboratory::Laboratory(LaboratorySetup setup)
+    : setup_(std::move(setup)),
+      changes_(laboratory_changes(stated(setup_), setup_.effects, setup_.outside)),
+      wheel_(with_legs(setup_.wheel, changes_.stated.leg_lengths)),
+      law_(changes_.slip_reversal ? Law::coulomb : setup_.law),
+      restitution_(changes_.stated.restitution_mean, changes_.stated.restitution_sd, 0, 1),
+      friction_(changes_.stated.friction_mean, changes_.stated.friction_sd, 0) {
+  wheel_.validate();
+  model_ = contact_model(wheel_, law_);
+  require(std::abs(setup_.restitution_skewness) < 2, "restitution_skewness", setup_.restitution_skewness, "(-2, 2)");
+  require(setup_.sensor_noise >= 0, "sensor_noise", setup_.sensor_noise, "[0, inf) rad/s");
+  require(setup_.smoothing >= 0 && setup_.smoothing <= 0.1, "smoothing", setup_.smoothing, "[0, 0.1] s");
+  require(setup_.max_collisions >= 1, "max_collisions", setup_.max_collisions, "[1, inf)");
+  for (std::size_t i = 0; i < setup_.conditions.size(); ++i) {
+    const LaboratoryCondition& condition = setup_.conditions[i];
+    const double slope = condition.slope + changes_.slope_offset_deg * degree;
+    const double steepest = steepest_slope(wheel_.legs());
+    if (!(slope > 0 && slope < steepest))
+      throw std::invalid_argument(fmt::format("condition {}: slope: {:.6g} deg is outside (0, {:.6g}) deg", i,
+                                              slope / degree, steepest / degree));
+    if (!(condition.ramp_length > 0))
+      throw std::invalid_argument(
+          fmt::format("condition {}: ramp length: {} m is outside (0, inf)", i, condition.ramp_length));
+    if (condition.first_landing_leg < 0 || condition.first_landing_leg >= wheel_.legs())
+      throw std::invalid_argument(fmt::format("condition {}: first landing leg: {} is outside [0, {}]", i,
+                                              condition.first_landing_leg, wheel_.legs() - 1));
+    RollingBody body;
+    body.leg_length = wheel_.leg_length;
+    body.mass = wheel_.hub_mass;
+    body.gravity = wheel_.gravity;
+    body.slope = slope;
+    body.offset = changes_.mass_offset;
+    body.offset_angle = changes_.mass_angle;
+    body.constant_drag = changes_.constant_drag;
+    body.linear_drag = changes_.linear_drag;
+    body.quadratic_drag = changes_.quadratic_drag;
+    body.fluid_inertia = changes_.slosh * stance_inertia(wheel_, law_, wheel_.mean_leg_length());
+    body.fluid_coupling = body.fluid_inertia / slosh_time;
+    body.flight = setup_.flight;
+    body_.push_back(body);
+    const double sag_end = changes_.sag_to > 0 ? changes_.sag_to : condition.ramp_length;
+    if (changes_.sag != 0 && !(sag_end > changes_.sag_from))
+      throw std::invalid_argument(
+          fmt::format("condition {}: the sagging stretch begins beyond its end, {} m", i, sag_end));
+    surface_.emplace_back(changes_.sag, changes_.sag_from, sag_end);
+    launch_.emplace_back(condition.launch_mean + changes_.launch_mean,
+                         std::max(0.0, condition.launch_sd + changes_.launch_sd), 0);
+  }
+  for (const std::size_t condition : setup_.order)
+    if (condition >= setup_.conditions.size())
+      throw std::invalid_argument(
+          fmt::format("order: condition {} is outside [0, {})", condition, setup_.conditions.size()));
+}
+
+// One trial as it unfolds.
+class Laboratory::Roll {
+ public:
+  Roll(const Laboratory& lab, std::size_t index)
+      : lab_(lab),
+        c_(lab.changes_),
+        condition_(lab.setup_.order.at(index)),
+        index_(index),
+        body_(lab.body_[condition_]),
+        surface_(lab.surface_[condition_]) {
+    const Draws own = draws(lab.setup_.seed, index, 0, Stream::trial);
+    const auto trials = static_cast<double>(lab.setup_.order.size());
+    launch_ = lab.launch_[condition_].at_score(own.score[0]);
+    added_friction_ = c_.trial_sd * own.score[1];
+    drift_ = trials > 1 ? 1 + c_.drift * static_cast<double>(index) / (trials - 1) : 1;
+  }
+
+  LaboratoryTrial run() {
+    const LaboratoryCondition& condition = lab_.setup_.conditions[condition_];
+    trial_.condition = condition_;
+    const Pose first = landing_pose(body_, surface_, condition.first_landing_leg, 0, launch_);
+    Touch touch = touch_standing(body_, first, inertia(first.leg));
+    trial_.motion = run_up(body_, surface_, first, inertia(first.leg), lead);
+    double time = 0, turn = 0;
+    for (;;) {
+      const Pose pose = touch.leg == touch.before.leg ? hop(touch) : land(touch, time);
+      const std::size_t before = trial_.motion.size();
+      touch = roll_on(body_, surface_, pose, inertia(pose.leg), &trial_.motion);
+      for (std::size_t m = before; m < trial_.motion.size(); ++m) {
+        trial_.motion[m].time += time;
+        trial_.motion[m].turn += turn;
+      }
+      time += touch.time;
+      turn += touch.turn;
+      const bool over = touch.end == RollEnd::rest;
+      if (over || touch.leg != touch.before.leg) report_after();
+      if (over) return finish(Outcome::rest);
+      if (touch.leg == touch.before.leg) continue;
+      if (tip(body_, touch.before, touch.leg).x > condition.ramp_length) return finish(Outcome::end_of_ramp);
+      if (static_cast<int>(trial_.collisions.size()) == lab_.setup_.max_collisions)
+        return finish(Outcome::max_collisions);
+    }
+  }
+
+ private:
+  double inertia(int leg) const {
+    const double length = body_.leg_length[static_cast<std::size_t>(leg)];
+    return c_.inertia_ratio * stance_inertia(lab_.wheel_, lab_.law_, length);
+  }
+
+  LaboratoryTrial finish(Outcome outcome) {
+    trial_.outcome = outcome;
+    return std::move(trial_);
+  }
+
+  // eta and mu of the collision that comes, effects included.
+  Contact draw(int leg, double position, double speed) {
+    const Draws d = draws(lab_.setup_.seed, index_, trial_.collisions.size() + 1, Stream::contact);
+    const double fresh = trial_.collisions.empty() ? 1 : std::sqrt(1 - c_.memory * c_.memory);
+    const double kept = trial_.collisions.empty() ? 0 : c_.memory;
+    restitution_score_ = kept * restitution_score_ + fresh * d.score[0];
+    friction_score_ = kept * friction_score_ + fresh * d.score[1];
+    Contact contact{0, lab_.friction_.at_score(friction_score_)};
+    if (lab_.setup_.restitution_skewness == 0)
+      contact.restitution = lab_.restitution_.at_score(restitution_score_);
+    else
+      contact.restitution = lab_.restitution_.mean() +
+                            lab_.restitution_.sd() * skewed(lab_.setup_.restitution_skewness, restitution_score_);
+    if (c_.spread > 0)
+      contact.friction = lab_.friction_.mean() +
+                         (contact.friction - lab_.friction_.mean()) * std::pow(speed / reference_speed, 8 * c_.spread);
+    contact.friction = std::max(0.0, contact.friction + added_friction_) * drift_;
+    for (const LegChange& change : c_.legs)
+      if (change.leg == leg) {
+        contact.friction *= change.friction_ratio;
+        contact.restitution *= change.restitution_ratio;
+      }
+    const double ramp = lab_.setup_.conditions[condition_].ramp_length;
+    for (const PatchChange& patch : c_.patches)
+      if (position >= patch.from && position <= (patch.to > 0 ? patch.to : ramp))
+        contact.friction *= patch.friction_ratio;
+    contact.friction *= 1 + c_.stribeck_amplitude * std::exp(-speed / c_.stribeck_speed);
+    contact.friction *= 1 + c_.planks * std::cos(2 * std::numbers::pi * position / plank);
+    contact.friction *= 1 + (leg % 2 == 1 ? c_.plates : -c_.plates);
+    if (d.uniform < c_.outlier_share) contact.friction *= c_.outlier_ratio;
+    contact.friction = std::max(0.0, contact.friction);
+    contact.restitution *= std::pow(speed / reference_speed, -c_.restitution_exponent);
+    const double off_resonance = (speed - 5.3) / 0.35;
+    contact.restitution *= 1 - c_.resonance * std::exp(-off_resonance * off_resonance);
+    contact.restitution = std::clamp(contact.restitution, 0.0, 1.0);
+    return contact;
+  }
+
+  // Energy left in the wheel after the collision [J]; nothing is left of a foot that jams.
+  double collide(const Touch& touch, const Contact& contact, double factor) {
+    const Point foot = tip(body_, touch.before, touch.leg), mass = centre_of_mass(body_, touch.before);
+    // Both feet on the ground: the ramp runs from one to the other. After a flight: as it is under the landing foot.
+    const double rise =
+        touch.flew ? surface_.rise(foot.x) : std::atan2(foot.z - touch.before.foot.z, foot.x - touch.before.foot.x);
+    const Point along{std::cos(rise), std::sin(rise)}, up{-std::sin(rise), std::cos(rise)};
+    const Point arm{mass.x - foot.x, mass.z - foot.z};
+    const auto dot = [](const Point& a, const Point& b) { return a.x * b.x + a.z * b.z; };
+    const int stance_leg = touch.leg;
+    if (lab_.law_ == Law::plastic) {
+      const double about_mass =
+          inertia(stance_leg) - body_.mass * std::pow(body_.leg_length[static_cast<std::size_t>(stance_leg)], 2);
+      const double omega = touch.before.speed;
+      const Point velocity{touch.tip_velocity.x + omega * arm.z, touch.tip_velocity.z - omega * arm.x};
+      const double momentum = body_.mass * (arm.z * velocity.x - arm.x * velocity.z) + about_mass * omega;
+      const double about_foot = about_mass + body_.mass * dot(arm, arm);
+      const double after = momentum > 0 ? momentum * momentum / (2 * about_foot) : 0;
+      return touch.energy - factor * (touch.energy - after);
+    }
+    Impact impact;
+    impact.law = lab_.law_;
+    impact.mass = body_.mass;
+    impact.gyration = lab_.law_ == Law::published
+                          ? body_.leg_length[static_cast<std::size_t>(stance_leg)]
+                          : std::max(lab_.model_.radius_of_gyration, 1e-8 * std::sqrt(dot(arm, arm)));
+    impact.behind = -dot(arm, along);
+    impact.above = dot(arm, up);
+    impact.approach = -dot(touch.tip_velocity, up);
+    impact.along = touch.flew ? dot(touch.tip_velocity, along) : 0;  // a standing wheel turns about the old foot
+    impact.restitution = contact.restitution;
+    impact.friction = contact.friction;
+    impact.slope = body_.slope - rise;
+    impact.gravity = body_.gravity;
+    impact.stiffness = lab_.model_.ramp_stiffness;
+    impact.contact_mass = lab_.model_.contact_mass;
+    const ImpactWork work = integrate_impact(impact);
+    if (work.jammed) return 0;
+    double loss = factor * (work.total() + c_.rebound_lost * work.released);
+    if (c_.stored > 0) {
+      const double lost = loss;
+      if (losses_ > 1) loss -= c_.stored * (last_loss_ - loss_sum_ / losses_);
+      loss_sum_ += lost;
+      last_loss_ = lost;
+      ++losses_;
+    }
+    return touch.energy - loss;
+  }
+
+  Pose next_pose(const Touch& touch, double energy) const {
+    Pose pose = touch.before;
+    pose.foot = tip(body_, touch.before, touch.leg);
+    if (touch.leg != touch.before.leg) pose.angle -= body_.leg_angle();
+    pose.leg = touch.leg;
+    pose.speed = energy > 0 ? std::sqrt(2 * energy / inertia_about_foot(body_, pose, inertia(pose.leg))) : 0;
+    return pose;
+  }
+
+  Pose land(const Touch& touch, double time) {
+    LaboratoryCollision collision;
+    collision.leg = touch.leg;
+    collision.time = time;
+    collision.position = tip(body_, touch.before, touch.leg).x;
+    collision.omega_minus = touch.before.speed;
+    collision.flew = touch.flew;
+    collision.contact = contact_ = draw(touch.leg, collision.position, touch.before.speed);
+    const double since = trial_.collisions.empty() ? 0 : time - trial_.collisions.back().time;
+    const double factor =
+        trial_.collisions.empty() ? 1 : 1 + c_.vibration * std::cos(2 * std::numbers::pi * c_.vibration_hz * since);
+    const Pose pose = next_pose(touch, collide(touch, contact_, factor));
+    collision.omega_plus = pose.speed;
+    const double window = lab_.setup_.smoothing;
+    double seen = collision.omega_minus;
+    if (window > 0) seen = mean_speed(std::max(time - window, trial_.motion.front().time), time);
+    collision.reported_minus = sensed(seen, 0);
+    trial_.collisions.push_back(collision);
+    return pose;
+  }
+
+  // The old foot comes down again: nothing that a camera would call a collision.
+  Pose hop(const Touch& touch) { return next_pose(touch, collide(touch, contact_, 1)); }
+
+  void report_after() {
+    LaboratoryCollision& last = trial_.collisions.back();
+    const double window = lab_.setup_.smoothing, end = trial_.motion.back().time;
+    double seen = last.omega_plus;
+    if (window > 0 && end > last.time) seen = mean_speed(last.time, std::min(end, last.time + window));
+    last.reported_plus = sensed(seen, 1);
+  }
+
+  double mean_speed(double from, double to) const {
+    return (angle_at(trial_.motion, to) - angle_at(trial_.motion, from)) / (to - from);
+  }
+
+  double sensed(double speed, int which) const {
+    const Draws d =
+        draws(lab_.setup_.seed, index_, 2 * trial_.collisions.size() + static_cast<std::size_t>(which), Stream::sensor);
+    const double noise = lab_.setup_.sensor_noise * d.score[0] + c_.sensor_noise * d.score[1];
+    return std::max(0.0, speed + c_.sensor_bias + noise);
+  }
+
+  const Laboratory& lab_;
+  const LaboratoryChanges& c_;
+  std::size_t condition_, index_;
+  const RollingBody& body_;
+  const RampSurface& surface_;
+  LaboratoryTrial trial_;
+  Contact contact_;
+  double launch_ = 0, added_friction_ = 0, drift_ = 1;
+  double restitution_score_ = 0, friction_score_ = 0;
+  double loss_sum_ = 0, last_loss_ = 0;
+  int losses_ = 0;
+};
+
+LaboratoryTrial Laboratory::run(std::size_t index) const { return Roll(*this, index).run(); }
+
+double angle_at(const std::vector<Moment>& motion, double time) {
+  const auto after =
+      std::upper_bound(motion.begin(), motion.end(), time, [](double t, const Moment& m) { return t < m.time; });
+  if (after == motion.begin()) return motion.front().turn;
+  const Moment& a = *(after - 1);
+  if (after == motion.end()) return a.turn;
+  const Moment& b = *after;
+  const double h = b.time - a.time, s = (time - a.time) / h;
+  return a.turn * (1 + 2 * s) * (1 - s) * (1 - s) + b.turn * s * s * (3 - 2 * s) +
+         h * s * (1 - s) * ((1 - s) * a.speed - s * b.speed);
+}
+
+}  // namespace metastable::dynamics

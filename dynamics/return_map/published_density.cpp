@@ -1,0 +1,540 @@
+#include "dynamics/return_map/published_density.h"
+
+#include <algorithm>
+#include <array>
+#include <boost/math/quadrature/gauss.hpp>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include "dynamics/return_map/vector_math.h"
+
+// One compiled version for each generation of vector units, chosen when the program starts. Fused multiply-adds make
+// the last bits depend on it.
+#ifdef METASTABLE_AVX2
+#define METASTABLE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define METASTABLE_WIDE
+#endif
+
+namespace metastable::dynamics {
+namespace {
+
+constexpr std::size_t lanes = 16;        // landings worked on together
+constexpr std::size_t most_points = 48;  // of the grid over eta
+constexpr double depth = 22;             // windows end where the integrand is e^-depth of its largest value
+constexpr double far_tail = 37;          // [sd]
+constexpr double split = 0.02;           // eta below which ln eta is the variable
+constexpr double longest = 690;          // -ln eta
+constexpr std::size_t most_forms = 4;    // speeds down to sqrt(1/8) of the slowest survivor's
+constexpr double pi2 = std::numbers::pi * std::numbers::pi;
+
+struct Nodes {  // Gauss-Legendre on [0, 1]
+  std::vector<double> at, weight;
+};
+template <unsigned N>
+const Nodes& nodes() {
+  static const Nodes all = [] {
+    using Rule = boost::math::quadrature::gauss<double, N>;
+    static_assert(N % 2 == 0);
+    Nodes n{std::vector<double>(N), std::vector<double>(N)};
+    for (std::size_t k = 0; k < N / 2; ++k) {
+      n.at[N / 2 + k] = 0.5 + 0.5 * Rule::abscissa()[k];
+      n.at[N / 2 - 1 - k] = 0.5 - 0.5 * Rule::abscissa()[k];
+      n.weight[N / 2 + k] = n.weight[N / 2 - 1 - k] = 0.5 * Rule::weights()[k];
+    }
+    return n;
+  }();
+  return all;
+}
+
+/// For the parts of the curve: above mu_c; there with eta below split, where that matters and where it hardly does;
+/// below mu_c, before and after the least loss.
+struct Rules {
+  const Nodes *main, *tail, *tail_minor, *least, *lower;
+};
+
+/// One row: everything that does not depend on the landing.
+struct Row {
+  double a0, a1, t0, t1, kappa;
+  double rounding;                                                // of eta in s where mu < mu_c
+  double sticking;                                                // mu_c, or 0
+  double normal_sticking;                                         // A there
+  double friction_middle;                                         // the usual mu
+  double s_usual;                                                 // s at the usual eta
+  double potential_zero;                                          // kappa s at eta = 0, where mu < mu_c
+  double least, level_least;                                      // mu of the least loss at eta = 0, g there
+  double restitution, restitution_rate, friction, friction_rate;  // means and 1/sd
+  double lower, upper;                                            // of eta
+  std::size_t points;
+  std::array<double, most_points> eta, a, b_middle, exponent;  // on the grid: 1 - eta^2, b + c A, z^2/2
+  std::size_t tail_points;                                     // of -ln eta, 0 where eta stays above split
+  std::array<double, most_points> y, y_a, y_b_middle, y_exponent;
+};
+
+struct Root {
+  double at, weight;  // weight: 1/|g'|
+};
+
+[[gnu::always_inline]] inline double square(double x) { return x * x; }
+
+// mu > mu_c with g(eta, mu) = level, for b_normal = b + c A with an A near that of the answer.
+[[gnu::always_inline]] inline double rough_friction(const Row& r, double a, double b_normal, double level) {
+  const double second = b_normal * r.t1 - level * r.a1 * r.a1;
+  const double first = 2 * level * r.a0 * r.a1 - a * r.a1 - r.t0 * b_normal;
+  const double zeroth = r.a0 * (a - level * r.a0);
+  return (std::sqrt(std::max(0.0, first * first - 4 * second * zeroth)) - first) / (2 * second);
+}
+
+// The same to rounding, with A at `near`, a friction not far away, and one step of Newton's method.
+[[gnu::always_inline]] inline Root friction_at(const Row& r, double eta, double log_eta, double level, double near) {
+  const double more = 1 + eta, a = (1 - eta) * more, b = more * more;
+  const double c = r.kappa * more * std::sqrt(pi2 + log_eta * log_eta);
+  double mu = rough_friction(r, a, b + c * (r.a0 - r.a1 * near), level);
+  const auto slope = [&](double normal, double product, double bc) __attribute__((always_inline)) {
+    return r.a1 * (2 * level * normal - a - c * product) + (2 * r.t1 * mu - r.t0) * bc;  // of (g - level) A^2
+  };
+  double normal = r.a0 - r.a1 * mu, product = mu * (r.t1 * mu - r.t0), bc = b + c * normal;
+  mu -= ((a - level * normal) * normal + product * bc) / slope(normal, product, bc);
+  normal = r.a0 - r.a1 * mu;
+  product = mu * (r.t1 * mu - r.t0);
+  bc = b + c * normal;
+  return {mu, normal * normal / slope(normal, product, bc)};
+}
+
+// eta with g(eta, mu) = level up to the change of s, for mu < mu_c; ratio = mu B/A.
+[[gnu::always_inline]] inline double rough_restitution(const Row& r, double ratio, double normal, double level) {
+  const double e = r.kappa * ratio * normal * r.s_usual, half = 0.5 * (2 * ratio + e), first = 1 - ratio;
+  return (half + std::sqrt(std::max(0.0, half * half + first * (1 + ratio + e - level * normal)))) / first;
+}
+
+[[gnu::always_inline]] inline Root restitution_at(const Row& r, double mu, double level) {
+  const double normal = r.a0 - r.a1 * mu, ratio = mu * (r.t1 * mu - r.t0) / normal;
+  const double pull = r.kappa * ratio * normal;
+  double eta = std::max(0.0, rough_restitution(r, ratio, normal, level)), slope = 1;
+  for (int i = 0; i < 2; ++i) {  // the quadratic that s leaves when it is replaced by its tangent
+    const double far2 = eta * eta + r.rounding * r.rounding, log_far = 0.5 * vector_log(far2);
+    const double s = std::sqrt(pi2 + log_far * log_far), speed = pull * log_far * eta / (far2 * s);
+    const double p0 = 1 + ratio + pull * s - speed * eta, p1 = ratio - 1 + speed;
+    slope = std::sqrt(std::max(0.0, square(p0 + p1) - 4 * p1 * (p0 - level * normal)));
+    eta = std::max(0.0, -(p0 + p1 + slope) / (2 * p1));
+  }
+  return {eta, normal / slope};
+}
+
+[[gnu::always_inline]] inline double friction_exponent(const Row& r, double mu) {
+  return 0.5 * square((mu - r.friction) * r.friction_rate);
+}
+[[gnu::always_inline]] inline double restitution_exponent(const Row& r, double eta) {
+  return 0.5 * square((eta - r.restitution) * r.restitution_rate);
+}
+
+// Where, below mu_c, the curve comes out of eta = 0, on this side of the least loss (-1, +1); `least` if it does not.
+[[gnu::always_inline]] inline double reaching_zero(const Row& r, double level, double side) {
+  const double c = r.potential_zero, b = 1 + c * (r.a0 - r.a1 * r.least);
+  const double second = b * r.t1 - level * r.a1 * r.a1;
+  const double first = 2 * level * r.a0 * r.a1 - r.a1 - r.t0 * b, zeroth = r.a0 * (1 - level * r.a0);
+  double mu = (side * std::sqrt(std::max(0.0, first * first - 4 * second * zeroth)) - first) / (2 * second);
+  for (int i = 0; i < 3; ++i) {
+    const double normal = r.a0 - r.a1 * mu, product = mu * (r.t1 * mu - r.t0), bc = 1 + c * normal;
+    const double derivative = r.a1 * (2 * level * normal - 1 - c * product) + (2 * r.t1 * mu - r.t0) * bc;
+    const double step = ((1 - level * normal) * normal + product * bc) / derivative;
+    mu -= side * derivative > 0 ? step : 0;
+  }
+  return level > r.level_least ? mu : r.least;
+}
+
+// Integral of exp(-z_eta^2/2 - z_mu^2/2) / |grad g| along the curves g = level, lane by lane. Conditions are joined by
+// & because a branch would keep the compiler from vector instructions.
+METASTABLE_WIDE
+void along_curves(const Row& r, const double* levels, const Rules& rules, double* sums) {
+  using Lanes = std::array<double, lanes>;
+  alignas(64) Lanes level, low, from, to, limit, near, last, deepest, total;
+  alignas(64) std::array<Lanes, most_points> h;
+  const double lower = r.tail_points > 0 ? split : r.lower, at_sticking = friction_exponent(r, r.sticking);
+  for (std::size_t l = 0; l < lanes; ++l) {
+    level[l] = levels[l];
+    low[l] = std::sqrt(std::max(0.0, 1 - level[l] * r.normal_sticking));
+    limit[l] = 1e300;
+    total[l] = 0;
+  }
+
+  // Above mu_c and above split: a grid tells where the integrand matters.
+  for (std::size_t q = 0; q < r.points; ++q)
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double inside = friction_exponent(r, rough_friction(r, r.a[q], r.b_middle[q], level[l])) + r.exponent[q];
+      const double edge = restitution_exponent(r, low[l]) + at_sticking;
+      const double here = r.eta[q] >= low[l] ? inside : edge;
+      h[q][l] = here;
+      limit[l] = std::min(limit[l], here);
+    }
+  for (std::size_t l = 0; l < lanes; ++l) {
+    deepest[l] = limit[l];
+    limit[l] += depth;
+    from[l] = std::min(std::max(low[l], lower), r.upper);
+    to[l] = r.upper;
+    near[l] = last[l] = r.friction_middle;
+  }
+  for (std::size_t q = 1; q < r.points; ++q)
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double left = std::max(r.eta[q - 1], low[l]), right = std::max(r.eta[q], low[l]);
+      const double before = h[q - 1][l], after = h[q][l];
+      const double crossing = left + (right - left) * (limit[l] - before) / (after - before);
+      from[l] = (before > limit[l]) & (after <= limit[l]) ? crossing : from[l];
+      to[l] = (before <= limit[l]) & (after > limit[l]) ? crossing : to[l];
+    }
+  for (std::size_t k = 0; k < rules.main->at.size(); ++k) {
+    const double at = rules.main->at[k], weight = rules.main->weight[k];
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double width = to[l] - from[l], eta = from[l] + width * at;
+      const Root root = friction_at(r, eta, vector_log(std::max(eta, 1e-300)), level[l], near[l]);
+      near[l] = 2 * root.at - last[l];
+      last[l] = root.at;
+      const double exponent = restitution_exponent(r, eta) + friction_exponent(r, root.at);
+      const double value = weight * width * root.weight * vector_exp(-std::min(exponent, 700.0));
+      total[l] += (exponent < 700) & (value > 0) ? value : 0;  // not a number where no curve is
+    }
+  }
+
+  // Above mu_c and below split, over y = -ln eta: long contacts are rare, but they lose much.
+  if (r.tail_points > 0) {
+    double nearest = 1e300;
+    for (std::size_t q = 0; q < r.tail_points; ++q)
+      for (std::size_t l = 0; l < lanes; ++l)
+        h[q][l] = friction_exponent(r, rough_friction(r, r.y_a[q], r.y_b_middle[q], level[l])) + r.y_exponent[q];
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double end = low[l] > 0 ? -vector_log(std::max(low[l], 1e-300)) : longest;
+      from[l] = r.y[0];
+      to[l] = low[l] >= split ? r.y[0] : std::min(end, longest);
+      limit[l] = low[l] >= split ? 1e300 : h[0][l];
+    }
+    for (std::size_t q = 1; q < r.tail_points; ++q)
+      for (std::size_t l = 0; l < lanes; ++l) limit[l] = r.y[q] < to[l] ? std::min(limit[l], h[q][l]) : limit[l];
+    for (std::size_t l = 0; l < lanes; ++l) {
+      nearest = std::min(nearest, limit[l] - deepest[l]);
+      deepest[l] = std::min(deepest[l], limit[l]);
+      limit[l] = std::max(deepest[l] + depth, limit[l] + 1);
+    }
+    for (std::size_t q = 1; q < r.tail_points; ++q)
+      for (std::size_t l = 0; l < lanes; ++l) {
+        const double before = h[q - 1][l], after = h[q][l];
+        const double crossing = r.y[q - 1] + (r.y[q] - r.y[q - 1]) * (limit[l] - before) / (after - before);
+        const bool inside = r.y[q - 1] < to[l];
+        from[l] = inside & (before > limit[l]) & (after <= limit[l]) ? crossing : from[l];
+        to[l] = inside & (before <= limit[l]) & (after > limit[l]) ? std::min(to[l], crossing) : to[l];
+      }
+    if (nearest < depth + 2) {
+      const Nodes& rule = nearest > 5 ? *rules.tail_minor : *rules.tail;
+      for (std::size_t l = 0; l < lanes; ++l) near[l] = last[l] = r.friction_middle;
+      for (std::size_t k = 0; k < rule.at.size(); ++k) {
+        const double at = rule.at[k], weight = rule.weight[k];
+        for (std::size_t l = 0; l < lanes; ++l) {
+          const double width = to[l] - from[l], y = from[l] + width * at, eta = vector_exp(-std::min(y, longest));
+          const Root root = friction_at(r, eta, -y, level[l], near[l]);
+          near[l] = 2 * root.at - last[l];
+          last[l] = root.at;
+          const double exponent = y + restitution_exponent(r, eta) + friction_exponent(r, root.at);
+          const double value = weight * width * root.weight * vector_exp(-std::min(exponent, 700.0));
+          total[l] += (exponent < 700) & (value > 0) ? value : 0;
+        }
+      }
+    }
+  }
+
+  // Below mu_c: [0, mu1] and [mu2, mu_c].
+  for (std::size_t l = 0; l < lanes; ++l) limit[l] = deepest[l] + depth + 8;  // the exponent is not convex here
+  for (int part = 0; part < 2 && r.sticking > 0; ++part) {
+    constexpr std::size_t steps = 6;
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double zero = reaching_zero(r, level[l], part == 0 ? -1 : 1);
+      from[l] = part == 0 ? 0 : std::min(std::max(zero, r.least), r.sticking);
+      to[l] = part == 0 ? std::min(std::max(zero, 0.0), r.least) : r.sticking;
+      near[l] = 1e300;
+    }
+    for (std::size_t q = 0; q <= steps; ++q)
+      for (std::size_t l = 0; l < lanes; ++l) {
+        const double mu = from[l] + (to[l] - from[l]) * (static_cast<double>(q) / steps);
+        const double normal = r.a0 - r.a1 * mu, ratio = mu * (r.t1 * mu - r.t0) / normal;
+        h[q][l] = friction_exponent(r, mu) + restitution_exponent(r, rough_restitution(r, ratio, normal, level[l]));
+        near[l] = std::min(near[l], h[q][l]);
+      }
+    double nearest = 1e300;
+    for (std::size_t l = 0; l < lanes; ++l) {
+      nearest = std::min(nearest, near[l] - limit[l]);
+      near[l] = std::max(limit[l], near[l] + 1);
+      low[l] = from[l];
+      h[steps + 1][l] = to[l] - from[l];
+    }
+    if (nearest > 2) continue;
+    for (std::size_t q = 1; q <= steps; ++q)
+      for (std::size_t l = 0; l < lanes; ++l) {
+        const double before = h[q - 1][l], after = h[q][l], share = (near[l] - before) / (after - before);
+        const double crossing = low[l] + h[steps + 1][l] / steps * (static_cast<double>(q - 1) + share);
+        from[l] = (before > near[l]) & (after <= near[l]) ? crossing : from[l];
+        to[l] = (before <= near[l]) & (after > near[l]) ? crossing : to[l];
+      }
+    const Nodes& rule = part == 0 ? *rules.least : *rules.lower;
+    for (std::size_t k = 0; k < rule.at.size(); ++k) {
+      const double at = rule.at[k], weight = rule.weight[k];
+      for (std::size_t l = 0; l < lanes; ++l) {
+        const double width = to[l] - from[l], mu = from[l] + width * at;
+        const Root root = restitution_at(r, mu, level[l]);
+        const double exponent = friction_exponent(r, mu) + restitution_exponent(r, root.at);
+        const double value = weight * width * root.weight * vector_exp(-std::min(exponent, 700.0));
+        const bool counts = (exponent < 700) & (value > 0) & (root.at >= r.lower) & (root.at <= r.upper);
+        total[l] += counts ? value : 0;
+      }
+    }
+  }
+  for (std::size_t l = 0; l < lanes; ++l) sums[l] = total[l];
+}
+
+// The window of [lower, upper] outside of which exp(-h) is below e^-(depth + 6) of its largest value.
+template <class Exponent>
+std::pair<double, double> window(double lower, double upper, std::size_t steps, const Exponent& exponent) {
+  std::array<double, most_points> at, h;
+  double least = 1e300;
+  for (std::size_t q = 0; q <= steps; ++q) {
+    at[q] = lower + (upper - lower) * static_cast<double>(q) / static_cast<double>(steps);
+    least = std::min(least, h[q] = exponent(at[q]));
+  }
+  const double bound = least + depth + 6;
+  std::pair<double, double> found{lower, upper};
+  for (std::size_t q = 1; q <= steps; ++q) {
+    const double crossing = at[q - 1] + (at[q] - at[q - 1]) * (bound - h[q - 1]) / (h[q] - h[q - 1]);
+    if (h[q - 1] > bound && h[q] <= bound) found.first = crossing;
+    if (h[q - 1] <= bound && h[q] > bound) found.second = crossing;
+  }
+  return found;
+}
+
+template <unsigned N, class F>
+double integrate(std::pair<double, double> range, const F& f) {
+  const Nodes& rule = nodes<N>();
+  const double width = range.second - range.first;
+  double sum = 0;
+  for (std::size_t k = 0; k < rule.at.size(); ++k) sum += rule.weight[k] * f(range.first + width * rule.at[k]);
+  return width * sum;
+}
+
+// P(g > level): beyond the upper part of the curve, and below the lower one.
+double rest(const Row& r, const TruncatedNormal& restitution, const TruncatedNormal& friction, double level) {
+  const double open = 1 - level * r.normal_sticking, low = std::sqrt(std::max(0.0, open));
+  const double lower = r.tail_points > 0 ? split : r.lower;
+  double sum = 0;
+  if (open > 0) sum += restitution.cdf(std::min(low, r.upper)) * friction.complement(r.sticking);
+  double near = r.friction_middle;  // of the last one asked for
+  const auto friction_of = [&](double eta, double log_eta) {
+    near = friction_at(r, eta, log_eta, level, near).at;
+    return near;
+  };
+  const auto beyond = [&](double mu) { return mu > r.friction ? friction_exponent(r, mu) : 0; };
+  if (low < r.upper) {
+    const auto range = window(std::max(low, lower), r.upper, r.points - 1, [&](double eta) {
+      return restitution_exponent(r, eta) + beyond(friction_of(eta, std::log(eta)));
+    });
+    sum += integrate<32>(range, [&](double eta) {
+      return restitution.density(eta) * friction.complement(friction_of(eta, std::log(eta)));
+    });
+  }
+  if (low < lower && r.tail_points > 0) {
+    const double end = low > 0 ? std::min(longest, -std::log(low)) : longest;
+    const auto range = window(std::log(r.y[0]), std::log(end), r.tail_points - 1, [&](double log_y) {
+      const double y = std::exp(log_y), eta = std::exp(-y);
+      return y + restitution_exponent(r, eta) + beyond(friction_of(eta, -y));
+    });
+    sum += integrate<40>({std::exp(range.first), std::exp(range.second)}, [&](double y) {
+      const double eta = std::exp(-y);
+      return eta * restitution.density(eta) * friction.complement(friction_of(eta, -y));
+    });
+  }
+  if (r.sticking > 0 && friction.cdf(r.sticking) > 0) {
+    const double mu1 = std::min(reaching_zero(r, level, -1), r.least),
+                 mu2 = std::max(reaching_zero(r, level, 1), r.least);
+    for (const auto& [from, to] : {std::pair(0.0, mu1), std::pair(mu2, r.sticking)}) {
+      if (!(to > from)) continue;
+      const auto restitution_of = [&](double mu) { return restitution_at(r, mu, level).at; };
+      const auto range = window(from, to, 12, [&](double mu) {
+        const double eta = restitution_of(mu);
+        return friction_exponent(r, mu) + (eta < r.restitution ? restitution_exponent(r, eta) : 0);
+      });
+      sum +=
+          integrate<16>(range, [&](double mu) { return friction.density(mu) * restitution.cdf(restitution_of(mu)); });
+    }
+  }
+  return std::min(sum, 1.0);
+}
+
+double normalisation(const TruncatedNormal& n) {  // density over exp(-z^2/2)
+  const double at = std::clamp(n.mean(), n.lower(), n.upper()), z = (at - n.mean()) / n.sd();
+  return n.density(at) * std::exp(0.5 * z * z);
+}
+
+double stretched(double eta, double rounding) {  // s
+  const double log_eta = 0.5 * std::log(std::max(eta * eta + rounding * rounding, 1e-300));
+  return std::sqrt(pi2 + log_eta * log_eta);
+}
+
+}  // namespace
+
+bool PublishedDensity::covers(const WheelMap& map) {
+  const ContactNoise& noise = map.noise();
+  return map.law() == Law::published && !noise.is_empirical() && noise.correlation() == 0 &&
+         !noise.restitution().constant() && !noise.friction().constant();
+}
+
+PublishedDensity::PublishedDensity(const WheelMap& map, int phase)
+    : restitution_(map.noise().restitution()), friction_(map.noise().friction()) {
+  const ContactModel& model = map.contact_model();
+  const Collision c = map.collision(phase, 1);
+  const double x = c.contact_x, y = c.contact_y, r2 = c.landing_length * c.landing_length;
+  const double scale = 1 / (model.mass * r2);
+  a0_ = (r2 + x * x) * scale;
+  a1_ = t0_ = x * y * scale;
+  t1_ = (r2 + y * y) * scale;
+  const Stance& stance = map.stance(phase);
+  lowest_ = stance.barrier + stance.gain;
+  gain_ = stance.gain;
+  inertia_ = stance.inertia;
+  before_ = map.stance(phase > 0 ? phase - 1 : map.phases() - 1).inertia;
+  energy_ = c.chord * c.chord / 2;
+  kappa_ = model.mass * model.gravity * std::sin(c.slope) * c.chord / 2 *
+           std::sqrt(model.contact_mass / model.ramp_stiffness) / energy_;
+
+  const double sd = restitution_.sd();
+  const double lower = std::max(restitution_.lower(), restitution_.mean() - far_tail * sd);
+  const double upper = std::min(restitution_.upper(), restitution_.mean() + far_tail * sd);
+  const int steps = std::clamp(static_cast<int>(std::ceil((upper - lower) / sd)), 7, static_cast<int>(most_points) - 1);
+  lower_ = lower;
+  constexpr int tail_steps = 24;
+  for (int q = 0; q <= tail_steps && lower == 0; ++q) {
+    tail_.push_back(-std::log(split) * std::pow(-longest / std::log(split), static_cast<double>(q) / tail_steps));
+    tail_restitution_.push_back(std::exp(-tail_.back()));
+  }
+  const double first = lower > 0 ? lower : split;
+  for (int q = 0; q <= steps; ++q) {
+    grid_.push_back(q == steps ? upper : first + (upper - first) * q / steps);
+    duration_.push_back(stretched(grid_.back(), 0));
+  }
+
+  // The least rounding with which g falls with eta for every mu below mu_c, with room to spare; the slower, the more.
+  sticking_ = std::max(0.0, t0_ / t1_);
+  if (sticking_ == 0) return;
+  const auto falls = [&](double rounding, double kappa) {
+    constexpr int count = 16;
+    for (int i = 1; i < count; ++i)
+      for (int k = 0; k <= 2 * count; ++k) {
+        const double mu = sticking_ * i / count;
+        const double eta = k < count ? 4 * rounding * k / count : static_cast<double>(k - count) / count;
+        const double normal = a0_ - a1_ * mu, ratio = mu * (t1_ * mu - t0_) / normal;
+        const double s = stretched(eta, rounding), far2 = eta * eta + rounding * rounding;
+        const double speed = 0.5 * std::log(far2) * eta / (far2 * s);
+        if (2 * (1 + eta) * ratio - 2 * eta + kappa * normal * ratio * (s + 2 * (1 + eta) * speed) > 0) return false;
+      }
+    return true;
+  };
+  constexpr std::array roundings{0.005, 0.007, 0.01, 0.014, 0.02, 0.03, 0.04, 0.06, 0.1, 0.2, 0.5};
+  double state = map.state_interval(phase).first;
+  for (auto rounding = roundings.begin(); forms_.size() < most_forms; state /= 2) {
+    while (rounding != roundings.end() && !falls(*rounding, kappa_ / std::sqrt(state))) ++rounding;
+    if (rounding == roundings.end()) break;
+    forms_.push_back({state, *rounding});
+  }
+}
+
+double PublishedDensity::slowest() const {
+  return sticking_ == 0 ? 0 : forms_.empty() ? std::numeric_limits<double>::infinity() : forms_.back().slowest;
+}
+
+double PublishedDensity::operator()(double state, std::span<const double> next, std::span<double> density) const {
+  if (next.size() != density.size()) throw std::invalid_argument("density: spans of different sizes");
+  Row r{};
+  r.a0 = a0_;
+  r.a1 = a1_;
+  r.t0 = t0_;
+  r.t1 = t1_;
+  r.kappa = kappa_ / std::sqrt(state);
+  const auto form = std::find_if(forms_.begin(), forms_.end(), [&](const Form& f) { return state >= f.slowest; });
+  r.rounding = form == forms_.end() ? rounding() : form->rounding;
+  r.sticking = sticking_;
+  r.normal_sticking = a0_ - a1_ * r.sticking;
+  r.restitution = restitution_.mean();
+  r.restitution_rate = 1 / restitution_.sd();
+  r.friction = friction_.mean();
+  r.friction_rate = 1 / friction_.sd();
+  r.friction_middle = std::max(r.friction, r.sticking);
+  if (a1_ > 0) r.friction_middle = std::min(r.friction_middle, 0.5 * a0_ / a1_);
+  const double normal_middle = a0_ - a1_ * r.friction_middle;
+  r.s_usual = stretched(std::clamp(r.restitution, 0.1, 1.0), 0);
+  r.potential_zero = r.kappa * stretched(r.rounding, 0);
+  r.lower = lower_;
+  r.upper = grid_.back();
+  r.points = grid_.size();
+  for (std::size_t q = 0; q < grid_.size(); ++q) {
+    const double eta = r.eta[q] = grid_[q];
+    r.a[q] = 1 - eta * eta;
+    r.b_middle[q] = (1 + eta) * (1 + eta) + r.kappa * (1 + eta) * duration_[q] * normal_middle;
+    r.exponent[q] = restitution_exponent(r, eta);
+  }
+  r.tail_points = tail_.size();
+  for (std::size_t q = 0; q < tail_.size(); ++q) {
+    const double y = r.y[q] = tail_[q], eta = tail_restitution_[q], more = 1 + eta;
+    r.y_a[q] = 1 - eta * eta;
+    r.y_b_middle[q] = more * more + r.kappa * more * std::sqrt(pi2 + y * y) * normal_middle;
+    r.y_exponent[q] = y + restitution_exponent(r, eta);
+  }
+  double low = 0, high = r.sticking;
+  for (int i = 0; i < 40; ++i) {
+    const double mu = 0.5 * (low + high), normal = a0_ - a1_ * mu;
+    const double product = mu * (t1_ * mu - t0_), rise = (2 * t1_ * mu - t0_) * normal;
+    const double slope = a1_ * normal + rise + 2 * product * a1_ + r.potential_zero * normal * (rise + product * a1_);
+    (slope < 0 ? low : high) = mu;
+  }
+  r.least = low;
+  const double normal_least = a0_ - a1_ * r.least, product_least = r.least * (t1_ * r.least - t0_);
+  r.level_least = (1 + product_least * (1 / normal_least + r.potential_zero)) / normal_least;
+
+  // No loss is less: it falls with eta below mu_c, where the least one is.
+  double least_level = 0;
+  constexpr int steps = 16;
+  for (int k = 0; k < steps; ++k) {
+    const double mu = r.sticking * k / steps, normal = a0_ - a1_ * mu, ratio = mu * (t1_ * mu - t0_) / normal;
+    const double more = 1 + r.upper;
+    least_level =
+        std::min(least_level, more * ((1 - r.upper + more * ratio) / normal + r.kappa * duration_.back() * ratio));
+  }
+  least_level -= 0.01;  // what steps of mu may miss
+
+  const double energy = energy_ * state;
+  const auto level = [&](double landing) { return (before_ * state - inertia_ * (landing - gain_)) / (2 * energy); };
+  const double per_loss = 0.5 * inertia_ / energy * normalisation(restitution_) * normalisation(friction_);
+  // By how many sds the curve bends over one sd of eta: d^2 mu/d eta^2 is about 0.6 on it.
+  const double bend = 0.6 * restitution_.sd() * restitution_.sd() / friction_.sd();
+  // Where eta = 0 meets the least loss, below mu_c, |grad g| is small and the curve turns sharply.
+  const double corner = restitution_exponent(r, r.lower) + friction_exponent(r, r.least);
+  const bool minor = r.friction > r.sticking + 2 * friction_.sd();
+  const bool sharp = r.sticking > 0 && corner < 11;
+  const Rules rules{bend < 0.1 ? &nodes<24>() : &nodes<40>(), &nodes<24>(), sharp ? &nodes<24>() : &nodes<10>(),
+                    sharp   ? &nodes<60>()
+                    : minor ? &nodes<6>()
+                            : &nodes<16>(),
+                    sharp   ? &nodes<60>()
+                    : minor ? &nodes<10>()
+                            : &nodes<16>()};
+  for (std::size_t first = 0; first < next.size(); first += lanes) {
+    std::array<double, lanes> levels, sums;
+    const std::size_t count = std::min(lanes, next.size() - first);
+    for (std::size_t l = 0; l < lanes; ++l) levels[l] = level(next[first + std::min(l, count - 1)]);
+    if (*std::max_element(levels.begin(), levels.end()) < least_level) {
+      std::fill_n(density.begin() + static_cast<std::ptrdiff_t>(first), count, 0.0);
+      continue;
+    }
+    along_curves(r, levels.data(), rules, sums.data());
+    for (std::size_t l = 0; l < count; ++l) density[first + l] = next[first + l] < lowest_ ? 0 : per_loss * sums[l];
+  }
+  return rest(r, restitution_, friction_, level(lowest_));
+}
+
+}  // namespace metastable::dynamics

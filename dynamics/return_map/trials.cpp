@@ -1,0 +1,140 @@
+#include "dynamics/return_map/trials.h"
+
+#include <Random123/philox.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace metastable::dynamics {
+namespace {
+
+// Standard normal scores of one event of one trial: Philox4x64 at counter (index, event), key (seed).
+std::array<double, 2> scores(std::uint64_t seed, std::uint64_t index, std::uint64_t event) {
+  const r123::Philox4x64::ctr_type counter{{index, event, 0, 0}};
+  const r123::Philox4x64::key_type key{{seed, 0}};
+  const auto bits = r123::Philox4x64()(counter, key);
+  // (n + 1/2) / 2^52 with n < 2^52: 53 significant bits, strictly inside (0, 1).
+  const auto score = [](std::uint64_t word) {
+    return normal_quantile((static_cast<double>(word >> 12) + 0.5) * 0x1p-52);
+  };
+  return {score(bits[0]), score(bits[1])};
+}
+
+// One trial as it unfolds. Event 0 of a trial is the launch, event n its collision n.
+class Roll {
+ public:
+  Roll(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg, std::uint64_t seed,
+       std::uint64_t index)
+      : map_(map), first_(first_landing_leg), seed_(seed), index_(index) {
+    const double omega = launch.at_score(scores(seed, index, 0)[0]);
+    state_ = omega * omega;
+  }
+
+  int leg() const { return static_cast<int>((static_cast<std::uint64_t>(first_) + number_ - 1) % legs()); }
+  int phase() const { return leg() % map_.phases(); }
+  std::uint64_t number() const { return number_; }
+  double state() const { return state_; }
+  Contact contact() const {
+    const auto both = scores(seed_, index_, number_);
+    return map_.noise().draw(std::span(both).first(static_cast<std::size_t>(map_.noise_dimension())));
+  }
+  void go_on(double state) {
+    state_ = state;
+    ++number_;
+  }
+
+ private:
+  std::uint64_t legs() const { return static_cast<std::uint64_t>(map_.wheel().legs()); }
+
+  const WheelMap& map_;
+  int first_;
+  std::uint64_t seed_, index_;
+  std::uint64_t number_ = 1;
+  double state_ = 0;
+};
+
+TruncatedNormal forwards(const TruncatedNormal& launch) {
+  return launch.lower() >= 0 ? launch : TruncatedNormal(launch.mean(), launch.sd(), 0, launch.upper());
+}
+
+void check_leg(const WheelMap& map, int leg) {
+  if (leg < 0 || leg >= map.wheel().legs())
+    throw std::invalid_argument(fmt::format("first_landing_leg: {} is outside [0, {}]", leg, map.wheel().legs() - 1));
+}
+
+}  // namespace
+
+int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ramp_length) {
+  check_leg(map, first_landing_leg);
+  if (!(ramp_length >= 0))
+    throw std::invalid_argument(fmt::format("ramp_length: {} m is outside [0, inf]", ramp_length));
+  double revolution = 0;
+  for (int p = 0; p < map.phases(); ++p) revolution += map.advance(p);
+  const double whole = std::floor(ramp_length / revolution);
+  if (whole * map.phases() > std::numeric_limits<int>::max() / 2) return std::numeric_limits<int>::max();
+  int number = 1 + static_cast<int>(whole) * map.phases();
+  double position = whole * revolution;
+  for (int p = first_landing_leg % map.phases(); position + map.advance(p) <= ramp_length; p = (p + 1) % map.phases()) {
+    position += map.advance(p);
+    ++number;
+  }
+  return number;
+}
+
+Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
+                     std::uint64_t index) {
+  if (options.max_collisions < 1)
+    throw std::invalid_argument(fmt::format("max_collisions: {} is outside [1, inf)", options.max_collisions));
+  const int last = last_collision_on_ramp(map, options.first_landing_leg, options.ramp_length);
+  Roll roll(map, forwards(launch), options.first_landing_leg, options.seed, index);
+  Trial trial;
+  double time = 0, position = 0;
+  for (;;) {
+    const int phase = roll.phase();
+    const Stance& stance = map.stance(phase);
+    TrialCollision c;
+    c.number = static_cast<int>(roll.number());
+    c.leg = roll.leg();
+    c.time = time;
+    c.position = position;
+    c.omega_minus = std::sqrt(roll.state());
+    c.contact = roll.contact();
+    c.loss = map.loss(phase, c.omega_minus, c.contact);
+    const double after = map.after_collision(roll.state(), phase, c.contact);
+    c.omega_plus = std::sqrt(std::max(0.0, after));
+    trial.collisions.push_back(c);
+    if (options.rest_rule && !(after >= stance.barrier)) {
+      trial.outcome = Outcome::rest;
+      return trial;
+    }
+    if (c.number == last) {
+      trial.outcome = Outcome::end_of_ramp;
+      return trial;
+    }
+    if (c.number == options.max_collisions) {
+      trial.outcome = Outcome::max_collisions;
+      return trial;
+    }
+    const double next = std::max(0.0, after + stance.gain);
+    time += map.duration(next, phase);
+    position += map.advance(phase);
+    roll.go_on(next);
+  }
+}
+
+std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,
+                            std::uint64_t seed, std::uint64_t index, std::uint64_t limit) {
+  check_leg(map, first_landing_leg);
+  for (Roll roll(map, forwards(launch), first_landing_leg, seed, index);;) {
+    const Stance& stance = map.stance(roll.phase());
+    const double after = map.after_collision(roll.state(), roll.phase(), roll.contact());
+    if (!(after >= stance.barrier) || roll.number() >= limit) return roll.number();
+    roll.go_on(after + stance.gain);
+  }
+}
+
+}  // namespace metastable::dynamics

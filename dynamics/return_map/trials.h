@@ -1,0 +1,52 @@
+#pragma once
+// Whole trials by direct simulation: the independent check of the chain, and made-up experiments.
+
+#include <cstdint>
+#include <vector>
+
+#include "dynamics/return_map/wheel_map.h"
+#include "dynamics/wheel/outcome.h"
+#include "dynamics/wheel/truncated_normal.h"
+
+namespace metastable::dynamics {
+
+/// One collision of a trial.
+struct TrialCollision {
+  int number = 0;          ///< from 1
+  int leg = 0;             ///< that lands
+  double time = 0;         ///< [s] since collision 1
+  double position = 0;     ///< of the landing foot, down the ramp from the first [m]
+  double omega_minus = 0;  ///< [rad/s]
+  double omega_plus = 0;   ///< [rad/s]; 0 if the collision left no energy
+  Contact contact;         ///< drawn
+  Loss loss;               ///< [J]
+};
+
+struct Trial {
+  std::vector<TrialCollision> collisions;  ///< the last one is the one that led to rest, if outcome is rest
+  Outcome outcome = Outcome::max_collisions;
+};
+
+struct TrialOptions {
+  int first_landing_leg = 0;
+  int max_collisions = 16;    ///< >= 1
+  double ramp_length = 3.66;  ///< [m]; infinity: no end. Reached when the last collision on the ramp is survived:
+                              ///< the next foot would land beyond it (the 32nd with the paper's legs)
+  bool rest_rule = true;      ///< false: never rest, x' < 0 is set to 0 (the reading of Fig. 8)
+  std::uint64_t seed = 1;
+};
+
+/// Trial number `index` of a run: launch speed omega_0 ~ launch (truncated at 0) and (eta, mu) of each collision from
+/// Philox at counter (index, collision): the same bits whatever ran before and on however many threads.
+/// @throws std::invalid_argument for options out of range
+Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
+                     std::uint64_t index);
+
+/// Number of steps before failure of trial `index` without storing it, at most `limit` (returned when reached).
+std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,
+                            std::uint64_t seed, std::uint64_t index, std::uint64_t limit);
+
+/// Index of the last collision on a ramp of that length (foot 1 at 0 m): surviving it means the end is reached.
+int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ramp_length);
+
+}  // namespace metastable::dynamics

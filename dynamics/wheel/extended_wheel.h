@@ -1,0 +1,107 @@
+#pragma once
+// The wheel's step with physical extensions: what each effect of the catalogue does inside the return map.
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "dynamics/wheel/collision_density.h"
+#include "dynamics/wheel/wheel.h"
+
+namespace metastable::dynamics {
+
+/// Everything that may be added to the model; the defaults add nothing. One field or two an effect, physical units.
+struct Extension {
+  std::vector<double> leg_change;         ///< added to each leg's length [m]; empty: none
+  double hub_forward = 0, hub_aside = 0;  ///< centre of mass off the hub [m]: towards leg 0, and a right angle further
+  double inertia_ratio = 1;               ///< of the inertia about the foot
+  double slope_offset = 0;                ///< true minus stated slope [rad]
+  enum class Shape { parabola, sine, step };
+  Shape sag_shape = Shape::parabola;             ///< of the surface between sag_from and sag_to
+  double sag = 0;                                ///< depth in the middle of that stretch [m]
+  double sag_from = 0, sag_to = 1;               ///< [m] down the ramp from foot 1
+  std::array<double, 4> slope_change{};          ///< local slope as Legendre polynomials 1..4 over that stretch [rad]
+  double viscous = 0;                            ///< resisting torque by omega [N m s]
+  double rolling = 0;                            ///< constant resisting torque [N m]
+  double air = 0;                                ///< resisting torque by omega^2 [N m s^2]
+  double restitution_exponent = 0;               ///< p in eta (omega / 5 rad/s)^-p
+  double stribeck = 0;                           ///< a in mu (1 + a exp(-omega / stribeck_speed))
+  double stribeck_speed = 5;                     ///< [rad/s]
+  int leg = -1;                                  ///< the leg with another contact; -1: none
+  double leg_friction = 1, leg_restitution = 1;  ///< its ratios
+  double patch_from = 0, patch_to = 0;           ///< [m] down the ramp from foot 1
+  double patch_friction = 1;                     ///< ratio of mu in the patch
+  double drift = 0;                              ///< r in mu (1 + r share of the run gone by)
+  double trial_friction_sd = 0;                  ///< of what each trial adds to mu
+  double memory = 0;                             ///< correlation of successive collisions of a trial
+  double outlier_share = 0;                      ///< probability of a collision with outlier_friction
+  double outlier_friction = 1;                   ///< ratio of its mu
+  double noise_sd = 0;                           ///< of reported speeds, beyond the stated [rad/s]
+  double bias_before = 0, bias_after = 0;        ///< of reported omega-, omega+ [rad/s]
+  double rebound_lost = 0;                       ///< share
+  double ring_cosine = 0, ring_sine = 0;         ///< loss times 1 + cosine cos(2 pi f dt) + sine sin(2 pi f dt)
+  double ring_frequency = 10;                    ///< f [Hz]
+  double launch_shift = 0;                       ///< added to the mean launch speed [rad/s]
+  double launch_widening = 0;                    ///< added to its sd [rad/s]
+  std::optional<Law> law;                        ///< another contact law
+};
+
+/// What one collision's place in the experiment tells.
+struct StepContext {
+  int leg = 0;                                ///< that lands
+  double position = 0;                        ///< of its foot, down the ramp from foot 1 [m]
+  std::optional<double> since_previous = {};  ///< collision [s]
+  double run_share = 0;                       ///< of the run's trials that came before, 0..1
+  double friction_shift = 0;                  ///< of this trial, added to mu's mean
+};
+
+/// One wheel on one ramp, extended. The stance conserves energy but for the resisting torques, whose work is integrated
+/// along the motion slowed by the torque of its start (third order in the torque is neglected).
+class ExtendedWheel {
+ public:
+  /// @param slope  stated slope [rad]
+  /// @throws std::invalid_argument for `plastic`, and for sds, lengths or slopes out of range
+  ExtendedWheel(const Wheel& wheel, double slope, Law law, const ContactSpread& contact, const Extension& extension);
+
+  /// Density of omega+ and probability of less, for a collision at speed omega [rad/s].
+  SpeedDensity after_collision(const StepContext& context, double omega, double omega_plus) const;
+  /// omega+ of that collision with a drawn contact (before the extension's changes) [rad/s]; nothing: no energy left.
+  std::optional<double> omega_plus(const StepContext& context, double omega, const Contact& drawn, bool outlier) const;
+  /// Least omega+ that carries the hub over the foot [rad/s].
+  double barrier(const StepContext& context) const;
+  /// omega just before the next collision [rad/s], by energy; nothing: there is none left. Whether the hub comes over
+  /// the foot is barrier()'s to say.
+  std::optional<double> next(const StepContext& context, double omega_plus) const;
+  /// omega+ from which the wheel arrives at the next collision with omega_next [rad/s]; nothing: there is none.
+  std::optional<double> back(const StepContext& context, double omega_next) const;
+  /// Time of the stance [s], from its speeds.
+  double duration(const StepContext& context, double omega_plus) const;
+  /// Distance between the landing foot and the next [m].
+  double advance(int leg) const { return geometry_[index(leg + 1)].triangle.chord; }
+  int legs() const { return static_cast<int>(geometry_.size()); }
+
+ private:
+  struct Leg {
+    Triangle triangle;  // of the collision in which it lands
+    double length = 0, before = 0, inertia = 0;
+    double eccentric_phase = 0;
+  };
+  struct Path {  // of one stance
+    double start = 0, end = 0, pendulum = 0, gain = 0, inertia = 0;
+  };
+  std::size_t index(int leg) const { return static_cast<std::size_t>(leg) % geometry_.size(); }
+  double local_slope(double position) const;
+  Path path(const StepContext& context) const;
+  double work(const Path& path, double omega_plus_squared) const;
+  Collision collision(const StepContext& context, double omega) const;
+  CollisionChange change(const StepContext& context, double omega) const;
+
+  Extension extension_;
+  double slope_;
+  ContactModel model_;
+  CollisionDensity density_;
+  std::vector<Leg> geometry_;
+  bool drag_ = false, profile_ = false;
+};
+
+}  // namespace metastable::dynamics

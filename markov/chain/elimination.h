@@ -1,0 +1,50 @@
+#pragma once
+// Subtraction-free elimination (Grassmann, Taksar, Heyman 1985) on an absorbing chain in triplet form
+// (Alfa, Xue, Ye 2002): full relative accuracy of every entry of the answer, however rare rest is.
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "markov/chain/chain.h"
+
+namespace metastable::markov {
+
+/// Factorization I - Q = (I - U) D (I - L) with U, L >= 0 and D > 0, computed without a subtraction.
+///
+/// Only for chains in which every state can reach rest. Cost: O(n^3 / 3) multiply-adds for a full chain,
+/// O(n b^2) for bandwidth b (row envelopes are stored, not the whole square); memory is the envelope. States are
+/// eliminated from the last to the first, in the order given: number them so that transitions stay near the diagonal.
+/// The relative error of every entry of a solution is a small multiple of n times rounding, whatever the chain.
+class Elimination {
+ public:
+  /// @throws std::domain_error if some state cannot reach rest (names the state).
+  /// @throws ConvergenceError("elimination", ...) if a probability falls below the range of double precision.
+  /// @param threads  for full chains; 0: all cores. The bits do not depend on it.
+  explicit Elimination(const Chain& chain, int threads = 1);
+  ~Elimination();
+  Elimination(Elimination&&) noexcept;
+  Elimination& operator=(Elimination&&) noexcept;
+
+  std::size_t size() const;
+  /// Solves (I - Q) x = rhs. @param rhs size n, every entry >= 0 (otherwise std::invalid_argument). Cost: the envelope.
+  /// @throws ConvergenceError("elimination", ...) if the answer exceeds the range of double precision.
+  std::vector<double> solve(std::span<const double> rhs) const;
+  /// Solves y (I - Q) = rhs (row vector), entries >= 0; y[i] is the expected number of visits to state i of chains
+  /// started in rhs. Throws as solve() does.
+  std::vector<double> solve_left(std::span<const double> rhs) const;
+
+ private:
+  struct Solver {
+    virtual ~Solver() = default;
+    virtual std::size_t size() const = 0;
+    virtual std::vector<double> solve(std::span<const double> rhs) const = 0;
+    virtual std::vector<double> solve_left(std::span<const double> rhs) const = 0;
+  };
+  struct Factors;   // subtraction-free
+  struct Bordered;  // of interpolated chains
+  std::unique_ptr<Solver> solver_;
+};
+
+}  // namespace metastable::markov

@@ -1,0 +1,323 @@
+#include "markov/passage/quasi_stationary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+namespace metastable::markov {
+namespace {
+
+constexpr int kIterations = 10000;
+constexpr double kSmallEntry = 1e-12;  // of the largest: below it an entry's relative change is not watched
+constexpr double kAccuracy = 1e-13;    // wanted of an entry, relative
+constexpr double kRounding = 1e-11;    // a change that has stopped falling below this is rounding
+constexpr int kStagnant = 8;           // iterations without a smaller change
+constexpr double kRateAccuracy = 1e-14;
+constexpr double kStays = 1e-12;
+constexpr double kNobody = 1e-13;  // lambda_1 of interpolated rows from which nobody survives: rounding
+constexpr int kNobodyLeft = 100;   // iterations spent on its vectors
+
+double total(const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); }
+
+void divide(std::vector<double>& v, double by) {
+  for (double& entry : v) entry /= by;
+}
+
+/// Largest relative change of an entry above kSmallEntry of the largest.
+double relative_change(const std::vector<double>& before, const std::vector<double>& after) {
+  const double floor = kSmallEntry * *std::max_element(after.begin(), after.end());
+  double change = 0;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    if (after[i] > floor) change = std::max(change, std::abs(after[i] - before[i]) / after[i]);
+  }
+  return change;
+}
+
+/// Decides when a linearly converging iteration is done: the geometric tail of the changes is below kAccuracy, or they
+/// have stopped falling at the level of rounding.
+class StoppingRule {
+ public:
+  bool done(double change) {
+    const double ratio = std::clamp(change / previous_, 0.0, 0.9999);
+    previous_ = change;
+    stagnant_ = change < smallest_ ? 0 : stagnant_ + 1;
+    smallest_ = std::min(smallest_, change);
+    return change * ratio / (1 - ratio) <= kAccuracy || (change <= kRounding && stagnant_ >= kStagnant);
+  }
+
+ private:
+  double previous_ = std::numeric_limits<double>::infinity();
+  double smallest_ = std::numeric_limits<double>::infinity();
+  int stagnant_ = 0;
+};
+
+struct LeadingPair {
+  std::vector<double> left;   ///< sum 1
+  std::vector<double> right;  ///< max 1
+  double rate = 1;
+  int iterations = 0;
+  double residual = 0;
+};
+
+/// True when no state can be visited twice: lambda_1 = 0.
+bool never_returns(const Chain& chain) {
+  const std::size_t n = chain.size();
+  std::vector<std::size_t> sources(n, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (chain.stay(i) > kStays) return false;
+    for (const std::uint32_t j : chain.columns(i)) ++sources[j];
+  }
+  std::vector<std::uint32_t> queue;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (sources[i] == 0) queue.push_back(static_cast<std::uint32_t>(i));
+  }
+  for (std::size_t head = 0; head < queue.size(); ++head) {
+    for (const std::uint32_t j : chain.columns(queue[head])) {
+      if (--sources[j] == 0) queue.push_back(j);
+    }
+  }
+  return queue.size() == n;
+}
+
+/// The eigenvectors of a chain that never returns (eigenvalue 0): the last survivors of an even start, and the states
+/// survival from which lasts longest.
+LeadingPair last_survivors(const Chain& chain) {
+  const std::size_t n = chain.size();
+  LeadingPair pair;
+  pair.left.assign(n, 1.0 / static_cast<double>(n));
+  pair.right.assign(n, 1.0);
+  for (;; ++pair.iterations) {
+    std::vector<double> left(n, 0.0), right(n, 0.0);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto to = chain.columns(i);
+      for (std::size_t e = 0; e < to.size(); ++e) {
+        left[to[e]] += pair.left[i] * chain.values(i)[e];
+        right[i] += chain.values(i)[e] * pair.right[to[e]];
+      }
+    }
+    const double survivors = total(left);
+    if (survivors == 0) return pair;
+    divide(left, survivors);
+    divide(right, *std::max_element(right.begin(), right.end()));
+    pair.left = std::move(left);
+    pair.right = std::move(right);
+  }
+}
+
+/// Iterates with Q (I - Q)^{-1}, whose eigenvalues are lambda / (1 - lambda): lambda_2 fades at least as fast as under
+/// inverse iteration (rare rest) and as under plain iteration (frequent rest).
+LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
+  const std::size_t n = chain.size();
+  LeadingPair pair;
+  pair.left.assign(n, 1.0 / static_cast<double>(n));
+  pair.right.assign(n, 1.0);
+  StoppingRule left_rule, right_rule;
+  bool left_done = false, right_done = false;
+  while (pair.iterations < kIterations) {
+    ++pair.iterations;
+    std::vector<double> left = elimination.solve_left(pair.left);
+    const double rate = 1 / total(left);
+    left = apply_left(chain, left);
+    std::vector<double> right = markov::apply(chain, elimination.solve(pair.right));
+    divide(left, total(left));
+    divide(right, *std::max_element(right.begin(), right.end()));
+
+    const double left_change = relative_change(pair.left, left);
+    const double right_change = relative_change(pair.right, right);
+    const double rate_change = std::abs(rate - pair.rate) / rate;
+    pair.left = std::move(left);
+    pair.right = std::move(right);
+    pair.rate = rate;
+    pair.residual = std::max(left_change, right_change);
+    left_done = left_rule.done(left_change) || left_done;
+    right_done = right_rule.done(right_change) || right_done;
+    const bool settled = left_done && right_done && (rate_change <= kRateAccuracy || left_change <= kAccuracy);
+    if (settled || (pair.iterations >= kNobodyLeft && std::abs(1 - rate) <= kNobody)) return pair;
+  }
+  throw ConvergenceError("inverse iteration", pair.residual,
+                         "still changing after " + std::to_string(kIterations) + " iterations");
+}
+
+/// Fills the classes after class 0 of a left eigenvector, each to sum one; classes no survivor reaches stay 0.
+void propagate_distribution(const Chain& chain, const Period& period, std::vector<double>& y) {
+  for (std::size_t c = 0; c + 1 < period.classes.size(); ++c) {
+    double sum = 0;
+    for (const std::uint32_t i : period.classes[c]) {
+      const auto to = chain.columns(i);
+      for (std::size_t e = 0; e < to.size(); ++e) y[to[e]] += y[i] * chain.values(i)[e];
+    }
+    for (const std::uint32_t j : period.classes[c + 1]) sum += y[j];
+    if (sum == 0) return;
+    for (const std::uint32_t j : period.classes[c + 1]) y[j] /= sum;
+  }
+}
+
+/// Fills the classes after class 0 of a right eigenvector: lambda x_c = Q_c x_{c+1} with lambda per step.
+void propagate_weight(const Chain& chain, const Period& period, double lambda, std::vector<double>& x) {
+  for (std::size_t c = period.classes.size(); c-- > 1;) {
+    for (const std::uint32_t i : period.classes[c]) {
+      const auto to = chain.columns(i);
+      double sum = 0;
+      for (std::size_t e = 0; e < to.size(); ++e) sum += chain.values(i)[e] * x[to[e]];
+      x[i] = lambda > 0 ? sum / lambda : 0;
+    }
+  }
+  const double largest = *std::max_element(x.begin(), x.end());
+  divide(x, largest);
+}
+
+std::vector<std::uint32_t> marked_states(const std::vector<std::uint8_t>& marked) {
+  std::vector<std::uint32_t> states;
+  for (std::size_t i = 0; i < marked.size(); ++i) {
+    if (marked[i]) states.push_back(static_cast<std::uint32_t>(i));
+  }
+  return states;
+}
+
+/// States of the chain from which `target` can be reached.
+std::vector<std::uint8_t> leading_to(const Incoming& into, std::uint32_t target) {
+  std::vector<std::uint8_t> marked(into.start.size() - 1, 0);
+  std::vector<std::uint32_t> queue{target};
+  marked[target] = 1;
+  while (!queue.empty()) {
+    const std::uint32_t state = queue.back();
+    queue.pop_back();
+    for (std::size_t e = into.start[state]; e < into.start[state + 1]; ++e) {
+      if (marked[into.row[e]]) continue;
+      marked[into.row[e]] = 1;
+      queue.push_back(into.row[e]);
+    }
+  }
+  return marked;
+}
+
+/// The only closed class among the `reachable` states of a chain without rest.
+std::vector<std::uint32_t> closed_class(const Chain& chain, const std::vector<std::uint8_t>& reachable) {
+  const Incoming into = incoming(chain);
+  std::uint32_t candidate = marked_states(reachable).front();
+  for (;;) {
+    std::vector<double> start(chain.size(), 0.0);
+    start[candidate] = 1;
+    const std::vector<std::uint32_t> ahead = marked_states(reachable_from(chain, start));
+    const std::vector<std::uint8_t> returns = leading_to(into, candidate);
+    const auto lost = std::find_if(ahead.begin(), ahead.end(), [&](std::uint32_t state) { return !returns[state]; });
+    if (lost != ahead.end()) {
+      candidate = *lost;  // its own future does not contain the old candidate: this ends
+      continue;
+    }
+    for (std::size_t i = 0; i < reachable.size(); ++i) {
+      if (reachable[i] && !returns[i]) {
+        throw std::domain_error("stationary distribution: several closed classes can be reached (state " +
+                                std::to_string(i) + " never leads to state " + std::to_string(candidate) + ")");
+      }
+    }
+    return ahead;
+  }
+}
+
+}  // namespace
+
+QuasiStationary quasi_stationary(const ChainSolver& solver) {
+  const Chain& revolution = solver.revolution();
+  const Period& period = solver.period();
+  if (revolution.size() == 0) throw std::invalid_argument("quasi-stationary distribution: the chain has no states");
+  const LeadingPair pair =
+      never_returns(revolution) ? last_survivors(revolution) : iterate(revolution, solver.revolution_elimination());
+  QuasiStationary quasi;
+  quasi.iterations = pair.iterations;
+  quasi.residual = pair.residual;
+  quasi.revolution_failure_rate = std::min(1.0, pair.rate);
+  quasi.failure_rate = quasi.revolution_failure_rate;
+  if (period.period == 1) {
+    quasi.distribution = pair.left;
+    quasi.survival_weight = pair.right;
+    return quasi;
+  }
+  quasi.failure_rate = -std::expm1(std::log1p(-quasi.revolution_failure_rate) / period.period);
+  quasi.distribution.assign(solver.chain().size(), 0.0);
+  quasi.survival_weight.assign(solver.chain().size(), 0.0);
+  for (std::size_t i = 0; i < pair.left.size(); ++i) {
+    quasi.distribution[period.classes[0][i]] = pair.left[i];
+    quasi.survival_weight[period.classes[0][i]] = pair.right[i];
+  }
+  propagate_distribution(solver.chain(), period, quasi.distribution);
+  propagate_weight(solver.chain(), period, 1 - quasi.failure_rate, quasi.survival_weight);
+  return quasi;
+}
+
+std::vector<double> stationary(const Chain& chain, std::span<const double> start) {
+  const std::vector<std::uint8_t> reachable = reachable_from(chain, start);
+  for (std::size_t i = 0; i < reachable.size(); ++i) {
+    if (reachable[i] && chain.kill(i) > 0) {
+      throw std::domain_error("stationary distribution: rest can be reached (from state " + std::to_string(i) + ")");
+    }
+  }
+  if (std::find(reachable.begin(), reachable.end(), 1) == reachable.end()) {
+    throw std::invalid_argument("stationary distribution: the start has no mass");
+  }
+  const std::vector<std::uint32_t> states = closed_class(chain, reachable);
+  // Visits to the other states between two visits to the first one.
+  const std::span<const std::uint32_t> others(states.begin() + 1, states.end());
+  std::vector<double> departures(chain.size(), 0.0);
+  for (std::size_t e = 0; e < chain.columns(states[0]).size(); ++e) {
+    departures[chain.columns(states[0])[e]] = chain.values(states[0])[e];
+  }
+  std::vector<double> rhs;
+  for (const std::uint32_t state : others) rhs.push_back(departures[state]);
+  const std::vector<double> visits = Elimination(chain.restricted_to(others)).solve_left(rhs);
+  std::vector<double> distribution(chain.size(), 0.0);
+  distribution[states[0]] = 1;
+  for (std::size_t i = 0; i < others.size(); ++i) distribution[others[i]] = visits[i];
+  divide(distribution, total(distribution));
+  return distribution;
+}
+
+std::vector<double> stationary_with_restart(const ChainSolver& solver, std::span<const double> restart) {
+  std::vector<double> distribution = solver.solve_left(restart);
+  const double sum = total(distribution);
+  if (!(sum > 0)) throw std::invalid_argument("stationary distribution with restart: the restart has no mass");
+  divide(distribution, sum);
+  return distribution;
+}
+
+std::optional<int> total_variation_mixing(const ChainSolver& solver, const QuasiStationary& quasi,
+                                          std::span<const double> start, double distance, int limit) {
+  const Chain& chain = solver.chain();
+  const Period& period = solver.period();
+  if (start.size() != chain.size()) throw std::invalid_argument("mixing: one start entry per state expected");
+  if (!(distance > 0)) throw std::invalid_argument("mixing: the distance must be positive");
+  std::vector<double> survivors(start.begin(), start.end());
+  int within = 0;
+  for (int step = 0; step <= limit; ++step) {
+    const double mass = total(survivors);
+    if (!(mass > (chain.interpolated() ? kNobody : 0))) return std::nullopt;  // nobody is left to be mixed
+    divide(survivors, mass);
+    std::vector<double> class_mass(period.classes.size(), 0.0);
+    for (std::size_t i = 0; i < survivors.size(); ++i) {
+      class_mass[static_cast<std::size_t>(period.state_class[i])] += survivors[i];
+    }
+    double variation = 0;
+    for (std::size_t i = 0; i < survivors.size(); ++i) {
+      const double settled = class_mass[static_cast<std::size_t>(period.state_class[i])] * quasi.distribution[i];
+      variation += 0.5 * std::abs(survivors[i] - settled);
+    }
+    within = variation <= distance ? within + 1 : 0;
+    if (within > period.period) return step - period.period;
+    survivors = apply_left(chain, survivors);
+  }
+  return std::nullopt;
+}
+
+double spectral_mixing_steps(std::span<const double> moduli) {
+  for (const double modulus : moduli) {
+    if (!(modulus >= 0)) throw std::invalid_argument("spectral mixing time: a modulus is negative or undefined");
+  }
+  if (moduli.size() < 2 || moduli[1] == 0) return 0;
+  if (moduli[1] >= moduli[0]) return std::numeric_limits<double>::infinity();
+  return 1 / std::log(moduli[0] / moduli[1]);
+}
+
+}  // namespace metastable::markov

@@ -1,0 +1,34 @@
+#pragma once
+// The backward form of integrated rows, for any noise: collocation of the expected steps as a function of the start.
+
+#include <utility>
+#include <vector>
+
+#include "markov/rows/node_rows.h"
+
+namespace metastable::markov {
+
+/// Row i holds the expectations, over the landing from node i, of the polynomials that are 1 at one node and 0 at the
+/// others of its panel (AnyReturnMap::landing_points). Jumps and peaks of the landing's distribution do no harm: only
+/// the expected steps, as a function of the start, have to be smooth between the edges of `space`, and may be like
+/// square roots beside them. Entries have both signs (Chain::interpolated). Cost: size() rows of the map's points.
+/// @throws std::invalid_argument if the map tells no points (names the sampled method)
+IntegratedChain collocate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads = 1);
+
+/// Where one event from `state` at `phase` leads, as a launch.
+Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase);
+
+/// Ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings, found
+/// on cells; nothing if no state comes to rest with a probability that a double can hold.
+/// @throws std::invalid_argument as collocate()
+std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& map, const LaunchState& launch,
+                                                          int threads);
+
+/// Edges for NodeSpace: the states within `ranges` from which extreme landings just come to rest, and, `generations` -
+/// 1 times, those from which extreme landings meet such a state; no generation that takes a phase beyond `most` edges,
+/// but for the first. As many for every phase (wide panels are halved).
+std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
+                                                   const std::vector<std::pair<double, double>>& ranges,
+                                                   int generations);
+
+}  // namespace metastable::markov

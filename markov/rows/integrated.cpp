@@ -1,0 +1,108 @@
+#include "markov/rows/integrated.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "markov/chain/solver.h"
+#include "markov/passage/quasi_stationary.h"
+
+namespace metastable::markov {
+namespace {
+
+constexpr double most_above = 1e-13;    // survivors beyond the upper edge
+constexpr double most_launched = 1e-9;  // landings of the launch beyond it
+constexpr std::size_t most_pilot_panels = 64;
+constexpr double least_scaled = 1e-6;  // survivors of a row whose total is worth correcting
+
+NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
+  const int next = (phase + 1) % space.phases();
+  const auto weights = space.weights(next);
+  NodeRow row;
+  row.landing.resize(space.nodes());
+  const std::optional<double> rest = map.landing_density(state, phase, space.nodes(next), row.landing);
+  if (!rest)
+    throw std::invalid_argument(
+        "method integrated: the map does not tell its landing's density; use the sampled method");
+  row.rest = *rest;
+  double sum = 0;
+  for (std::size_t j = 0; j < row.landing.size(); ++j) sum += row.landing[j] *= weights[j];
+  if (!std::isfinite(sum))
+    throw ConvergenceError("integrated rows", sum,
+                           "a density of the landing from state " + std::to_string(state) + " is not finite");
+  const double survivors = 1 - row.rest;
+  row.error = std::abs(sum - survivors);
+  if (survivors > least_scaled && sum > 0.1 * survivors)
+    for (double& p : row.landing) p *= survivors / sum;
+  return row;
+}
+
+MakeNodeRow rows(const AnyReturnMap& map, const NodeSpace& space) {
+  return [&](double state, int phase) { return make_row(map, space, state, phase); };
+}
+
+}  // namespace
+
+IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads) {
+  return chain_of_rows(map, space, launch, rows(map, space), false, {}, threads);
+}
+
+Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
+  return launch_of_rows(rows(map, space), space, {[state](double) { return state; }, phase}, {}, 1);
+}
+
+std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads) {
+  double lower = 0, highest = 0;
+  for (int p = 0; p < map.phases(); ++p) {
+    const auto [least, most] = map.state_interval(p);
+    lower = p == 0 ? least : std::min(lower, least);
+    highest = std::max(highest, most);
+  }
+  // One upper edge for all phases: what the launch leaves high up at one phase comes by at the next.
+  const auto ranges = [&](double upper) {
+    std::vector<std::pair<double, double>> all;
+    for (int p = 0; p < map.phases(); ++p) all.emplace_back(map.state_interval(p).first, upper);
+    return all;
+  };
+  const double launched = launch.state(3), length = std::max({launched - lower, 0.1 * std::abs(launched), 1e-3});
+  double upper = std::min(highest, lower + 1.2 * length);
+  for (std::size_t panels = map.phases() > 1 ? 1 : 2;;) {
+    const NodeSpace space(ranges(upper), panels);
+    const IntegratedChain pilot = integrate(map, space, launch, threads);
+    const Reachability reachable = classify(pilot.chain.chain);
+    const bool rests =
+        std::find(reachable.must_rest.begin(), reachable.must_rest.end(), 0) == reachable.must_rest.end();
+    if ((!rests || pilot.row_error > 0.5) && panels < most_pilot_panels) {
+      panels *= 2;
+      continue;
+    }
+    if (!rests) return {};
+    const std::vector<double> quasi = quasi_stationary(ChainSolver(pilot.chain.chain)).distribution;
+    // The lowest node that has at most the shares wanted at it and above it, at every phase.
+    std::size_t first = 0;
+    for (int p = 0; p < space.phases(); ++p) {
+      const std::size_t base = static_cast<std::size_t>(p) * space.nodes();
+      double above = 0, after = 0;
+      std::size_t k = space.nodes();
+      while (k > 0 && above + quasi[base + k - 1] <= most_above &&
+             after + pilot.chain.launch.after[base + k - 1] <= most_launched) {
+        --k;
+        above += quasi[base + k];
+        after += pilot.chain.launch.after[base + k];
+      }
+      first = std::max(first, k);
+    }
+    if (first == space.nodes() && upper < highest) {
+      upper = std::min(highest, lower + 1.5 * (upper - lower));
+      if (!std::isfinite(upper)) throw std::invalid_argument("method integrated: states grow without limit");
+      continue;
+    }
+    if (first < space.nodes())
+      upper =
+          std::max(space.node(first), space.node(first + static_cast<std::size_t>(space.phases() - 1) * space.nodes()));
+    return ranges(upper);
+  }
+}
+
+}  // namespace metastable::markov

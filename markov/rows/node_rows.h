@@ -1,0 +1,47 @@
+#pragma once
+// A chain on nodes from its rows, however they are made.
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "markov/rows/discretization.h"
+#include "markov/rows/node_space.h"
+#include "markov/rows/return_map.h"
+
+namespace metastable::markov {
+
+/// Where one state leads.
+struct NodeRow {
+  std::vector<double> landing;  ///< on the nodes of the next phase
+  double rest = 0;
+  double error = 0;  ///< of the sum of both, before it was removed
+};
+/// Called from several threads at once.
+using MakeNodeRow = std::function<NodeRow(double state, int phase)>;
+
+/// A chain of exact rows, and how well the nodes resolve them.
+struct IntegratedChain {
+  SampledChain chain;    ///< `chain.launch` by quadrature over the launch state
+  double row_error = 0;  ///< largest |sum of a row - probability of surviving| before it was removed
+};
+
+/// @param interpolated  entries may have any sign (Chain::interpolated)
+/// @param kinks  states of the launch at which rows have kinks
+IntegratedChain chain_of_rows(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch,
+                              const MakeNodeRow& make_row, bool interpolated, std::span<const double> kinks,
+                              int threads);
+
+struct LaunchPoint {
+  double score, weight;
+};
+/// The launch's score by the trapezoidal rule: exact to rounding for densities wider than a third of the launch's
+/// spread; by panels where rows, as functions of the state, have kinks at some of `states`.
+std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<const double> states);
+
+/// Where the launch leads, by launch_points().
+Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,
+                      std::span<const double> kinks, int threads);
+
+}  // namespace metastable::markov

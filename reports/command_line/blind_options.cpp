@@ -1,0 +1,54 @@
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "reports/command_line/command.h"
+#include "reports/commands/blind_command.h"
+
+namespace metastable::reports {
+
+std::vector<Command> blind_commands() {
+  return {{"blind", "The diagnosis tested on cases whose truth is sealed until it has answered: make, answer, open",
+           [](Options& o) {
+             o.add_place("ACTION", "make: draw cases and seal their truths; answer: diagnose the folders; open: grade");
+             o.add_place("DIR", "Folder of the run");
+             o.add("sealed", "DIR", "", "Folder of the truths (default: DIR-sealed, beside the run)");
+             o.add("seed", "SEED", "", "make: of all cases (default: from the system's entropy)");
+             o.add("per-effect", "N", "6", "make: cases of each effect at each of 1x, 2x, 4x");
+             o.add("none", "N", "300", "make: cases without a gap");
+             o.add("pairs", "N", "50", "make: cases with two effects");
+             o.add("outside", "N", "50", "make: cases with an effect that no catalogue holds");
+             o.add("left-out", "N", "3", "make: cases of each effect with a catalogue that lacks it");
+             o.add("tool", "PROGRAM", "",
+                   "answer: run 'PROGRAM diagnose CASE --json FILE ...' (default: this program)");
+             o.add_threads();
+             o.add("out", "DIR", "", "open: folder of tables and page (default: report in the run's folder)");
+           },
+           [](const Options& o, const std::string& line) {
+             BlindRequest request;
+             request.folder = o.text("DIR");
+             while (request.folder.size() > 1 && request.folder.ends_with('/')) request.folder.pop_back();
+             request.sealed = o.text("sealed");
+             if (o.given("seed")) request.seed = o.seed();
+             request.size.per_effect_and_strength = o.count("per-effect", 0, 1000);
+             request.size.none = o.count("none", 0, 5000);
+             request.size.pairs = o.count("pairs", 0, 5000);
+             request.size.outside = o.count("outside", 0, 5000);
+             request.size.left_out_per_effect = o.count("left-out", 0, 1000);
+             request.tool = o.text("tool");
+             request.threads = o.threads();
+             request.out = o.text("out");
+             request.command = line;
+             const std::string action = o.text("ACTION");
+             if (action == "make")
+               run_blind_make(request);
+             else if (action == "answer")
+               run_blind_answer(request);
+             else if (action == "open")
+               run_blind_open(request);
+             else
+               throw std::invalid_argument(fmt::format("ACTION: '{}' is none of 'make', 'answer', 'open'", action));
+           }}};
+}
+
+}  // namespace metastable::reports

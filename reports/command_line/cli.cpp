@@ -1,0 +1,243 @@
+#include "reports/command_line/cli.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <deque>
+#include <optional>
+#include <ranges>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "analysis/experiment/input_error.h"
+#include "markov/chain/chain.h"
+#include "reports/command_line/command.h"
+#include "reports/command_line/option_values.h"
+#include "reports/command_line/setting_options.h"
+#include "reports/commands/compare_command.h"
+#include "reports/commands/report_command.h"
+#include "reports/commands/request.h"
+#include "reports/commands/steps_command.h"
+#include "reports/commands/sweep_command.h"
+#include "reports/commands/verify_command.h"
+#include "reports/output/interrupt.h"
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+namespace {
+
+Command steps() {
+  return {"steps", "Expected steps before failure of one setting, with their interval",
+          [](Options& o) {
+            o.add("slope", "DEG", "7.02", "Ramp slope [deg], above 0 and below half the angle between legs");
+            o.add("initial-speed", "MEAN,SD", "",
+                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
+            add_wheel(o), add_contact(o), add_course(o), add_study(o);
+            o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
+            o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
+            add_standard_errors(o);
+            o.add("json", "FILE|-", "", "Write the results as JSON");
+          },
+          [](const Options& o, const std::string& line) {
+            StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
+            request.sensitivities = o.flag("sensitivities");
+            request.standard_errors = standard_errors(o, request.setting);
+            run_steps(request);
+          }};
+}
+
+Command compare() {
+  return {"compare", "Expected steps of two or more slopes on common random numbers",
+          [](Options& o) {
+            o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]; later ones are compared with the first");
+            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
+            add_wheel(o), add_contact(o), add_course(o), add_study(o);
+            o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
+            add_standard_errors(o);
+            o.add("json", "FILE|-", "", "Write the results as JSON");
+          },
+          [](const Options& o, const std::string& line) {
+            CompareRequest request{several_settings(o, 2), study_options(o), o.count("collisions", 1, 63),
+                                   o.text("json"), line};
+            request.standard_errors = standard_errors(o, request.settings.front());
+            run_compare(request);
+          }};
+}
+
+Command sweep() {
+  return {
+      "sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
+      [](Options& o) {
+        o.add("slope", "RANGE", "7.02", "[deg] first:last:step, a comma list or one value; likewise the other axes");
+        o.add("restitution-mean", "RANGE", "", "Mean of eta");
+        o.add("restitution-sd", "RANGE", "", "Sd of eta");
+        o.add("friction-mean", "RANGE", "", "Mean of mu");
+        o.add("friction-sd", "RANGE", "", "Sd of mu");
+        o.add("initial-speed", "MEAN,SD", "", "Of all points (default: the paper's if the one slope is 7.02 or 9.59)");
+        add_wheel(o), add_contact(o), add_course(o), add_study(o);
+        o.add("out", "FILE", "sweep.csv",
+              "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
+      },
+      [](const Options& o, const std::string& line) {
+        SweepRequest request;
+        request.setting = common_setting(o);
+        for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
+          if (o.text(name).empty()) continue;
+          analysis::Axis axis{analysis::parameter_from_name(name), range_value(name, o.text(name))};
+          if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
+            request.setting.slope_deg = axis.values.front();
+          else
+            request.axes.push_back(std::move(axis));
+        }
+        if (request.axes.empty())
+          throw std::invalid_argument(
+              "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
+              "--friction-mean or --friction-sd as first:last:step)");
+        for (const analysis::Axis& axis : request.axes)
+          if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
+            throw std::invalid_argument(
+                fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
+        const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
+        std::optional<std::string> launch;
+        if (o.given("initial-speed")) launch = o.text("initial-speed");
+        if (!launch && !one_slope) throw std::invalid_argument("--initial-speed: must be given when the slope varies");
+        request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
+        request.study = study_options(o);
+        request.out = o.text("out");
+        request.command = line;
+        run_sweep(request);
+      }};
+}
+
+Command report() {
+  return {"report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
+          [](Options& o) {
+            o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]");
+            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
+            add_wheel(o), add_contact(o), add_course(o), add_study(o);
+            o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
+            o.add("out", "DIR", "report", "Folder for the files");
+          },
+          [](const Options& o, const std::string& line) {
+            run_report(
+                {several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000), o.text("out"), line});
+          }};
+}
+
+Command verify() {
+  return {"verify", "How accurate the program is: known values, doubling of nodes, three solvers side by side",
+          [](Options& o) {
+            o.add("seeds", "N", "0",
+                  "Sampled studies a benchmark, to count how often their interval is right; 0: none");
+            o.add("nodes", "N", "512", "Nodes a landing leg at which doubling stops, 128..4096");
+            o.add_threads();
+            o.add("out", "DIR", "", "Folder for the tables (CSV, Markdown, LaTeX)");
+            o.add("export", "DIR", "", "Folder for the default wheel's chain (PRISM .tra, .lab, .srew; MatrixMarket)");
+          },
+          [](const Options& o, const std::string& line) {
+            run_verify({o.count("seeds", 0, 1000), o.whole("nodes", 128, 4096), o.threads(), o.text("out"),
+                        o.text("export"), line});
+          }};
+}
+
+std::vector<Command> commands() {
+  std::vector<Command> all{steps(), compare(), sweep()};
+  for (const std::vector<Command>& more :
+       {experiment_commands(), std::vector<Command>{report(), verify()}, blind_commands()})
+    all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+// For provenance: without the options that leave the results as they are, so that equal results are equal bytes.
+std::string command_line(int argc, const char* const* argv) {
+  std::string line = "metastable";
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const auto is = [&](const std::string& name) { return word == name || word.starts_with(name + "="); };
+    if (is("--out") || is("--json") || is("--threads")) {
+      if (word.find('=') == std::string::npos) ++i;
+      continue;
+    }
+    const bool plain = !word.empty() && word.find_first_of(" \t\n'\"\\$&|;<>()*?#~`!") == std::string::npos;
+    line += ' ';
+    if (plain) {
+      line += word;
+      continue;
+    }
+    line += '\'';
+    for (const char c : word) line += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    line += '\'';
+  }
+  return line;
+}
+
+int parse_and_run(int argc, const char* const* argv) {
+  CLI::App app("Metastability of walking machines: the rimless wheel on a ramp", "metastable");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "metastable " + version());
+  app.footer("Exit codes: 0 done, 2 wrong option or file, 3 a solver failed, 130 interrupted.");
+  const std::vector<Command> all = commands();
+  std::deque<Options> options;
+  std::vector<CLI::App*> subcommands;
+  std::deque<std::string> config_files;
+  for (const Command& command : all) {
+    CLI::App* sub = app.add_subcommand(command.name, command.summary);
+    options.emplace_back(*sub);
+    command.declare(options.back());
+    sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")
+        ->type_name("FILE");
+    subcommands.push_back(sub);
+  }
+  if (argc < 2 || (argv[1][0] != '-' &&
+                   std::none_of(all.begin(), all.end(), [&](const Command& c) { return c.name == argv[1]; }))) {
+    const std::string names = fmt::format("{}", fmt::join(all | std::views::transform(&Command::name), ", "));
+    throw std::invalid_argument(argc < 2 ? fmt::format("a subcommand is needed: {}", names)
+                                         : fmt::format("'{}' is none of the subcommands {}", argv[1], names));
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    for (const CLI::App* sub : subcommands)  // before what may be missing because of it
+      for (const std::string& word : sub->remaining())
+        if (word.starts_with("-"))
+          throw std::invalid_argument(fmt::format("{}: is no option of '{}'", word, sub->get_name()));
+    throw std::invalid_argument(error.what());
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!subcommands[i]->parsed()) continue;
+    if (!config_files[i].empty()) options[i].read(config_files[i]);
+    all[i].run(options[i], command_line(argc, argv));
+  }
+  return 0;
+}
+
+}  // namespace
+
+int run(int argc, const char* const* argv) {
+  const auto fail = [](const std::string& what, int code) {
+    fmt::print(stderr, "metastable: {}\n", what);
+    return code;
+  };
+  try {
+    catch_interrupts();
+    return parse_and_run(argc, argv);
+  } catch (const Interrupted& interrupted) {
+    return fail(interrupted.what(), interrupted.exit_code());
+  } catch (const analysis::InputError& error) {  // all that is wrong with an input, a line each
+    for (const std::string& line : error.lines()) fail(line, 2);
+    return 2;
+  } catch (const std::invalid_argument& error) {
+    return fail(error.what(), 2);
+  } catch (const markov::ConvergenceError& error) {
+    return fail(error.what(), 3);
+  } catch (const std::exception& error) {
+    return fail(error.what(), 1);
+  }
+}
+
+}  // namespace metastable::reports

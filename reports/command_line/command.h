@@ -1,0 +1,23 @@
+#pragma once
+// One command of the command line: its options, and its request from them.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "reports/command_line/options.h"
+
+namespace metastable::reports {
+
+struct Command {
+  std::string name, summary;
+  std::function<void(Options&)> declare;
+  std::function<void(const Options&, const std::string& command_line)> run;
+};
+
+/// blind
+std::vector<Command> blind_commands();
+/// simulate, collisions, describe, diagnose, effects, study and others: the commands about experiments.
+std::vector<Command> experiment_commands();
+
+}  // namespace metastable::reports

@@ -1,0 +1,331 @@
+#include <fmt/format.h>
+
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "analysis/experiment/stand_in.h"
+#include "dynamics/wheel/contact_law.h"
+#include "reports/command_line/command.h"
+#include "reports/command_line/option_values.h"
+#include "reports/command_line/setting_options.h"
+#include "reports/commands/coast_down_command.h"
+#include "reports/commands/collisions_command.h"
+#include "reports/commands/describe_command.h"
+#include "reports/commands/diagnose_command.h"
+#include "reports/commands/effects_command.h"
+#include "reports/commands/lessons_command.h"
+#include "reports/commands/simulate_command.h"
+#include "reports/commands/study_command.h"
+
+namespace metastable::reports {
+namespace {
+
+// Its conditions come with slope, launch and number of trials; the rest can be chosen.
+analysis::Setting stand_in_base(const Options& o) {
+  for (const char* name : {"slope", "initial-speed", "trials", "collisions"})
+    if (o.given(name)) throw std::invalid_argument(fmt::format("--{}: is fixed by --stand-in", name));
+  analysis::Setting setting = common_setting(o);
+  const analysis::Setting chosen = analysis::stand_in_setting();
+  if (!o.given("restitution")) setting.restitution = chosen.restitution;
+  if (!o.given("friction")) setting.friction = chosen.friction;
+  return setting;
+}
+
+void add_reality(Options& o) {
+  o.add_flag("reality", "In the virtual laboratory: motion in continuous time, sharing no formula with the model");
+  o.add("effect", "ID:NAME=VALUE,...", "",
+        "With --reality, repeatable: an effect the model lacks, e.g. leg_contact:leg=3,friction_ratio=1.4");
+  o.add("outside", "ID:SIZE", "",
+        "With --reality, repeatable: an effect outside the catalogue (sloshing_fluid, planks, frame_resonance, "
+        "stored_energy, speed_spread, double_plate)");
+  o.add("skewness", "G", "0", "With --reality: skewness of restitution, (-2, 2)");
+  o.add("sensor-noise", "SD", "0", "With --reality: white noise of every reported speed [rad/s]");
+  o.add("smoothing", "S", "0", "With --reality: reported speeds are means over this time, 0..0.1 [s]");
+  o.add("drop", "NAME,...", "",
+        "With --reality: columns and statements left out (leg, time_s, position_m, omega_plus_rad_s, outcome, "
+        "initial_speed_rad_s, noise)");
+  o.add_flag("no-flight", "With --reality: feet that should lift stay on the ramp");
+  o.add_flag("shuffle", "With --reality: conditions take turns at random");
+}
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, separator);) parts.push_back(part);
+  return parts;
+}
+
+void simulate_reality(const Options& o, const SimulateRequest& plain) {
+  RealityRequest request;
+  request.conditions = plain.stand_in ? analysis::stand_in_conditions(plain.setting)
+                                      : std::vector<analysis::RealityCondition>{
+                                            {fmt::format("{}", plain.setting.slope_deg), plain.setting, plain.trials}};
+  analysis::RealityOptions& reality = request.reality;
+  const analysis::Setting& s = plain.setting;
+  const dynamics::NominalValues stated = analysis::stated_values(s.restitution, s.friction, s.wheel.leg_length);
+  for (const std::string& text : o.all("effect")) reality.effects.push_back(dynamics::effect_from_text(text, stated));
+  for (const std::string& text : o.all("outside")) {
+    const std::vector<std::string> parts = split(text, ':');
+    if (parts.size() != 2) throw std::invalid_argument(fmt::format("--outside: '{}' is not of the form ID:SIZE", text));
+    reality.outside.push_back({parts[0], number_value("outside", parts[1])});
+  }
+  reality.restitution_skewness = o.number("skewness");
+  reality.sensor_noise = o.number("sensor-noise");
+  reality.smoothing = o.number("smoothing");
+  reality.flight = !o.flag("no-flight");
+  reality.shuffled = o.flag("shuffle");
+  reality.collisions = plain.collisions;
+  reality.seed = plain.seed;
+  reality.threads = plain.threads;
+  if (o.given("drop")) request.dropped = split(o.text("drop"), ',');
+  request.camera = plain.camera;
+  request.out = plain.out;
+  request.command = plain.command;
+  run_reality(request);
+}
+
+Command simulate() {
+  return {"simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)",
+          [](Options& o) {
+            o.add("slope", "DEG", "7.02", "Ramp slope [deg]");
+            o.add("initial-speed", "MEAN,SD", "",
+                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
+            add_wheel(o), add_contact(o), add_course(o);
+            o.add_flag(
+                "stand-in",
+                "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
+                "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
+            o.add("trials", "N", "50", "Trials");
+            o.add("collisions", "N", "16", "Most collisions of a trial");
+            o.add("angle-rate", "HZ", "",
+                  "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
+            o.add("angle-noise", "RAD", "", "White noise of the angle (default 0.0002; needs --angle-rate)");
+            add_reality(o);
+            o.add_seed();
+            o.add_threads();
+            o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+          },
+          [](const Options& o, const std::string& line) {
+            if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
+            const bool stand_in = o.flag("stand-in");
+            SimulateRequest request{stand_in ? stand_in_base(o) : one_setting(o),
+                                    o.count("trials", 1, 1000000),
+                                    o.count("collisions", 1, 100000),
+                                    o.seed(),
+                                    o.threads(),
+                                    o.text("out"),
+                                    line};
+            if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
+              throw std::invalid_argument("--angle-noise: needs --angle-rate");
+            request.stand_in = stand_in;
+            const bool reality = o.flag("reality");
+            for (const char* name :
+                 {"effect", "outside", "skewness", "sensor-noise", "smoothing", "drop", "no-flight", "shuffle"})
+              if (o.given(name) && !reality) throw std::invalid_argument(fmt::format("--{}: needs --reality", name));
+            if (o.given("angle-rate") || (stand_in && !reality)) {
+              analysis::CameraOptions& camera = request.camera.emplace();
+              if (o.given("angle-rate")) camera.rate = o.number("angle-rate");
+              if (stand_in) camera.decimals = 5;  // a twentieth of the noise; keeps the folder small
+              if (o.given("angle-noise")) camera.noise_sd = o.number("angle-noise");
+              camera.seed = request.seed;
+              camera.threads = request.threads;
+              camera.validate();
+            }
+            if (reality)
+              simulate_reality(o, request);
+            else
+              run_simulate(request);
+          }};
+}
+
+Command coast_down() {
+  return {
+      "coast-down", "Logs of a drum's revolution counter to an experiment folder (system = \"coast_down\")",
+      [](Options& o) {
+        o.add_places("LOG",
+                     "Files without header: time [us], drum speed [km/h], drum revolutions, wheel speed, wheel "
+                     "revolutions; each becomes a condition");
+        o.add("stop", "RAD/S", "5", "Speed at which a run ends");
+        o.add("block", "N", "50", "Revolutions of a block, which serves as a trial");
+        o.add("blocks", "all|odd|even", "all", "Which blocks: one half to fit a nominal loss, the other to check it");
+        o.add("nominal", "DIR", "", "Take the nominal loss of this experiment folder (default: fitted to the logs)");
+        o.add_flag("linear", "Fit a loss proportional to omega even where it is within five standard errors of none");
+        o.add("rotor-inertia", "KGM2", "", "Of the drum [kg m^2]: turns losses into torques");
+        o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+      },
+      [](const Options& o, const std::string& line) {
+        CoastDownRequest request;
+        request.logs = o.all("LOG");
+        request.options.stop = o.number("stop");
+        request.options.block = o.count("block", 10, 100000);
+        request.options.validate();
+        request.blocks = o.text("blocks");
+        if (request.blocks != "all" && request.blocks != "odd" && request.blocks != "even")
+          throw std::invalid_argument(fmt::format("--blocks: '{}' is none of 'all', 'odd', 'even'", request.blocks));
+        request.nominal = o.text("nominal");
+        request.linear = o.flag("linear");
+        if (request.linear && !request.nominal.empty())
+          throw std::invalid_argument("--linear: nothing is fitted with --nominal");
+        if (o.given("rotor-inertia")) {
+          request.rotor_inertia = o.number("rotor-inertia");
+          if (!(*request.rotor_inertia > 0))
+            throw std::invalid_argument(fmt::format("--rotor-inertia: {} is outside (0, inf)", *request.rotor_inertia));
+        }
+        request.out = o.text("out");
+        if (request.out.empty()) throw std::invalid_argument("--out: a folder must be given");
+        request.command = line;
+        run_coast_down(request);
+      }};
+}
+
+Command collisions() {
+  return {
+      "collisions", "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
+      [](Options& o) {
+        o.add_place("DIR", "Experiment folder with experiment.toml and angle.csv");
+        o.add("window", "N", "", "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples)");
+        o.add("collisions", "N", "16", "Most collisions of a trial");
+        o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides");
+        o.add("omega-minus", "fit|peak", "fit",
+              "Stance motion extrapolated to the collision, or the smoothed speed's peak");
+        o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision");
+        o.add_threads();
+        o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
+      },
+      [](const Options& o, const std::string&) {
+        CollisionsRequest request;
+        request.folder = o.text("DIR");
+        if (o.given("window")) request.finder.window = o.count("window", 5, 10001);
+        request.finder.collisions = o.count("collisions", 1, 100000);
+        request.finder.rise = o.number("rise");
+        request.finder.fit_span = o.number("fit-span");
+        request.finder.validate();
+        const std::string speed = o.text("omega-minus");
+        if (speed != "fit" && speed != "peak")
+          throw std::invalid_argument(fmt::format("--omega-minus: '{}' is neither 'fit' nor 'peak'", speed));
+        request.peak = speed == "peak";
+        request.threads = o.threads();
+        request.out = o.text("out");
+        run_collisions(request);
+      }};
+}
+
+Command describe() {
+  return {"describe", "What the trials of an experiment folder show: speeds, tests, survival, restitution and friction",
+          [](Options& o) {
+            o.add_place("DIR", "Experiment folder");
+            o.add("transition", "auto|collision|step", "auto",
+                  "Restitution and friction from omega_minus to omega_plus, or to the next omega_minus");
+            o.add("against", "LAW,LAW,...", "", "Compare with simulated trials under published, coulomb, plastic");
+            o.add("trials", "N", "2000", "Simulated trials of that comparison, 2..1000000");
+            o.add_seed();
+            o.add_threads();
+            o.add("out", "DIR", "", "Folder for tables, figures and index.html (default: tables on the terminal)");
+          },
+          [](const Options& o, const std::string& line) {
+            DescribeRequest request;
+            request.folder = o.text("DIR");
+            request.out = o.text("out");
+            const std::string transition = o.text("transition");
+            if (transition == "collision" || transition == "step")
+              request.options.transition =
+                  transition == "step" ? analysis::Transition::step : analysis::Transition::collision;
+            else if (transition != "auto")
+              throw std::invalid_argument(
+                  fmt::format("--transition: '{}' is none of 'auto', 'collision' and 'step'", transition));
+            std::istringstream laws(o.text("against"));
+            for (std::string law; std::getline(laws, law, ',');)
+              request.against.push_back(dynamics::law_from_name(law));
+            request.trials = o.count("trials", 2, 1000000);
+            request.options.seed = o.seed();
+            request.options.threads = o.threads();
+            request.command = line;
+            run_describe(request);
+          }};
+}
+
+Command study() {
+  return {"study", "The paper's study: its simulated figures, its claims one by one and its hypotheses, under each law",
+          [](Options& o) {
+            o.add("data", "DIR", "", "Experiment folder of its three experiments (default: a simulated stand-in)");
+            o.add("trials", "N", "1000", "Trials of each simulated profile, 20..1000000");
+            o.add("samples", "N", "8192", "Samples behind the variance shares, 32..1048576");
+            o.add_seed();
+            o.add_threads();
+            o.add("out", "DIR", "study", "Folder for tables, figures and index.html");
+          },
+          [](const Options& o, const std::string& line) {
+            StudyRequest request;
+            request.data = o.text("data");
+            request.out = o.text("out");
+            request.options.trials = o.count("trials", 20, 1000000);
+            request.options.samples = o.whole("samples", 32, 1048576);
+            request.options.seed = o.seed();
+            request.options.threads = o.threads();
+            request.command = line;
+            run_study(request);
+          }};
+}
+
+Command diagnose() {
+  return {
+      "diagnose", "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
+      [](Options& o) {
+        o.add_place("DIR", "Experiment folder");
+        o.add(
+            "catalogue", "FILE|ID,ID,...", "",
+            "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects'); a pair, "
+            "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");
+        o.add_seed();
+        o.add_threads();
+        o.add("json", "FILE|-", "", "Write the results as JSON");
+        o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
+      },
+      [](const Options& o, const std::string& line) {
+        DiagnoseRequest request;
+        request.folder = o.text("DIR");
+        if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
+        request.options.seed = o.seed();
+        request.options.threads = o.threads();
+        request.json = o.text("json");
+        request.out = o.text("out");
+        request.command = line;
+        run_diagnose(request);
+      }};
+}
+
+Command lessons() {
+  return {"lessons",
+          "Worked examples of the diagnosis: the published law on a coulomb wheel, the paper's hypotheses, data",
+          [](Options& o) {
+            o.add("data", "DIR", "", "Repeatable: an experiment folder, diagnosed under published and coulomb");
+            o.add_seed();
+            o.add_threads();
+            o.add("out", "DIR", "lessons", "Folder for tables, figures and index.html");
+          },
+          [](const Options& o, const std::string& line) {
+            LessonsRequest request;
+            request.data = o.all("data");
+            request.out = o.text("out");
+            request.options.seed = o.seed();
+            request.options.threads = o.threads();
+            request.command = line;
+            run_lessons(request);
+          }};
+}
+
+Command effects() {
+  return {"effects", "The catalogue of effects a model may lack: parameters, units, ranges, meaning",
+          [](Options& o) { o.add("json", "FILE|-", "", "Write the catalogue as JSON"); },
+          [](const Options& o, const std::string&) { run_effects({o.text("json")}); }};
+}
+
+}  // namespace
+
+std::vector<Command> experiment_commands() {
+  return {simulate(), coast_down(), collisions(), describe(), study(), diagnose(), lessons(), effects()};
+}
+
+}  // namespace metastable::reports

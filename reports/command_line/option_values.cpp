@@ -1,0 +1,176 @@
+#include "reports/command_line/option_values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+#include <stdexcept>
+
+#include "analysis/sensitivity/sweep.h"
+#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/wheel/wheel.h"
+#include "reports/output/input_file.h"
+
+namespace metastable::reports {
+namespace {
+
+[[noreturn]] void refuse(std::string_view name, std::string_view text, std::string_view wanted) {
+  throw std::invalid_argument(fmt::format("--{}: '{}' is not {}", name, text, wanted));
+}
+
+// The whole text as a finite number.
+bool parse(std::string_view text, double& value) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+}
+
+std::vector<std::string_view> split(std::string_view text, char mark) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t at = text.find(mark);
+    parts.push_back(text.substr(0, at));
+    if (at == std::string_view::npos) return parts;
+    text.remove_prefix(at + 1);
+  }
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
+  return text;
+}
+
+}  // namespace
+
+double number_value(std::string_view name, std::string_view text) {
+  double value = 0;
+  if (!parse(trimmed(text), value)) refuse(name, text, "a number");
+  return value;
+}
+
+std::uint64_t whole_value(std::string_view name, std::string_view text, std::uint64_t least, std::uint64_t most) {
+  std::uint64_t value = 0;
+  const std::string_view digits = trimmed(text);
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error != std::errc() || end != digits.data() + digits.size() || value < least || value > most)
+    refuse(name, text, fmt::format("a whole number in {}..{}", least, most));
+  return value;
+}
+
+std::vector<double> list_value(std::string_view name, std::string_view text) {
+  std::vector<double> values;
+  for (const std::string_view part : split(text, ',')) {
+    double value = 0;
+    if (!parse(trimmed(part), value)) refuse(name, text, "a comma list of numbers");
+    values.push_back(value);
+  }
+  return values;
+}
+
+analysis::Spread spread_value(std::string_view name, std::string_view text) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  analysis::Spread spread;
+  if (parts.size() > 2 || !parse(trimmed(parts[0]), spread.mean) ||
+      (parts.size() == 2 && !parse(trimmed(parts[1]), spread.sd)))
+    refuse(name, text, "'mean,sd' (or one number for a constant)");
+  if (spread.sd < 0) throw std::invalid_argument(fmt::format("--{}: sd {} is below 0", name, spread.sd));
+  return spread;
+}
+
+std::vector<double> range_value(std::string_view name, std::string_view text) {
+  constexpr std::string_view wanted = "'first:last:step', a comma list in rising order, or one number";
+  const std::vector<std::string_view> parts = split(text, ':');
+  if (parts.size() == 3) {
+    double first = 0, last = 0, step = 0;
+    if (!parse(trimmed(parts[0]), first) || !parse(trimmed(parts[1]), last) || !parse(trimmed(parts[2]), step))
+      refuse(name, text, wanted);
+    try {
+      return analysis::axis_values(first, last, step);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("--{}: {}", name, error.what()));
+    }
+  }
+  if (parts.size() != 1) refuse(name, text, wanted);
+  const std::vector<double> values = list_value(name, text);
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (!(values[i - 1] < values[i])) refuse(name, text, wanted);
+  return values;
+}
+
+std::vector<double> legs_value(std::string_view name, std::string_view text, int count) {
+  if (trimmed(text) == "paper") return dynamics::paper_leg_lengths();
+  std::vector<double> lengths;
+  for (const std::string_view part : split(text, ',')) {
+    double length = 0;
+    if (!parse(trimmed(part), length)) refuse(name, text, "'paper', one length or a comma list of lengths in m");
+    lengths.push_back(length);
+  }
+  if (lengths.size() == 1) lengths.assign(static_cast<std::size_t>(count), lengths.front());
+  if (lengths.size() < 3)
+    throw std::invalid_argument(fmt::format("--{}: {} legs are fewer than 3", name, lengths.size()));
+  return lengths;
+}
+
+std::vector<dynamics::Contact> contact_list(const std::string& file) {
+  std::istringstream in(read_file(file));
+  std::vector<dynamics::Contact> pairs;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    const std::string_view text = trimmed(line);
+    if (number == 1) {
+      if (text != "restitution,friction")
+        throw std::invalid_argument(fmt::format("{}:1: expected the header 'restitution,friction'", file));
+      continue;
+    }
+    if (text.empty()) continue;
+    const std::vector<std::string_view> parts = split(text, ',');
+    if (parts.size() != 2)
+      throw std::invalid_argument(fmt::format("{}:{}: {} columns where 2 are expected", file, number, parts.size()));
+    dynamics::Contact pair;
+    if (!parse(trimmed(parts[0]), pair.restitution) || pair.restitution < 0 || pair.restitution > 1)
+      throw std::invalid_argument(
+          fmt::format("{}:{}: column restitution: '{}' is not a number in [0, 1]", file, number, parts[0]));
+    if (!parse(trimmed(parts[1]), pair.friction) || pair.friction < 0)
+      throw std::invalid_argument(
+          fmt::format("{}:{}: column friction: '{}' is not a number >= 0", file, number, parts[1]));
+    pairs.push_back(pair);
+  }
+  if (pairs.empty()) throw std::invalid_argument(fmt::format("{}: holds no pair", file));
+  return pairs;
+}
+
+std::vector<std::string> catalogue_value(std::string_view name, const std::string& text) {
+  std::vector<std::string> ids;
+  const auto take = [&ids](std::string_view word, const std::string& where) {
+    const std::string id(trimmed(word));
+    try {
+      for (const std::string_view one : split(id, '+')) dynamics::effect_info(one);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: {}", where, error.what()));
+    }
+    if (std::ranges::count(id, '+') > 1)
+      throw std::invalid_argument(fmt::format("{}: \"{}\" has more than two effects", where, id));
+    if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
+  };
+  std::error_code too_long;  // a list of names need not be a possible path
+  if (std::filesystem::is_regular_file(text, too_long)) {
+    std::istringstream in(read_file(text));
+    std::string line;
+    for (int number = 1; std::getline(in, line); ++number) {
+      const std::string_view word = trimmed(std::string_view(line).substr(0, line.find('#')));
+      if (!word.empty()) take(word, fmt::format("{}:{}", text, number));
+    }
+    if (ids.empty()) throw std::invalid_argument(fmt::format("{}: holds no effect", text));
+    return ids;
+  }
+  if (text.find_first_of("./") != std::string::npos)  // no effect is called so
+    throw std::invalid_argument(fmt::format("--{}: {}: no such file, nor a list of effects", name, text));
+  for (const std::string_view word : split(text, ',')) take(word, fmt::format("--{}", name));
+  return ids;
+}
+
+}  // namespace metastable::reports

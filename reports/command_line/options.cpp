@@ -1,0 +1,84 @@
+#include "reports/command_line/options.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <stdexcept>
+
+#include "reports/command_line/config_file.h"
+#include "reports/command_line/option_values.h"
+
+namespace metastable::reports {
+
+void Options::add(const std::string& name, const std::string& value, const std::string& fallback,
+                  const std::string& help) {
+  std::vector<std::string>& texts = texts_[name];
+  CLI::Option* option = command_.add_option("--" + name, texts, help);
+  option->expected(1)->allow_extra_args(false)->type_name(value)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  if (!fallback.empty()) {
+    option->default_str(fallback);
+    fallback_[name] = fallback;
+  }
+}
+
+void Options::add_flag(const std::string& name, const std::string& help) {
+  std::vector<std::string>& texts = texts_[name];
+  command_.add_flag_callback(
+      "--" + name, [&texts] { texts = {"true"}; }, help);
+  fallback_[name] = "false";
+}
+
+void Options::add_place(const std::string& name, const std::string& help) {
+  command_.add_option(name, texts_[name], help)->required()->expected(1)->allow_extra_args(false)->type_name("");
+}
+
+void Options::add_places(const std::string& name, const std::string& help) {
+  command_.add_option(name, texts_[name], help)->required()->expected(1, -1)->type_name("");
+}
+
+void Options::read(const std::string& file) {
+  for (const ConfigEntry& entry : read_config(file)) {
+    if (entry.key == "config" || !texts_.contains(entry.key))
+      throw std::invalid_argument(fmt::format("{}:{}: unknown key '{}' (keys are the long options of 'metastable {}')",
+                                              file, entry.line, entry.key, command_.get_name()));
+    std::vector<std::string>& texts = texts_[entry.key];
+    if (texts.empty()) texts = entry.values;
+  }
+}
+
+std::string Options::text(const std::string& name) const {
+  const std::vector<std::string>& texts = texts_.at(name);
+  if (texts.size() > 1) throw std::invalid_argument(fmt::format("--{}: given {} times", name, texts.size()));
+  if (!texts.empty()) return texts.front();
+  const auto fallback = fallback_.find(name);
+  return fallback == fallback_.end() ? "" : fallback->second;
+}
+
+bool Options::flag(const std::string& name) const {
+  const std::string value = text(name);
+  if (value != "true" && value != "false")
+    throw std::invalid_argument(fmt::format("--{}: '{}' is neither true nor false", name, value));
+  return value == "true";
+}
+
+double Options::number(const std::string& name) const { return number_value(name, text(name)); }
+
+void Options::add_seed() { add("seed", "SEED", "1", "Seed of the random numbers"); }
+
+void Options::add_threads() { add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it"); }
+
+std::uint64_t Options::whole(const std::string& name, std::uint64_t least, std::uint64_t most) const {
+  return whole_value(name, text(name), least, most);
+}
+
+int Options::count(const std::string& name, int least, int most) const {
+  return static_cast<int>(whole(name, static_cast<std::uint64_t>(least), static_cast<std::uint64_t>(most)));
+}
+
+std::uint64_t Options::seed() const { return whole("seed", 0, UINT64_MAX); }
+
+int Options::threads() const { return count("threads", 0, 1024); }
+
+analysis::Spread Options::spread(const std::string& name) const { return spread_value(name, text(name)); }
+
+}  // namespace metastable::reports

@@ -1,0 +1,55 @@
+#pragma once
+// The options of one command, as texts; CLI11 stays in the .cpp.
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "analysis/study/setting.h"
+
+namespace CLI {
+class App;
+}
+
+namespace metastable::reports {
+
+/// Given on the command line, in a --config file, or left at their default. What a text means is checked when it is
+/// read; messages name the option (std::invalid_argument).
+class Options {
+ public:
+  explicit Options(CLI::App& command) : command_(command) {}
+
+  void add(const std::string& name, const std::string& value, const std::string& fallback, const std::string& help);
+  /// An option without a value; `true` or `false` in a file.
+  void add_flag(const std::string& name, const std::string& help);
+  /// The options of what draws random numbers (default 1) and of what runs in parallel (default 0: all cores).
+  void add_seed();
+  void add_threads();
+  /// What the command is about, given by its place on the command line; required.
+  void add_place(const std::string& name, const std::string& help);
+  /// One or more of those.
+  void add_places(const std::string& name, const std::string& help);
+  /// Keys of the file that the command line did not give.
+  void read(const std::string& file);
+
+  bool given(const std::string& name) const { return !texts_.at(name).empty(); }
+  const std::vector<std::string>& all(const std::string& name) const { return texts_.at(name); }
+  /// The one value of an option: given once, or its default ("" if it has none).
+  std::string text(const std::string& name) const;
+  bool flag(const std::string& name) const;
+  double number(const std::string& name) const;
+  std::uint64_t whole(const std::string& name, std::uint64_t least, std::uint64_t most) const;
+  /// A whole number that is an int; 0 <= least, most <= INT_MAX.
+  int count(const std::string& name, int least, int most) const;
+  std::uint64_t seed() const;
+  int threads() const;
+  analysis::Spread spread(const std::string& name) const;
+
+ private:
+  CLI::App& command_;
+  std::map<std::string, std::vector<std::string>> texts_;
+  std::map<std::string, std::string> fallback_;
+};
+
+}  // namespace metastable::reports

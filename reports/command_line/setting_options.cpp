@@ -1,0 +1,212 @@
+#include "reports/command_line/setting_options.h"
+
+#include <fmt/format.h>
+
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include "dynamics/wheel/contact_law.h"
+#include "reports/command_line/option_values.h"
+
+namespace metastable::reports {
+namespace {
+
+dynamics::Wheel wheel(const Options& options) {
+  dynamics::Wheel wheel;
+  wheel.leg_length = legs_value("legs", options.text("legs"), options.count("leg-count", 3, 1000));
+  wheel.hub_mass = options.number("mass");
+  if (options.given("inertia")) wheel.inertia = options.number("inertia");
+  if (options.given("radius-of-gyration")) wheel.radius_of_gyration = options.number("radius-of-gyration");
+  wheel.ramp_stiffness = options.number("ramp-stiffness");
+  if (options.given("contact-mass")) wheel.contact_mass = options.number("contact-mass");
+  wheel.gravity = options.number("gravity");
+  wheel.validate();
+  return wheel;
+}
+
+// Before the launch is asked for: a slope that no launch can save is named as such.
+void check_slope(const analysis::Setting& setting) {
+  const double steepest = dynamics::steepest_slope(setting.wheel.legs()) * 180 / std::numbers::pi;
+  if (!(setting.slope_deg > 0 && setting.slope_deg < steepest))
+    throw std::invalid_argument(fmt::format(
+        "slope: {:.6g} deg is outside (0, {:.6g}) deg (half the angle between legs)", setting.slope_deg, steepest));
+}
+
+// Checks what can be checked before any work: ranges live with the quantities they belong to.
+analysis::Setting checked(analysis::Setting setting) {
+  setting.problem();
+  return setting;
+}
+
+}  // namespace
+
+void add_wheel(Options& options) {
+  options.add("legs", "paper|L|L1,L2,...", "paper",
+              "Leg lengths [m]: the paper's, one for all, or a list in landing order");
+  options.add("leg-count", "N", "8", "Number of legs when --legs is one length (3 or more)");
+  options.add("mass", "KG", "1.39", "Hub mass M [kg]");
+  options.add("inertia", "KGM2", "",
+              "About the stance foot [kg m^2] (default: M (mean L)^2; under coulomb and plastic plus M r_g^2)");
+  options.add("radius-of-gyration", "M", "", "About the hub [m] (default: 0.05 under coulomb, 0 under plastic)");
+  options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m]");
+  options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (default: the hub mass)");
+  options.add("gravity", "M/S2", "9.81", "g [m/s^2]");
+}
+
+void add_contact(Options& options) {
+  options.add("law", "published|coulomb|plastic", "published", "Contact law");
+  options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops, 0..1 (coulomb)");
+  options.add("restitution", "MEAN,SD", "0.4,0.1", "eta, normal truncated to [0, 1]; SD 0 or MEAN alone: constant");
+  options.add("friction", "MEAN,SD", "0.4,0.1", "mu, normal truncated to [0, inf)");
+  options.add("correlation", "RHO", "0", "Of the normal scores of eta and mu, (-1, 1)");
+  options.add("contact-list", "FILE", "", "CSV 'restitution,friction': draw pairs from a list instead");
+}
+
+void add_course(Options& options) {
+  options.add("ramp-length", "M", "3.66", "Ramp length [m]");
+  options.add("first-leg", "I", "0", "Leg that lands at collision 1");
+}
+
+void add_study(Options& options) {
+  options.add("method", "sampled|integrated", "sampled",
+              "How rows are made: by sampling eta and mu per cell, or by quadrature over them (independent eta, mu)");
+  options.add("cells", "N", "", "Cells per landing leg, 8..4096 (default: refined until the tolerance is met)");
+  options.add("samples", "S", "", "Draws per cell and replicate (default: raised until the tolerance is met)");
+  options.add("tolerance", "REL", "0.01", "Half-width of the 95 % interval of the expected steps, relative");
+  options.add("sequence", "sobol|random", "sobol", "Where the draws come from");
+  options.add("draws", "weighted|plain", "weighted", "Weighted draws cover the tails; plain ones see what is frequent");
+  options.add("tail", "P", "1e-30", "Tail probability the weighted draws reach");
+  options.add("replicates", "R", "8", "Independent randomisations behind the interval, 2..64");
+  options.add("mixing-distance", "D", "0.05", "Total variation distance that counts as mixed");
+  options.add("eigenvalues", "K", "6", "How many eigenvalue moduli to report");
+  options.add_seed();
+  options.add_threads();
+}
+
+// All but slope and launch speed.
+analysis::Setting common_setting(const Options& options) {
+  analysis::Setting setting;
+  setting.wheel = wheel(options);
+  setting.law = dynamics::law_from_name(options.text("law"));
+  setting.rebound_lost = options.number("rebound-lost");
+  if (options.given("rebound-lost") && setting.law != dynamics::Law::coulomb)
+    throw std::invalid_argument("--rebound-lost: has a meaning under --law coulomb only");
+  setting.restitution = options.spread("restitution");
+  setting.friction = options.spread("friction");
+  setting.correlation = options.number("correlation");
+  if (options.given("contact-list")) {
+    if (options.given("restitution") || options.given("friction") || options.given("correlation"))
+      throw std::invalid_argument("--contact-list: excludes --restitution, --friction and --correlation");
+    setting.pairs = contact_list(options.text("contact-list"));
+  }
+  setting.ramp_length = options.number("ramp-length");
+  setting.first_landing_leg = options.count("first-leg", 0, setting.wheel.legs() - 1);
+  return setting;
+}
+
+analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text) {
+  if (text) return spread_value("initial-speed", *text);
+  const std::optional<analysis::Spread> paper = analysis::paper_launch(slope_deg);
+  if (!paper)
+    throw std::invalid_argument(fmt::format(
+        "--initial-speed: must be given at {} deg (the paper's launches are known at 7.02 and 9.59 deg only)",
+        slope_deg));
+  return *paper;
+}
+
+analysis::Setting one_setting(const Options& options) {
+  analysis::Setting setting = common_setting(options);
+  setting.slope_deg = options.number("slope");
+  check_slope(setting);
+  std::optional<std::string> launch;
+  if (options.given("initial-speed")) launch = options.text("initial-speed");
+  setting.initial_speed = launch_for(setting.slope_deg, launch);
+  return checked(std::move(setting));
+}
+
+std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least) {
+  const std::vector<double> slopes = list_value("slopes", options.text("slopes"));
+  if (slopes.size() < least)
+    throw std::invalid_argument(fmt::format("--slopes: {} given where at least {} are needed", slopes.size(), least));
+  const std::vector<std::string>& launches = options.all("initial-speed");
+  if (!launches.empty() && launches.size() != slopes.size())
+    throw std::invalid_argument(fmt::format("--initial-speed: {} values for {} slopes (give it once a slope, in order)",
+                                            launches.size(), slopes.size()));
+  std::vector<analysis::Setting> settings;
+  for (std::size_t i = 0; i < slopes.size(); ++i) {
+    analysis::Setting setting = common_setting(options);
+    setting.slope_deg = slopes[i];
+    check_slope(setting);
+    setting.initial_speed = launch_for(slopes[i], launches.empty() ? std::nullopt : std::optional(launches[i]));
+    settings.push_back(checked(std::move(setting)));
+  }
+  return settings;
+}
+
+analysis::StudyOptions study_options(const Options& options) {
+  analysis::StudyOptions study;
+  if (options.text("method") != "sampled" && options.text("method") != "integrated")
+    throw std::invalid_argument(
+        fmt::format("--method: '{}' is neither 'sampled' nor 'integrated'", options.text("method")));
+  study.method = analysis::method_from_name(options.text("method"));
+  if (options.given("cells")) study.cells = options.whole("cells", 8, 4096);
+  if (options.given("samples")) study.samples = options.whole("samples", 16, 1u << 24);
+  study.tolerance = options.number("tolerance");
+  const std::string sequence = options.text("sequence"), draws = options.text("draws");
+  if (sequence != "sobol" && sequence != "random")
+    throw std::invalid_argument(fmt::format("--sequence: '{}' is neither 'sobol' nor 'random'", sequence));
+  if (draws != "weighted" && draws != "plain")
+    throw std::invalid_argument(fmt::format("--draws: '{}' is neither 'weighted' nor 'plain'", draws));
+  study.sequence = sequence == "sobol" ? markov::Sequence::sobol : markov::Sequence::random;
+  study.weighting = draws == "weighted" ? markov::Weighting::weighted : markov::Weighting::plain;
+  study.tail = options.number("tail");
+  study.replicates = options.count("replicates", 2, 64);
+  study.mixing_distance = options.number("mixing-distance");
+  study.eigenvalues = options.count("eigenvalues", 1, 64);
+  study.seed = options.seed();
+  study.threads = options.threads();
+  study.validate();
+  return study;
+}
+
+void add_standard_errors(Options& options) {
+  options.add("slope-se", "DEG", "",
+              "Standard error of each slope: an interval from it is given apart; likewise below");
+  options.add("restitution-se", "MEAN,SD", "", "Of the mean of eta, and of its sd");
+  options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd");
+  options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]");
+  options.add("inertia-se", "KGM2", "", "[kg m^2]");
+  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb)");
+  options.add("ramp-stiffness-se", "N/M", "", "[N/m] (published)");
+  options.add("contact-mass-se", "KG", "", "[kg] (published)");
+}
+
+std::vector<analysis::StandardError> standard_errors(const Options& options, const analysis::Setting& setting) {
+  using analysis::Parameter;
+  std::vector<analysis::StandardError> errors;
+  const auto add = [&](Parameter parameter, double value) {
+    if (value != 0) errors.push_back({parameter, value});
+  };
+  const auto one = [&](const char* name, Parameter parameter) {
+    if (options.given(name)) add(parameter, options.number(name));
+  };
+  const auto both = [&](const char* name, Parameter mean, Parameter sd) {
+    if (!options.given(name)) return;
+    const analysis::Spread given = options.spread(name);
+    add(mean, given.mean);
+    add(sd, given.sd);
+  };
+  one("slope-se", Parameter::slope);
+  both("restitution-se", Parameter::restitution_mean, Parameter::restitution_sd);
+  both("friction-se", Parameter::friction_mean, Parameter::friction_sd);
+  one("legs-se", Parameter::leg_length);
+  one("inertia-se", Parameter::inertia);
+  one("radius-of-gyration-se", Parameter::radius_of_gyration);
+  one("ramp-stiffness-se", Parameter::ramp_stiffness);
+  one("contact-mass-se", Parameter::contact_mass);
+  analysis::check_standard_errors(setting, errors);
+  return errors;
+}
+
+}  // namespace metastable::reports

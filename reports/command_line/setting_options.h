@@ -1,0 +1,34 @@
+#pragma once
+// Options that several commands share: wheel, contact, course, study.
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/sensitivity/propagation.h"
+#include "analysis/study/metastability.h"
+#include "analysis/study/setting.h"
+#include "reports/command_line/options.h"
+
+namespace metastable::reports {
+
+void add_wheel(Options& options);
+void add_contact(Options& options);
+void add_course(Options& options);
+void add_study(Options& options);
+void add_standard_errors(Options& options);
+
+/// What the options above say, all but slope and launch speed.
+analysis::Setting common_setting(const Options& options);
+/// `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
+analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);
+/// With --slope and --initial-speed, checked.
+analysis::Setting one_setting(const Options& options);
+/// One a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
+std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least);
+analysis::StudyOptions study_options(const Options& options);
+/// The standard errors above 0 that were given, checked against the setting. @throws std::invalid_argument
+std::vector<analysis::StandardError> standard_errors(const Options& options, const analysis::Setting& setting);
+
+}  // namespace metastable::reports

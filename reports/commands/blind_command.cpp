@@ -1,0 +1,313 @@
+#include "reports/commands/blind_command.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <set>
+#include <stdexcept>
+
+#include "analysis/blind/blind_cases.h"
+#include "analysis/experiment/experiment.h"
+#include "markov/parallel.h"
+#include "reports/diagnosis/blind_json.h"
+#include "reports/diagnosis/blind_tables.h"
+#include "reports/output/interrupt.h"
+#include "reports/output/output_file.h"
+#include "reports/output/page_folder.h"
+#include "reports/output/progress.h"
+#include "reports/output/seal.h"
+#include "reports/output/version.h"
+
+extern char** environ;
+
+namespace metastable::reports {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<std::string> file_text(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return std::nullopt;
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+std::string name_of(int number) { return fmt::format("{:04}", number); }
+
+struct Places {
+  fs::path run, cases, answers, record, sealed, marker, plan;
+  explicit Places(const BlindRequest& request)
+      : run(request.folder),
+        cases(run / "cases"),
+        answers(run / "answers"),
+        record(answers / "record.csv"),
+        sealed(request.sealed.empty() ? fs::path(request.folder + "-sealed") : fs::path(request.sealed)),
+        marker(sealed / "opened.csv"),
+        plan(sealed / "plan.txt") {}
+  fs::path case_folder(int number) const { return cases / name_of(number); }
+  fs::path truth(int number) const { return sealed / (name_of(number) + ".json"); }
+  fs::path answer(int number) const { return answers / (name_of(number) + ".json"); }
+};
+
+// The number of a case by the name of its folder.
+int case_number(const fs::path& folder) {
+  const std::string name = folder.filename().string();
+  int number = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+  if (error != std::errc{} || number < 1 || name != name_of(number))
+    throw std::invalid_argument(
+        fmt::format("{}: holds a seal.txt, but its name is not that of a case (0001, 0002, ...)", folder.string()));
+  return number;
+}
+
+// The numbers of the cases that are complete, ascending.
+std::vector<int> case_numbers(const Places& places) {
+  std::vector<int> numbers;
+  if (fs::is_directory(places.cases))
+    for (const auto& entry : fs::directory_iterator(places.cases))
+      if (fs::exists(entry.path() / "seal.txt")) numbers.push_back(case_number(entry.path()));
+  std::sort(numbers.begin(), numbers.end());
+  if (numbers.empty())
+    throw std::invalid_argument(
+        fmt::format("{}: holds no blind case; `blind make` writes them", places.cases.string()));
+  return numbers;
+}
+
+std::string now() {
+  const std::time_t time = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  gmtime_r(&time, &parts);
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday,
+                     parts.tm_hour, parts.tm_min, parts.tm_sec);
+}
+
+std::uint64_t entropy() {
+  std::random_device device;
+  return (static_cast<std::uint64_t>(device()) << 32) | device();
+}
+
+void write_case(const Places& places, const analysis::BlindCase& made, const std::string& salt) {
+  const int number = made.truth.number;
+  const std::string truth = truth_json(made.truth, salt);
+  const fs::path folder = places.case_folder(number);
+  make_folder(folder);
+  write_file(places.truth(number), truth);
+  write_file(folder / "collisions.csv", made.files.files.collisions_csv);
+  if (!made.files.files.trials_csv.empty()) write_file(folder / "trials.csv", made.files.files.trials_csv);
+  if (!made.catalogue.empty()) {
+    std::string ids;
+    for (const std::string& id : made.catalogue) ids += (ids.empty() ? "" : ",") + id;
+    write_file(folder / "catalogue.txt", ids + "\n");
+  }
+  write_file(folder / "experiment.toml", made.files.files.experiment_toml);
+  write_file(folder / "seal.txt", sha256(truth) + "\n");  // last: without it there is no case
+}
+
+// Runs a program to its end; its standard output goes nowhere, its errors to a file. The exit code.
+int run_program(const std::vector<std::string>& words, const fs::path& errors) {
+  std::vector<char*> arguments;
+  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  pid_t child = 0;
+  const int failed = posix_spawnp(&child, arguments.front(), &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failed != 0) throw std::invalid_argument(fmt::format("--tool: {} cannot be run", words.front()));
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+std::vector<RecordedAnswer> checked_record(const Places& places) {
+  return read_record(places.record.string(), file_text(places.record).value_or(""));
+}
+
+std::string trimmed(std::string text) {
+  while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
+  return text;
+}
+
+}  // namespace
+
+void run_blind_make(const BlindRequest& request) {
+  const Places places(request);
+  const fs::path inside = fs::weakly_canonical(places.sealed).lexically_relative(fs::weakly_canonical(places.run));
+  if (!inside.empty() && *inside.begin() != "..")
+    throw std::invalid_argument(
+        fmt::format("--sealed: {} lies inside {}; truths must be kept apart", places.sealed.string(), request.folder));
+  std::uint64_t seed = request.seed ? *request.seed : entropy();
+  const analysis::BlindSize& size = request.size;
+  const auto plan_text = [&](std::uint64_t with) {
+    return fmt::format("seed {}\neffect {}\nnone {}\npairs {}\noutside {}\nleft_out {}\n", with,
+                       size.per_effect_and_strength, size.none, size.pairs, size.outside, size.left_out_per_effect);
+  };
+  make_folder(places.sealed);
+  make_folder(places.cases);
+  if (const std::optional<std::string> before = file_text(places.plan)) {
+    if (!request.seed) std::sscanf(before->c_str(), "seed %lu", &seed);
+    if (*before != plan_text(seed))
+      throw OutputError(places.sealed, "belongs to a run of another seed or size; choose another folder");
+  } else {
+    write_file(places.plan, plan_text(seed));
+  }
+  const std::vector<analysis::BlindPlan> plan = analysis::blind_plan(size, seed);
+  Progress progress("making cases", plan.size());
+  markov::parallel_for(plan.size(), request.threads, [&](std::size_t i) {
+    const int number = static_cast<int>(i) + 1;
+    if (!fs::exists(places.case_folder(number) / "seal.txt")) {
+      check_interrupt();
+      analysis::BlindCase made = analysis::blind_case(
+          plan[i], number, seed,
+          [](const auto& design, const auto& effects) { return analysis::expected_power(design, effects, 3); });
+      analysis::complete_truth(made);
+      write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
+    }
+    progress.advance();
+  });
+  fmt::print("{}: {} cases; truths sealed in {}\n", request.folder, plan.size(), places.sealed.string());
+}
+
+void run_blind_answer(const BlindRequest& request) {
+  const Places places(request);
+  const std::vector<int> numbers = case_numbers(places);
+  if (fs::exists(places.marker))
+    throw OutputError(places.sealed, "was opened; an answer written now would not be blind");
+  make_folder(places.answers);
+  std::vector<RecordedAnswer> record = checked_record(places);
+  std::set<int> answered;
+  for (const RecordedAnswer& entry : record) answered.insert(entry.number);
+  std::vector<int> open;
+  for (const int number : numbers)
+    if (!answered.contains(number)) open.push_back(number);
+  const std::string tool = request.tool.empty() ? fs::read_symlink("/proc/self/exe").string() : request.tool;
+  std::mutex mutex;
+  std::atomic<int> failed = 0;
+  Progress progress("answering", std::max<std::size_t>(1, open.size()));
+  markov::parallel_for(open.size(), request.threads, [&](std::size_t i) {
+    check_interrupt();
+    const int number = open[i];
+    const fs::path folder = places.case_folder(number), answer = places.answer(number);
+    const fs::path fresh = answer.string() + ".new", errors = answer.string() + ".err";
+    std::vector<std::string> words{tool, "diagnose", folder.string(), "--json", fresh.string(), "--threads", "1"};
+    if (const std::optional<std::string> catalogue = file_text(folder / "catalogue.txt")) {
+      words.emplace_back("--catalogue");
+      words.push_back(trimmed(*catalogue));
+    }
+    const int code = run_program(words, errors);
+    try {
+      check_interrupt();
+    } catch (const Interrupted&) {
+      fs::remove(errors);
+      throw;
+    }
+    const std::lock_guard lock(mutex);
+    const std::optional<std::string> text = file_text(fresh);
+    if (code != 0 || !text) {
+      ++failed;  // its errors stay beside where the answer would be
+    } else {
+      read_answer(fresh.string(), *text);
+      fs::rename(fresh, answer);
+      fs::remove(errors);
+      record.push_back(record_answer(record.empty() ? "" : record.back().chain, number, now(), *text));
+      std::string lines;
+      for (const RecordedAnswer& entry : record) lines += record_line(entry);
+      write_file(places.record, lines);
+    }
+    progress.advance();
+  });
+  fmt::print("{}: {} of {} cases answered", request.folder, record.size(), numbers.size());
+  if (failed > 0) fmt::print("; {} failed, see {}/*.err", failed.load(), places.answers.string());
+  fmt::print("\n");
+}
+
+void run_blind_open(const BlindRequest& request) {
+  const Places places(request);
+  const std::vector<int> numbers = case_numbers(places);
+  std::vector<analysis::BlindTruth> truths;
+  for (const int number : numbers) {
+    const fs::path path = places.truth(number);
+    const std::optional<std::string> text = file_text(path);
+    if (!text) throw OutputError(path, "there is no such sealed truth");
+    if (sha256(*text) != trimmed(file_text(places.case_folder(number) / "seal.txt").value_or("")))
+      throw std::invalid_argument(fmt::format("{}: the seal of case {} is broken", path.string(), number));
+    truths.push_back(read_truth(path.string(), *text));
+  }
+  std::map<int, analysis::BlindAnswer> given;
+  const std::vector<RecordedAnswer> record = checked_record(places);
+  if (record.empty()) throw OutputError(places.record, "no case is answered; `blind answer` does that");
+  for (const RecordedAnswer& entry : record) {
+    const fs::path path = places.answer(entry.number);
+    const std::optional<std::string> text = file_text(path);
+    if (!text)
+      throw std::invalid_argument(fmt::format("{}: the answer to case {} is missing", path.string(), entry.number));
+    if (sha256(*text) != entry.digest)
+      throw std::invalid_argument(
+          fmt::format("{}: the answer to case {} was changed since it was recorded", path.string(), entry.number));
+    given[entry.number] = read_answer(path.string(), *text);
+  }
+  // From the first opening on the record is closed.
+  const std::string head = fmt::format("{},{}\n", record.size(), record.back().chain);
+  if (const std::optional<std::string> marker = file_text(places.marker)) {
+    if (*marker != head)
+      throw std::invalid_argument(
+          fmt::format("{}: answers were written after the truths had been opened", places.record.string()));
+  } else {
+    write_file(places.marker, head);
+  }
+  // Cases that were not reached are left out; one that the tool failed on is an answer, and a wrong one.
+  std::vector<analysis::BlindTruth> reached;
+  std::vector<std::optional<analysis::BlindAnswer>> answers;
+  for (const analysis::BlindTruth& truth : truths) {
+    const bool answered = given.contains(truth.number);
+    if (!answered && !fs::exists(places.answer(truth.number).string() + ".err")) continue;
+    reached.push_back(truth);
+    answers.push_back(answered ? std::optional(given.at(truth.number)) : std::nullopt);
+  }
+  markov::parallel_for(reached.size(), request.threads, [&](std::size_t i) {
+    analysis::BlindTruth& truth = reached[i];
+    if (truth.kind != analysis::BlindKind::pair) return;
+    analysis::complete_pair(truth, analysis::read_experiment(places.case_folder(truth.number)));
+  });
+
+  const analysis::BlindGrades grades = analysis::grade(reached, answers);
+  std::uint64_t seed = 0;
+  std::sscanf(file_text(places.plan).value_or("seed 0").c_str(), "seed %lu", &seed);
+  const Provenance provenance{
+      request.command,
+      fmt::format("{} cases, {} answered; record {}", numbers.size(), record.size(), record.back().chain), seed,
+      version()};
+  const fs::path out = request.out.empty() ? places.run / "report" : fs::path(request.out);
+  PageFolder folder(out);
+  Page& page = folder.page();
+  page.title = "Blind check of the diagnosis";
+  page.intro = {
+      "Cases from the virtual laboratory, which shares no formula with the models. Truths were sealed before "
+      "the diagnosis saw the folders; seals and the record of answers were checked."};
+  page.provenance = provenance;
+  const std::vector<Table> tables = blind_tables(grades, reached, answers, provenance);
+  for (const Table& table : tables) folder.section(table.id + "-section", table.title, "", {}, {table});
+  folder.write_index();
+  fmt::print("{}", to_markdown(tables.front()));
+  fmt::print("\n{}\n", (out / "index.html").string());
+}
+
+}  // namespace metastable::reports

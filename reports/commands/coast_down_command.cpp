@@ -1,0 +1,79 @@
+#include "reports/commands/coast_down_command.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+
+#include "reports/output/input_file.h"
+#include "reports/output/output_file.h"
+#include "reports/output/table.h"
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+namespace {
+
+constexpr double clearly = 5;  // standard errors from which on a loss proportional to omega is there
+
+// Even or odd blocks: what one half says can be checked on the other.
+void keep(analysis::CoastDownRun& run, const std::string& which) {
+  if (which == "all") return;
+  std::vector<std::vector<analysis::Revolution>> kept;
+  for (std::size_t b = which == "odd" ? 0 : 1; b < run.blocks.size(); b += 2) kept.push_back(run.blocks[b]);
+  if (kept.empty()) throw std::invalid_argument(fmt::format("--blocks: {} has no {} block", run.name, which));
+  run.blocks = std::move(kept);
+}
+
+}  // namespace
+
+void run_coast_down(const CoastDownRequest& request) {
+  const std::filesystem::path folder = request.out;
+  for (const char* name : {"experiment.toml", "collisions.csv"})
+    if (std::filesystem::exists(folder / name))
+      throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
+  std::vector<analysis::CoastDownRun> runs;
+  for (const std::string& path : request.logs) {
+    analysis::CounterLog log = analysis::parse_counter_log(path, read_file(path));
+    log.name = std::filesystem::path(path).stem().string();
+    if (log.name.find_first_of(",\"\r\n") != std::string::npos)
+      throw std::invalid_argument(
+          fmt::format("{}: a comma or a quote in the file's name cannot name a condition", path));
+    for (const analysis::CoastDownRun& other : runs)
+      if (other.name == log.name) throw std::invalid_argument(fmt::format("{}: a log named so was there before", path));
+    analysis::CoastDownRun& run = runs.emplace_back(analysis::coast_down(log, request.options));
+    keep(run, request.blocks);
+    fmt::print(
+        "{}: {} revolutions from {:.4g} to {:.4g} rad/s, {} blocks; ticks missed {}, double {}, displaced {}; "
+        "{} revolutions left out\n",
+        run.name, run.revolutions, run.top, request.options.stop, run.blocks.size(), run.missed, run.doubled,
+        run.displaced, run.left_out);
+  }
+  analysis::RevolutionLoss nominal;
+  std::string origin;
+  if (request.nominal.empty()) {
+    analysis::LossFit fit = analysis::fit_loss(runs, true);
+    const bool linear = request.linear || std::abs(fit.loss.linear) > clearly * fit.linear_error;
+    if (!linear) fit = analysis::fit_loss(runs, false);
+    nominal = fit.loss;
+    origin = "nominal loss fitted robustly to these runs";
+    fmt::print("loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}", nominal.constant, fit.constant_error);
+    if (linear) fmt::print(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error);
+    fmt::print(" + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; {} of {} transitions beyond five of those\n",
+               nominal.quadratic, fit.quadratic_error, nominal.noise_sd, fit.outliers, fit.transitions);
+  } else {
+    const analysis::Experiment other = analysis::parse_description(analysis::read_source(request.nominal));
+    if (other.system != analysis::System::coast_down)
+      throw std::invalid_argument(fmt::format("--nominal: {} is no coast-down", request.nominal));
+    nominal = other.loss;
+    origin = fmt::format("nominal loss of the experiment \"{}\"", other.title);
+  }
+  Provenance provenance{request.command, origin, 0, version()};
+  const analysis::ExperimentFiles files = analysis::coast_down_files(
+      runs, nominal, request.rotor_inertia, "Coast-down of " + runs.front().name, provenance_lines(provenance));
+  make_folder(folder);
+  write_file(folder / "collisions.csv", files.collisions_csv);
+  write_file(folder / "experiment.toml", files.experiment_toml);
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,187 @@
+#include "reports/commands/collisions_command.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "analysis/experiment/experiment.h"
+#include "analysis/experiment/input_error.h"
+#include "analysis/motion_capture/angle_file.h"
+#include "analysis/motion_capture/collision_comparison.h"
+#include "markov/parallel.h"
+#include "reports/output/output_file.h"
+#include "reports/output/table.h"
+
+namespace metastable::reports {
+namespace {
+namespace fs = std::filesystem;
+
+using analysis::FoundCollision;
+using analysis::FoundTrial;
+
+std::string text(const analysis::SpeedDifferences& d) {
+  if (d.count < 2) return "too few to say";
+  return fmt::format("bias {:+.4f} +- {:.4f} rad/s, spread (sd) {:.4f} rad/s, n = {}", d.bias, d.bias_half_width, d.sd,
+                     d.count);
+}
+
+struct Files {
+  std::string collisions = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
+  std::string details =
+      "condition,trial,collision,peak_time_s,omega_peak_rad_s,time_fit_s,omega_minus_fit_rad_s,omega_plus_fit_rad_s,"
+      "fit_residual_rad,apex_time_s,omega_apex_rad_s,bounces\n";
+};
+
+Files write_files(const analysis::Experiment& experiment, const std::vector<analysis::MeasuredAngle>& angles,
+                  const std::vector<FoundTrial>& found, const std::vector<dynamics::WheelMap>& maps, bool peak) {
+  Files files;
+  for (std::size_t t = 0; t < angles.size(); ++t) {
+    const analysis::Condition& condition = experiment.conditions[angles[t].condition];
+    const dynamics::WheelMap& map = maps[angles[t].condition];
+    double position = 0;  // chord by chord
+    for (const FoundCollision& c : found[t].collisions) {
+      const std::string key = fmt::format("{},{},{}", csv_field(condition.id), angles[t].number, c.number);
+      const int leg = (condition.first_landing_leg + c.number - 1) % experiment.legs();
+      fmt::format_to(std::back_inserter(files.collisions), "{},{},{:.6f},{:.6f},{:.6g},{}\n", key, leg,
+                     reported_time(c), position, reported_speed(c, peak),
+                     c.fit ? fmt::format("{:.6g}", c.fit->omega_plus) : "");
+      position += map.advance(leg % map.phases());
+      const std::string fit = c.fit ? fmt::format("{:.6f},{:.6g},{:.6g},{:.3g}", c.fit->time, c.fit->omega_minus,
+                                                  c.fit->omega_plus, c.fit->residual_sd)
+                                    : ",,,";
+      fmt::format_to(std::back_inserter(files.details), "{},{:.6f},{:.6g},{},{:.6f},{:.6g},{}\n", key, c.peak_time,
+                     c.peak, fit, c.apex_time, c.apex, c.bounces);
+    }
+  }
+  return files;
+}
+
+void print_comparison(const analysis::CollisionComparison& c) {
+  fmt::print("against the {} collisions of collisions.csv: {} found ({:.2f} %), {} others\n", c.due, c.found,
+             c.due > 0 ? 100.0 * static_cast<double>(c.found) / static_cast<double>(c.due) : 0.0, c.others);
+  fmt::print("  omega_minus as written:  {}\n", text(c.written));
+  fmt::print("  omega_minus, peak:       {}\n", text(c.peak));
+  fmt::print("  omega_minus, stance fit: {}\n", text(c.fit_before));
+  fmt::print("  omega_plus, stance fit:  {}\n", text(c.fit_after));
+}
+
+// Trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two files
+// would put the rest too early.
+void print_cut_rests(const analysis::ExperimentSource& source, const std::string& collisions,
+                     const std::vector<analysis::MeasuredAngle>& angles, const std::vector<char>& cut,
+                     std::size_t limit) {
+  if (!source.trials_csv) return;
+  analysis::ExperimentSource written = source;
+  written.collisions_csv = collisions;
+  analysis::Experiment experiment;
+  try {
+    experiment = analysis::parse_experiment(written);
+  } catch (const analysis::InputError& error) {
+    fmt::print("trials.csv does not go with these collisions: {}\n", error.lines().front());
+    return;
+  }
+  std::map<int, dynamics::Outcome> outcomes;
+  for (const analysis::MeasuredTrial& trial : experiment.trials)
+    if (trial.outcome) outcomes[trial.number] = *trial.outcome;
+  std::vector<int> early;
+  for (std::size_t t = 0; t < angles.size(); ++t) {
+    const auto outcome = outcomes.find(angles[t].number);
+    if (cut[t] && outcome != outcomes.end() && outcome->second == dynamics::Outcome::rest)
+      early.push_back(angles[t].number);
+  }
+  if (early.empty()) return;
+  fmt::print(
+      "{} trials that trials.csv lists as rest roll on after collision {}, where they are cut (the first is trial {}): "
+      "raise --collisions, or list them as max_collisions\n",
+      early.size(), limit, early.front());
+}
+
+}  // namespace
+
+void run_collisions(const CollisionsRequest& request) {
+  const fs::path folder = request.folder;
+  const analysis::ExperimentSource source = analysis::read_source(folder);
+  analysis::Experiment experiment = analysis::parse_description(source);
+  if (experiment.system != analysis::System::rimless_wheel)
+    throw std::invalid_argument(fmt::format("{}: a coast-down has no collisions to find", request.folder));
+  const std::vector<analysis::MeasuredAngle> angles = analysis::parse_angles(source, experiment);
+  std::optional<analysis::Experiment> known;
+  if (source.collisions_csv) known = analysis::parse_experiment(source);
+  const fs::path out = !request.out.empty() ? fs::path(request.out)
+                       : known              ? folder / "collisions-from-angle.csv"
+                                            : folder / "collisions.csv";
+  const bool to_terminal = out == "-";
+  OutputFile collisions_file(out);
+  std::optional<OutputFile> details_file;
+  fs::path details;
+  if (!to_terminal) {
+    details = out.parent_path() / (out.stem().string() + "-details.csv");
+    details_file.emplace(details);
+  }
+
+  std::vector<dynamics::WheelMap> maps;
+  for (const analysis::Condition& condition : experiment.conditions) {
+    analysis::Setting setting;
+    setting.wheel = experiment.wheel;
+    setting.slope_deg = condition.slope_deg;
+    setting.law = experiment.contact.law;
+    setting.first_landing_leg = condition.first_landing_leg;
+    maps.push_back(setting.map());
+  }
+  // One more than asked for tells a trial that ends there from one that is cut.
+  analysis::FinderOptions finder = request.finder;
+  const auto limit = static_cast<std::size_t>(finder.collisions++);
+  std::vector<FoundTrial> found(angles.size());
+  std::vector<char> cut(angles.size());
+  markov::parallel_for(angles.size(), request.threads, [&](std::size_t t) {
+    const auto& [number, condition, recording] = angles[t];
+    try {
+      found[t] = analysis::find_collisions(recording, maps[condition],
+                                           experiment.conditions[condition].first_landing_leg, finder);
+      cut[t] = found[t].collisions.size() > limit;
+      if (cut[t]) found[t].collisions.resize(limit);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(
+          fmt::format("{}: trial {}: {}", (folder / "angle.csv").string(), number, error.what()));
+    }
+  });
+
+  const Files files = write_files(experiment, angles, found, maps, request.peak);
+  collisions_file.stream() << files.collisions;
+  if (details_file) {
+    details_file->stream() << files.details;
+    details_file->commit();
+  }
+  collisions_file.commit();
+  if (to_terminal) return;
+
+  std::size_t count = 0, bounces = 0, unfitted = 0;
+  std::map<std::string, std::size_t> stopped;
+  for (const FoundTrial& trial : found) {
+    count += trial.collisions.size();
+    for (const FoundCollision& c : trial.collisions) {
+      bounces += static_cast<std::size_t>(c.bounces);
+      unfitted += !c.fit;
+    }
+    if (trial.collisions.empty()) ++stopped[trial.stopped];
+  }
+  fmt::print("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}\n", out.string(), count,
+             angles.size(), bounces, details.string());
+  fmt::print("omega_minus is the {}\n", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
+                                                     : "stance motion extrapolated to the collision");
+  if (unfitted > 0)
+    fmt::print(
+        "{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
+        "empty\n",
+        unfitted);
+  for (const auto& [why, trials] : stopped) fmt::print("{} trials without a collision: {}\n", trials, why);
+  print_cut_rests(source, files.collisions, angles, cut, limit);
+  if (known)
+    print_comparison(analysis::compare_collisions(*known, angles, found, request.peak, request.finder.collisions));
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,90 @@
+#include "reports/commands/describe_command.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "analysis/description/law_comparison.h"
+#include "analysis/experiment/experiment.h"
+#include "reports/description/describe_figures.h"
+#include "reports/description/describe_tables.h"
+#include "reports/output/page_folder.h"
+#include "reports/output/progress.h"
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+
+void run_describe(const DescribeRequest& request) {
+  const analysis::Experiment experiment = analysis::read_experiment(request.folder);
+  std::optional<PageFolder> pages;
+  if (!request.out.empty()) pages.emplace(request.out);
+  const Provenance provenance{request.command, "experiment: " + experiment.title, request.options.seed, version()};
+
+  // A fit takes some 500 to 1000 evaluations of its likelihood.
+  const std::size_t fits = experiment.conditions.size() + 1 + request.against.size();
+  std::optional<Progress> progress(std::in_place, "describe", 1000 * fits);
+  analysis::DescriptionOptions options = request.options;
+  options.progress = [&] { progress->advance(); };
+  const analysis::Description description = analysis::describe(experiment, options);
+  std::optional<analysis::LawComparison> laws;
+  if (!request.against.empty())
+    laws = analysis::compare_laws(experiment, request.against, request.trials, options.seed, options.threads,
+                                  options.progress);
+  progress.reset();
+
+  std::vector<Table> tables{conditions_table(description, provenance)};
+  if (!description.comparisons.empty()) tables.push_back(tests_table(description, provenance));
+  if (!description.fits.empty()) tables.push_back(fits_table(description, provenance));
+  if (laws) tables.push_back(laws_table(*laws, provenance));
+  if (!pages) {
+    for (Table& table : tables) {
+      table.provenance = {};
+      fmt::print("{}\n", to_markdown(table));
+    }
+    return;
+  }
+
+  Page& page = pages->page();
+  page.title = experiment.title;
+  page.intro = {
+      "What the trials of this experiment show: speeds just before each collision, how conditions differ, how "
+      "long trials last, and which restitution and friction they speak for."};
+  page.provenance = provenance;
+  pages->section("conditions", "The conditions",
+                 "Mean speeds collision by collision; they meet where a steady state is reached.",
+                 {profiles_figure(description, provenance)}, {tables[0], profiles_table(description, provenance)});
+  if (!description.comparisons.empty())
+    pages->section(
+        "tests", "Do they end in one steady state?",
+        "A large P says that two conditions cannot be told apart; the interval of the difference says how far "
+        "apart they may still be.",
+        {}, {tests_table(description, provenance)});
+  std::vector<Figure> maps;
+  for (const analysis::ConditionDescription& c : description.conditions)
+    if (c.trials > 0) maps.push_back(measured_map_figure(c, provenance));
+  pages->section("return-maps", "Return maps", "Each dot is one step; a steady state is a cloud on the diagonal.", maps,
+                 {});
+  if (const auto figure = legs_figure(description, provenance))
+    pages->section("legs", "Leg by leg", "Legs of one length and one contact would give one level.", {*figure},
+                   {legs_table(description, provenance)});
+  if (const auto figure = survival_curves_figure(description, provenance))
+    pages->section("survival", "How long trials last",
+                   "The curve falls where trials rest; bands are 95 % intervals, one collision at a time.", {*figure},
+                   {survival_table(description, provenance)});
+  if (!description.fits.empty())
+    pages->section(
+        "contact", "Restitution and friction",
+        "What the trials say about both distributions under the nominal law, and which of their numbers they "
+        "cannot tell apart.",
+        {}, {fits_table(description, provenance)});
+  if (laws)
+    pages->section("laws", "The contact laws beside it",
+                   "A law that describes this wheel gives its speed, its spread and its share of rests at once.", {},
+                   {laws_table(*laws, provenance)});
+  pages->write_index();
+  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+}
+
+}  // namespace metastable::reports

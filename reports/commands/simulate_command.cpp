@@ -1,0 +1,91 @@
+#include "reports/commands/simulate_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <vector>
+
+#include "analysis/experiment/experiment_folder.h"
+#include "analysis/experiment/stand_in.h"
+#include "reports/output/output_file.h"
+#include "reports/output/table.h"
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+namespace {
+
+analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
+  return {fmt::format("{}", request.setting.slope_deg), request.setting,
+          analysis::simulate_trials(request.setting, {.trials = request.trials,
+                                                      .collisions = request.collisions,
+                                                      .seed = request.seed,
+                                                      .threads = request.threads})};
+}
+
+void check_empty(const std::filesystem::path& folder) {
+  for (const char* name : {"experiment.toml", "collisions.csv", "trials.csv", "angle.csv"})
+    if (std::filesystem::exists(folder / name))
+      throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
+}
+
+}  // namespace
+
+void run_simulate(const SimulateRequest& request) {
+  const std::filesystem::path folder = request.out;
+  check_empty(folder);
+  make_folder(folder);
+  const std::vector<analysis::SimulatedCondition> conditions =
+      request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
+                       : std::vector<analysis::SimulatedCondition>{one_condition(request)};
+  Provenance provenance{request.command, {}, request.seed, version()};
+  for (const analysis::SimulatedCondition& condition : conditions)
+    provenance.settings += (provenance.settings.empty() ? "" : "\n") + condition.setting.describe();
+  const std::string title = request.stand_in
+                                ? "Simulated stand-in of the paper's three experiments (not a measurement)"
+                                : fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg);
+  analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
+  if (request.camera) {
+    files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
+    write_file(folder / "angle.csv", analysis::angle_csv(conditions, *request.camera));
+  }
+  // experiment.toml last: a folder without it is not an experiment yet.
+  write_file(folder / "collisions.csv", files.collisions_csv);
+  write_file(folder / "trials.csv", files.trials_csv);
+  write_file(folder / "experiment.toml", files.experiment_toml);
+  for (const auto& [id, setting, trials] : conditions) {
+    const auto rested = std::count_if(trials.begin(), trials.end(),
+                                      [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
+    fmt::print("{}: {} trials{}, {} of them came to rest\n", request.out, trials.size(),
+               request.stand_in ? " of " + id : "", rested);
+  }
+}
+
+void run_reality(const RealityRequest& request) {
+  const std::filesystem::path folder = request.out;
+  check_empty(folder);
+  const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
+  const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
+  Provenance provenance{request.command, {}, request.reality.seed, version()};
+  analysis::FolderOptions options;
+  options.title = "Rimless wheel in the virtual laboratory";
+  options.comment = provenance_lines(provenance);
+  options.dropped = request.dropped;
+  options.camera = request.camera;
+  const analysis::RealityFiles made = analysis::reality_files(request.conditions, setup, trials, options);
+  make_folder(folder);
+  if (made.angle_csv) write_file(folder / "angle.csv", *made.angle_csv);
+  write_file(folder / "collisions.csv", made.files.collisions_csv);
+  if (!made.files.trials_csv.empty()) write_file(folder / "trials.csv", made.files.trials_csv);
+  write_file(folder / "experiment.toml", made.files.experiment_toml);
+  std::size_t collisions = 0, rested = 0, flown = 0;
+  for (const dynamics::LaboratoryTrial& trial : trials) {
+    collisions += trial.collisions.size();
+    rested += trial.outcome == dynamics::Outcome::rest;
+    for (const dynamics::LaboratoryCollision& c : trial.collisions) flown += c.flew;
+  }
+  fmt::print("{}: {} trials, {} of them came to rest; {} collisions, {} of them after a flight\n", request.out,
+             trials.size(), rested, collisions, flown);
+}
+
+}  // namespace metastable::reports

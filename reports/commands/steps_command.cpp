@@ -1,0 +1,54 @@
+#include "reports/commands/steps_command.h"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "analysis/study/certify.h"
+#include "reports/output/output_file.h"
+#include "reports/output/version.h"
+#include "reports/study/study_json.h"
+#include "reports/study/study_progress.h"
+#include "reports/study/study_text.h"
+
+namespace metastable::reports {
+
+void run_steps(const StepsRequest& request) {
+  std::optional<OutputFile> json;
+  if (!request.json.empty()) json.emplace(request.json);
+  const analysis::Metastability study = [&] {
+    Progress progress("steps", study_units);
+    analysis::StudyOptions options = request.study;
+    options.progress = study_progress(progress);
+    return analysis::study(request.setting.problem(), options);
+  }();
+  const RestThresholds thresholds = rest_thresholds(request.setting, study);
+  StepsExtras extras;
+  if (request.certify) {
+    Progress progress("certificate", study_units);
+    extras.certified = analysis::certify(
+        request.setting,
+        {.tolerance = request.study.tolerance, .threads = request.study.threads, .progress = study_progress(progress)});
+  }
+  if (request.sensitivities || !request.standard_errors.empty()) {
+    Progress progress("sensitivities", study_units);
+    analysis::StudyOptions options = request.study;
+    options.progress = study_progress(progress);
+    extras.sensitivities = analysis::sensitivities(request.setting, study, options);
+    if (!request.standard_errors.empty() && extras.sensitivities->reason.empty())
+      extras.propagated = analysis::propagate(study.from_start.value, *extras.sensitivities, request.standard_errors);
+  }
+  if (json) {
+    const Provenance provenance{request.command, request.setting.describe(), request.study.seed, version()};
+    json->stream() << steps_json(request.setting, study, thresholds, provenance, extras);
+    json->commit();
+  }
+  if (request.json == "-") return;
+  fmt::print("{}", study_text(request.setting, study, thresholds));
+  if (extras.certified) fmt::print("  {:<38}{}\n", "certificate", analysis::certificate_text(*extras.certified));
+  if (extras.propagated)
+    fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
+  if (extras.sensitivities) fmt::print("\n{}", sensitivities_text(*extras.sensitivities));
+}
+
+}  // namespace metastable::reports

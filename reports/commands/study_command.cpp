@@ -1,0 +1,105 @@
+#include "reports/commands/study_command.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iterator>
+#include <optional>
+#include <vector>
+
+#include "analysis/experiment/experiment.h"
+#include "analysis/paper/paper_claims.h"
+#include "reports/description/paper_figures.h"
+#include "reports/description/paper_tables.h"
+#include "reports/output/page_folder.h"
+#include "reports/output/progress.h"
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+namespace {
+
+using analysis::PaperExperiments;
+
+// The panels of all variants, one variant after the other.
+template <typename Make>
+std::vector<Figure> all_variants(const Studies& studies, const Make& make) {
+  std::vector<Figure> all;
+  for (const analysis::VariantStudy& study : studies) {
+    std::vector<Figure> figures = make(study);
+    all.insert(all.end(), std::make_move_iterator(figures.begin()), std::make_move_iterator(figures.end()));
+  }
+  return all;
+}
+
+}  // namespace
+
+void run_study(const StudyRequest& request) {
+  const analysis::PaperStudyOptions& asked = request.options;
+  const PaperExperiments experiments = request.data.empty()
+                                           ? analysis::simulated_experiments(asked.seed, asked.threads)
+                                           : analysis::paper_experiments(analysis::read_experiment(request.data));
+  PageFolder pages(request.out);
+  const std::vector<analysis::Variant> variants = analysis::paper_variants();
+  std::optional<Progress> progress(std::in_place, "study", variants.size() * analysis::paper_study_units());
+  analysis::PaperStudyOptions options = asked;
+  options.progress = [&] { progress->advance(); };
+  Studies studies;
+  for (const analysis::Variant& variant : variants)
+    studies.push_back(analysis::study_variant(variant, experiments, options));
+  progress.reset();
+
+  const Provenance provenance{
+      request.command,
+      fmt::format(
+          "the paper's wheel; {} trials of 16 collisions a profile; {} samples a variance share; experiment: {}",
+          options.trials, options.samples, experiments.title),
+      options.seed, version()};
+  Page& page = pages.page();
+  page.title = "Dominant sources of variability in passive walking: the paper's study, regenerated";
+  page.intro = {
+      "T. Nanayakkara, K. Byl, H. Liu, X. Song, T. Villabona, “Dominant Sources of Variability in Passive Walking” "
+      "(ICRA "
+      "2012): its simulated figures and its claims, under its own contact law in two readings and under a law that is "
+      "consistent with Coulomb friction.",
+      experiments.stand_in ? "Its measurements are not public: what is called stand-in here is a simulation too."
+                           : "Measured trials: " + experiments.title + "."};
+  page.provenance = provenance;
+  const std::vector<analysis::Claim> claims = analysis::paper_claims(studies, experiments);
+  pages.section("claims", "Claim by claim", "Each cell gives the verdict first and then the numbers behind it.", {},
+                {claims_table(claims, studies, experiments, provenance),
+                 changes_table(claims, studies, experiments, provenance), readings_table(claims, provenance)});
+  pages.section("hypotheses", "The three hypotheses",
+                "A source that matters takes a large share of the variance with it; the table below has all shares.",
+                {},
+                {hypotheses_table(analysis::paper_hypotheses(studies), studies, provenance),
+                 variance_table(studies, provenance)});
+  std::vector<Figure> fig4{fig4_experiment_figure(experiments, provenance)};
+  for (Figure& figure : all_variants(studies, [&](const auto& s) { return fig4_figures(s, provenance); }))
+    fig4.push_back(std::move(figure));
+  pages.section("fig4", "Fig. 4: two starts, one steady state",
+                "Lines that meet forget their start; bands are standard errors.", fig4,
+                {fig4_table(studies, experiments, provenance)});
+  pages.section(
+      "fig6", "Fig. 6: launch speed and friction",
+      "Three launches at one friction each; a steady state that remembers its launch would keep the lines apart.",
+      all_variants(studies, [&](const auto& s) { return fig6_figures(s, experiments, provenance); }),
+      {fig6_table(studies, provenance)});
+  pages.section("equal-legs", "Sec. IV-A: leg lengths",
+                "The runs of Fig. 6 with the measured legs and with eight equal ones.", {},
+                {equal_legs_table(studies, provenance)});
+  pages.section("fig7", "Fig. 7: spreads of restitution and friction",
+                "From panel to panel friction scatters more, from line to line restitution does.",
+                all_variants(studies, [&](const auto& s) { return fig7_figures(s, experiments, provenance); }),
+                {fig7_table(studies, experiments, provenance)});
+  pages.section("fig8", "Fig. 8: energy losses", "Bars are standard deviations from collision to collision.",
+                all_variants(studies, [&](const auto& s) { return fig8_figures(s, provenance); }),
+                {fig8_table(studies, provenance)});
+  pages.section("fig9", "Fig. 9: means of restitution and friction",
+                "From panel to panel friction grows, from line to line restitution does.",
+                all_variants(studies, [&](const auto& s) { return fig9_figures(s, experiments, provenance); }),
+                {fig9_table(studies, provenance)});
+  pages.write_index();
+  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+}
+
+}  // namespace metastable::reports

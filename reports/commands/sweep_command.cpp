@@ -1,0 +1,200 @@
+#include "reports/commands/sweep_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <optional>
+
+#include "reports/output/figure.h"
+#include "reports/output/input_file.h"
+#include "reports/output/output_file.h"
+#include "reports/output/progress.h"
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+namespace {
+
+constexpr std::size_t most_lines = 8;         // of a figure
+constexpr std::size_t most_map_columns = 16;  // of a heat map with a number in every cell
+constexpr std::size_t most_map_rows = 16;
+
+// Everything the numbers depend on; a partial file with another head belongs to another sweep.
+std::string head(const SweepRequest& request) {
+  const analysis::StudyOptions& study = request.study;
+  std::string text = fmt::format("# sweep: {}; the axes vary\n# axes:", request.setting.describe());
+  for (const analysis::Axis& axis : request.axes) {
+    text += fmt::format(" {} =", analysis::parameter_name(axis.parameter));
+    for (const double value : axis.values) text += fmt::format(" {}", value);
+    text += ';';
+  }
+  text += "\n";
+  for (const dynamics::Contact& pair : request.setting.pairs)
+    text += fmt::format("# pair: restitution {}, friction {}\n", pair.restitution, pair.friction);
+  const auto size = [](std::size_t given) {
+    return given == 0 ? std::string("as the tolerance needs") : std::to_string(given);
+  };
+  text += fmt::format(
+      "# method {}, cells {}, samples {}, tolerance {}, seed {}, replicates {}, sequence {}, draws {}, tail {}\n",
+      analysis::method_name(study.method), size(study.cells), size(study.samples), study.tolerance, study.seed,
+      study.replicates, study.sequence == markov::Sequence::sobol ? "sobol" : "random",
+      study.weighting == markov::Weighting::weighted ? "weighted" : "plain", study.tail);
+  text += fmt::format("# version: {}\n", version());
+  for (const analysis::Axis& axis : request.axes)
+    text += fmt::format("{} [{}],", analysis::parameter_name(axis.parameter), analysis::parameter_unit(axis.parameter));
+  text +=
+      "expected_steps,expected_steps_low95,expected_steps_high95,expected_steps_quasi_stationary,failure_rate_per_step,"
+      "quasi_stationary_mean_rad_s,quasi_stationary_sd_rad_s,reach_ramp_end,status\n";
+  return text;
+}
+
+std::string number(double value) { return std::isinf(value) ? "infinite" : fmt::format("{}", value); }
+
+std::string row(const analysis::SweepPoint& point) {
+  const analysis::Metastability& study = point.study;
+  std::string text;
+  for (const double value : point.at) text += fmt::format("{},", value);
+  if (study.status == analysis::Status::solver_failed)
+    return text + fmt::format(",,,,,,,,{}\n", analysis::status_text(study.status));
+  return text + fmt::format("{},{},{},{},{},{},{},{},{}\n", number(study.from_start.value),
+                            number(study.from_start.lower), number(study.from_start.upper),
+                            number(study.from_quasi_stationary.value), number(study.failure_rate.value),
+                            study.observable_mean, study.observable_sd, study.reach_end ? number(*study.reach_end) : "",
+                            analysis::status_text(study.status));
+}
+
+// Complete rows behind the head; a last line without its end was cut short and is dropped.
+std::vector<std::string> rows_behind(const std::string& text, const std::string& head) {
+  std::vector<std::string> rows;
+  for (std::size_t at = head.size(); at < text.size();) {
+    const std::size_t end = text.find('\n', at);
+    if (end == std::string::npos) break;
+    rows.push_back(text.substr(at, end + 1 - at));
+    at = end + 1;
+  }
+  return rows;
+}
+
+// Column `index` behind the coordinates: 0 expected steps, 1 and 2 its interval.
+double value_of(const std::string& row, std::size_t index) {
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < index; ++i) at = row.find(',', at) + 1;
+  const std::string text = row.substr(at, row.find(',', at) - at);
+  if (text.empty()) return std::numeric_limits<double>::quiet_NaN();  // a point whose solver failed
+  return text == "infinite" ? std::numeric_limits<double>::infinity() : std::stod(text);
+}
+
+std::string axis_label(analysis::Parameter parameter) { return std::string(analysis::parameter_label(parameter)); }
+
+std::string axis_unit(analysis::Parameter parameter) { return parameter == analysis::Parameter::slope ? "deg" : ""; }
+
+// Nothing if no point has a finite number of steps.
+std::optional<Figure> figure(const SweepRequest& request, const std::vector<std::string>& rows) {
+  const std::vector<analysis::Axis>& axes = request.axes;
+  Figure figure;
+  figure.id = "sweep";
+  figure.title = "Expected steps before failure";
+  figure.provenance = {request.command, request.setting.describe(), request.study.seed, version()};
+  // The two axes shown; further ones stay at their first value.
+  const analysis::Axis& across = axes.front();
+  const std::size_t second = axes.size() > 1 ? 1 : 0;
+  std::size_t stride = 1, stride_second = 1;
+  for (std::size_t a = 1; a < axes.size(); ++a) stride *= axes[a].values.size();
+  for (std::size_t a = 2; a < axes.size(); ++a) stride_second *= axes[a].values.size();
+  const std::size_t lines = second == 1 ? axes[1].values.size() : 1;
+  const auto row_at = [&](std::size_t i, std::size_t k) -> const std::string& {
+    return rows[i * stride + (second == 1 ? k * stride_second : 0)];
+  };
+  figure.x = {axis_label(across.parameter), axis_unit(across.parameter)};
+  const bool mapped = second == 1 && lines > 4 && lines <= most_map_rows && across.values.size() <= most_map_columns;
+  if (mapped) {
+    figure.y = {axis_label(axes[1].parameter), axis_unit(axes[1].parameter)};
+    HeatMap map{across.values, axes[1].values, {}, "expected steps", true};
+    for (std::size_t k = 0; k < lines; ++k) {
+      map.value.emplace_back();
+      for (std::size_t i = 0; i < across.values.size(); ++i)
+        map.value.back().push_back(value_of(row_at(i, k), axes.size()));
+    }
+    const auto finite = [](const std::vector<double>& row) {
+      return std::any_of(row.begin(), row.end(), [](double value) { return std::isfinite(value); });
+    };
+    if (std::none_of(map.value.begin(), map.value.end(), finite)) return std::nullopt;
+    figure.heat_map = std::move(map);
+    figure.width = 960;
+    return figure;
+  }
+  figure.y = {"expected steps", "", true};
+  const std::size_t shown = std::min(lines, most_lines);
+  for (std::size_t j = 0; j < shown; ++j) {
+    const std::size_t k = shown > 1 ? j * (lines - 1) / (shown - 1) : 0;
+    Series band{"", Style::band, across.values, {}, {}, {}, static_cast<int>(j)};
+    Series line{"", Style::line, across.values, {}, {}, {}, static_cast<int>(j)};
+    if (second == 1) line.label = fmt::format("{} {}", axis_label(axes[1].parameter), axes[1].values[k]);
+    for (std::size_t i = 0; i < across.values.size(); ++i) {
+      line.y.push_back(value_of(row_at(i, k), axes.size()));
+      band.lower.push_back(value_of(row_at(i, k), axes.size() + 1));
+      band.upper.push_back(value_of(row_at(i, k), axes.size() + 2));
+    }
+    if (std::none_of(line.y.begin(), line.y.end(), [](double value) { return std::isfinite(value); })) continue;
+    figure.series.push_back(std::move(band));
+    figure.series.push_back(std::move(line));
+  }
+  if (figure.series.empty()) return std::nullopt;
+  figure.legend = Legend::below;
+  return figure;
+}
+
+}  // namespace
+
+void run_sweep(const SweepRequest& request) {
+  const std::filesystem::path out = request.out, partial = request.out + ".partial";
+  const std::string first_lines = head(request);
+  const std::size_t size = analysis::sweep_size(request.axes);
+  for (std::size_t i = 0; i < size; ++i)  // wrong settings are found before the first is computed
+    analysis::sweep_setting(request.setting, request.axes, i).problem();
+
+  std::vector<std::string> rows;
+  if (std::filesystem::is_directory(out)) throw OutputError(out, "is a folder");
+  if (std::filesystem::exists(out)) {
+    const std::string text = read_file(out);
+    if (!text.starts_with(first_lines))
+      throw OutputError(out, "holds another sweep; choose another --out or remove it");
+    rows = rows_behind(text, first_lines);
+  } else if (std::filesystem::exists(partial)) {
+    const std::string text = read_file(partial);
+    if (!text.starts_with(first_lines))
+      throw OutputError(partial, "belongs to another sweep; choose another --out or remove it");
+    rows = rows_behind(text, first_lines);
+  }
+  const std::size_t had = rows.size();
+  if (had < size) {
+    std::string so_far = first_lines;
+    for (const std::string& one : rows) so_far += one;
+    write_file(partial, so_far);
+    std::ofstream journal(partial, std::ios::binary | std::ios::app);
+    Progress progress("sweep", size);
+    progress.advance(had);
+    analysis::sweep(request.setting, request.axes, had, request.study,
+                    [&](std::size_t, const analysis::SweepPoint& point) {
+                      rows.push_back(row(point));
+                      journal << rows.back() << std::flush;
+                      if (!journal) throw OutputError(partial, "cannot be written");
+                      progress.advance();
+                    });
+    journal.close();
+    std::error_code error;
+    std::filesystem::rename(partial, out, error);
+    if (error) throw OutputError(out, error.message());
+  }
+  std::filesystem::path picture = out;
+  picture.replace_extension(".svg");
+  const std::optional<Figure> drawn = figure(request, rows);
+  if (drawn) write_file(picture, render_svg(*drawn));
+  fmt::print("{}: {} points ({} taken over); {}\n", out.string(), size, had,
+             drawn ? picture.string() : "no figure: no point has a finite number of steps");
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,278 @@
+#include "reports/description/describe_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/statistics/t_interval.h"
+#include "dynamics/wheel/contact_law.h"
+
+namespace metastable::reports {
+namespace {
+
+Cell mean_cell(const analysis::SpeedSummary& s) {
+  if (s.count == 0) return "";
+  if (s.count == 1) return s.mean;
+  return mean_interval(s);
+}
+
+Cell cell(const analysis::Estimate& e) {
+  if (std::isinf(e.value)) return std::isinf(e.upper) ? Cell(fmt::format("> {:.4g}", e.lower)) : Cell(Infinite{});
+  return Estimate{e.value, e.lower, e.upper};
+}
+
+Cell effect(const analysis::EffectSize& e) {
+  if (!std::isfinite(e.value)) return Infinite{};
+  return Estimate{e.value, e.lower, e.upper};
+}
+
+}  // namespace
+
+Estimate mean_interval(const analysis::SpeedSummary& s) {
+  const double half = analysis::t_half_width(s.standard_error, s.count);
+  return {s.mean, s.mean - half, s.mean + half};
+}
+
+std::string p_text(double p) { return p < 1e-6 ? "< 1e-6" : fmt::format("{:.2g}", p); }
+
+Table conditions_table(const analysis::Description& description, const Provenance& provenance) {
+  Table table;
+  table.id = "conditions";
+  table.title = "The conditions";
+  table.provenance = provenance;
+  table.columns = {{"condition"},
+                   {"slope", "deg", NumberFormat::general, 4},
+                   {"trials"},
+                   {"collisions"},
+                   {"steady speed", "rad/s", NumberFormat::significant, 4},
+                   {"sd between trials", "rad/s", NumberFormat::fixed, 3},
+                   {"sd between collisions", "rad/s", NumberFormat::fixed, 3},
+                   {"return-map slope", "", NumberFormat::fixed, 3},
+                   {"its fixed point", "rad/s", NumberFormat::significant, 4},
+                   {"trials that rest"},
+                   {"expected steps before failure", "", NumberFormat::significant, 3}};
+  for (const analysis::ConditionDescription& c : description.conditions) {
+    std::vector<Cell> row{c.id, c.slope_deg, c.trials, c.collisions};
+    row.push_back(mean_cell(c.steady));
+    row.push_back(c.steady.count > 1 ? Cell(c.steady.sd) : Cell(""));
+    row.push_back(c.steady_collisions.count > 1 ? Cell(c.steady_collisions.sd) : Cell(""));
+    row.push_back(c.line ? Cell(with_error(c.line->slope, c.line->slope_error)) : Cell(""));
+    row.push_back(c.line && c.line->fixed_point ? Cell(*c.line->fixed_point) : Cell(""));
+    row.push_back(c.survival ? Cell(c.survival->rests) : Cell(""));
+    row.push_back(c.survival ? cell(c.survival->expected.from_start) : Cell(""));
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {
+      "Speeds are those just before a collision. Steady: from the 13th collision on; its mean and interval are over "
+      "trials, "
+      "one mean a trial. Return map: straight line through all pairs of successive speeds. Brackets hold 95 % "
+      "intervals.",
+      "Expected steps: area under the Kaplan-Meier curve up to the 12th collision, and a constant failure rate from "
+      "the "
+      "13th on; “> n” where no trial rested there."};
+  for (const analysis::ConditionDescription& c : description.conditions)
+    if (c.survival && !c.survival->expected.message.empty())
+      table.notes.push_back(fmt::format("{}: {}.", c.id, c.survival->expected.message));
+  table.notes.insert(table.notes.end(), description.notes.begin(), description.notes.end());
+  return table;
+}
+
+Table profiles_table(const analysis::Description& description, const Provenance& provenance) {
+  Table table;
+  table.id = "profiles";
+  table.title = "Speed just before each collision, mean and standard error";
+  table.provenance = provenance;
+  table.columns = {{"collision"}};
+  std::size_t longest = 0;
+  for (const analysis::ConditionDescription& c : description.conditions) {
+    table.columns.push_back({c.id + " trials"});
+    table.columns.push_back({c.id + " mean", "rad/s", NumberFormat::fixed, 3});
+    table.columns.push_back({c.id + " standard error", "rad/s", NumberFormat::fixed, 3});
+    longest = std::max(longest, c.profile.size());
+  }
+  for (std::size_t k = 0; k < longest; ++k) {
+    std::vector<Cell> row{k + 1};
+    for (const analysis::ConditionDescription& c : description.conditions) {
+      if (k >= c.profile.size()) {
+        row.insert(row.end(), {std::size_t{0}, "", ""});
+        continue;
+      }
+      const analysis::SpeedSummary& s = c.profile[k];
+      row.insert(row.end(), {s.count, s.mean, s.standard_error});
+      if (s.count < 2) row.back() = "";
+    }
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {"Over the trials that met the collision: where trials rest, later rows are of the survivors."};
+  return table;
+}
+
+Table legs_table(const analysis::Description& description, const Provenance& provenance) {
+  Table table;
+  table.id = "legs";
+  table.title = "Speed before the collision of each leg";
+  table.provenance = provenance;
+  table.columns = {{"leg"}};
+  std::size_t legs = 0;
+  for (const analysis::ConditionDescription& c : description.conditions) {
+    table.columns.push_back({c.id, "rad/s", NumberFormat::significant, 4});
+    if (c.legs) legs = std::max(legs, c.legs->size());
+  }
+  for (std::size_t leg = 0; leg < legs; ++leg) {
+    if (std::none_of(description.conditions.begin(), description.conditions.end(),
+                     [&](const auto& c) { return c.legs && (*c.legs)[leg].count > 0; }))
+      continue;
+    std::vector<Cell> row{leg};
+    for (const analysis::ConditionDescription& c : description.conditions)
+      row.push_back(c.legs ? mean_cell((*c.legs)[leg]) : Cell(""));
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {
+      "From the wheel's second turn on, so that every leg counts; one mean a trial, with 95 % interval. The first of "
+      "them land before the 13th collision, from which speeds are taken as steady."};
+  return table;
+}
+
+Table tests_table(const analysis::Description& description, const Provenance& provenance) {
+  Table table;
+  table.id = "tests";
+  table.title = "Steady speeds of two conditions: the same distribution?";
+  table.provenance = provenance;
+  table.columns = {{"conditions"},
+                   {"values"},
+                   {"n"},
+                   {"difference of means", "rad/s", NumberFormat::fixed, 3},
+                   {"P Welch"},
+                   {"P pooled t"},
+                   {"P Kolmogorov-Smirnov"},
+                   {"P Anderson-Darling"},
+                   {"Hedges' g", "", NumberFormat::fixed, 2},
+                   {"P(first > second)", "", NumberFormat::fixed, 3},
+                   {"distance D", "", NumberFormat::fixed, 3},
+                   {"not told apart from collision"}};
+  for (const analysis::ConditionComparison& c : description.comparisons) {
+    const std::string pair = description.conditions[c.a].id + ", " + description.conditions[c.b].id;
+    const auto add = [&](const std::optional<analysis::SampleComparison>& s, const char* values, bool meet) {
+      if (!s) return;
+      table.rows.push_back({pair, values, fmt::format("{}, {}", s->count_a, s->count_b), effect(s->welch.difference),
+                            p_text(s->welch.p), p_text(s->pooled.p), p_text(s->kolmogorov_smirnov.p),
+                            p_text(s->anderson_darling.p), effect(s->hedges), effect(s->superiority),
+                            effect(s->distance), meet ? (c.meet ? Cell(*c.meet) : Cell("never")) : Cell("")});
+    };
+    add(c.trial_means, "trial means", true);
+    add(c.all_collisions, "all collisions", false);
+  }
+  table.notes = {
+      "From the 13th collision on. P is two-sided: how often samples of one distribution differ this much. Trial means "
+      "are "
+      "independent of each other, and their P holds; collisions of one trial are not, so that P of “all collisions”, "
+      "which is closest to what the paper reports, is too small where trials differ.",
+      "Last column: first collision from which on Welch's test at every collision has P of 0.05 or more."};
+  return table;
+}
+
+Table survival_table(const analysis::Description& description, const Provenance& provenance) {
+  Table table;
+  table.id = "survival";
+  table.title = "Probability of surviving n collisions (Kaplan-Meier)";
+  table.provenance = provenance;
+  table.columns = {{"n"}};
+  std::size_t longest = 0;
+  for (const analysis::ConditionDescription& c : description.conditions) {
+    table.columns.push_back({c.id + " at risk"});
+    table.columns.push_back({c.id + " rested"});
+    table.columns.push_back({c.id + " P(steps > n)", "", NumberFormat::fixed, 3});
+    if (c.survival) longest = std::max(longest, c.survival->curve.size());
+  }
+  for (std::size_t k = 0; k < longest; ++k) {
+    std::vector<Cell> row{k + 1};
+    for (const analysis::ConditionDescription& c : description.conditions) {
+      if (!c.survival || k >= c.survival->curve.size()) {
+        row.insert(row.end(), {"", "", ""});
+        continue;
+      }
+      const analysis::SurvivalPoint& p = c.survival->curve[k];
+      row.insert(row.end(), {p.at_risk, p.rested, Estimate{p.survival, p.lower, p.upper}});
+    }
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {
+      "Trials that reached the end of the ramp or of the recording are censored there, not failures. Brackets: 95 %, "
+      "from "
+      "Greenwood's variance on the log(−log) scale."};
+  return table;
+}
+
+Table fits_table(const analysis::Description& description, const Provenance& provenance) {
+  Table table;
+  table.id = "contact";
+  table.title = "Restitution and friction by maximum likelihood";
+  table.provenance = provenance;
+  table.columns = {{"fitted to"}, {"transitions"}, {"rests"}, {"left out"}};
+  for (const char* name : {"η mean", "η sd", "μ mean", "μ sd"})
+    table.columns.push_back({name, "", NumberFormat::fixed, 3});
+  table.columns.push_back({"log-likelihood", "", NumberFormat::fixed, 1});
+  for (const analysis::DescribedFit& f : description.fits) {
+    std::vector<Cell> row{f.of, f.fit.transitions, f.fit.rests, f.fit.impossible};
+    const bool fitted = f.fit.status != analysis::ContactFit::Status::impossible;
+    for (std::size_t i = 0; i < 4; ++i)
+      row.push_back(fitted ? Cell(Estimate{f.fit.value[i], f.fit.lower_95[i], f.fit.upper_95[i]}) : Cell(""));
+    row.push_back(fitted ? Cell(f.fit.log_likelihood) : Cell(""));
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {
+      fmt::format("η ~ N(mean, sd²) on [0, 1], μ ~ N(mean, sd²) on [0, ∞), from {}. Brackets: 95 %, where the "
+                  "likelihood with the other three at their best has fallen by 1.92; infinite where it does not. "
+                  "Speeds are taken as exact, so that noise of the sensor counts as spread.",
+                  description.transition == analysis::Transition::collision ? "each collision's ω− and ω+"
+                                                                            : "each step's ω− and the next ω−")};
+  for (const analysis::DescribedFit& f : description.fits) {
+    if (!f.fit.message.empty()) table.notes.push_back(fmt::format("{}: {}.", f.of, f.fit.message));
+    std::string sentences;
+    for (const std::string& sentence : analysis::ambiguities(f.fit)) sentences += " " + sentence;
+    if (!sentences.empty()) table.notes.push_back(fmt::format("{}:{}", f.of, sentences));
+  }
+  return table;
+}
+
+Table laws_table(const analysis::LawComparison& comparison, const Provenance& provenance) {
+  Table table;
+  table.id = "laws";
+  table.title = "Measured beside what the contact laws predict";
+  table.provenance = provenance;
+  table.columns = {{"condition"},
+                   {"source"},
+                   {"trials"},
+                   {"steady speed", "rad/s", NumberFormat::significant, 4},
+                   {"sd between trials", "rad/s", NumberFormat::fixed, 3},
+                   {"sd between collisions", "rad/s", NumberFormat::fixed, 3},
+                   {"share that rests", "", NumberFormat::fixed, 3},
+                   {"P same speed"}};
+  for (const analysis::LawRow& r : comparison.rows) {
+    if (r.trials == 0) {
+      table.rows.push_back({r.condition, r.source, "", "no fit", "", "", "", ""});
+      continue;
+    }
+    table.rows.push_back({r.condition, r.source, r.trials, mean_cell(r.steady),
+                          r.steady.count > 1 ? Cell(r.steady.sd) : Cell(""),
+                          r.steady.count > 0 ? Cell(r.collision_sd) : Cell(""),
+                          r.outcomes_known ? cell(r.rest_share) : Cell(""), r.p_speed ? p_text(*r.p_speed) : ""});
+  }
+  table.notes = {
+      "Steady: from the 13th collision on, by the trials that got there; empty if none did. Brackets: 95 %. P: Welch's "
+      "test "
+      "of the trial means against the measured ones. “As given” takes η and μ from experiment.toml, “fitted” from all "
+      "conditions by maximum likelihood of the steps."};
+  for (const auto& [law, fit] : comparison.fits) {
+    std::string text(dynamics::law_name(law));
+    text += fit.status == analysis::ContactFit::Status::impossible
+                ? ": " + fit.message
+                : fmt::format(": η ~ N({:.3f}, {:.3f}²), μ ~ N({:.3f}, {:.3f}²){}{}", fit.value[0], fit.value[1],
+                              fit.value[2], fit.value[3], fit.message.empty() ? "" : "; ", fit.message);
+    table.notes.push_back(text + ".");
+  }
+  return table;
+}
+
+}  // namespace metastable::reports

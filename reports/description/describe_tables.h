@@ -1,0 +1,32 @@
+#pragma once
+// The tables of `metastable describe`, from a finished description.
+
+#include <string>
+
+#include "analysis/description/description.h"
+#include "analysis/description/law_comparison.h"
+#include "reports/output/table.h"
+
+namespace metastable::reports {
+
+/// Trials, steady speed, return map and survival of each condition.
+Table conditions_table(const analysis::Description& description, const Provenance& provenance);
+/// Mean speed and standard error at each collision, all conditions side by side.
+Table profiles_table(const analysis::Description& description, const Provenance& provenance);
+/// Speed per landing leg.
+Table legs_table(const analysis::Description& description, const Provenance& provenance);
+/// Every test on every pair of conditions.
+Table tests_table(const analysis::Description& description, const Provenance& provenance);
+/// Survival step by step.
+Table survival_table(const analysis::Description& description, const Provenance& provenance);
+/// Restitution and friction by maximum likelihood.
+Table fits_table(const analysis::Description& description, const Provenance& provenance);
+/// Measured beside predicted: speeds, spread, share of trials that rest.
+Table laws_table(const analysis::LawComparison& comparison, const Provenance& provenance);
+
+/// Mean of two values or more with its t-interval.
+Estimate mean_interval(const analysis::SpeedSummary& s);
+/// One test as a table's rows do: "0.012", "< 1e-6".
+std::string p_text(double p);
+
+}  // namespace metastable::reports

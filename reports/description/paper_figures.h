@@ -1,0 +1,22 @@
+#pragma once
+// The figures of `metastable study`, as the paper draws them: mean profiles, standard errors as bands.
+
+#include <vector>
+
+#include "analysis/paper/paper_study.h"
+#include "reports/output/figure.h"
+
+namespace metastable::reports {
+
+/// One figure a panel of the paper's, for one variant.
+std::vector<Figure> fig4_figures(const analysis::VariantStudy& study, const Provenance& provenance);
+std::vector<Figure> fig6_figures(const analysis::VariantStudy& study, const analysis::PaperExperiments& experiments,
+                                 const Provenance& provenance);
+std::vector<Figure> fig7_figures(const analysis::VariantStudy& study, const analysis::PaperExperiments& experiments,
+                                 const Provenance& provenance);
+std::vector<Figure> fig8_figures(const analysis::VariantStudy& study, const Provenance& provenance);
+std::vector<Figure> fig9_figures(const analysis::VariantStudy& study, const analysis::PaperExperiments& experiments,
+                                 const Provenance& provenance);
+Figure fig4_experiment_figure(const analysis::PaperExperiments& experiments, const Provenance& provenance);
+
+}  // namespace metastable::reports

@@ -1,0 +1,377 @@
+#include "reports/description/paper_tables.h"
+
+#include <fmt/format.h>
+
+#include "reports/description/describe_tables.h"
+
+namespace metastable::reports {
+namespace {
+
+using analysis::StudiedProfile;
+using analysis::VariantStudy;
+
+// Mean steady speed over trials, with its interval.
+Cell steady_cell(const std::vector<double>& trial_means) {
+  if (trial_means.size() < 2) return "";
+  return mean_interval(analysis::summarize(trial_means));
+}
+
+Cell sd_cell(double sd) { return sd > 0 ? Cell(sd) : Cell(""); }
+
+std::string experiment_name(const analysis::PaperExperiments& experiments) {
+  return experiments.stand_in ? "stand-in (simulated)" : "experiment";
+}
+
+std::string experiment_note(const analysis::PaperExperiments& experiments) {
+  return experiments.stand_in
+             ? "The paper's measurements are not public. Where they are needed, a simulated stand-in takes their "
+               "place: 51 "
+               "fast and 48 slow trials at 9.59 deg, 50 at 7.02 deg, published law with η ~ N(0.54, 0.045²) and μ ~ "
+               "N(0.352, 0.043²). It is no evidence about the real wheel; --data takes a measured one."
+             : fmt::format("Experiment: {}.", experiments.title);
+}
+
+const char* const variants_note =
+    "Published, goes on: the paper gives no rest rule; the wheel goes on whatever happens and x′ < 0 is set to 0 (the "
+    "reading under which Fig. 8 comes out). Published, rests: a wheel that fails to vault is at rest; later collisions "
+    "are "
+    "of the survivors. Coulomb: stick and slip with r_g = 0.05 m (an assumption); at these slopes nothing rests under "
+    "it.";
+
+std::string finding_text(const analysis::Finding& finding) {
+  if (finding.ours.empty()) return "";
+  return analysis::verdict_text(finding.verdict) + ": " + finding.ours;
+}
+
+Table start(const char* id, const std::string& title, const Provenance& provenance) {
+  Table table;
+  table.id = id;
+  table.title = title;
+  table.provenance = provenance;
+  return table;
+}
+
+}  // namespace
+
+Table claims_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
+                   const analysis::PaperExperiments& experiments, const Provenance& provenance) {
+  Table table = start("claims", "The paper's claims", provenance);
+  table.columns = {{"where"}, {"claim"}, {"paper"}};
+  for (const VariantStudy& s : studies) table.columns.push_back({s.variant.name});
+  table.columns.push_back({experiment_name(experiments)});
+  for (const analysis::Claim& claim : claims) {
+    std::vector<Cell> row{claim.where, claim.claim, claim.paper};
+    for (const analysis::Finding& finding : claim.findings) row.emplace_back(finding_text(finding));
+    row.emplace_back(finding_text(claim.experiment));
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {variants_note, experiment_note(experiments)};
+  return table;
+}
+
+Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
+                    const analysis::PaperExperiments& experiments, const Provenance& provenance) {
+  Table table = start("changes", "What the law and the reading change", provenance);
+  table.columns = {{"what"}};
+  for (const VariantStudy& s : studies) table.columns.push_back({s.variant.name});
+  table.columns.push_back({"changes with"});
+  const auto add = [&](const std::string& what, const auto& of) {
+    std::vector<Cell> row{what};
+    for (const VariantStudy& s : studies) row.emplace_back(of(s));
+    row.emplace_back("");
+    table.rows.push_back(std::move(row));
+  };
+  // Figures first: at 7.02 deg with sds of 0.1.
+  const auto plain = [](const Estimate& e) {
+    return fmt::format("{:.3f} ({:.3f} to {:.3f})", e.value, e.lower, e.upper);
+  };
+  add("steady speed [rad/s]", [&](const VariantStudy& s) {
+    const std::vector<double>& means = s.fig7[1][1].trial_means;
+    if (means.size() < 2) return std::string("none gets there");
+    return plain(mean_interval(analysis::summarize(means)));
+  });
+  add("trials that rest within 16 collisions", [](const VariantStudy& s) {
+    return s.variant.reading == analysis::RestReading::goes_on ? std::string("cannot")
+                                                               : fmt::format("{:.3f}", s.fig7[1][1].rest_share);
+  });
+  add("largest source of the steady speed's variance (total index)", [](const VariantStudy& s) {
+    const std::vector<analysis::SobolIndex>& group = s.variance[1].steady_speed.group;
+    std::size_t most = 0;
+    for (std::size_t g = 1; g < group.size(); ++g)
+      if (group[g].total.value > group[most].total.value) most = g;
+    return group.empty() ? std::string()
+                         : fmt::format("{} ({:.2f})", analysis::variance_sources[most], group[most].total.value);
+  });
+  add("friction's net loss, normal loss [J]", [](const VariantStudy& s) {
+    return fmt::format("{:.3f}, {:.3f}", s.fig8[1].tangential_net.mean, s.fig8[1].normal.mean);
+  });
+  std::size_t kept = 0;
+  for (const analysis::Claim& claim : claims) {
+    const analysis::ClaimVerdict goes_on = claim.findings[0].verdict, rests = claim.findings[1].verdict,
+                                 coulomb = claim.findings[2].verdict;
+    const bool reading = goes_on != rests, law = coulomb != goes_on && coulomb != rests;
+    if (!reading && !law) {
+      ++kept;
+      continue;
+    }
+    std::vector<Cell> row{claim.where + ": " + claim.claim};
+    for (const analysis::Finding& finding : claim.findings) row.emplace_back(analysis::verdict_text(finding.verdict));
+    row.emplace_back(reading && law ? "reading and law" : law ? "law" : "reading");
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {
+      fmt::format("Numbers: 7.02 deg, launch N(7.35, 0.19²) rad/s, η, μ ~ N(0.4, 0.1²). Then the claims whose verdict "
+                  "differs; the other {} of {} have one verdict throughout. The law changes a verdict where coulomb "
+                  "agrees with neither reading of published, the reading where these two differ.",
+                  kept, claims.size()),
+      variants_note, experiment_note(experiments)};
+  return table;
+}
+
+Table readings_table(const std::vector<analysis::Claim>& claims, const Provenance& provenance) {
+  Table table = start("readings", "What counts as reproduced", provenance);
+  table.columns = {{"where"}, {"claim"}, {"reading"}};
+  for (const analysis::Claim& claim : claims) table.rows.push_back({claim.where, claim.claim, claim.reading});
+  return table;
+}
+
+Table hypotheses_table(const std::vector<analysis::Hypothesis>& hypotheses, const Studies& studies,
+                       const Provenance& provenance) {
+  Table table = start("hypotheses", "The three hypotheses", provenance);
+  table.columns = {{""}, {"hypothesis"}};
+  for (const VariantStudy& s : studies) table.columns.push_back({s.variant.name});
+  for (const analysis::Hypothesis& h : hypotheses) {
+    std::vector<Cell> row{h.name, h.text};
+    for (const analysis::Finding& f : h.findings) {
+      const char* verdict = f.verdict == analysis::ClaimVerdict::reproduced ? "yes"
+                            : f.verdict == analysis::ClaimVerdict::partly   ? "for the steps only"
+                                                                            : "no";
+      row.emplace_back(fmt::format("{}: {}", verdict, f.ours));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {
+      "Yes: the largest total Sobol' index of the steady speed over mean friction 0.3 to 0.55 exceeds 0.1. It is the "
+      "share of "
+      "the variance that would go if everything but this source were known; shares with interactions may add up to "
+      "more "
+      "than one.",
+      variants_note};
+  return table;
+}
+
+Table variance_table(const Studies& studies, const Provenance& provenance) {
+  Table table = start("variance", "Where the variance comes from: Sobol' indices at 7.02 deg", provenance);
+  table.columns = {{"law"},
+                   {"output"},
+                   {"mean of μ", "", NumberFormat::fixed, 2},
+                   {"mean", "", NumberFormat::significant, 4},
+                   {"sd", "", NumberFormat::significant, 3}};
+  for (const char* source : analysis::variance_sources) {
+    table.columns.push_back({fmt::format("{}, first", source), "", NumberFormat::fixed, 3});
+    table.columns.push_back({fmt::format("{}, total", source), "", NumberFormat::fixed, 3});
+  }
+  for (const VariantStudy& s : studies) {
+    if (s.variant.reading == analysis::RestReading::goes_on) continue;  // one law, one set of indices
+    const std::string law(dynamics::law_name(s.variant.law));
+    for (const bool steps : {false, true})
+      for (std::size_t f = 0; f < s.variance.size(); ++f) {
+        const analysis::SobolResult& result = steps ? s.variance[f].steps : s.variance[f].steady_speed;
+        std::vector<Cell> row{law, steps ? "steps" : "steady speed [rad/s]", analysis::variance_friction[f],
+                              result.mean, result.sd};
+        for (std::size_t g = 0; g < analysis::variance_sources.size(); ++g) {
+          if (result.group.empty()) {
+            row.insert(row.end(), {"", ""});
+            continue;
+          }
+          const analysis::SobolIndex& index = result.group[g];
+          row.emplace_back(Estimate{index.first.value, index.first.lower, index.first.upper});
+          row.emplace_back(Estimate{index.total.value, index.total.lower, index.total.upper});
+        }
+        table.rows.push_back(std::move(row));
+      }
+  }
+  table.notes = {
+      "Sources: launch N(7.35, 0.19²) rad/s; each leg N(0.1519, 0.000687²) m; η ~ N(0.4, 0.1²) and μ ~ N(mean, 0.1²), "
+      "afresh "
+      "at every collision. Steady speed: mean before collisions 13 to 16, with x′ < 0 set to 0 and no rest. Steps: "
+      "before "
+      "failure, at most the 32 on the ramp; their first-order share is that of the expected steps given the source. "
+      "Empty: "
+      "the output does not vary. Brackets: 95 %; sampling may put an index a little outside [0, 1]."};
+  return table;
+}
+
+Table fig4_table(const Studies& studies, const analysis::PaperExperiments& experiments, const Provenance& provenance) {
+  Table table = start("fig4", "Fig. 4: fast and slow start at 9.59 deg", provenance);
+  table.columns = {{"source"},
+                   {"fast, steady", "rad/s", NumberFormat::significant, 4},
+                   {"slow, steady", "rad/s", NumberFormat::significant, 4},
+                   {"difference", "rad/s", NumberFormat::fixed, 3},
+                   {"P, trial means"},
+                   {"P, all collisions"},
+                   {"not told apart from collision"}};
+  const auto add = [&](const std::string& source, const analysis::TrialSpeeds& fast,
+                       const analysis::TrialSpeeds& slow) {
+    const analysis::ConditionComparison c = analysis::compare_conditions(fast, slow);
+    std::vector<Cell> row{source, steady_cell(analysis::steady_trial_means(fast)),
+                          steady_cell(analysis::steady_trial_means(slow))};
+    if (c.trial_means)
+      row.insert(row.end(), {Estimate{c.trial_means->welch.difference.value, c.trial_means->welch.difference.lower,
+                                      c.trial_means->welch.difference.upper},
+                             p_text(c.trial_means->welch.p), p_text(c.all_collisions->pooled.p)});
+    else
+      row.insert(row.end(), {"", "", ""});
+    row.push_back(c.meet ? Cell(*c.meet) : Cell("never"));
+    table.rows.push_back(std::move(row));
+  };
+  add(experiment_name(experiments), experiments.fast_959, experiments.slow_959);
+  for (const VariantStudy& s : studies) add(s.variant.name, s.fig4[0].speeds, s.fig4[1].speeds);
+  table.notes = {
+      "Simulated with η, μ ~ N(0.4, 0.1²): the paper states no contact for this figure. Paper: P > 0.07 beyond the "
+      "12th collision (two-sided t-test).",
+      variants_note, experiment_note(experiments)};
+  return table;
+}
+
+Table fig6_table(const Studies& studies, const Provenance& provenance) {
+  Table table = start("fig6", "Fig. 6: three launch speeds, constant friction, η ~ N(0.4, 0.2²), 7.02 deg", provenance);
+  table.columns = {{"variant"}, {"μ", "", NumberFormat::fixed, 2}};
+  for (const double launch : analysis::fig6_launch)
+    table.columns.push_back({fmt::format("steady, launch {}", launch), "rad/s", NumberFormat::significant, 4});
+  table.columns.push_back({"sd of a collision", "rad/s", NumberFormat::fixed, 3});
+  for (const char* pair : {"P 1-2", "P 1-3", "P 2-3"}) table.columns.push_back({pair});
+  for (const char* pair : {"P 1-2 by trial", "P 1-3 by trial", "P 2-3 by trial"}) table.columns.push_back({pair});
+  table.columns.push_back({"trials that rest", "", NumberFormat::fixed, 3});
+  for (const VariantStudy& s : studies)
+    for (std::size_t j = 0; j < 4; ++j) {
+      std::vector<Cell> row{s.variant.name, analysis::fig6_friction[j]};
+      for (const StudiedProfile& profile : s.fig6[j]) row.push_back(steady_cell(profile.trial_means));
+      row.push_back(sd_cell(s.fig6[j][2].steady_sd()));
+      const auto p_cells = [&](const std::array<double, 3>& p) {
+        constexpr std::array<std::array<std::size_t, 2>, 3> pairs{{{0, 1}, {0, 2}, {1, 2}}};
+        for (std::size_t i = 0; i < 3; ++i)
+          row.push_back(
+              s.fig6[j][pairs[i][0]].steady.size() < 2 || s.fig6[j][pairs[i][1]].steady.size() < 2 ? "" : p_text(p[i]));
+      };
+      p_cells(s.fig6_p[j]);
+      p_cells(s.fig6_p_trials[j]);
+      row.emplace_back(s.fig6[j][2].rest_share);
+      table.rows.push_back(std::move(row));
+    }
+  table.notes = {
+      "Launches N(1.35 + 2k, 0.198²) rad/s, k = 1, 2, 3. P: pooled t-test of all collisions from the 13th on, as the "
+      "paper "
+      "seems to do; by trial: Welch's test with one mean a trial. The caption keeps η = 0.4, the text scatters it; the "
+      "text is followed. Empty: fewer than two trials get that far. Sd and rests are of k = 3.",
+      variants_note};
+  return table;
+}
+
+Table equal_legs_table(const Studies& studies, const Provenance& provenance) {
+  Table table = start("equal-legs", "Sec. IV-A: the measured legs against eight of mean length", provenance);
+  table.columns = {{"variant"},
+                   {"μ", "", NumberFormat::fixed, 2},
+                   {"launch", "rad/s", NumberFormat::fixed, 2},
+                   {"measured legs", "rad/s", NumberFormat::significant, 4},
+                   {"equal legs", "rad/s", NumberFormat::significant, 4},
+                   {"P"},
+                   {"P by trial"}};
+  for (const VariantStudy& s : studies)
+    for (std::size_t j = 0; j < 4; ++j)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const bool both = s.fig6[j][k].steady.size() >= 2 && s.equal_legs[j][k].steady.size() >= 2;
+        table.rows.push_back({s.variant.name, analysis::fig6_friction[j], analysis::fig6_launch[k],
+                              steady_cell(s.fig6[j][k].trial_means), steady_cell(s.equal_legs[j][k].trial_means),
+                              both ? p_text(s.legs_p[j][k]) : "", both ? p_text(s.legs_p_trials[j][k]) : ""});
+      }
+  table.notes = {
+      "Steady speeds (from the 13th collision on) of the runs of Fig. 6. Paper: P > 0.1 everywhere. Collisions 13 to "
+      "16 "
+      "land on legs 4 to 7, whose mean length is not that of all eight.",
+      variants_note};
+  return table;
+}
+
+Table fig7_table(const Studies& studies, const analysis::PaperExperiments& experiments, const Provenance& provenance) {
+  Table table = start("fig7", "Fig. 7: spreads of η and μ, 7.02 deg", provenance);
+  table.columns = {{"variant"},
+                   {"sd of μ", "", NumberFormat::fixed, 2},
+                   {"sd of η", "", NumberFormat::fixed, 2},
+                   {"steady speed", "rad/s", NumberFormat::significant, 4},
+                   {"sd of a collision", "rad/s", NumberFormat::fixed, 3},
+                   {"trials that rest", "", NumberFormat::fixed, 3},
+                   {fmt::format("{} less simulated", experiment_name(experiments)), "rad/s", NumberFormat::fixed, 3},
+                   {"P"}};
+  for (const VariantStudy& s : studies)
+    for (std::size_t j = 0; j < 4; ++j)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const StudiedProfile& profile = s.fig7[j][k];
+        const std::optional<analysis::TTest>& test = s.fig7_test[j][k];
+        table.rows.push_back(
+            {s.variant.name, analysis::fig7_friction_sd[j], analysis::fig7_restitution_sd[k],
+             steady_cell(profile.trial_means), sd_cell(profile.steady_sd()), profile.rest_share,
+             test ? Cell(Estimate{test->difference.value, test->difference.lower, test->difference.upper}) : Cell(""),
+             test ? p_text(test->p) : ""});
+      }
+  table.notes = {
+      "η ~ N(0.4, sd²), μ ~ N(0.4, sd²), launch N(7.35, 0.19²) rad/s. P: pooled t-test of all collisions from the 13th "
+      "on "
+      "against the experiment at 7.02 deg.",
+      variants_note, experiment_note(experiments)};
+  return table;
+}
+
+Table fig8_table(const Studies& studies, const Provenance& provenance) {
+  Table table = start("fig8", "Fig. 8: energy lost in a collision, 7.02 deg", provenance);
+  table.columns = {{"variant"},
+                   {"sd of η and μ", "", NumberFormat::fixed, 2},
+                   {"tangential net, mean", "J", NumberFormat::fixed, 3},
+                   {"tangential net, sd", "J", NumberFormat::fixed, 3},
+                   {"paper"},
+                   {"normal, mean", "J", NumberFormat::fixed, 3},
+                   {"normal, sd", "J", NumberFormat::fixed, 3},
+                   {"paper"}};
+  for (const VariantStudy& s : studies)
+    for (std::size_t k = 0; k < 4; ++k) {
+      const analysis::MeanSpread &t = s.fig8[k].tangential_net, &n = s.fig8[k].normal;
+      table.rows.push_back({s.variant.name, 0.05 * static_cast<double>(k + 1), with_error(t.mean, t.standard_error),
+                            t.sd,
+                            k == 0   ? "0.05 (0.03)"
+                            : k == 3 ? "0.11 (0.19)"
+                                     : "",
+                            with_error(n.mean, n.standard_error), n.sd,
+                            k == 0   ? "0.17 (0.06)"
+                            : k == 3 ? "0.17 (0.1)"
+                                     : ""});
+    }
+  table.notes = {
+      "Launch N(7.35, 0.19²) rad/s, 16 collisions. Net: friction loss less the potential energy gained by slipping "
+      "downhill. Paper: mean (sd).",
+      variants_note};
+  return table;
+}
+
+Table fig9_table(const Studies& studies, const Provenance& provenance) {
+  Table table = start("fig9", "Fig. 9: means of η and μ, both with sd 0.15, 7.02 deg", provenance);
+  table.columns = {{"variant"},
+                   {"mean of μ", "", NumberFormat::fixed, 1},
+                   {"mean of η", "", NumberFormat::fixed, 1},
+                   {"sd at collisions 2-6", "rad/s", NumberFormat::fixed, 3},
+                   {"sd at collisions 13-16", "rad/s", NumberFormat::fixed, 3},
+                   {"steady speed", "rad/s", NumberFormat::significant, 4},
+                   {"trials that rest", "", NumberFormat::fixed, 3}};
+  for (const VariantStudy& s : studies)
+    for (std::size_t n = 0; n < 4; ++n)
+      for (std::size_t m = 0; m < 3; ++m) {
+        const StudiedProfile& profile = s.fig9[n][m];
+        table.rows.push_back({s.variant.name, analysis::fig9_friction[n], analysis::fig9_restitution[m],
+                              sd_cell(profile.transient_sd()), sd_cell(profile.steady_sd()),
+                              steady_cell(profile.trial_means), profile.rest_share});
+      }
+  table.notes = {"Launch N(7.35, 0.19²) rad/s. Sds between trials; empty where fewer than two trials get that far.",
+                 variants_note};
+  return table;
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,108 @@
+#include "reports/diagnosis/blind_json.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace metastable::reports {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json spread(const analysis::Spread& s) { return {{"mean", s.mean}, {"sd", s.sd}}; }
+analysis::Spread spread(const ordered_json& j) { return {j.at("mean").get<double>(), j.at("sd").get<double>()}; }
+
+}  // namespace
+
+std::string truth_json(const analysis::BlindTruth& truth, const std::string& salt) {
+  ordered_json j;
+  j["case"] = truth.number;
+  j["kind"] = std::string(analysis::blind_kind_name(truth.kind));
+  j["effects"] = ordered_json::array();
+  for (const dynamics::Effect& effect : truth.effects)
+    j["effects"].push_back({{"id", effect.id}, {"values", effect.values}, {"text", dynamics::effect_text(effect)}});
+  j["outside"] =
+      truth.outside ? ordered_json{{"id", truth.outside->id}, {"size", truth.outside->size}} : ordered_json();
+  j["strength"] = truth.strength;
+  j["power"] = truth.power;
+  j["power_left_after_recalibration"] = truth.left;
+  j["nominal_is_true"] = truth.nominal_is_true;
+  j["restitution"] = spread(truth.restitution);
+  j["friction"] = spread(truth.friction);
+  j["restitution_skewness"] = truth.skewness;
+  j["sensor_noise_rad_s"] = truth.noise;
+  j["seed"] = truth.seed;
+  j["left_out"] = truth.left_out;
+  j["salt"] = salt;
+  return j.dump(1) + "\n";
+}
+
+analysis::BlindTruth read_truth(const std::string& file, std::string_view text) {
+  try {
+    const ordered_json j = ordered_json::parse(text);
+    analysis::BlindTruth truth;
+    truth.number = j.at("case").get<int>();
+    truth.kind = analysis::blind_kind(j.at("kind").get<std::string>());
+    for (const ordered_json& effect : j.at("effects"))
+      truth.effects.push_back({effect.at("id").get<std::string>(), effect.at("values").get<std::vector<double>>()});
+    if (!j.at("outside").is_null())
+      truth.outside = {j.at("outside").at("id").get<std::string>(), j.at("outside").at("size").get<double>()};
+    truth.strength = j.at("strength").get<int>();
+    truth.power = j.at("power").get<double>();
+    truth.left = j.at("power_left_after_recalibration").get<double>();
+    truth.nominal_is_true = j.at("nominal_is_true").get<bool>();
+    truth.restitution = spread(j.at("restitution"));
+    truth.friction = spread(j.at("friction"));
+    truth.skewness = j.at("restitution_skewness").get<double>();
+    truth.noise = j.at("sensor_noise_rad_s").get<double>();
+    truth.seed = j.at("seed").get<std::uint64_t>();
+    truth.left_out = j.at("left_out").get<std::vector<std::string>>();
+    return truth;
+  } catch (const nlohmann::json::exception& error) {
+    throw std::invalid_argument(fmt::format("{}: not a sealed truth: {}", file, error.what()));
+  }
+}
+
+analysis::BlindAnswer read_answer(const std::string& file, std::string_view text) {
+  try {
+    const ordered_json j = ordered_json::parse(text);
+    analysis::BlindAnswer answer;
+    try {
+      answer.verdict = analysis::verdict_from_name(j.at("verdict").get<std::string>());
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: {}", file, error.what()));
+    }
+    for (const ordered_json& cause : j.at("causes"))
+      answer.causes.emplace_back(cause.at("effect").get<std::string>(), cause.at("probability").get<double>());
+    answer.cause_set = j.at("cause_set").get<std::vector<std::string>>();
+    if (!j.at("causes").empty()) {
+      const ordered_json& first = j.at("causes").front();
+      const ordered_json intervals = first.value("interval_90", ordered_json::object());
+      for (const auto& [name, value] : first.at("parameters").items()) {
+        if (!value.is_number()) continue;
+        analysis::AnsweredParameter p{first.at("effect").get<std::string>(), name, value.get<double>(), {}, {}};
+        if (intervals.contains(name) && intervals.at(name).is_array() && intervals.at(name).size() == 2 &&
+            intervals.at(name)[0].is_number() && intervals.at(name)[1].is_number()) {
+          p.lower = intervals.at(name)[0].get<double>();
+          p.upper = intervals.at(name)[1].get<double>();
+        }
+        answer.parameters.push_back(std::move(p));
+      }
+    }
+    for (const ordered_json& w : j.at("where"))
+      answer.where.push_back(
+          {w.at("facet").get<std::string>(), w.at("aspect").get<std::string>(), w.at("p_adjusted").get<double>()});
+    const ordered_json& shrinkage = j.at("shrinkage");
+    const ordered_json interval = shrinkage.value("closed_interval_90", ordered_json());
+    if (interval.is_array() && interval.size() == 2 && interval[0].is_number() && interval[1].is_number()) {
+      answer.closed_lower = interval[0].get<double>();
+      answer.closed_upper = interval[1].get<double>();
+    }
+    return answer;
+  } catch (const nlohmann::json::exception& error) {
+    throw std::invalid_argument(fmt::format("{}: not an answer of `diagnose --json`: {}", file, error.what()));
+  }
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,101 @@
+#include "reports/diagnosis/blind_tables.h"
+
+#include <fmt/format.h>
+
+namespace metastable::reports {
+namespace {
+
+std::string mean_size(double size) { return size > 0 ? fmt::format("{:.2f}", size) : "no case"; }
+
+Table measures(const analysis::BlindGrades& grades, const Provenance& provenance) {
+  Table table{.id = "blind-measures",
+              .title = "Blind check: what was asked for and what came out",
+              .notes = {"Shares with Wilson's 95 % interval. met: the share reaches the aim; "
+                        "open: it falls short, but its interval does not exclude the aim.",
+                        fmt::format("Mean size of the 95 % set: {} at 1x (aim at most 3), {} at 2x (at most 1.7).",
+                                    mean_size(grades.mean_set_size_1x), mean_size(grades.mean_set_size_2x))},
+              .columns = {{"measure"}, {"right"}, {"of"}, {"share"}, {"aim"}, {"verdict"}},
+              .provenance = provenance};
+  for (const analysis::Grade& grade : grades.grades) {
+    const auto [low, high] = analysis::wilson(grade.proportion);
+    std::string aim = grade.aim_low > 0 && grade.aim_high < 1
+                          ? fmt::format("{:.0f} to {:.0f} %", 100 * grade.aim_low, 100 * grade.aim_high)
+                      : grade.aim_low > 0 ? fmt::format("at least {:.0f} %", 100 * grade.aim_low)
+                                          : fmt::format("at most {:.0f} %", 100 * grade.aim_high);
+    if (grade.most_upper < 1) aim += fmt::format(", its interval at most {:.0f} %", 100 * grade.most_upper);
+    if (grade.proportion.of == 0) {
+      table.rows.push_back({grade.measure, 0, 0, "", aim, "no case"});
+      continue;
+    }
+    const double share = static_cast<double>(grade.proportion.right) / grade.proportion.of;
+    const bool met = share >= grade.aim_low && share <= grade.aim_high && high <= grade.most_upper;
+    const bool possible = high >= grade.aim_low && low <= grade.aim_high;
+    table.rows.push_back({grade.measure, grade.proportion.right, grade.proportion.of, Estimate{share, low, high}, aim,
+                          met        ? "met"
+                          : possible ? "open"
+                                     : "not met"});
+  }
+  return table;
+}
+
+std::string list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::vector<analysis::BlindTruth>& truths,
+                                const std::vector<std::optional<analysis::BlindAnswer>>& answers,
+                                const Provenance& provenance) {
+  std::vector<Table> tables{measures(grades, provenance)};
+  Table confusion{.id = "blind-confusion",
+                  .title = "What was true and what was said",
+                  .notes = {"Counts. An explained gap is entered under the first name of its set."},
+                  .columns = {{"truth"}, {"said"}, {"cases"}},
+                  .provenance = provenance};
+  for (const auto& [truth, row] : grades.confusion)
+    for (const auto& [said, count] : row) confusion.rows.push_back({truth, said, count});
+  tables.push_back(std::move(confusion));
+
+  Table calibration{.id = "blind-calibration",
+                    .title = "Probability of the first cause and how often it is right",
+                    .notes = {"Explained cases with one effect of the catalogue."},
+                    .columns = {{"from"}, {"to"}, {"cases"}, {"mean probability"}, {"share right"}},
+                    .provenance = provenance};
+  for (const analysis::CalibrationBin& bin : grades.calibration) {
+    if (bin.count == 0) continue;
+    const auto [low, high] = analysis::wilson(bin.right);
+    calibration.rows.push_back({bin.from, bin.to, bin.count, bin.mean_probability,
+                                Estimate{static_cast<double>(bin.right.right) / bin.right.of, low, high}});
+  }
+  tables.push_back(std::move(calibration));
+
+  Table alike{.id = "blind-alike",
+              .title = "Ambiguity groups: effects in a quarter or more of another one's 95 % sets",
+              .columns = {{"effect"}, {"shares its sets with"}},
+              .provenance = provenance};
+  for (const auto& [effect, others] : grades.alike) alike.rows.push_back({effect, list(others)});
+  tables.push_back(std::move(alike));
+
+  Table cases{.id = "blind-cases",
+              .title = "Every case",
+              .notes = {"power: expected 2 Delta log likelihood with the true contact known; left: what recalibration "
+                        "leaves of it in the data."},
+              .columns = {{"case"}, {"kind"}, {"truth"}, {"strength"}, {"power"}, {"left"}, {"verdict"}, {"set"}},
+              .provenance = provenance};
+  for (std::size_t i = 0; i < truths.size(); ++i) {
+    const analysis::BlindTruth& t = truths[i];
+    std::string what = t.outside ? fmt::format("{}:{:.3g}", t.outside->id, t.outside->size) : "";
+    for (const dynamics::Effect& effect : t.effects) what += (what.empty() ? "" : " ") + dynamics::effect_text(effect);
+    if (what.empty()) what = t.nominal_is_true ? "nominal contact" : "other contact";
+    cases.rows.push_back({t.number, std::string(analysis::blind_kind_name(t.kind)), what, t.strength, t.power, t.left,
+                          answers[i] ? analysis::verdict_name(answers[i]->verdict) : "no answer",
+                          answers[i] ? list(answers[i]->cause_set) : ""});
+  }
+  tables.push_back(std::move(cases));
+  return tables;
+}
+
+}  // namespace metastable::reports

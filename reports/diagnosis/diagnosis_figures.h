@@ -1,0 +1,21 @@
+#pragma once
+// The figures of a diagnosis; all without provenance. Nothing where there is nothing to draw.
+
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+#include "reports/output/figure.h"
+
+namespace metastable::reports {
+
+/// Scores of the map's cells under the three models, a figure for the collisions and one for the stances (or one for
+/// whole steps).
+std::vector<Figure> map_figures(const analysis::Diagnosis& diagnosis);
+/// Mean speed by collision, measured and simulated, a figure a condition.
+std::vector<Figure> profile_figures(const analysis::Diagnosis& diagnosis);
+/// Causes by probability.
+std::vector<Figure> ranking_figures(const analysis::Diagnosis& diagnosis);
+/// Bars of each held-out measure, its floor as a line.
+std::vector<Figure> shrinkage_figures(const analysis::Diagnosis& diagnosis);
+
+}  // namespace metastable::reports

@@ -1,0 +1,231 @@
+#include "reports/diagnosis/diagnosis_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "dynamics/wheel/effect_catalogue.h"
+#include "reports/diagnosis/diagnosis_tables.h"
+
+namespace metastable::reports {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) {
+  if (std::isnan(value)) return nullptr;
+  if (std::isinf(value)) return value > 0 ? "infinite" : "-infinite";
+  return value;
+}
+
+Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+
+// Steps that are not known, and a size of an effect without one, are 0.
+Json positive(double value) { return value > 0 ? number(value) : Json(nullptr); }
+
+bool is_whole(const std::string& effect, const std::string& parameter) {
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())
+    if (info.id == effect)
+      for (const dynamics::EffectParameter& p : info.parameters)
+        if (p.name == parameter) return p.integer;
+  return false;
+}
+
+bool is_list(const std::string& parameter) { return parameter == "leg_lengths_m"; }
+
+struct Named {
+  Json values = Json::object(), intervals = Json::object();
+};
+
+Named named(const std::string& effect, const std::vector<analysis::EstimatedParameter>& parameters) {
+  Named json;
+  for (const analysis::EstimatedParameter& p : parameters) {
+    const Json value = is_whole(effect, p.name) ? Json(static_cast<int>(std::lround(p.value))) : number(p.value);
+    const Json interval = {number(p.lower), number(p.upper)};
+    if (is_list(p.name)) {
+      json.values[p.name].push_back(value);
+      json.intervals[p.name].push_back(interval);
+      continue;
+    }
+    json.values[p.name] = value;
+    if (p.fitted) json.intervals[p.name] = interval;
+  }
+  return json;
+}
+
+Json cause_json(const analysis::Cause& cause) {
+  Json json = {{"effect", cause.name()}, {"probability", number(cause.probability)}};
+  Named all;
+  for (std::size_t e = 0; e < cause.effects.size() && e < cause.parameters.size(); ++e) {
+    Named one = named(cause.effects[e], cause.parameters[e]);
+    if (cause.effects.size() == 1) {
+      all = std::move(one);
+    } else {
+      all.values[cause.effects[e]] = one.values;
+      all.intervals[cause.effects[e]] = one.intervals;
+    }
+  }
+  json["parameters"] = all.values;
+  json["interval_90"] = all.intervals;
+  json["gain"] = number(cause.gain);
+  json["p_value"] = number(cause.p_value);
+  json["log_bayes_factor"] = number(cause.evidence);
+  return json;
+}
+
+Json causes_json(const analysis::Diagnosis& d) {
+  std::vector<Json> all;
+  for (const analysis::Cause& cause : d.causes) all.push_back(cause_json(cause));
+  const Named contact = named("contact_distribution", d.contact);
+  const auto other = [&](const char* name, double probability, const Named& parameters) {
+    all.push_back({{"effect", name},
+                   {"probability", number(probability)},
+                   {"parameters", parameters.values},
+                   {"interval_90", parameters.intervals}});
+  };
+  other("no_gap", d.p_no_gap, {});
+  other("recalibration", d.p_recalibrate, contact);
+  other("none_of_these", d.p_none, {});
+  std::stable_sort(all.begin(), all.end(), [](const Json& a, const Json& b) {
+    return a["probability"].is_number() && (!b["probability"].is_number() || a["probability"] > b["probability"]);
+  });
+  return all;
+}
+
+Json where_json(const std::vector<analysis::GapCell>& cells) {
+  Json list = Json::array();
+  for (const analysis::GapCell& cell : cells)
+    list.push_back({{"facet", cell.facet},
+                    {"aspect", cell.aspect},
+                    {"at", cell.at},
+                    {"p_adjusted", number(cell.p_adjusted)},
+                    {"size", number(cell.size)},
+                    {"band_95", {number(cell.size - cell.band), number(cell.size + cell.band)}},
+                    {"unit", cell.unit},
+                    {"score", number(cell.statistic)},
+                    {"transitions", cell.events}});
+  return list;
+}
+
+Json shrinkage_json(const analysis::Shrinkage& s) {
+  Json closed_interval = nullptr;
+  if (s.closed_lower && s.closed_upper) closed_interval = {number(*s.closed_lower), number(*s.closed_upper)};
+  return {{"measure", s.measure},
+          {"unit", s.unit},
+          {"baseline", number(s.baseline)},
+          {"baseline_interval_90", {number(s.baseline_lower), number(s.baseline_upper)}},
+          {"recalibrated", number(s.recalibrated)},
+          {"with_effect", number(s.with_effect)},
+          {"floor", number(s.floor)},
+          {"closed", number(s.closed)},
+          {"closed_interval_90", closed_interval}};
+}
+
+// Every key is there where nothing is known.
+analysis::Shrinkage unknown_shrinkage() {
+  analysis::Shrinkage s;
+  s.baseline = s.recalibrated = s.with_effect = s.floor = std::numeric_limits<double>::quiet_NaN();
+  s.baseline_lower = s.baseline_upper = s.baseline;
+  s.measure = "too few trials to hold any out";
+  return s;
+}
+
+Json steps_json(const analysis::StepsBeforeFailure& s) {
+  return {{"observed", positive(s.observed)},
+          {"observed_interval_90", {positive(s.observed_lower), positive(s.observed_upper)}},
+          {"baseline", positive(s.baseline)},
+          {"recalibrated", positive(s.recalibrated)},
+          {"with_effect", positive(s.with_effect)}};
+}
+
+Json visibility_json(const analysis::Visibility& v) {
+  Json alike = Json::object();
+  for (const auto& [effect, share] : v.alike) alike[effect] = number(share);
+  return {{"effect", v.effect},
+          {"parameter", v.parameter},
+          {"unit", effect_unit(v.effect, v.parameter)},
+          {"smallest", v.undecidable.empty() ? positive(v.smallest) : Json(nullptr)},
+          {"alike", alike},
+          {"undecidable", v.undecidable.empty() ? Json(nullptr) : Json(v.undecidable)}};
+}
+
+template <typename Values, typename Convert>
+Json list_json(const Values& values, Convert convert) {
+  Json list = Json::array();
+  for (const auto& value : values) list.push_back(convert(value));
+  return list;
+}
+
+}  // namespace
+
+std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& provenance) {
+  const std::vector<analysis::GapCell> as_given = beyond_chance(d.as_given),
+                                       recalibrated = beyond_chance(d.recalibrated), left = beyond_chance(d.left);
+  Json json;
+  json["schema"] = 1;
+  json["verdict"] = analysis::verdict_name(d.verdict);
+  json["sentences"] = d.sentences;
+  json["gap"] = {{"p_value_as_given", number(d.p_as_given)},
+                 {"p_value", number(d.p_value)},
+                 {"p_value_recalibration", number(d.p_recalibration)},
+                 {"p_value_effects", number(d.p_effects)},
+                 {"p_value_where", number(d.p_where)}};
+  json["where"] = where_json(recalibrated);
+  json["where_as_given"] = where_json(as_given);
+  json["where_left"] = where_json(left);
+  json["causes"] = causes_json(d);
+  json["cause_set"] = d.cause_set;
+  json["not_decided"] = list_json(d.not_decided, [](const auto& cause) {
+    return Json{{"effect", cause.name()}, {"reason", cause.not_decided}};
+  });
+  const Named contact = named("contact_distribution", d.contact);
+  json["contact"] = {{"parameters", contact.values}, {"interval_90", contact.intervals}};
+  json["shrinkage"] = shrinkage_json(d.shrinkage.empty() ? unknown_shrinkage() : d.shrinkage.front());
+  json["shrinkage_by_measure"] = list_json(d.shrinkage, shrinkage_json);
+  json["steps_before_failure"] = steps_json(d.steps);
+  json["visibility"] = list_json(d.visible, visibility_json);
+  json["missing_columns"] = list_json(d.missing, [](const analysis::MissingColumn& missing) {
+    return Json{{"column", missing.column}, {"effects", list_json(missing.effects, [](const auto& effect) {
+                                               return Json{{"effect", effect.effect},
+                                                           {"parameter", effect.parameter},
+                                                           {"smallest", number(effect.smallest)},
+                                                           {"smallest_with_it", number(effect.smallest_with_it)},
+                                                           {"not_told_from", effect.not_told_from}};
+                                             })}};
+  });
+  json["not_possible"] = list_json(d.not_possible, [](const analysis::NotPossible& n) {
+    return Json{
+        {"statement", n.statement}, {"because", n.because}, {"trials", n.trials ? Json(*n.trials) : Json(nullptr)}};
+  });
+  json["next_experiment"] = list_json(d.next, [](const analysis::NextExperiment& next) {
+    return Json{{"change", next.change}, {"separation", number(next.separation)}};
+  });
+  json["data"] = {{"trials", d.trials}, {"collisions", d.collisions}, {"transitions", d.events}};
+  json["notes"] = d.notes;
+  json["provenance"] = {{"command", provenance.command},
+                        {"settings", provenance.settings},
+                        {"seed", provenance.seed},
+                        {"version", provenance.version}};
+  return json.dump(2) + "\n";
+}
+
+std::string effects_json() {
+  Json list = Json::array();
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
+    Json parameters = Json::array();
+    for (const dynamics::EffectParameter& p : info.parameters)
+      parameters.push_back({{"name", p.name},
+                            {"unit", p.unit},
+                            {"neutral", number(p.neutral)},
+                            {"lower", number(p.lower)},
+                            {"upper", number(p.upper)},
+                            {"whole_number", p.integer},
+                            {"per_leg", p.per_leg},
+                            {"meaning", p.meaning}});
+    list.push_back({{"id", info.id}, {"summary", info.summary}, {"parameters", parameters}});
+  }
+  return Json{{"schema", 1}, {"effects", list}}.dump(2) + "\n";
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,314 @@
+#include "reports/diagnosis/diagnosis_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "analysis/statistics/interval_95.h"
+#include "dynamics/wheel/effect_catalogue.h"
+
+namespace metastable::reports {
+namespace {
+
+using analysis::Cause;
+using analysis::Diagnosis;
+using analysis::EstimatedParameter;
+using analysis::GapCell;
+
+// What is not known is an empty cell.
+Cell known(double value) { return std::isnan(value) ? Cell("") : Cell(value); }
+Cell known(const std::optional<double>& value) { return value ? known(*value) : Cell(""); }
+// Steps that are not known, and a size of an effect without one, are 0.
+Cell positive(double value) { return value > 0 ? Cell(value) : Cell(""); }
+
+std::string short_number(double value) {
+  return std::isnan(value) ? "unknown" : format_number(value, NumberFormat::general, 3);
+}
+
+// "leg 4, friction_ratio 0.879 (0.864 to 0.894)"; a list without its intervals.
+std::string parameters_text(const std::vector<EstimatedParameter>& parameters) {
+  std::string text;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const EstimatedParameter& p = parameters[i];
+    const bool goes_on = i > 0 && parameters[i - 1].name == p.name;
+    const bool in_list = goes_on || (i + 1 < parameters.size() && parameters[i + 1].name == p.name);
+    text += goes_on ? "; " : (text.empty() ? "" : ", ") + p.name + " ";
+    text += short_number(p.value);
+    if (p.fitted && !in_list) text += fmt::format(" ({} to {})", short_number(p.lower), short_number(p.upper));
+  }
+  return text;
+}
+
+std::string parameters_text(const Cause& cause) {
+  std::string text;
+  for (const std::vector<EstimatedParameter>& one : cause.parameters) {
+    const std::string part = parameters_text(one);
+    if (!part.empty()) text += (text.empty() ? "" : " + ") + part;
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string_view effect_unit(std::string_view effect, std::string_view parameter) {
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())
+    if (info.id == effect)
+      for (const dynamics::EffectParameter& p : info.parameters)
+        if (p.name == parameter) return p.unit;
+  return "";
+}
+
+std::vector<GapCell> beyond_chance(const analysis::GapMap& map) {
+  std::vector<GapCell> cells;
+  std::copy_if(map.cells.begin(), map.cells.end(), std::back_inserter(cells),
+               [](const GapCell& cell) { return cell.p_adjusted < where_level; });
+  std::stable_sort(cells.begin(), cells.end(), [](const GapCell& a, const GapCell& b) {
+    return std::pair(a.p_adjusted, -std::abs(a.statistic)) < std::pair(b.p_adjusted, -std::abs(b.statistic));
+  });
+  return cells;
+}
+
+Table data_table(const Diagnosis& d) {
+  Table table{
+      .id = "data", .title = "Data", .notes = d.notes, .columns = {{"trials"}, {"collisions"}, {"transitions"}}};
+  table.rows.push_back({d.trials, d.collisions, d.events});
+  return table;
+}
+
+Table gap_table(const Diagnosis& d) {
+  return {.id = "gap",
+          .title = "Is there a gap?",
+          .notes = {"The chance levels are not followed below 10⁻¹²: a p of one or two of those is at most that."},
+          .columns = {{"model"}, {"against"}, {"p", "", NumberFormat::significant, 2}},
+          .rows = {{"as given", "anything, the launch and the contact included", d.p_as_given},
+                   {"as given", "other contact parameters", d.p_recalibration},
+                   {"recalibrated", "anything else", d.p_value},
+                   {"recalibrated", "the effects of the catalogue", d.p_effects},
+                   {"recalibrated", "the cells of the map", d.p_where}}};
+}
+
+Table contact_table(const Diagnosis& d) {
+  Table table{.id = "contact",
+              .title = "Recalibrated parameters",
+              .columns = {{"parameter"}, {"value"}, {"low 90 %"}, {"high 90 %"}}};
+  for (const EstimatedParameter& p : d.contact)
+    table.rows.push_back(
+        {p.name, known(p.value), p.fitted ? known(p.lower) : Cell(""), p.fitted ? known(p.upper) : Cell("")});
+  return table;
+}
+
+Table where_table(const Diagnosis& d) {
+  Table table{.id = "where",
+              .title = "Where it lies, after recalibration",
+              .notes = {},
+              .columns = {{"facet"},
+                          {"aspect"},
+                          {"at"},
+                          {"size (simultaneous 95 % band)", "", NumberFormat::significant, 2},
+                          {"of"},
+                          {"score"},
+                          {"adjusted p", "", NumberFormat::significant, 2}}};
+  for (const GapCell& cell : beyond_chance(d.recalibrated))
+    table.rows.push_back({cell.facet, cell.aspect, cell.at,
+                          Estimate{cell.size, cell.size - cell.band, cell.size + cell.band}, cell.unit, cell.statistic,
+                          cell.p_adjusted});
+  return table;
+}
+
+Table map_table(const Diagnosis& d) {
+  Table table{.id = "map",
+              .title = "The whole map",
+              .notes = {"Score: standard normal where there is no gap. Adjusted p: step-down over all cells, after "
+                        "recalibration; false discovery: Benjamini and Hochberg's. Band: half-width of the "
+                        "simultaneous 95 % band of the size."},
+              .columns = {{"facet"},
+                          {"aspect"},
+                          {"at"},
+                          {"transitions"},
+                          {"score as given"},
+                          {"score recalibrated"},
+                          {"score with effect"},
+                          {"size"},
+                          {"band"},
+                          {"of"},
+                          {"adjusted p"},
+                          {"false discovery"}}};
+  const auto score_of = [](const analysis::GapMap& map, std::size_t i, const GapCell& cell) {
+    const bool same = i < map.cells.size() && map.cells[i].facet == cell.facet && map.cells[i].at == cell.at &&
+                      map.cells[i].aspect == cell.aspect;
+    return same ? known(map.cells[i].statistic) : Cell("");
+  };
+  for (std::size_t i = 0; i < d.recalibrated.cells.size(); ++i) {
+    const GapCell& cell = d.recalibrated.cells[i];
+    table.rows.push_back({cell.facet, cell.aspect, cell.at, cell.events, score_of(d.as_given, i, cell), cell.statistic,
+                          score_of(d.left, i, cell), cell.size, cell.band, cell.unit, cell.p_adjusted,
+                          cell.false_discovery});
+  }
+  return table;
+}
+
+Table causes_table(const Diagnosis& d) {
+  Table table{.id = "causes",
+              .title = "Which effect",
+              .notes = {},
+              .columns = {{"cause"},
+                          {"probability", "", NumberFormat::fixed, 3},
+                          {"95 % set"},
+                          {"2 Δ ln L", "", NumberFormat::fixed, 1},
+                          {"p alone", "", NumberFormat::significant, 2},
+                          {"ln Bayes factor", "", NumberFormat::fixed, 1},
+                          {"parameters (90 % intervals)"}}};
+  std::vector<std::pair<double, std::vector<Cell>>> rows;
+  for (const Cause& cause : d.causes) {
+    const std::string name = cause.name();
+    const bool inside = std::find(d.cause_set.begin(), d.cause_set.end(), name) != d.cause_set.end();
+    rows.push_back({cause.probability,
+                    {name, cause.probability, inside ? "in" : "", known(cause.gain), known(cause.p_value),
+                     known(cause.evidence), parameters_text(cause)}});
+  }
+  for (const auto& [name, p] : {std::pair("no gap", d.p_no_gap), std::pair("recalibration", d.p_recalibrate),
+                                std::pair("none of these", d.p_none)})
+    rows.push_back({p, {name, p, "", "", "", "", ""}});
+  std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  for (auto& [probability, row] : rows) table.rows.push_back(std::move(row));
+  return table;
+}
+
+Table parameters_table(const Diagnosis& d) {
+  Table table{.id = "parameters",
+              .title = "Parameters of the effects",
+              .notes = {"Without interval: chosen from a list (a leg, an interval, a frequency)."},
+              .columns = {{"cause"}, {"effect"}, {"parameter"}, {"value"}, {"low 90 %"}, {"high 90 %"}, {"unit"}}};
+  for (const Cause& cause : d.causes)
+    for (std::size_t e = 0; e < cause.parameters.size(); ++e)
+      for (const EstimatedParameter& p : cause.parameters[e])
+        table.rows.push_back({cause.name(), cause.effects.at(e), p.name, known(p.value),
+                              p.fitted ? known(p.lower) : Cell(""), p.fitted ? known(p.upper) : Cell(""),
+                              std::string(effect_unit(cause.effects.at(e), p.name))});
+  return table;
+}
+
+Table shrinkage_table(const Diagnosis& d) {
+  Table table{.id = "shrinkage",
+              .title = "How far it shrinks, held out",
+              .notes = {"Floor: the same measure on data of the last model itself. Closed: (as given − with effect) / "
+                        "(as given − floor); empty where that denominator's interval covers zero."},
+              .columns = {{"measure"},
+                          {"unit"},
+                          {"as given"},
+                          {"as given, low 90 %"},
+                          {"as given, high 90 %"},
+                          {"recalibrated"},
+                          {"with effect"},
+                          {"floor"},
+                          {"closed"},
+                          {"closed, low 90 %"},
+                          {"closed, high 90 %"}}};
+  for (const analysis::Shrinkage& s : d.shrinkage)
+    table.rows.push_back({s.measure, s.unit, known(s.baseline), known(s.baseline_lower), known(s.baseline_upper),
+                          known(s.recalibrated), known(s.with_effect), known(s.floor), known(s.closed),
+                          known(s.closed_lower), known(s.closed_upper)});
+  return table;
+}
+
+Table steps_table(const Diagnosis& d) {
+  const analysis::StepsBeforeFailure& s = d.steps;
+  return {.id = "steps",
+          .title = "Expected steps before failure",
+          .columns = {{"observed"},
+                      {"observed, low 90 %"},
+                      {"observed, high 90 %"},
+                      {"as given"},
+                      {"recalibrated"},
+                      {"with effect"}},
+          .rows = {{positive(s.observed), positive(s.observed_lower), positive(s.observed_upper), positive(s.baseline),
+                    positive(s.recalibrated), positive(s.with_effect)}}};
+}
+
+Table profile_table(const Diagnosis& d) {
+  Table table{.id = "profile",
+              .title = "Mean speed before a collision, measured and simulated",
+              .notes = {"Band: half-width of the 95 % band of the simulated mean of as many trials."},
+              .columns = {{"condition"},
+                          {"collision"},
+                          {"trials"},
+                          {"measured", "rad/s", NumberFormat::significant, 4},
+                          {"as given", "rad/s", NumberFormat::significant, 4},
+                          {"with effect", "rad/s", NumberFormat::significant, 4},
+                          {"band", "rad/s"}}};
+  for (const analysis::ProfilePoint& p : d.profile) {
+    const double half = analysis::normal_95 * p.measured_error;
+    table.rows.push_back({d.condition_names.at(p.condition), p.collision, p.trials,
+                          std::isnan(p.measured) ? Cell("")
+                          : std::isnan(half)     ? Cell(p.measured)
+                                                 : Cell(Estimate{p.measured, p.measured - half, p.measured + half}),
+                          known(p.baseline), known(p.with_effect), known(p.band)});
+  }
+  return table;
+}
+
+Table visibility_table(const Diagnosis& d) {
+  Table table{.id = "visibility",
+              .title = "What these data could have seen",
+              .notes = {"Smallest: the size that most experiments like this one would find (2 Δ ln L of 16). Alike: "
+                        "effects that imitate more than half of its information."},
+              .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"alike"}, {"cannot be told because"}}};
+  for (const analysis::Visibility& v : d.visible) {
+    std::string alike;
+    for (const auto& [effect, share] : v.alike)
+      alike += fmt::format("{}{} {:.0f} %", alike.empty() ? "" : ", ", effect, 100 * share);
+    table.rows.push_back({v.effect, v.parameter, v.undecidable.empty() ? positive(v.smallest) : Cell(""),
+                          std::string(effect_unit(v.effect, v.parameter)), alike, v.undecidable});
+  }
+  return table;
+}
+
+Table missing_table(const Diagnosis& d) {
+  Table table{
+      .id = "missing-columns",
+      .title = "What missing columns hide",
+      .notes = {"Smallest visible sizes by the design's own information, without the column and as if it had "
+                "been measured; empty: not at all. Not told from: effects that imitate more than nine tenths "
+                "of it without the column and less than eight with it."},
+      .columns = {
+          {"column"}, {"effect"}, {"parameter"}, {"smallest without"}, {"smallest with"}, {"unit"}, {"not told from"}}};
+  for (const analysis::MissingColumn& m : d.missing) {
+    if (m.effects.empty()) table.rows.push_back({m.column, "no effect is much harder to see", "", "", "", "", ""});
+    for (const analysis::HiddenEffect& e : m.effects) {
+      table.rows.push_back({m.column, e.effect, e.parameter, known(e.smallest), known(e.smallest_with_it),
+                            std::string(effect_unit(e.effect, e.parameter)),
+                            fmt::format("{}", fmt::join(e.not_told_from, ", "))});
+    }
+  }
+  return table;
+}
+
+Table not_possible_table(const Diagnosis& d) {
+  Table table{.id = "not-possible",
+              .title = "What these data cannot say",
+              .notes = {"Trials: of this kind that would do; empty where no number of them would."},
+              .columns = {{"statement"}, {"because"}, {"trials"}}};
+  for (const analysis::NotPossible& n : d.not_possible)
+    table.rows.push_back({n.statement, n.because, n.trials ? Cell(*n.trials) : Cell("")});
+  return table;
+}
+
+Table undecided_table(const Diagnosis& d) {
+  Table table{.id = "not-decided", .title = "Not decided", .columns = {{"effect"}, {"because"}}};
+  for (const Cause& cause : d.not_decided) table.rows.push_back({cause.name(), cause.not_decided});
+  return table;
+}
+
+Table next_table(const Diagnosis& d) {
+  Table table{.id = "next-experiment",
+              .title = "The next experiment",
+              .notes = {"Separation: 2 Δ ln L to be expected between the two leading causes, at the fitted size; from "
+                        "16 on they are told apart."},
+              .columns = {{"change"}, {"separation"}}};
+  for (const analysis::NextExperiment& n : d.next) table.rows.push_back({n.change, known(n.separation)});
+  return table;
+}
+
+}  // namespace metastable::reports

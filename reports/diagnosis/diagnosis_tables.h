@@ -1,0 +1,38 @@
+#pragma once
+// The tables of a diagnosis.
+
+#include <string_view>
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+#include "reports/output/table.h"
+
+namespace metastable::reports {
+
+/// Adjusted p-value below which a cell of the map counts as beyond chance.
+constexpr double where_level = 0.05;
+/// The cells beyond chance, by rising adjusted p-value, then by falling statistic.
+std::vector<analysis::GapCell> beyond_chance(const analysis::GapMap& map);
+
+/// The unit of an effect's parameter, "" for a ratio and for what the catalogue does not hold.
+std::string_view effect_unit(std::string_view effect, std::string_view parameter);
+
+/// All without provenance. A table of nothing has no rows.
+Table data_table(const analysis::Diagnosis& diagnosis);     ///< what was there; the notes below it
+Table gap_table(const analysis::Diagnosis& diagnosis);      ///< p-values
+Table contact_table(const analysis::Diagnosis& diagnosis);  ///< recalibrated parameters
+Table where_table(const analysis::Diagnosis& diagnosis);    ///< beyond chance after recalibration
+/// Every cell under the nominal, the refitted and the chosen model.
+Table map_table(const analysis::Diagnosis& diagnosis);
+Table causes_table(const analysis::Diagnosis& diagnosis);      ///< with "no gap", "recalibration", "none of these"
+Table parameters_table(const analysis::Diagnosis& diagnosis);  ///< of every cause
+Table shrinkage_table(const analysis::Diagnosis& diagnosis);
+Table steps_table(const analysis::Diagnosis& diagnosis);
+Table profile_table(const analysis::Diagnosis& diagnosis);
+Table visibility_table(const analysis::Diagnosis& diagnosis);
+Table missing_table(const analysis::Diagnosis& d);
+Table not_possible_table(const analysis::Diagnosis& d);
+Table undecided_table(const analysis::Diagnosis& diagnosis);
+Table next_table(const analysis::Diagnosis& diagnosis);
+
+}  // namespace metastable::reports

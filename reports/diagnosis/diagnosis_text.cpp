@@ -1,0 +1,88 @@
+#include "reports/diagnosis/diagnosis_text.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "reports/diagnosis/diagnosis_tables.h"
+#include "reports/output/text_table.h"
+
+namespace metastable::reports {
+namespace {
+
+constexpr std::size_t most_cells = 10, most_causes = 8;
+constexpr double shown_probability = 0.0005;  // causes below are only in the files
+
+// One effect a line, with the one that is most like it.
+Table visibility_lines(const analysis::Diagnosis& d) {
+  Table table{.id = "visibility",
+              .title = "What these data could have seen (the size most experiments like this one find)",
+              .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"remark"}}};
+  for (const analysis::Visibility& v : d.visible) {
+    std::string remark = v.undecidable;
+    if (remark.empty() && !v.alike.empty()) {
+      remark = fmt::format("{:.0f} % like {}", 100 * v.alike.front().second, v.alike.front().first);
+      if (v.alike.size() > 1) remark += fmt::format(", and {} more", v.alike.size() - 1);
+    }
+    const bool seen = v.undecidable.empty() && std::isfinite(v.smallest) && v.smallest > 0;
+    table.rows.push_back({v.effect, v.parameter, seen ? Cell(v.smallest) : Cell(""),
+                          std::string(effect_unit(v.effect, v.parameter)), remark});
+  }
+  return table;
+}
+
+// "0.99 (0.94 to 1.05)"
+Table shrinkage_lines(const analysis::Diagnosis& d) {
+  Table table{
+      .id = "shrinkage",
+      .title = "How far it shrinks",
+      .columns = {
+          {"measure"}, {"unit"}, {"as given"}, {"recalibrated"}, {"with effect"}, {"floor"}, {"closed (90 %)"}}};
+  const auto percent = [](double share) { return fmt::format("{:.0f}", 100 * share); };
+  const auto known = [](double value) { return std::isnan(value) ? Cell("") : Cell(value); };
+  for (const analysis::Shrinkage& s : d.shrinkage)
+    table.rows.push_back(
+        {s.measure, s.unit, known(s.baseline), known(s.recalibrated), known(s.with_effect), known(s.floor),
+         s.closed && s.closed_lower && s.closed_upper
+             ? fmt::format("{} % ({} to {})", percent(*s.closed), percent(*s.closed_lower), percent(*s.closed_upper))
+             : std::string("not to be said")});
+  return table;
+}
+
+std::string part(const Table& table, std::size_t most = 1000) {
+  return table.rows.empty() ? "" : "\n" + to_text(table, most);
+}
+
+}  // namespace
+
+std::string diagnosis_text(const analysis::Diagnosis& d) {
+  std::string text = fmt::format("verdict: {}\n", analysis::verdict_name(d.verdict));
+  for (const std::string& sentence : d.sentences) text += wrapped(sentence);
+  text += part(gap_table(d));
+  text += part(contact_table(d));
+
+  const Table where = where_table(d);
+  text +=
+      where.rows.empty() ? "\nWhere it lies, after recalibration: no cell is beyond chance\n" : part(where, most_cells);
+
+  Table causes = causes_table(d);
+  const std::string nearest = d.causes.empty() ? "" : d.causes.front().name();
+  std::erase_if(causes.rows, [&](const std::vector<Cell>& row) {
+    return std::get<double>(row[1].value()) < shown_probability && std::get<std::string>(row[0].value()) != nearest;
+  });
+  text += part(causes, most_causes);
+
+  text += part(shrinkage_lines(d));
+  text += part(steps_table(d));
+  text += part(visibility_lines(d));
+  text += part(missing_table(d));
+  text += part(undecided_table(d));
+  text += part(not_possible_table(d));
+  text += part(next_table(d));
+  return text + part(data_table(d));
+}
+
+}  // namespace metastable::reports

@@ -1,3 +1,0 @@
-#include "reports/cli.h"
-
-int main(int argc, char** argv) { return metastable::reports::run(argc, argv); }

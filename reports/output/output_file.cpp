@@ -1,0 +1,87 @@
+#include "reports/output/output_file.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <iostream>
+#include <locale>
+#include <string>
+#include <system_error>
+
+namespace metastable::reports {
+namespace fs = std::filesystem;
+namespace {
+
+std::string last_reason() { return errno != 0 ? std::strerror(errno) : "write error"; }
+
+fs::path temporary_name(const fs::path& target) {
+  static std::atomic<unsigned> count{0};
+  return target.parent_path() /
+         ("." + target.filename().string() + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".tmp");
+}
+
+}  // namespace
+
+OutputError::OutputError(const fs::path& path, const std::string& reason)
+    : std::invalid_argument("cannot write " + (path.empty() ? std::string("''") : path.string()) + ": " + reason) {}
+
+OutputFile::OutputFile(const fs::path& path) : path_(path) {
+  file_.imbue(std::locale::classic());
+  buffer_.imbue(std::locale::classic());
+  if (path == "-") return;
+  if (path.empty()) throw OutputError(path, "the name is empty");
+  std::error_code error;
+  const bool present = fs::exists(path, error);
+  target_ = present ? fs::canonical(path, error) : path;
+  if (error) throw OutputError(path, error.message());
+  if (fs::is_directory(target_, error)) throw OutputError(path, std::strerror(EISDIR));
+  const bool in_place = present && !fs::is_regular_file(target_, error);
+  if (!in_place) temporary_ = temporary_name(target_);
+  errno = 0;
+  file_.open(in_place ? target_ : temporary_, std::ios::binary);
+  if (!file_) throw OutputError(path, last_reason());
+}
+
+OutputFile::~OutputFile() {
+  if (temporary_.empty()) return;
+  file_.close();
+  std::error_code ignored;
+  fs::remove(temporary_, ignored);
+}
+
+std::ostream& OutputFile::stream() {
+  if (target_.empty()) return buffer_;
+  return file_;
+}
+
+void OutputFile::commit() {
+  errno = 0;
+  if (target_.empty()) {
+    if (!(std::cout << buffer_.view() << std::flush)) throw OutputError("standard output", last_reason());
+    return;
+  }
+  file_.close();
+  if (!file_) throw OutputError(path_, last_reason());
+  if (temporary_.empty()) return;
+  std::error_code error;
+  fs::rename(temporary_, target_, error);
+  if (error) throw OutputError(path_, error.message());
+  temporary_.clear();
+}
+
+void write_file(const fs::path& path, std::string_view content) {
+  OutputFile file(path);
+  file.stream().write(content.data(), static_cast<std::streamsize>(content.size()));
+  file.commit();
+}
+
+void make_folder(const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (!error && !fs::is_directory(path, error) && !error) error = std::make_error_code(std::errc::not_a_directory);
+  if (error) throw OutputError(path, error.message());
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,34 @@
+#include "reports/output/page_folder.h"
+
+#include <utility>
+
+#include "reports/output/output_file.h"
+
+namespace metastable::reports {
+
+PageFolder::PageFolder(const std::filesystem::path& folder) : folder_(folder) { make_folder(folder_ / "tables"); }
+
+void PageFolder::section(const std::string& id, const std::string& heading, const std::string& reading,
+                         const std::vector<Figure>& figures, std::vector<Table> tables) {
+  PageSection section{id, heading, reading, {}, {}};
+  if (!figures.empty()) make_folder(folder_ / "figures");
+  for (const Figure& figure : figures) {
+    const std::string svg = render_svg(figure);
+    write_file(folder_ / "figures" / (figure.id + ".svg"), svg);
+    section.figures.push_back({figure.id, svg, ""});
+  }
+  for (Table& table : tables) {
+    const std::filesystem::path stem = folder_ / "tables" / table.id;
+    write_file(stem.string() + ".csv", to_csv(table));
+    write_file(stem.string() + ".md", to_markdown(table));
+    write_file(stem.string() + ".tex", to_latex(table));
+    const std::string href = "tables/" + table.id;
+    section.tables.push_back(
+        {std::move(table), {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}, {"LaTeX", href + ".tex"}}});
+  }
+  page_.sections.push_back(std::move(section));
+}
+
+void PageFolder::write_index() const { write_file(folder_ / "index.html", render_page(page_)); }
+
+}  // namespace metastable::reports

@@ -1,0 +1,169 @@
+#include "reports/study/report_figures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "analysis/experiment/experiment_folder.h"
+#include "dynamics/wheel/contact_law.h"
+#include "markov/rows/draws.h"
+
+namespace metastable::reports {
+namespace {
+
+constexpr std::size_t survival_steps = 33;  // the paper's ramp
+constexpr int cloud_trials = 150;
+constexpr int cloud_collisions = 16;
+constexpr std::size_t mean_draws = 1024;
+constexpr std::size_t density_bins = 120;
+
+std::string label(const analysis::Setting& setting) {
+  return fmt::format("{}, {} deg", dynamics::law_name(setting.law), setting.slope_deg);
+}
+
+// Cells carry mass over x = omega^2; spread evenly over equal bins of omega.
+Series density(const analysis::Metastability& study, int colour) {
+  double low = std::numeric_limits<double>::infinity(), high = 0;
+  for (const analysis::PhaseDistribution& phase : study.quasi_stationary) {
+    low = std::min(low, std::sqrt(std::max(0.0, phase.edges.front())));
+    high = std::max(high, std::sqrt(phase.edges.back()));
+  }
+  const double width = (high - low) / static_cast<double>(density_bins);
+  std::vector<double> bins(density_bins, 0.0);
+  for (const analysis::PhaseDistribution& phase : study.quasi_stationary) {
+    for (std::size_t c = 0; c < phase.mass.size(); ++c) {
+      const double a = std::sqrt(std::max(0.0, phase.edges[c])), b = std::sqrt(phase.edges[c + 1]);
+      const auto first = static_cast<std::size_t>(std::clamp((a - low) / width, 0.0, density_bins - 1.0));
+      for (std::size_t k = first; k < density_bins && low + width * static_cast<double>(k) < b; ++k) {
+        const double from = std::max(a, low + width * static_cast<double>(k));
+        const double to = std::min(b, low + width * static_cast<double>(k + 1));
+        if (to > from) bins[k] += phase.mass[c] * (to - from) / (b - a);
+      }
+    }
+  }
+  Series series{"", Style::line, {}, {}, {}, {}, colour};
+  for (std::size_t k = 0; k < density_bins; ++k) {
+    const double share = bins[k] / static_cast<double>(study.quasi_stationary.size()) / width;
+    if (share < 1e-6) continue;
+    series.x.push_back(low + width * (static_cast<double>(k) + 0.5));
+    series.y.push_back(share);
+  }
+  return series;
+}
+
+}  // namespace
+
+Figure density_figure(const std::vector<Studied>& settings, const Provenance& provenance) {
+  Figure figure;
+  figure.id = "quasi-stationary";
+  figure.title = "Speed of rolling wheels before a collision, long run";
+  figure.x = {"ω before a collision", "rad/s"};
+  figure.y = {"density", "s/rad"};
+  figure.legend = Legend::below;
+  figure.provenance = provenance;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    Series series = density(settings[i].study, static_cast<int>(i));
+    series.label = label(settings[i].setting);
+    figure.series.push_back(std::move(series));
+  }
+  return figure;
+}
+
+Figure survival_figure(const std::vector<Studied>& settings, const Provenance& provenance) {
+  Figure figure;
+  figure.id = "survival";
+  figure.title = "Probability of still rolling";
+  figure.x = {"steps n", ""};
+  figure.y = {.label = "P(steps > n)", .logarithmic = true, .high = 1.0};
+  figure.legend = Legend::bottom_left;
+  figure.provenance = provenance;
+  bool any_endless = false;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const bool endless = settings[i].study.status == analysis::Status::rest_unreachable;
+    Series series{label(settings[i].setting), Style::steps, {}, {}, {}, {}, static_cast<int>(i)};
+    if (endless) {
+      series.label += " (never rests)";
+      if (any_endless) series.style = Style::dashed;  // over the one before it
+      any_endless = true;
+    }
+    const std::vector<double>& survival = settings[i].study.survival;
+    for (std::size_t n = 0; n < std::min(survival.size(), survival_steps); ++n) {
+      series.x.push_back(static_cast<double>(n));
+      series.y.push_back(survival[n]);
+    }
+    figure.series.push_back(std::move(series));
+  }
+  return figure;
+}
+
+Figure return_map_figure(const analysis::Setting& setting, const Provenance& provenance) {
+  Figure figure;
+  figure.id = fmt::format("return-map-{}", setting.slope_deg);
+  std::replace(figure.id.begin(), figure.id.end(), '.', '-');
+  figure.title = fmt::format("Return map, {}", label(setting));
+  figure.x = {"ω before a collision", "rad/s"};
+  figure.y = {"ω before the next", "rad/s"};
+  figure.diagonal = Diagonal::yes;
+  figure.legend = Legend::top_left;
+  figure.provenance = provenance;
+
+  Series cloud{"simulated steps", Style::dots, {}, {}, {}, {}, 0};
+  double low = std::numeric_limits<double>::infinity(), high = 0;
+  for (const dynamics::Trial& trial : analysis::simulate_trials(
+           setting, {.trials = cloud_trials, .collisions = cloud_collisions, .seed = provenance.seed})) {
+    for (std::size_t k = 0; k + 1 < trial.collisions.size(); ++k) {
+      cloud.x.push_back(trial.collisions[k].omega_minus);
+      cloud.y.push_back(trial.collisions[k + 1].omega_minus);
+      low = std::min({low, cloud.x.back(), cloud.y.back()});
+      high = std::max({high, cloud.x.back(), cloud.y.back()});
+    }
+  }
+  figure.series.push_back(cloud);
+  if (cloud.x.empty()) return figure;
+
+  // Mean of sqrt(x') over the draws that survive, all legs together.
+  const dynamics::WheelMap map = setting.map();
+  const markov::Draws draws = markov::make_draws(
+      map.noise_dimension(), {.count = mean_draws, .seed = provenance.seed, .weighting = markov::Weighting::plain});
+  Series mean{"mean of the survivors", Style::line, {}, {}, {}, {}, 1};
+  const auto dimension = static_cast<std::size_t>(draws.dimension);
+  for (int i = 0; i <= 60; ++i) {
+    const double omega = low + (high - low) * i / 60;
+    double sum = 0, survivors = 0;
+    for (int phase = 0; phase < map.phases(); ++phase)
+      for (std::size_t k = 0; k < draws.count(); ++k)
+        if (const auto next =
+                map.landing(omega * omega, phase, std::span(draws.score).subspan(k * dimension, dimension))) {
+          sum += std::sqrt(*next);
+          survivors += 1;
+        }
+    if (survivors < 16) continue;
+    mean.x.push_back(omega);
+    mean.y.push_back(sum / survivors);
+  }
+  figure.series.push_back(std::move(mean));
+  return figure;
+}
+
+Figure grid_figure(const std::string& id, const std::string& title, const analysis::Axis& down,
+                   const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+                   const Provenance& provenance) {
+  Figure figure;
+  figure.id = id;
+  figure.title = title;
+  figure.x = {std::string(analysis::parameter_label(across.parameter)), ""};
+  figure.y = {std::string(analysis::parameter_label(down.parameter)), ""};
+  figure.provenance = provenance;
+  HeatMap map{across.values, down.values, {}, "expected steps", true};
+  for (std::size_t i = 0; i < down.values.size(); ++i) {
+    map.value.emplace_back();
+    for (std::size_t j = 0; j < across.values.size(); ++j)
+      map.value.back().push_back(studies[i * across.values.size() + j].from_start.value);
+  }
+  figure.heat_map = std::move(map);
+  return figure;
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,139 @@
+#include "reports/study/report_tables.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <functional>
+
+#include "dynamics/wheel/contact_law.h"
+
+namespace metastable::reports {
+namespace {
+
+Cell cell(const analysis::Estimate& estimate) {
+  if (std::isinf(estimate.value)) return Infinite{};
+  return Estimate{estimate.value, estimate.lower, estimate.upper};
+}
+
+Cell cell(const std::optional<double>& value) {
+  if (value) return *value;
+  return "";
+}
+
+}  // namespace
+
+Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance) {
+  Table table;
+  table.id = "ramps";
+  table.title = "The ramps side by side under each contact law";
+  table.provenance = provenance;
+  table.columns = {{"quantity"}, {"unit"}};
+  for (const Studied& one : columns)
+    table.columns.push_back({fmt::format("{}, {} deg", dynamics::law_name(one.setting.law), one.setting.slope_deg), "",
+                             NumberFormat::general, 4});
+  const auto add = [&](const std::string& name, const std::string& unit,
+                       const std::function<Cell(const Studied&)>& of) {
+    std::vector<Cell> row{name, unit};
+    for (const Studied& one : columns) row.push_back(of(one));
+    table.rows.push_back(std::move(row));
+  };
+  using S = const Studied&;
+  add("expected steps before failure, from the launch", "steps", [](S s) { return cell(s.study.from_start); });
+  add("the same from the metastable regime", "steps", [](S s) { return cell(s.study.from_quasi_stationary); });
+  add("the same from the worst start", "steps", [](S s) { return cell(s.study.worst_start); });
+  add("standard deviation of the steps", "steps", [](S s) { return Cell(s.study.steps.sd); });
+  add("median of the steps", "steps",
+      [](S s) { return s.study.steps.quantile.empty() ? Cell(Infinite{}) : Cell(s.study.steps.quantile[2]); });
+  add("mean time to failure", "s",
+      [](S s) { return s.study.seconds ? Cell(s.study.seconds->mean) : Cell(Infinite{}); });
+  add("mean distance to failure", "m",
+      [](S s) { return s.study.metres ? Cell(s.study.metres->mean) : Cell(Infinite{}); });
+  add("failure rate per step, 1 − λ₁", "1", [](S s) { return Cell(s.study.failure_rate.value); });
+  add("mixing, spectral", "steps", [](S s) { return Cell(s.study.mixing_steps); });
+  add("mixing from the launch, total variation", "steps",
+      [](S s) { return s.study.total_variation_steps ? Cell(*s.study.total_variation_steps) : Cell(""); });
+  add("reaches the end of the ramp", "1", [](S s) { return cell(s.study.reach_end); });
+  add("speed before a collision, long-run mean", "rad/s", [](S s) { return Cell(s.study.observable_mean); });
+  add("its standard deviation", "rad/s", [](S s) { return Cell(s.study.observable_sd); });
+  add("the same mean with a new launch after each rest", "rad/s", [](S s) { return Cell(s.study.restart_mean); });
+  add("rest is unreachable for launches from", "rad/s", [](S s) { return cell(s.thresholds.safe_speed); });
+  add("slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); });
+  const std::vector<analysis::Share>& shares = columns.front().study.violations;
+  for (std::size_t a = 0; a < shares.size(); ++a) {
+    add(fmt::format("“{}”, share of collisions, long run", shares[a].name), "1",
+        [a](S s) { return s.study.violations.size() > a ? Cell(s.study.violations[a].quasi_stationary) : Cell(""); });
+    add(fmt::format("“{}”, share of all collisions until rest", shares[a].name), "1",
+        [a](S s) { return s.study.violations.size() > a ? Cell(s.study.violations[a].until_rest) : Cell(""); });
+  }
+  table.notes = {
+      "Brackets hold 95 % intervals: replicated randomisations plus the estimated discretization error. An empty cell "
+      "means "
+      "that there is no such number. Long run: the metastable regime of wheels that still roll; where none ever rests, "
+      "the "
+      "stationary one, and “until rest” is then on the ramp.",
+      "The published law charges friction work on collisions in which Coulomb friction would stick; the coulomb law "
+      "does "
+      "not, and keeps enough speed to make rest unreachable. Its radius of gyration about the hub is an assumption "
+      "where "
+      "none is given (0.05 m)."};
+  return table;
+}
+
+Table grid_table(const std::string& id, const std::string& title, const analysis::Axis& down,
+                 const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+                 const Provenance& provenance) {
+  Table table;
+  table.id = id;
+  table.title = title;
+  table.provenance = provenance;
+  table.columns = {{std::string(analysis::parameter_label(down.parameter)), "", NumberFormat::general, 3}};
+  for (const double value : across.values)
+    table.columns.push_back({fmt::format("{} {}", analysis::parameter_label(across.parameter), value), "steps",
+                             NumberFormat::significant, 3});
+  for (std::size_t i = 0; i < down.values.size(); ++i) {
+    std::vector<Cell> row{down.values[i]};
+    for (std::size_t j = 0; j < across.values.size(); ++j)
+      row.push_back(cell(studies[i * across.values.size() + j].from_start));
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {"Expected steps before failure from the launch, with 95 % intervals."};
+  return table;
+}
+
+Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Provenance& provenance) {
+  // Printed with Fig. 8: tangential from N(0.05, 0.03^2) to N(0.11, 0.19^2), normal about 0.17 with sd 0.06 to 0.1.
+  struct Printed {
+    const char *tangential, *tangential_sd, *normal, *normal_sd;
+  };
+  const auto printed = [&](std::size_t k) -> Printed {
+    if (k == 0) return {"0.05", "0.03", "0.17", "0.06"};
+    if (k + 1 == losses.size()) return {"0.11", "0.19", "0.17", "0.1"};
+    return {"", "", "0.17", ""};
+  };
+  Table table;
+  table.id = "energy-losses";
+  table.title = "Energy lost in a collision, beside the figures of the paper's Fig. 8";
+  table.provenance = provenance;
+  table.columns = {{"sd of η and μ", "", NumberFormat::fixed, 2}};
+  for (const char* name : {"tangential net mean", "tangential net sd", "normal mean", "normal sd"}) {
+    table.columns.push_back({name, "J", NumberFormat::fixed, 3});
+    table.columns.push_back({fmt::format("paper: {}", name), "J"});
+  }
+  for (std::size_t k = 0; k < losses.size(); ++k) {
+    const analysis::EnergyLosses& loss = losses[k];
+    const auto mean = [](const analysis::MeanSpread& spread) { return with_error(spread.mean, spread.standard_error); };
+    const Printed paper = printed(k);
+    table.rows.push_back({0.05 * static_cast<double>(k + 1), mean(loss.tangential_net), paper.tangential,
+                          loss.tangential_net.sd, paper.tangential_sd, mean(loss.normal), paper.normal, loss.normal.sd,
+                          paper.normal_sd});
+  }
+  table.notes = {
+      "Reading of Fig. 8: no rest rule, x′ < 0 is set to 0, all collisions of all trials. The tangential net loss is "
+      "the "
+      "friction loss less the potential energy gained by slipping downhill.",
+      "The paper prints figures for the smallest and the largest spread only, and a normal mean of “around 0.17” for "
+      "all."};
+  return table;
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,34 @@
+#pragma once
+// The tables of `metastable report`, from finished studies.
+
+#include <string>
+#include <vector>
+
+#include "analysis/paper/energy_losses.h"
+#include "analysis/sensitivity/sweep.h"
+#include "analysis/study/metastability.h"
+#include "analysis/study/setting.h"
+#include "reports/output/table.h"
+#include "reports/study/study_json.h"
+
+namespace metastable::reports {
+
+/// A setting with its study.
+struct Studied {
+  analysis::Setting setting;
+  analysis::Metastability study;
+  RestThresholds thresholds;
+};
+
+/// All ramps under all laws side by side: quantities down, settings across.
+Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance);
+
+/// Expected steps over two parameters; `studies` row by row (`down` slow, `across` fast).
+Table grid_table(const std::string& id, const std::string& title, const analysis::Axis& down,
+                 const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+                 const Provenance& provenance);
+
+/// Energy losses at equal spreads 0.05 k of eta and mu, k = 1 .. 4, beside the figures printed with the paper's Fig. 8.
+Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Provenance& provenance);
+
+}  // namespace metastable::reports

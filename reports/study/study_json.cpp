@@ -1,0 +1,177 @@
+#include "reports/study/study_json.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "analysis/study/rest_reachability.h"
+#include "dynamics/wheel/contact_law.h"
+
+namespace metastable::reports {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) {
+  if (std::isinf(value)) return value > 0 ? "infinite" : "-infinite";
+  return value;
+}
+
+Json interval(const analysis::Estimate& estimate) { return {number(estimate.lower), number(estimate.upper)}; }
+
+Json optional_number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+
+Json accumulated(const analysis::Accumulated& total) {
+  Json json = {{"mean", number(total.mean)}, {"sd", number(total.sd)}};
+  Json quantiles = Json::object();
+  for (std::size_t i = 0; i < total.quantile.size(); ++i)
+    quantiles[format_number(analysis::Metastability::levels[i], NumberFormat::general, 3)] = number(total.quantile[i]);
+  json["quantiles"] = quantiles;
+  return json;
+}
+
+Json certificate_json(const analysis::CertifiedSteps& certified) {
+  Json json = {{"exists", certified.exists}};
+  if (!certified.reason.empty()) json["reason"] = certified.reason;
+  if (!certified.exists) return json;
+  json["expected_steps"] = {{"lower", number(certified.lower)}, {"upper", number(certified.upper)}};
+  json["relative_width"] = number(certified.width());
+  json["cells"] = certified.cells;
+  // From any omega^2 just before a collision: linear between states.
+  Json legs = Json::array();
+  const markov::Certificate& all = certified.from_state;
+  for (std::size_t p = 0; p < all.nodes.size(); ++p)
+    legs.push_back({{"state_rad2_s2", all.nodes[p]},
+                    {"lower", all.lower[p]},
+                    {"upper", all.upper.empty() ? Json(nullptr) : Json(all.upper[p])}});
+  json["per_leg"] = legs;
+  return json;
+}
+
+Json sensitivities_json(const analysis::Sensitivities& sensitivities) {
+  if (!sensitivities.reason.empty()) return {{"reason", sensitivities.reason}};
+  Json list = Json::array();
+  for (const analysis::Sensitivity& one : sensitivities.ranked)
+    list.push_back({{"parameter", analysis::sensitivity_name(one)},
+                    {"unit", analysis::parameter_unit(one.parameter)},
+                    {"value", one.value},
+                    {"d_ln_steps", one.derivative},
+                    {"d_ln_steps_error", one.error},
+                    {"elasticity", one.elasticity()}});
+  return list;
+}
+
+Json propagated_json(const analysis::Propagated& propagated) {
+  Json shares = Json::object();
+  for (const analysis::Propagated::Share& one : propagated.shares)
+    shares[std::string(analysis::parameter_name(one.parameter))] = one.share;
+  return {{"interval_95", interval(propagated.interval)},
+          {"log_standard_error", propagated.log_sd},
+          {"variance_shares", shares}};
+}
+
+Json provenance_json(const Provenance& provenance) {
+  return {{"command", provenance.command},
+          {"settings", provenance.settings},
+          {"seed", provenance.seed},
+          {"version", provenance.version}};
+}
+
+Json study_json(const analysis::Setting& setting, const analysis::Metastability& study,
+                const RestThresholds& thresholds) {
+  const bool endless = study.status == analysis::Status::rest_unreachable;
+  const double median = study.steps.quantile.empty() ? study.from_start.value : study.steps.quantile[2];
+  Json json;
+  json["slope_deg"] = setting.slope_deg;
+  json["law"] = dynamics::law_name(setting.law);
+  json["method"] = analysis::method_name(study.method);
+  json["status"] = analysis::status_text(study.status);
+  if (!study.message.empty()) json["message"] = study.message;
+  json["expected_steps"] = {{"from_start", number(study.from_start.value)},
+                            {"interval_95", interval(study.from_start)},
+                            {"from_quasi_stationary", number(study.from_quasi_stationary.value)},
+                            {"from_quasi_stationary_interval_95", interval(study.from_quasi_stationary)},
+                            {"worst_start", number(study.worst_start.value)},
+                            {"worst_start_interval_95", interval(study.worst_start)},
+                            {"sd", number(study.steps.sd)},
+                            {"median", number(median)},
+                            {"quantiles", accumulated(study.steps)["quantiles"]}};
+  json["failure_rate_per_step"] = study.failure_rate.value;
+  json["failure_rate_interval_95"] = interval(study.failure_rate);
+  json["seconds_before_failure"] =
+      study.seconds ? accumulated(*study.seconds) : Json(endless ? "infinite" : Json(nullptr));
+  json["metres_before_failure"] =
+      study.metres ? accumulated(*study.metres) : Json(endless ? "infinite" : Json(nullptr));
+  json["survival"] = study.survival;
+  json["eigenvalue_moduli"] = study.eigenvalue_moduli;
+  json["mixing_steps"] = number(study.mixing_steps);
+  json["total_variation_mixing_steps"] =
+      study.total_variation_steps ? Json(*study.total_variation_steps) : Json(nullptr);
+  Json legs = Json::array();
+  for (const analysis::PhaseDistribution& phase : study.quasi_stationary)
+    legs.push_back({{"mean_rad_s", phase.mean}, {"sd_rad_s", phase.sd}});
+  json["quasi_stationary"] = {
+      {"mean_rad_s", study.observable_mean}, {"sd_rad_s", study.observable_sd}, {"per_leg", legs}};
+  json["stationary_with_restart"] = {{"mean_rad_s", study.restart_mean}, {"sd_rad_s", study.restart_sd}};
+  json["reach_ramp_end"] = optional_number(study.reach_end);
+  Json shares = Json::object();
+  for (const analysis::Share& share : study.violations)
+    shares[share.name] = {{"quasi_stationary", share.quasi_stationary}, {"until_rest", share.until_rest}};
+  json["outside_assumptions"] = shares;
+  json["rest_unreachable_above"] = {{"speed_rad_s", optional_number(thresholds.safe_speed)},
+                                    {"slope_deg", optional_number(thresholds.safe_slope_deg)}};
+  json["error"] = {{"discretization", number(study.discretization_error)}, {"sampling", number(study.sampling_error)}};
+  json["resolution"] = {{"cells", study.cells},
+                        {"samples", study.samples},
+                        {"replicates", study.replicates},
+                        {"phases", study.phases},
+                        {"period", study.period}};
+  json["solver_disagreement"] = study.solver_disagreement;
+  return json;
+}
+
+}  // namespace
+
+RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis::Metastability& study) {
+  RestThresholds thresholds;
+  if (study.safe_state) thresholds.safe_speed = std::sqrt(*study.safe_state);
+  thresholds.safe_slope_deg = analysis::safe_slope_deg(setting);
+  return thresholds;
+}
+
+std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
+                       const RestThresholds& thresholds, const Provenance& provenance, const StepsExtras& extras) {
+  Json json = {{"schema", 1}};
+  json.update(study_json(setting, study, thresholds));
+  if (extras.certified) json["certificate"] = certificate_json(*extras.certified);
+  if (extras.sensitivities) json["sensitivities"] = sensitivities_json(*extras.sensitivities);
+  if (extras.propagated) json["from_standard_errors"] = propagated_json(*extras.propagated);
+  json["provenance"] = provenance_json(provenance);
+  return json.dump(2) + "\n";
+}
+
+std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,
+                         const Provenance& provenance, const CompareExtras& extras) {
+  Json json = {{"schema", 1}, {"settings", Json::array()}, {"contrasts", Json::array()}};
+  for (std::size_t i = 0; i < comparison.settings.size(); ++i) {
+    json["settings"].push_back(study_json(comparison.settings[i], comparison.studies[i], thresholds[i]));
+    if (!extras.steps.empty()) json["settings"].back()["from_standard_errors"] = propagated_json(extras.steps[i]);
+  }
+  const auto estimate = [](const std::optional<analysis::Estimate>& value) {
+    return value ? Json{{"value", number(value->value)}, {"interval_95", interval(*value)}} : Json(nullptr);
+  };
+  for (std::size_t i = 0; i < comparison.contrasts.size(); ++i) {
+    const analysis::Contrast& contrast = comparison.contrasts[i];
+    json["contrasts"].push_back({{"slope_deg", comparison.settings[contrast.of].slope_deg},
+                                 {"against_slope_deg", comparison.settings[contrast.against].slope_deg},
+                                 {"ratio", estimate(contrast.ratio)},
+                                 {"difference", estimate(contrast.difference)},
+                                 {"trials_needed", optional_number(contrast.trials_needed)},
+                                 {"sentence", contrast.sentence}});
+    if (!extras.ratios.empty())
+      json["contrasts"].back()["ratio_from_standard_errors"] = propagated_json(extras.ratios[i]);
+  }
+  json["provenance"] = provenance_json(provenance);
+  return json.dump(2) + "\n";
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,47 @@
+#pragma once
+// Results as JSON.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/sensitivity/comparison.h"
+#include "analysis/sensitivity/propagation.h"
+#include "analysis/sensitivity/sensitivity.h"
+#include "analysis/study/certify.h"
+#include "analysis/study/metastability.h"
+#include "analysis/study/setting.h"
+#include "reports/output/table.h"
+
+namespace metastable::reports {
+
+/// What else is known of a setting's rest: thresholds beside its study.
+struct RestThresholds {
+  std::optional<double> safe_speed;      ///< launches at least this fast never come to rest [rad/s]
+  std::optional<double> safe_slope_deg;  ///< steeper ramps have such launches [deg]
+};
+RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis::Metastability& study);
+
+/// What `steps` finds beyond the study, where it is asked for.
+struct StepsExtras {
+  std::optional<analysis::CertifiedSteps> certified = {};
+  std::optional<analysis::Sensitivities> sensitivities = {};
+  std::optional<analysis::Propagated> propagated = {};  ///< from the parameters' standard errors
+};
+
+/// What `compare` finds beyond the comparison; empty without standard errors.
+struct CompareExtras {
+  std::vector<analysis::Propagated> steps = {};   ///< a setting each
+  std::vector<analysis::Propagated> ratios = {};  ///< a contrast each
+};
+
+/// The result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as many
+/// digits as a double holds. Keys as in the README ("steps --json").
+std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
+                       const RestThresholds& thresholds, const Provenance& provenance, const StepsExtras& extras = {});
+
+/// The result of `compare`: "settings" (each as in steps_json) and "contrasts".
+std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,
+                         const Provenance& provenance, const CompareExtras& extras = {});
+
+}  // namespace metastable::reports

@@ -1,0 +1,121 @@
+#include "reports/study/study_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace metastable::reports {
+namespace {
+
+// Six significant digits, trailing zeros dropped: what a terminal line holds.
+std::string show(double value) { return std::isinf(value) ? "infinite" : fmt::format("{:.6g}", value); }
+
+// As many digits as the interval supports, and one more.
+std::string to_the_digit(double value, double half_width) {
+  const int digits = half_width > 0 ? static_cast<int>(std::ceil(std::log10(std::abs(value) / half_width))) + 2 : 12;
+  return fmt::format("{:.{}g}", value, std::clamp(digits, 3, 12));
+}
+
+std::string line(const std::string& name, const std::string& value) { return fmt::format("  {:<38}{}\n", name, value); }
+
+std::string total_line(const std::string& name, const analysis::Accumulated& total) {
+  return line(name, fmt::format("mean {}, sd {}, median {}, 5 to 95 %: {} to {}", show(total.mean), show(total.sd),
+                                show(total.quantile[2]), show(total.quantile.front()), show(total.quantile.back())));
+}
+
+}  // namespace
+
+std::string estimate_text(const analysis::Estimate& estimate) {
+  if (std::isinf(estimate.value)) return "infinite";
+  const double half = 0.5 * (estimate.upper - estimate.lower);
+  return fmt::format("{} (95 % interval {} to {})", to_the_digit(estimate.value, half),
+                     to_the_digit(estimate.lower, half), to_the_digit(estimate.upper, half));
+}
+
+std::string sensitivities_text(const analysis::Sensitivities& sensitivities) {
+  if (!sensitivities.reason.empty()) return "No sensitivities: " + sensitivities.reason + ".\n";
+  std::string text = fmt::format("{:<22}{:>10} {:<8}{:>15}{:>11}{:>24}\n", "Sensitivities to", "value", "",
+                                 "d ln steps / d", "+- (95 %)", "steps for 1 % more");
+  for (const analysis::Sensitivity& one : sensitivities.ranked) {
+    const std::string_view unit = analysis::parameter_unit(one.parameter);
+    text += fmt::format("  {:<20}{:>10.5g} {:<8}{:>15}{:>11.2g}{:>22.3f} %\n", analysis::sensitivity_name(one),
+                        one.value, unit == "1" ? "" : unit, to_the_digit(one.derivative, one.error), one.error,
+                        100 * std::expm1(0.01 * one.elasticity()));
+  }
+  return text;
+}
+
+std::string propagated_text(const analysis::Propagated& propagated) {
+  const double half = 0.5 * (propagated.interval.upper - propagated.interval.lower);
+  std::string shares;
+  for (const analysis::Propagated::Share& one : propagated.shares)
+    shares += fmt::format("{}{} {:.0f} %", shares.empty() ? "" : ", ", analysis::parameter_name(one.parameter),
+                          100 * one.share);
+  return fmt::format("{} to {} (variance: {})", to_the_digit(propagated.interval.lower, half),
+                     to_the_digit(propagated.interval.upper, half), shares);
+}
+
+std::string thresholds_text(const RestThresholds& thresholds) {
+  std::string text = thresholds.safe_speed
+                         ? fmt::format("out of reach for launches of {:.4g} rad/s and faster", *thresholds.safe_speed)
+                         : std::string("within reach at every speed");
+  text += thresholds.safe_slope_deg
+              ? fmt::format("; on slopes above {:.3f} deg fast enough launches never rest", *thresholds.safe_slope_deg)
+              : std::string("; no slope puts it out of reach");
+  return text;
+}
+
+std::string study_text(const analysis::Setting& setting, const analysis::Metastability& study,
+                       const RestThresholds& thresholds) {
+  const bool endless = study.status == analysis::Status::rest_unreachable;
+  std::string text = setting.describe() + "\n\n";
+  if (study.status == analysis::Status::rest_unresolved) return text + "  " + study.message + "\n";
+  if (endless) {
+    text += line("expected steps before failure", study.message);
+  } else {
+    text += line("expected steps before failure", estimate_text(study.from_start));
+    text += line("  from the metastable regime", estimate_text(study.from_quasi_stationary));
+    text += line("  from the worst start", estimate_text(study.worst_start));
+    text += line("failure rate per step", fmt::format("{:.6g}", study.failure_rate.value));
+    text += line("steps", fmt::format("sd {}, median {}, 5 to 95 %: {} to {}", show(study.steps.sd),
+                                      show(study.steps.quantile[2]), show(study.steps.quantile.front()),
+                                      show(study.steps.quantile.back())));
+    if (study.seconds) text += total_line("seconds", *study.seconds);
+    if (study.metres) text += total_line("metres", *study.metres);
+  }
+  if (study.reach_end)
+    text += line(fmt::format("reaches the end of {} m", setting.ramp_length), show(*study.reach_end));
+  text += line(endless ? "stationary speed" : "quasi-stationary speed",
+               fmt::format("{:.4f} rad/s, sd {:.4f}", study.observable_mean, study.observable_sd));
+  if (!endless)
+    text += line("stationary speed, relaunched",
+                 fmt::format("{:.4f} rad/s, sd {:.4f}", study.restart_mean, study.restart_sd));
+  text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.eigenvalue_moduli, ", ")));
+  std::string mixing = fmt::format("{:.4g} steps (spectral)", study.mixing_steps);
+  if (study.total_variation_steps)
+    mixing += fmt::format(", {} from the launch (total variation)", *study.total_variation_steps);
+  text += line("mixing", mixing);
+  text += "\n";
+  text += line("rest", thresholds_text(thresholds));
+  for (const analysis::Share& share : study.violations)
+    text += line(fmt::format("collisions with '{}'", share.name),
+                 fmt::format("{:.3f} % in the {} regime, {:.3f} % {}", 100 * share.quasi_stationary,
+                             endless ? "stationary" : "metastable", 100 * share.until_rest,
+                             endless ? "on the ramp" : "until rest"));
+  const std::string legs = study.phases > 1 ? fmt::format(" for each of {} legs", study.phases) : "";
+  text += line("resolution", study.method == analysis::Method::integrated
+                                 ? fmt::format("{} nodes{}, integrated", study.cells, legs)
+                                 : fmt::format("{} cells{}, {} draws a cell, {}", study.cells, legs, study.samples,
+                                               study.replicates > 1 ? fmt::format("{} replicates", study.replicates)
+                                                                    : std::string("one randomisation")));
+  if (!endless) {
+    text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)",
+                                               study.discretization_error, study.sampling_error));
+    text += line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.solver_disagreement));
+    if (!study.message.empty()) text += "\n" + study.message + "\n";
+  }
+  return text;
+}
+
+}  // namespace metastable::reports

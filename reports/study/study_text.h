@@ -1,0 +1,28 @@
+#pragma once
+// A study in words and numbers for the terminal, and its words shared with tables and pages.
+
+#include <string>
+
+#include "analysis/study/metastability.h"
+#include "analysis/study/setting.h"
+#include "reports/study/study_json.h"
+
+namespace metastable::reports {
+
+/// Everything `metastable steps` prints.
+std::string study_text(const analysis::Setting& setting, const analysis::Metastability& study,
+                       const RestThresholds& thresholds);
+
+/// The sensitivities as a table, ranked, or why there are none.
+std::string sensitivities_text(const analysis::Sensitivities& sensitivities);
+
+/// "3.9 to 4.6 (from friction-mean 93 %, slope 7 %)": the interval of the parameters' standard errors alone.
+std::string propagated_text(const analysis::Propagated& propagated);
+
+/// "4.256 (95 % interval 4.254 to 4.258)", or "infinite".
+std::string estimate_text(const analysis::Estimate& estimate);
+
+/// What the thresholds mean, one sentence.
+std::string thresholds_text(const RestThresholds& thresholds);
+
+}  // namespace metastable::reports

@@ -1,0 +1,201 @@
+#include "analysis/blind/blind_cases.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "analysis/blind/sized_effect.h"
+#include "analysis/experiment/experiment.h"
+
+namespace metastable::analysis::test {
+namespace {
+
+const dynamics::NominalValues paper{0.54, 0.045, 0.352, 0.043, dynamics::paper_leg_lengths()};
+
+// A power that grows like the square of the distance from neutral.
+double square_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects) {
+  const Setting& s = design.conditions.front().setting;
+  const dynamics::NominalValues stated = stated_values(s.restitution, s.friction, s.wheel.leg_length);
+  double sum = 0;
+  for (const dynamics::Effect& effect : effects) {
+    // The strength of a patch or a leg sits in one value; where and which it is does not count.
+    const std::size_t at = effect.id == "leg_contact" ? 1 : effect.id == "friction_patch" ? 2 : 0;
+    const dynamics::Effect neutral = dynamics::effect_from_values(effect.id, {}, stated);
+    sum += 4e4 * std::pow(effect.values.at(at) - neutral.values[at], 2);
+  }
+  return sum;
+}
+
+Experiment read(const BlindCase& made) { return parse_experiment(source_of(made.files.files, "case")); }
+
+TEST(BlindCases, PlanHasTheSizeAskedFor) {
+  const std::vector<BlindPlan> plan = blind_plan({}, 3);
+  EXPECT_EQ(plan.size(), 300U + 23 * 3 * 6 + 22 * 3 + 50 + 50);
+  std::map<BlindKind, int> count;
+  std::map<std::string, int> effect, family;
+  for (const BlindPlan& p : plan) {
+    ++count[p.kind];
+    if (p.kind == BlindKind::effect) ++effect[p.effects.front()];
+    if (p.kind == BlindKind::outside) ++family[p.effects.front()];
+    if (p.kind == BlindKind::pair) {
+      EXPECT_NE(p.effects[0], p.effects[1]);
+    }
+  }
+  EXPECT_EQ(count[BlindKind::none], 300);
+  for (const auto& [id, n] : effect) EXPECT_EQ(n, 18) << id;
+  EXPECT_EQ(effect.size(), 23U);
+  EXPECT_GE(family.size(), 4U);
+  EXPECT_EQ(blind_plan({}, 3)[17].effects, plan[17].effects);
+}
+
+// The contact is no candidate beside which another effect could be named, and slip_reversal has no size to balance.
+TEST(BlindCases, PairsAreOfAllEffectsThatHaveASizeAndAreNotTheContact) {
+  std::set<std::string> paired;
+  for (const BlindPlan& p : blind_plan({0, 0, 500, 0, 0}, 8)) paired.insert(p.effects.begin(), p.effects.end());
+  std::set<std::string> expected;
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) expected.insert(info.id);
+  EXPECT_EQ(expected.erase("contact_distribution") + expected.erase("slip_reversal"), 2U);
+  EXPECT_EQ(paired, expected);
+}
+
+TEST(BlindCases, APlanOfFewerThanNoCasesIsRefused) {
+  try {
+    blind_plan({.pairs = -1}, 1);
+    ADD_FAILURE();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "pairs: -1 is below 0");
+  }
+}
+
+// An effect that cannot be drawn would be counted as one that nobody finds.
+TEST(SizedEffect, EveryEffectOfTheCatalogueHasASize) {
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
+    BlindDice dice(4, 1);
+    const SizedEffect effect = sized_effect(info.id, paper, dice);
+    EXPECT_EQ(effect.at(effect.largest).id, info.id);  // and is in the catalogue's range
+    if (info.id == "slip_reversal") continue;          // there or not
+    EXPECT_GT(effect.start, 0) << info.id;
+    EXPECT_LE(effect.start, effect.largest) << info.id;
+    EXPECT_NE(effect.at(effect.start).values, effect.at(0).values) << info.id;
+    EXPECT_NE(effect.at(effect.largest).values, effect.at(effect.start).values) << info.id;
+    const auto columns = droppable();
+    for (const std::string& name : effect.needs)
+      EXPECT_NE(std::find(columns.begin(), columns.end(), name), columns.end()) << info.id << ' ' << name;
+  }
+  BlindDice dice(4, 1);
+  EXPECT_THROW(sized_effect("sloshing_fluid", paper, dice), std::logic_error);
+}
+
+TEST(BlindCases, SizesReachThePowerAskedFor) {
+  int number = 0;
+  for (const char* id : {"inertia", "slope_offset", "leg_contact", "trial_drift", "contact_memory", "bounce",
+                         "speed_dependent_restitution", "friction_patch"})
+    for (const auto& [strength, target] : {std::pair{1, 16.0}, {2, 64.0}}) {
+      const BlindCase made = blind_case({BlindKind::effect, {id}, strength}, ++number, 5, square_power);
+      EXPECT_NEAR(made.truth.power / target, 1, 0.11) << id << ' ' << strength;
+      EXPECT_EQ(made.truth.effects.front().id, id);
+    }
+}
+
+TEST(BlindCases, FoldersAreReadAndTheSameSeedGivesTheSameBytes) {
+  std::set<std::string> headers;
+  std::set<std::size_t> conditions;
+  bool exact = false, unlike = false, skewed = false;
+  for (int number = 1; number <= 12; ++number) {
+    const BlindCase made = blind_case({BlindKind::none, {}, 0}, number, 9, square_power);
+    const std::string& rows = made.files.files.collisions_csv;
+    const Experiment e = read(made);
+    EXPECT_GE(e.trials.size(), 50U);
+    EXPECT_LE(e.trials.size(), 150U);
+    conditions.insert(e.conditions.size());
+    headers.insert(rows.substr(0, rows.find('\n')));
+    (made.truth.nominal_is_true ? exact : unlike) = true;
+    skewed |= made.truth.skewness != 0;
+    if (made.truth.nominal_is_true) {
+      EXPECT_EQ(e.contact.friction.mean, made.truth.friction.mean);
+    }
+    if (number == 4) {
+      const BlindCase again = blind_case({BlindKind::none, {}, 0}, 4, 9, square_power);
+      EXPECT_EQ(again.files.files.collisions_csv, rows);
+    }
+  }
+  EXPECT_GT(headers.size(), 1U);
+  EXPECT_GT(conditions.size(), 1U);
+  EXPECT_TRUE(exact && unlike && skewed);
+}
+
+TEST(BlindCases, LeftOutEffectsAreNotInTheCatalogueGiven) {
+  const BlindCase made = blind_case({BlindKind::left_out, {"inertia"}, 2}, 1, 9, square_power);
+  EXPECT_EQ(made.catalogue.size(), 22U);
+  for (const std::string& id : made.catalogue) EXPECT_NE(id, "inertia");
+  EXPECT_EQ(made.truth.left_out, std::vector<std::string>{"inertia"});
+  const BlindCase outside = blind_case({BlindKind::outside, {"planks"}, 0}, 2, 9, square_power);
+  ASSERT_TRUE(outside.truth.outside);
+  EXPECT_GT(outside.truth.outside->size, 0);
+  EXPECT_THROW(blind_kind("some"), std::invalid_argument);
+}
+
+// The laboratory and the likelihood of the diagnosis, which share no formula, on the same effects.
+TEST(EffectPower, GrowsLikeTheSquareOfTheSize) {
+  PowerDesign design;
+  Setting base;
+  base.restitution = {0.54, 0.045};
+  base.friction = {0.352, 0.043};
+  base.slope_deg = 9.59;
+  base.initial_speed = {5.83, 0.28};
+  design.conditions = {{"fast", base, 60}};
+  design.reality.sensor_noise = 0.01;
+  design.reality.flight = false;
+  const auto power = [&](const std::string& text) {
+    return expected_power(design, {dynamics::effect_from_text(text, paper)}, 4);
+  };
+  EXPECT_NEAR(power("leg_contact"), 0, 1e-9);  // neutral
+  for (const auto& [one, two] : {std::pair<std::string, std::string>{"leg_contact:leg=2,friction_ratio=1.06",
+                                                                     "leg_contact:leg=2,friction_ratio=1.12"},
+                                 {"slope_offset:offset_deg=0.02", "slope_offset:offset_deg=0.04"},
+                                 {"trial_drift:relative_change=0.06", "trial_drift:relative_change=0.12"}}) {
+    const double small = power(one), large = power(two);
+    EXPECT_GT(small, 4) << one;
+    EXPECT_NEAR(large / small, 4, 1.6) << one;
+  }
+}
+
+// An effect that the contact's means imitate leaves nothing once they are refitted.
+TEST(EffectPower, RecalibrationAbsorbsAShiftOfTheContact) {
+  BlindCase made = blind_case({BlindKind::effect, {"contact_distribution"}, 4}, 3, 21,
+                              [](const PowerDesign& design, const std::vector<dynamics::Effect>& effects) {
+                                return expected_power(design, effects, 1);
+                              });
+  EXPECT_GT(made.truth.power, 150);
+  EXPECT_EQ(made.truth.left, 0);
+  complete_truth(made);
+  EXPECT_NE(made.truth.left, 0);
+  EXPECT_LT(made.truth.left, 16);
+}
+
+// Beside its other effect in the model, each effect of a pair leaves what refitting cannot take up.
+TEST(EffectPower, OfAPairEachEffectIsWeighedBesideTheOther) {
+  BlindCase made = blind_case({BlindKind::pair, {"leg_contact", "contact_memory"}, 2}, 2, 21,
+                              [](const PowerDesign& design, const std::vector<dynamics::Effect>& effects) {
+                                return expected_power(design, effects, 1);
+                              });
+  complete_truth(made);
+  complete_pair(made.truth, read(made));
+  ASSERT_EQ(made.truth.left_by_effect.size(), 2U);
+  for (const double left : made.truth.left_by_effect) {
+    EXPECT_GT(left, 16);
+    EXPECT_LT(left, made.truth.left);
+  }
+  BlindTruth none;
+  complete_pair(none, read(made));
+  EXPECT_TRUE(none.left_by_effect.empty());
+}
+
+TEST(EffectPower, NeedsAReplicate) { EXPECT_THROW(expected_power({}, {}, 0), std::invalid_argument); }
+
+}  // namespace
+}  // namespace metastable::analysis::test

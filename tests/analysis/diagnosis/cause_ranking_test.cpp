@@ -1,0 +1,73 @@
+#include "analysis/diagnosis/cause_ranking.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/likelihood/coast_down_transitions.h"
+#include "tests/analysis/diagnosed.h"
+#include "tests/analysis/line.h"
+#include "tests/analysis/rotor.h"
+
+namespace metastable::analysis {
+namespace {
+
+using test::Line;
+using test::line;
+
+RankingOptions quick() { return {.threads = 1, .draws = 300, .seed = 1, .progress = {}}; }
+
+// On a line the gain is least squares' and the evidence that of one parameter: 36/37 of half the gain less log(37)/2.
+TEST(RankCauses, OnALineGainAndEvidenceAreThoseOfLeastSquares) {
+  const Line model = line(0.1, 1);
+  const Fit plain = fit(model, {0, 0}, {});
+  const CauseRanking ranking = rank_causes(model, plain, {&model.candidates()[0]}, quick());
+  ASSERT_EQ(ranking.singles.size(), 1U);
+  const RankedCause& cause = ranking.singles[0];
+  const Fit with = fit(model, {0, 0}, {{&model.candidates()[0], {}, {0.0}}});
+  EXPECT_NEAR(cause.gain, 2 * (with.penalised - plain.penalised), 0.02);
+  EXPECT_NEAR(cause.evidence, 0.5 * cause.gain * 36 / 37 - 0.5 * std::log(37.0), 1e-9);
+  EXPECT_NEAR(std::log(cause.p_value), std::log(std::erfc(std::sqrt(0.5 * cause.gain))), 1.5);  // by 300 draws
+  EXPECT_TRUE(cause.not_decided.empty());
+  EXPECT_TRUE(ranking.pairs.empty());
+}
+
+TEST(RankCauses, PutsTheTorqueOnARotorFirst) {
+  const auto design = coast_down_transitions(test::coasting_rotor());
+  const auto data =
+      design->simulate(nominal_values(*design), std::vector{test::term(*design, "rolling_resistance", {}, {0.02})}, 5);
+  std::vector<const Candidate*> candidates;
+  for (const Candidate& candidate : data->candidates()) candidates.push_back(&candidate);
+  const Fit recalibrated = fit(*data, nominal_values(*data), {});
+  const CauseRanking ranking = rank_causes(*data, recalibrated, candidates, quick());
+  ASSERT_EQ(ranking.singles.size(), candidates.size());
+  const auto best = std::max_element(ranking.singles.begin(), ranking.singles.end(),
+                                     [](const auto& a, const auto& b) { return a.evidence < b.evidence; });
+  EXPECT_EQ(best->terms[0].candidate->id, "rolling_resistance");
+  EXPECT_LT(best->p_value, 1e-6);
+  EXPECT_LT(ranking.p_value, 1e-5);
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    EXPECT_EQ(ranking.singles[i].terms[0].candidate, candidates[i]) << candidates[i]->id;
+  for (const RankedCause& pair : ranking.pairs) EXPECT_EQ(pair.terms.size(), 2U);
+}
+
+// Only an exact effect that was fitted is forgiven nothing.
+TEST(RankCauses, TheExactPartIsTheFitOfTheExactEffect) {
+  const Line model = line(0.1, 1);
+  Candidate exact = model.candidates()[0], rough = model.candidates()[1];
+  exact.exact = true;
+  const Fit recalibrated = fit(model, {0, 0}, {});
+  std::vector<RankedCause> singles(2);
+  singles[0].terms = {{&exact, {}, {0.1}}};
+  singles[0].fit = fit(model, {0, 0}, singles[0].terms);
+  singles[1].terms = {{&rough, {}, {0.1}}};
+  singles[1].fit = fit(model, {0, 0}, singles[1].terms);
+  EXPECT_EQ(&exact_part(singles, singles[1].terms, recalibrated), &recalibrated);
+  EXPECT_EQ(&exact_part(singles, {singles[1].terms[0], singles[0].terms[0]}, recalibrated), &singles[0].fit);
+  singles[0].fit = {};  // its scores said enough
+  EXPECT_EQ(&exact_part(singles, singles[0].terms, recalibrated), &recalibrated);
+}
+
+}  // namespace
+}  // namespace metastable::analysis

@@ -1,0 +1,219 @@
+#include "analysis/diagnosis/diagnosis.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/experiment/reality.h"
+#include "analysis/experiment/stand_in.h"
+#include "analysis/likelihood/coast_down_transitions.h"
+#include "tests/analysis/diagnosed.h"
+#include "tests/analysis/rotor.h"
+
+namespace metastable::analysis {
+namespace {
+
+using test::term;
+
+DiagnosisOptions quick() {
+  DiagnosisOptions options;
+  options.draws = 500;
+  return options;
+}
+
+std::unique_ptr<TransitionModel> data(
+    const std::vector<std::pair<std::string, std::pair<std::vector<double>, std::vector<double>>>>& effects,
+    std::uint64_t seed, std::vector<double> contact = {}) {
+  const auto design = wheel_transitions(test::wheel_design(100, 14));
+  std::vector<Term> terms;
+  for (const auto& [id, sizes] : effects) terms.push_back(term(*design, id, sizes.first, sizes.second));
+  if (contact.empty()) contact = nominal_values(*design);
+  return design->simulate(contact, terms, seed);
+}
+
+// Where the verdict is a gap, a gap is the likelier; where it is none, none is.
+void expect_probabilities_to_agree(const Diagnosis& d) {
+  const double null = d.p_no_gap + d.p_recalibrate;
+  const bool gap = d.verdict == Verdict::explained || d.verdict == Verdict::unexplained;
+  EXPECT_TRUE(gap ? null <= 0.5 + 1e-9 : null >= 0.5 - 1e-9) << verdict_name(d.verdict) << " " << null;
+  double sum = null + d.p_none;
+  for (const Cause& cause : d.causes) sum += cause.probability;
+  EXPECT_NEAR(sum, 1, 1e-9);
+}
+
+TEST(Diagnosis, FindsNoGapWhereThereIsNone) {
+  const Diagnosis d = diagnose(*data({}, 21), quick());
+  EXPECT_EQ(d.verdict, Verdict::no_gap);
+  EXPECT_TRUE(d.cause_set.empty());
+  EXPECT_FALSE(d.sentences.empty());
+  expect_probabilities_to_agree(d);
+}
+
+// Small effects lie on the border, where tests and evidence may disagree.
+TEST(Diagnosis, ItsProbabilitiesAgreeWithItsVerdict) {
+  const auto design = wheel_transitions(test::wheel_design(40, 5));
+  DiagnosisOptions options = quick();
+  options.draws = 200;
+  options.catalogue = {"leg_contact", "trial_drift", "air_drag", "sensor_bias", "inertia", "slope_offset"};
+  for (const double torque : {0.0, 1e-4, 2e-4})
+    for (std::uint64_t seed = 31; seed < 34; ++seed)
+      expect_probabilities_to_agree(
+          diagnose(*design->simulate(nominal_values(*design),
+                                     std::vector{term(*design, "rolling_resistance", {}, {torque})}, seed),
+                   options));
+}
+
+TEST(Diagnosis, CallsOtherContactParametersRecalibration) {
+  const auto design = wheel_transitions(test::wheel_design(100, 14));
+  std::vector<double> contact = nominal_values(*design);
+  contact[2] += 0.05;  // friction's mean
+  const Diagnosis d = diagnose(*data({}, 22, contact), quick());
+  EXPECT_EQ(d.verdict, Verdict::recalibrate);
+  EXPECT_LT(d.p_recalibration, 1e-6);
+  // The loss tells one number of the two means: recalibrated and true model agree on the steps.
+  EXPECT_GT(d.shrinkage[0].baseline, 10 * std::abs(d.shrinkage[0].recalibrated));
+}
+
+TEST(Diagnosis, NamesTheCauseItsSizeAndWhatItCloses) {
+  const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.3}}}}, 23), quick());
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_EQ(d.cause_set, std::vector<std::string>{"leg_contact"});
+  ASSERT_FALSE(d.causes.empty());
+  const auto& parameters = d.causes[0].parameters[0];
+  EXPECT_EQ(parameters[0].value, 3);
+  const double half = (parameters[1].upper - parameters[1].lower) / 2;
+  EXPECT_NEAR(parameters[1].value, 1.3, 2.5 * half);  // half: 1.64 standard errors
+  EXPECT_LT(half, 0.1);
+  ASSERT_TRUE(d.shrinkage[0].closed);
+  EXPECT_GT(*d.shrinkage[0].closed, 0.8);
+  EXPECT_LT(d.p_value, 1e-6);
+  // Where: leg 3 comes first.
+  const auto first = std::min_element(
+      d.recalibrated.cells.begin(), d.recalibrated.cells.end(),
+      [](const GapCell& a, const GapCell& b) { return std::abs(a.statistic) > std::abs(b.statistic); });
+  EXPECT_EQ(first->facet, "leg");
+  EXPECT_EQ(first->at.substr(0, 5), "leg 3");
+}
+
+// What the refitted contact takes up of a shift is given back in its size. A friction of 1.3 times 0.35 takes 0.79 to
+// 0.95 rad/s from omega+ at 4.5 to 5.5 rad/s.
+TEST(Diagnosis, SizesOnTheMapAreThoseOfTheCause) {
+  const auto model = data({{"leg_contact", {{3, 0}, {1.3}}}}, 23);
+  const Diagnosis d = diagnose(*model, quick());
+  const auto size = [](const GapMap& map) {
+    for (const GapCell& cell : map.cells)
+      if (cell.facet == "leg" && cell.aspect == "mean" && cell.at.starts_with("leg 3")) return cell.size;
+    ADD_FAILURE() << "no cell of leg 3";
+    return 0.0;
+  };
+  EXPECT_NEAR(size(d.as_given), -0.87, 0.2);
+  EXPECT_NEAR(size(d.recalibrated), -0.87, 0.2);
+}
+
+TEST(Diagnosis, NamesBothOfTwoCauses) {
+  const Diagnosis d =
+      diagnose(*data({{"contact_memory", {{}, {0.4}}}, {"rolling_resistance", {{}, {0.003}}}}, 24), quick());
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  ASSERT_FALSE(d.causes.empty());
+  const std::string name = d.causes[0].name();
+  EXPECT_NE(name.find("contact_memory"), std::string::npos) << name;
+  EXPECT_EQ(d.causes[0].effects.size(), 2u) << name;
+  EXPECT_LT(d.together, most_together);
+}
+
+// Without the true effect in the catalogue the answer is that nothing explains it.
+TEST(Diagnosis, SaysUnexplainedWhenTheCatalogueLacksTheCause) {
+  DiagnosisOptions options = quick();
+  options.catalogue = {"initial_speed", "inertia", "trial_spread", "friction_patch", "air_drag"};
+  const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.5}}}}, 25), options);
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_TRUE(d.cause_set.empty());
+}
+
+// A pair that nothing promises is tried where it is asked for; alone it extends the whole catalogue.
+TEST(Diagnosis, TriesThePairsAskedFor) {
+  const auto experiment = data({{"leg_contact", {{3, 0}, {1.5}}}}, 28);
+  DiagnosisOptions options = quick();
+  options.catalogue = {"leg_contact", "trial_drift", "trial_drift+leg_contact"};
+  const Diagnosis d = diagnose(*experiment, options);
+  const auto pair =
+      std::find_if(d.causes.begin(), d.causes.end(), [](const Cause& c) { return c.effects.size() == 2; });
+  ASSERT_NE(pair, d.causes.end());
+  EXPECT_EQ(pair->name(), "trial_drift+leg_contact");
+  EXPECT_GE(pair->gain, d.causes[0].gain - 1e-6);
+  EXPECT_EQ(d.causes[0].name(), "leg_contact");
+  options.catalogue = {"trial_drift+trial_drift"};
+  EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
+}
+
+// Noise of the contact that grows with speed: two effects on its mean that cancel one another take its shape.
+TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
+  auto conditions = stand_in_conditions(stand_in_setting());
+  const dynamics::LaboratorySetup setup =
+      laboratory_setup(conditions, {.outside = {{"speed_spread", 0.45}}, .sensor_noise = 0.008, .seed = 27});
+  const ExperimentFiles files = reality_files(conditions, setup, run_laboratory(setup, 0), {}).files;
+  const Experiment experiment =
+      parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+  DiagnosisOptions options = quick();
+  options.catalogue = {"speed_dependent_restitution", "speed_dependent_friction", "leg_contact"};
+  const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
+  ASSERT_FALSE(d.causes.empty());
+  EXPECT_EQ(d.causes[0].effects.size(), 2U) << d.causes[0].name();
+  EXPECT_GT(d.together, most_together);
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_TRUE(d.cause_set.empty());
+  ASSERT_GE(d.sentences.size(), 2U);
+  EXPECT_NE(d.sentences[1].find("as much together as alone"), std::string::npos) << d.sentences[1];
+}
+
+TEST(Diagnosis, IsTheSameOnAnyNumberOfThreads) {
+  const auto experiment = data({{"trial_drift", {{}, {0.3}}}}, 26);
+  DiagnosisOptions one = quick(), two = quick();
+  one.threads = 1;
+  two.threads = 2;
+  const Diagnosis a = diagnose(*experiment, one), b = diagnose(*experiment, two);
+  ASSERT_EQ(a.causes.size(), b.causes.size());
+  for (std::size_t i = 0; i < a.causes.size(); ++i) {
+    EXPECT_EQ(a.causes[i].name(), b.causes[i].name());
+    EXPECT_EQ(a.causes[i].probability, b.causes[i].probability);
+  }
+  EXPECT_EQ(a.p_value, b.p_value);
+  EXPECT_EQ(a.shrinkage[0].with_effect, b.shrinkage[0].with_effect);
+}
+
+TEST(Diagnosis, RefusesOptionsOutOfRange) {
+  const auto experiment = data({}, 27);
+  DiagnosisOptions options;
+  options.folds = 1;
+  EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
+  options = {};
+  options.catalogue = {"air_drag", "gravity_waves"};
+  try {
+    diagnose(*experiment, options);
+    ADD_FAILURE() << "unknown effect taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("gravity_waves"), std::string::npos) << error.what();
+  }
+  options = {};
+  options.level = 0;
+  EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
+}
+
+// The second system: a rotor with a torque that its nominal losses lack.
+TEST(Diagnosis, NamesTheTorqueOnARotor) {
+  const auto design = coast_down_transitions(test::coasting_rotor());
+  const auto dragged =
+      design->simulate(nominal_values(*design), std::vector{term(*design, "rolling_resistance", {}, {0.02})}, 5);
+  const Diagnosis d = diagnose(*dragged, quick());
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  ASSERT_FALSE(d.causes.empty());
+  EXPECT_EQ(d.causes[0].name(), "rolling_resistance");
+  EXPECT_NEAR(d.causes[0].parameters[0][0].value, 0.02, 0.002);
+  const Diagnosis none = diagnose(*design->simulate(nominal_values(*design), {}, 6), quick());
+  EXPECT_EQ(none.verdict, Verdict::no_gap);
+}
+
+}  // namespace
+}  // namespace metastable::analysis

@@ -1,0 +1,53 @@
+#include "analysis/diagnosis/effect_scan.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "tests/analysis/line.h"
+
+namespace metastable::analysis {
+namespace {
+
+using test::Line;
+using test::line;
+
+TEST(EffectScan, ScoresPromiseWhatTheFitGains) {
+  const Line model = line(0.08, 4, 2000);
+  const Fit plain = fit(model, {0, 0}, {});
+  const EffectScan scan = scan_effects(model, plain, {&model.candidates()[0], &model.candidates()[1]}, 1);
+  const Fit with = fit(model, plain.nuisance, {{&model.candidates()[0], {}, {0.0}}});
+  EXPECT_NEAR(scan.effects[0].gain[0], 2 * (with.penalised - plain.penalised), 0.5);
+  EXPECT_NEAR(scan.effects[0].start[0][0], with.terms[0].values[0], 2e-3);
+  EXPECT_EQ(scan.effects[0].gain[0], scan.effects[1].gain[0]);
+}
+
+// Under no effect the p-values of many data sets are uniform.
+TEST(EffectScan, ChanceLevelsAreHonest) {
+  int below_tenth = 0, below_hundredth = 0;
+  constexpr int sets = 300;
+  for (unsigned seed = 0; seed < sets; ++seed) {
+    const Line model = line(0, 100 + seed, 240);
+    const Fit plain = fit(model, {3, -0.7}, {});
+    const EffectScan scan = scan_effects(model, plain, {&model.candidates()[0]}, 1);
+    const double p = ChanceGains(scan, 400, 1).p_value(&model.candidates()[0], scan.effects[0].gain[0]);
+    below_tenth += p < 0.1;
+    below_hundredth += p < 0.01;
+  }
+  EXPECT_NEAR(below_tenth, 0.1 * sets, 4 * std::sqrt(0.09 * sets));
+  EXPECT_LE(below_hundredth, 0.01 * sets + 4 * std::sqrt(0.0099 * sets));
+}
+
+TEST(EffectScan, ChanceNeedsADrawAndAScannedEffect) {
+  const Line model = line(0, 5, 240);
+  const EffectScan scan = scan_effects(model, fit(model, {3, -0.7}, {}), {&model.candidates()[0]}, 1);
+  EXPECT_THROW(ChanceGains(scan, 0, 1), std::invalid_argument);
+  const ChanceGains chance(scan, 1, 1);
+  EXPECT_GT(chance.p_value(&model.candidates()[0], 1), 0);
+  EXPECT_LE(chance.look_elsewhere(0.5), 1);
+  EXPECT_THROW(chance.p_value(&model.candidates()[1], 1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace metastable::analysis

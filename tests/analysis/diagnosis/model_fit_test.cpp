@@ -1,0 +1,69 @@
+#include "analysis/diagnosis/model_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/analysis/line.h"
+
+namespace metastable::analysis {
+namespace {
+
+using test::Line;
+using test::line;
+
+struct Squares {
+  double mean = 0, variance = 0, slope = 0, left = 0, sww = 0;
+};
+Squares least_squares(const Line& model) {  // by the textbook
+  const Evaluation e = model.evaluate(std::vector<double>{0, 0}, {});
+  const double n = static_cast<double>(e.score.size());
+  double sy = 0, sw = 0, syy = 0, sww = 0, syw = 0;
+  for (std::size_t i = 0; i < e.score.size(); ++i) {
+    const double y = e.score[i], w = model.events()[i].speed;
+    sy += y, sw += w, syy += y * y, sww += w * w, syw += y * w;
+  }
+  Squares s;
+  s.mean = sy / n;
+  s.variance = syy / n - s.mean * s.mean;
+  s.sww = sww - sw * sw / n;
+  s.slope = (syw - sy * sw / n) / s.sww;
+  s.left = s.variance - s.slope * s.slope * s.sww / n;
+  return s;
+}
+
+TEST(ModelFit, IsLeastSquaresOnALine) {
+  const Line model = line(0.1, 1);
+  const Squares s = least_squares(model);
+  const Fit plain = fit(model, {0, 0}, {});
+  EXPECT_TRUE(plain.converged);
+  EXPECT_NEAR(plain.nuisance[0], s.mean, 1e-3);
+  EXPECT_NEAR(plain.nuisance[1], 0.5 * std::log(s.variance), 2e-3);
+  EXPECT_NEAR(plain.information(0, 0), 400 / s.variance, 2);
+  EXPECT_NEAR(plain.information(1, 1), 800, 8);
+  const Fit with = fit(model, {0, 0}, {{&model.candidates()[0], {}, {0.0}}});
+  EXPECT_NEAR(with.terms[0].values[0], s.slope, 1e-3);
+  EXPECT_NEAR(2 * (with.log_likelihood - plain.log_likelihood), 400 * std::log(s.variance / s.left), 0.02);
+}
+
+TEST(ModelFit, LeavesOutTrialsThatDoNotCount) {
+  const Line model = line(0, 2, 80, 5);
+  FitOptions options;
+  options.count.assign(20, 0);
+  options.count[0] = options.count[1] = 1;
+  const Fit part = fit(model, {0, 0}, {}, options);
+  const Evaluation e = model.evaluate(std::vector<double>{0, 0}, {});
+  double mean = 0;
+  for (int i = 0; i < 8; ++i) mean += e.score[static_cast<std::size_t>(i)] / 8;
+  EXPECT_NEAR(part.nuisance[0], mean, 0.02);
+}
+
+TEST(ModelFit, StaysInsideItsBounds) {
+  const Line model = line(-0.4, 3);
+  const Fit held = fit(model, {0, 0}, {{&model.candidates()[1], {}, {0.0}}});
+  EXPECT_TRUE(held.converged);
+  EXPECT_EQ(held.terms[0].values[0], 0);
+}
+
+}  // namespace
+}  // namespace metastable::analysis

@@ -1,0 +1,113 @@
+#include "analysis/likelihood/wheel_runs.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "tests/analysis/diagnosed.h"
+
+namespace metastable::analysis {
+namespace {
+
+TEST(WheelRuns, LegsThatWereNotNotedAreFoundFromTheStances) {
+  const auto design = wheel_transitions(test::wheel_design(20, 10));
+  const auto data = design->simulate(nominal_values(*design), {}, 3);
+  Experiment e = test::wheel_design(20, 10);
+  e.columns.leg = Presence::none;
+  // The simulated speeds, without legs.
+  std::size_t event = 0;
+  for (MeasuredTrial& trial : e.trials)
+    for (std::size_t k = 0; k < trial.collisions.size(); ++k) trial.collisions[k].leg.reset();
+  for (; event < data->events().size(); ++event) {
+    const Event& one = data->events()[event];
+    auto& trial = e.trials[one.trial];
+    if (static_cast<std::size_t>(one.number) > trial.collisions.size()) continue;
+    MeasuredCollision& c = trial.collisions[static_cast<std::size_t>(one.number) - 1];
+    if (one.kind == EventKind::collision) c.omega_minus = one.speed;
+    if (one.kind == EventKind::stance) c.omega_plus = one.speed;
+  }
+  const WheelRuns read = wheel_runs(e);
+  EXPECT_TRUE(read.legs_known);
+  std::size_t right = 0, collisions = 0;
+  for (const WheelRun& run : read.runs)
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+      ++collisions;
+      right += run.collisions[k].context.leg == static_cast<int>(k % 8);
+    }
+  EXPECT_GT(static_cast<double>(right), 0.9 * static_cast<double>(collisions));
+  EXPECT_FALSE(read.notes.empty());
+}
+
+TEST(WheelRuns, SaysWhatItCannotRead) {
+  Experiment plastic = test::wheel_design(2, 3);
+  plastic.contact.law = dynamics::Law::plastic;
+  EXPECT_THROW(wheel_runs(plastic), std::invalid_argument);
+  const WheelRuns without = wheel_runs(test::wheel_design(4, 4, false));
+  EXPECT_FALSE(without.speeds_after);
+  EXPECT_NE(std::find(without.notes.begin(), without.notes.end(),
+                      "omega_plus_rad_s is missing: collision and stance cannot be told apart"),
+            without.notes.end());
+}
+
+// What is not measured follows from the geometry: a wheel of equal legs advances by its chord.
+TEST(WheelRuns, PositionsAndTimesThatWereNotMeasuredAreCompleted) {
+  Experiment e = test::wheel_design(2, 5);
+  e.wheel.leg_length.assign(8, 0.15);
+  for (MeasuredTrial& trial : e.trials)
+    for (MeasuredCollision& c : trial.collisions) {
+      c.time.reset();
+      c.position.reset();
+    }
+  e.columns.time = e.columns.position = Presence::none;
+  const WheelRuns read = wheel_runs(e);
+  const double chord = 2 * 0.15 * std::sin(std::numbers::pi / 8);
+  for (const WheelRun& run : read.runs)
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+      const dynamics::StepContext& context = run.collisions[k].context;
+      EXPECT_NEAR(context.position, chord * static_cast<double>(k), 1e-12);
+      ASSERT_EQ(context.since_previous.has_value(), k > 0);
+      if (k == 0) continue;
+      // pi/4 at speeds that lie above the slowest of the stance and below the fastest reported.
+      EXPECT_GT(*context.since_previous, std::numbers::pi / 4 / 5.5);
+      EXPECT_LT(*context.since_previous, std::numbers::pi / 4 / 2.5);
+    }
+  EXPECT_EQ(read.notes.size(), 2U);
+}
+
+// With omega+ a step is two events, without it one; the last one tells rest from survival.
+TEST(WheelRuns, EventsFollowFromWhatWasMeasured) {
+  const auto kinds = [](const Experiment& e) {
+    std::vector<EventKind> of_first_trial;
+    for (const Event& event : wheel_events(wheel_runs(e)))
+      if (event.trial == 0) of_first_trial.push_back(event.kind);
+    return of_first_trial;
+  };
+  using enum EventKind;
+  EXPECT_EQ(kinds(test::wheel_design(2, 2)), (std::vector{launch, collision, stance, collision}));
+  Experiment e = test::wheel_design(2, 2, false);
+  EXPECT_EQ(kinds(e), (std::vector{launch, step, survival}));
+  e.trials[0].outcome = dynamics::Outcome::rest;
+  e.conditions[0].initial_speed.reset();
+  EXPECT_EQ(kinds(e), (std::vector{step, rest}));
+}
+
+// A foot that jams leaves no speed; what is reported there is noise (0.008 rad/s).
+TEST(WheelRuns, NoiseAroundZeroIsNoSpeed) {
+  Experiment e = test::wheel_design(2, 2);
+  for (MeasuredTrial& trial : e.trials) trial.collisions.back().omega_plus = 0.02;
+  e.trials[0].outcome = dynamics::Outcome::rest;
+  const WheelRuns read = wheel_runs(e);
+  EXPECT_EQ(*read.runs[0].collisions.back().after, 0);
+  EXPECT_EQ(*read.runs[1].collisions.back().after, 0.02);  // this one went on
+  const std::vector<Event> events = wheel_events(read);
+  EXPECT_EQ(events[3].kind, EventKind::rest);
+  EXPECT_EQ(events[3].rested, true);
+  EXPECT_EQ(events[1].rested, false);
+  EXPECT_EQ(events.back().kind, EventKind::collision);
+  EXPECT_EQ(events.back().rested, false);
+}
+
+}  // namespace
+}  // namespace metastable::analysis

@@ -1,0 +1,41 @@
+#include "analysis/statistics/random.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace metastable::analysis {
+namespace {
+
+TEST(Random, UnitIntervalStaysInsideAndIsSymmetric) {
+  EXPECT_EQ(unit_interval(0), 0x1p-53);
+  EXPECT_EQ(1 - unit_interval(~std::uint64_t{0}), 0x1p-53);
+  EXPECT_EQ(unit_interval(std::uint64_t{1} << 63), 0.5 + 0x1p-53);
+}
+
+TEST(Random, MultipliersAreStandardNormalAndEachStreamsOwn) {
+  const Eigen::VectorXd many = normal_multipliers(3, 7, DrawStream::chance_on_map, 4001);
+  EXPECT_NEAR(many.mean(), 0, 4 / std::sqrt(4001.0));
+  EXPECT_NEAR(many.squaredNorm() / 4001, 1, 4 * std::sqrt(2 / 4001.0));
+  EXPECT_EQ(normal_multipliers(3, 7, DrawStream::chance_on_map, 10), many.head(10));
+  for (const auto& other : {normal_multipliers(3, 7, DrawStream::chance_of_effects, 10),
+                            normal_multipliers(3, 8, DrawStream::chance_on_map, 10),
+                            normal_multipliers(4, 7, DrawStream::chance_on_map, 10)})
+    EXPECT_NE(other, many.head(10));
+  EXPECT_EQ(normal_multipliers(3, 7, DrawStream::chance_on_map, 0).size(), 0);
+}
+
+TEST(Random, ExponentialWeightsHaveMeanAndVarianceOne) {
+  double sum = 0, squares = 0;
+  for (std::uint64_t trial = 0; trial < 4000; ++trial) {
+    const double weight = exponential_weight(5, 2, trial);
+    EXPECT_GT(weight, 0);
+    sum += weight / 4000;
+    squares += weight * weight / 4000;
+  }
+  EXPECT_NEAR(sum, 1, 4 / std::sqrt(4000.0));
+  EXPECT_NEAR(squares, 2, 4 * std::sqrt(20 / 4000.0));
+}
+
+}  // namespace
+}  // namespace metastable::analysis

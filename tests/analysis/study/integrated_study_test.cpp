@@ -1,0 +1,210 @@
+#include "analysis/study/integrated_study.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "analysis/sensitivity/comparison.h"
+#include "analysis/study/setting.h"
+#include "dynamics/return_map/rough_terrain.h"
+
+namespace metastable::analysis {
+namespace {
+
+Setting equal_legs(double slope_deg, Spread friction) {
+  Setting setting;
+  setting.wheel.leg_length.assign(8, 0.1519);
+  setting.slope_deg = slope_deg;
+  setting.friction = friction;
+  setting.initial_speed = *paper_launch(slope_deg);
+  return setting;
+}
+
+Metastability integrated(const Setting& setting, double tolerance, std::size_t cells = 0) {
+  StudyOptions options;
+  options.method = Method::integrated;
+  options.tolerance = tolerance;
+  options.cells = cells;
+  return study(setting.problem(), options);
+}
+
+TEST(IntegratedStudy, GivesTheKnownAnswersOfThePapersWheel) {
+  // Direct simulation: 4.26 and 6.17 (tests/dynamics/return_map/trials_test.cpp); sampled and
+  // extrapolated: 4.2585(1), 6.1746(2).
+  const Metastability flat = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-3);
+  EXPECT_EQ(flat.method, Method::integrated);
+  EXPECT_EQ(flat.status, Status::converged);
+  EXPECT_EQ(flat.sampling_error, 0);
+  EXPECT_NEAR(flat.from_start.value, 4.2585, 1e-4);
+  EXPECT_NEAR(flat.steps.mean / flat.from_start.value, 1, 1e-12);
+  EXPECT_NEAR(integrated(equal_legs(9.59, {0.4, 0.1}), 1e-3).from_start.value, 6.1746, 2e-4);
+}
+
+TEST(IntegratedStudy, GivesEightDigitsWithFewNodes) {
+  // LandingDensity, an adaptive integral for each pair of nodes, on 256 nodes of equal panels: 4.2584828629.
+  const Metastability result = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-8);
+  EXPECT_EQ(result.status, Status::converged);
+  EXPECT_LE(result.cells, 128u);
+  EXPECT_NEAR(result.from_start.value / 4.2584828629, 1, 1e-8);
+}
+
+TEST(IntegratedStudy, IsRightWhereFailuresAreRare) {
+  // Sampled and extrapolated: 46577.7(50).
+  EXPECT_NEAR(integrated(equal_legs(9.59, {0.3, 0.05}), 1e-3).from_start.value, 46577.7, 5);
+}
+
+TEST(IntegratedStudy, ErrorCoversFinerNodes) {
+  const Setting setting = equal_legs(7.02, {0.3, 0.05});
+  const Metastability coarse = integrated(setting, 0.5, 48), fine = integrated(setting, 0.5, 96);
+  EXPECT_EQ(coarse.cells, 48u);
+  EXPECT_LT(std::abs(std::log(coarse.from_start.value / fine.from_start.value)), coarse.discretization_error);
+  EXPECT_LT(fine.discretization_error, 0.1 * coarse.discretization_error + 1e-5);  // the rows' own
+}
+
+TEST(IntegratedStudy, ReproducesTheSixtyDigitValuesOfRoughTerrain) {
+  constexpr double degree = std::numbers::pi / 180;
+  const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = 1.5 * degree});
+  const double start = wheel.fixed_point();
+  StudyOptions options;
+  options.method = Method::integrated;
+  options.tolerance = 1e-11;
+  const Metastability result =
+      study({wheel, {[start](double) { return start; }, 0}, [](double x) { return x; }, {}}, options);
+  EXPECT_EQ(result.status, Status::converged);
+  EXPECT_NEAR(result.failure_rate.value / 1.5280057867965971e-6, 1, 1e-11);
+  EXPECT_NEAR(result.from_start.value / 654449.43992398285, 1, 1e-11);
+}
+
+TEST(IntegratedStudy, ComparisonsHaveNoSamplingError) {
+  StudyOptions options;
+  options.method = Method::integrated;
+  options.cells = 32;
+  const Comparison comparison = compare({equal_legs(7.02, {0.4, 0.1}), equal_legs(9.59, {0.4, 0.1})}, options);
+  const Estimate ratio = *comparison.contrasts.front().ratio;
+  EXPECT_NEAR(ratio.value, 6.1746 / 4.2585, 0.01);
+  EXPECT_LT(ratio.upper - ratio.lower, 0.1);
+}
+
+// Where two levels once agreed by chance, or the changes fell faster than the error.
+TEST(IntegratedStudy, IntervalsHoldTheValueOfATighterTolerance) {
+  struct Case {
+    double slope_deg;
+    Spread friction;
+  };
+  for (const Case& c : {Case{7.02, {0.3, 0.02}},
+                        {8.4, {0.3, 0.1}},
+                        {8.4, {0.3, 0.14}},
+                        {9.59, {0.25, 0.14}},
+                        {9.59, {0.3, 0.02}},
+                        {9.59, {0.36, 0.02}},
+                        {9.59, {0.36, 0.14}},
+                        {11, {0.36, 0.1}}}) {
+    Setting setting = equal_legs(7.02, c.friction);
+    setting.slope_deg = c.slope_deg;
+    const Metastability fine = integrated(setting, 1e-6);
+    for (const double tolerance : {1e-3, 1e-4, 1e-5}) {
+      const Metastability coarse = integrated(setting, tolerance);
+      EXPECT_EQ(coarse.status, Status::converged);
+      EXPECT_LE(coarse.cells, tolerance < 2e-5 ? 192u : 128u)
+          << c.slope_deg << ' ' << c.friction.mean << ' ' << c.friction.sd;
+      for (const auto& [rough, exact] : {std::pair(coarse.from_start, fine.from_start),
+                                         {coarse.failure_rate, fine.failure_rate},
+                                         {coarse.worst_start, fine.worst_start}}) {
+        EXPECT_LE(rough.lower, exact.value) << c.slope_deg << ' ' << c.friction.mean << ' ' << tolerance;
+        EXPECT_GE(rough.upper, exact.value) << c.slope_deg << ' ' << c.friction.mean << ' ' << tolerance;
+      }
+    }
+  }
+}
+
+TEST(IntegratedStudy, TakesLaunchesSlowerThanAnySurvivor) {
+  for (const double friction : {0.3, 0.36}) {
+    Setting setting = equal_legs(8.4, {friction, 0.14});
+    setting.initial_speed = {6, 0.3};  // some 8 sds below the mean, slower than the slowest landing
+    const Metastability fine = integrated(setting, 1e-6);
+    EXPECT_EQ(fine.status, Status::converged);
+    StudyOptions sampled;
+    sampled.tolerance = 0.01;
+    const Metastability drawn = study(setting.problem(), sampled);
+    EXPECT_NEAR(fine.from_start.value / drawn.from_start.value, 1, 0.01) << friction;
+  }
+}
+
+TEST(IntegratedStudy, TakesCoulomb) {
+  Setting setting = equal_legs(3.0, {0.4, 0.1});
+  setting.law = dynamics::Law::coulomb;
+  setting.initial_speed = {4.5, 0.2};
+  const Metastability result = integrated(setting, 1e-8);
+  EXPECT_EQ(result.status, Status::converged);
+  // Direct simulation: 24.68 (s.e. 0.03), tests/dynamics/return_map/trials_test.cpp. The digits: 24 panels of 16 nodes
+  // between edges of three generations, and 30 points a panel of eta and mu: 24.67743312.
+  EXPECT_NEAR(result.from_start.value, 24.68, 0.09);
+  EXPECT_NEAR(result.from_start.value / 24.67743312, 1, 1e-9);
+  EXPECT_NEAR(result.steps.mean / result.from_start.value, 1, 1e-12);
+  EXPECT_LT(result.solver_disagreement, 1e-12);
+}
+
+// Constant friction, constant restitution, spreads that reach their bounds.
+TEST(IntegratedStudy, TakesAnyNoise) {
+  struct Case {
+    dynamics::Law law;
+    double slope_deg;
+    Spread restitution, friction, speed;
+  };
+  using enum dynamics::Law;
+  for (const Case& c : {Case{published, 7.02, {0.4, 0}, {0.4, 0.1}, {7.35, 0.19}},
+                        {published, 9.59, {0.4, 0.2}, {0.4, 0.2}, {5.83, 0.28}},
+                        {coulomb, 3, {0.4, 0.2}, {0.4, 0}, {4.5, 0.2}},
+                        {coulomb, 3, {0.4, 0.2}, {0.4, 0.2}, {4.5, 0}}}) {
+    Setting setting = equal_legs(c.slope_deg, c.friction);
+    setting.law = c.law;
+    setting.restitution = c.restitution;
+    setting.initial_speed = c.speed;
+    const Metastability fine = integrated(setting, 1e-8), coarse = integrated(setting, 1e-4);
+    EXPECT_EQ(fine.status, Status::converged) << law_name(c.law) << ' ' << c.restitution.sd << ' ' << c.friction.sd;
+    EXPECT_LE(coarse.from_start.lower, fine.from_start.value);
+    EXPECT_GE(coarse.from_start.upper, fine.from_start.value);
+  }
+}
+
+// metastable steps --restitution 0.4,0.2 --friction 0.45,0 --legs 0.1519 --tolerance 0.001: 3.33529 (3.33441
+// to 3.33617).
+// The paper's Fig. 6.
+TEST(IntegratedStudy, OfConstantFrictionAgreesWithSampling) {
+  Setting setting = equal_legs(7.02, {0.45, 0});
+  setting.restitution = {0.4, 0.2};
+  EXPECT_NEAR(integrated(setting, 1e-3).from_start.value, 3.33529, 9e-4);
+}
+
+// Densities and collocation share the law's formula and nothing else.
+TEST(IntegratedStudy, DensitiesAgreeWithCollocation) {
+  for (const Spread& friction : {Spread{0.4, 0.1}, {0.3, 0.05}}) {
+    const Metastability densities = integrated(equal_legs(7.02, friction), 2e-5, 128),
+                        points = integrated(equal_legs(7.02, friction), 1e-8);
+    EXPECT_NEAR(densities.from_start.value / points.from_start.value, 1, 1e-8);
+    EXPECT_NEAR(densities.failure_rate.value / points.failure_rate.value, 1, 1e-8);
+  }
+}
+
+TEST(IntegratedStudy, NamesTheReasonWhereThereAreNoRows) {
+  Setting setting = equal_legs(7.02, {0.4, 0.1});
+  setting.correlation = 0.5;
+  try {
+    integrated(setting, 0.01);
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("correlated restitution and friction"), std::string::npos);
+  }
+}
+
+TEST(IntegratedStudy, LeavesUnreachableRestToTheSampledStudy) {
+  Setting setting = equal_legs(9.59, {0.4, 0.1});
+  setting.law = dynamics::Law::plastic;
+  const Metastability result = integrated(setting, 0.01, 64);
+  EXPECT_EQ(result.status, Status::rest_unreachable);
+  EXPECT_EQ(result.method, Method::sampled);
+}
+
+}  // namespace
+}  // namespace metastable::analysis

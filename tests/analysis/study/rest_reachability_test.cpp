@@ -1,0 +1,83 @@
+#include "analysis/study/rest_reachability.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "analysis/study/metastability.h"
+#include "tests/analysis/settings.h"
+
+namespace metastable::analysis {
+namespace {
+
+Setting coulomb(double slope_deg) {
+  Setting setting = paper_setting(7.02, true);
+  setting.law = dynamics::Law::coulomb;
+  setting.slope_deg = slope_deg;
+  return setting;
+}
+
+// With rebound_lost = 0 a collision leaves k = omega+^2/omega-^2 >= 0.54, whatever eta and mu are. At the fixed point
+// of that k, omega+^2 = k/(1 - k) times what a stance adds; it clears the barrier if k/(1 - k) 2 sin(gamma)
+// sin(alpha/2) >= 1 - cos(alpha/2 - gamma): from gamma = 3.47 deg on. At 7.02 and 9.59 deg rest would need k < 0.28 and
+// 0.17.
+TEST(RestReachability, CoulombNeverRestsOnThePapersRamps) {
+  for (const double slope : {7.02, 9.59}) {
+    const RestReachability reach = rest_reachability(coulomb(slope).problem());
+    EXPECT_FALSE(reach.certain);
+    ASSERT_TRUE(reach.safe_state);
+    EXPECT_LT(std::sqrt(*reach.safe_state), 7.0);
+  }
+  const auto slope = safe_slope_deg(coulomb(7.02));
+  ASSERT_TRUE(slope);
+  EXPECT_NEAR(*slope, 3.47, 0.005);
+  EXPECT_TRUE(rest_reachability(coulomb(3.4).problem()).certain);
+}
+
+TEST(RestReachability, PublishedFrictionWithoutBoundAlwaysReachesRest) {
+  const Setting setting = paper_setting(9.59, true);
+  EXPECT_TRUE(rest_reachability(setting.problem()).certain);
+  EXPECT_FALSE(safe_slope_deg(setting));
+}
+
+// The plastic wheel rolls for ever where its fixed point clears the barrier, from launches that clear it at once:
+// cos^2(alpha) x >= barrier, for equal legs and a point mass.
+TEST(RestReachability, PlasticThresholdIsTheBarrierOfTheFirstStep) {
+  Setting setting = paper_setting(9.59, true);
+  setting.law = dynamics::Law::plastic;
+  const RestReachability reach = rest_reachability(setting.problem());
+  EXPECT_FALSE(reach.certain);
+  const double alpha = 2 * M_PI / 8, gamma = 9.59 * M_PI / 180;
+  const double barrier = 2 * 9.81 / 0.1519 * (1 - std::sin(M_PI / 2 - alpha / 2 + gamma));
+  EXPECT_NEAR(*reach.safe_state, barrier / std::pow(std::cos(alpha), 2), 1e-6);
+}
+
+TEST(RestReachability, AStudyOfAnEndlessWheelIsInfiniteNotLarge) {
+  const Metastability result = study(coulomb(7.02).problem(), {.cells = 128, .samples = 4096});
+  EXPECT_EQ(result.status, Status::rest_unreachable);
+  EXPECT_EQ(result.message, "infinite: rest is unreachable");
+  EXPECT_TRUE(std::isinf(result.from_start.value));
+  EXPECT_EQ(result.failure_rate.value, 0.0);
+  EXPECT_NEAR(result.eigenvalue_moduli.front(), 1.0, 1e-9);
+  EXPECT_GT(result.mixing_steps, 0.0);
+  EXPECT_GT(result.observable_mean, 4.0);
+  ASSERT_TRUE(result.reach_end);
+  EXPECT_NEAR(*result.reach_end, 1.0, 1e-9);
+}
+
+// Some launches rest, the others never do: both are said.
+TEST(RestReachability, SlowLaunchesOfAnEndlessWheelRest) {
+  Setting setting = paper_setting(7.02, true);
+  setting.law = dynamics::Law::plastic;
+  setting.initial_speed = {3, 0.1};
+  const Metastability result = study(setting.problem(), {});
+  EXPECT_TRUE(std::isinf(result.from_start.value));
+  EXPECT_NE(result.message.find("the others rest"), std::string::npos);
+  // Rest at once below the threshold speed of the barrier: P(omega_0 < 3.061) for N(3, 0.1^2).
+  const double threshold = std::sqrt(*result.safe_state);
+  EXPECT_NEAR(*result.reach_end, 0.5 * std::erfc((threshold - 3) / 0.1 / std::sqrt(2.0)), 2e-3);
+  EXPECT_EQ(result.steps.quantile[2], 1.0);
+}
+
+}  // namespace
+}  // namespace metastable::analysis

@@ -1,0 +1,50 @@
+#include "analysis/study/setting.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <stdexcept>
+
+#include "tests/analysis/settings.h"
+
+namespace metastable::analysis {
+namespace {
+
+TEST(Setting, DefaultsAreThePapers) {
+  const Setting setting;
+  EXPECT_EQ(setting.wheel.legs(), 8);
+  EXPECT_DOUBLE_EQ(setting.wheel.hub_mass, 1.39);
+  EXPECT_EQ(setting.describe(),
+            "7.02 deg, legs 0.1524, 0.1524, 0.1514, 0.1514, 0.1516, 0.1508, 0.1524, 0.1528 m, law published, "
+            "eta ~ N(0.4, 0.1^2), mu ~ N(0.4, 0.1^2), omega_0 ~ N(7.35, 0.19^2) rad/s");
+  EXPECT_EQ(setting.problem().last_event, 32);  // 31 chords of 0.1163 m fit on 3.66 m
+  EXPECT_DOUBLE_EQ(paper_launch(9.59)->mean, 5.83);
+  EXPECT_FALSE(paper_launch(8.0));
+}
+
+TEST(Setting, ErrorsNameTheQuantityAndItsRange) {
+  const auto expect_message = [](const std::function<void(Setting&)>& change, const std::string& part) {
+    Setting setting;
+    change(setting);
+    try {
+      setting.problem();
+      FAIL() << part;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+    }
+  };
+  expect_message([](Setting& s) { s.slope_deg = 25; }, "22.5");
+  expect_message([](Setting& s) { s.slope_deg = 0; }, "slope");
+  expect_message([](Setting& s) { s.restitution.sd = -1; }, "-1");
+  expect_message([](Setting& s) { s.friction = {-5, 0.01}; }, "friction");
+  expect_message([](Setting& s) { s.initial_speed.mean = -2; }, "initial speed");
+  expect_message([](Setting& s) { s.wheel.leg_length = {0.1, 0.1}; }, "leg");
+  expect_message([](Setting& s) { s.ramp_length = 0; }, "ramp length");
+  expect_message([](Setting& s) { s.first_landing_leg = 8; }, "first landing leg: 8 is outside 0..7");
+  expect_message([](Setting& s) { s.rebound_lost = 2; }, "rebound");
+  expect_message([](Setting& s) { s.correlation = 1; }, "correlation");
+}
+
+}  // namespace
+}  // namespace metastable::analysis

@@ -1,0 +1,170 @@
+#include "dynamics/wheel/collision_density.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "dynamics/return_map/landing_density.h"
+#include "dynamics/return_map/rest_probability.h"
+#include "tests/dynamics/support.h"
+
+namespace metastable::dynamics {
+namespace {
+
+using test::degree;
+
+WheelMap uneven(Law law, double slope_deg, const ContactSpread& s, double rebound_lost = 0) {
+  return WheelMap(Wheel{}, slope_deg * degree, law,
+                  ContactNoise::normal(s.restitution_mean, s.restitution_sd, s.friction_mean, s.friction_sd),
+                  rebound_lost);
+}
+
+double inertia_before(const WheelMap& map, int phase) {
+  return map.stance((phase + map.phases() - 1) % map.phases()).inertia;
+}
+
+// Where one of eta and mu hardly varies, nodes in the other that lie too far apart make a comb of the density.
+TEST(CollisionDensity, NarrowSpreadsLoseNoProbabilityAndWinNone) {
+  for (const auto& [law, contact] : {std::pair{Law::published, ContactSpread{0.49, 0.0785, 0.15, 0.0096}},
+                                     std::pair{Law::published, ContactSpread{0.2, 0.1, 0.15, 0.0096}},
+                                     std::pair{Law::published, ContactSpread{0.5, 0.05, 0.35, 0.01}},
+                                     std::pair{Law::coulomb, ContactSpread{0.5, 0.01, 0.2, 0.05}}}) {
+    const WheelMap map = uneven(law, 9.59, contact);
+    const CollisionDensity fast(map.contact_model(), contact);
+    const Stance& stance = map.stance(6);
+    const double omega = 6.0, width = 5e-4;
+    double sum = 0, largest = 0;
+    const auto at = [&](double plus) {
+      return fast.at(map.collision(6, omega), inertia_before(map, 6), stance.inertia, {}, plus);
+    };
+    double before = at(0.5).below;
+    for (double plus = 0.5; plus < omega; plus += width) {
+      const double added = width * at(plus + width / 2).density, below = at(plus + width).below;
+      largest = std::max(largest, std::abs(added - (below - before)));
+      sum += added;
+      before = below;
+    }
+    EXPECT_NEAR(sum, 1, 1e-3) << contact.friction_sd;
+    EXPECT_LT(largest, 1e-4) << contact.friction_sd;  // of a density of at most 10 over 5e-4
+  }
+}
+
+class AgainstTheExactDensity : public ::testing::TestWithParam<std::tuple<Law, double, ContactSpread, double>> {};
+
+// Another route to the same numbers: adaptive quadrature of the landing, over the stance's energy.
+TEST_P(AgainstTheExactDensity, AgreesInTheBody) {
+  const auto& [law, slope, contact, tolerance] = GetParam();
+  const WheelMap map = uneven(law, slope, contact);
+  const CollisionDensity fast(map.contact_model(), contact);
+  for (const int phase : {0, 2, 5})
+    for (const double omega : {4.0, 5.3, 7.0}) {
+      const double x = omega * omega;
+      const LandingDensity exact(map, x, phase);
+      const Stance& stance = map.stance(phase);
+      const auto at = [&](double plus) {
+        return fast.at(map.collision(phase, omega), inertia_before(map, phase), stance.inertia, {}, plus);
+      };
+      double peak = 0;
+      for (double share = 0.4; share < 0.99; share += 0.03) peak = std::max(peak, at(share * omega).density);
+      for (double share = 0.41; share < 0.98; share += 0.05) {
+        const double plus = share * omega;
+        if (plus * plus <= stance.barrier) continue;
+        EXPECT_NEAR(at(plus).density, 2 * plus * exact(plus * plus + stance.gain), tolerance * peak)
+            << omega << ' ' << share << ' ' << phase;
+      }
+      EXPECT_NEAR(at(std::sqrt(stance.barrier)).below, rest_probability(map, x, phase), 1e-5) << omega;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, AgainstTheExactDensity,
+                         ::testing::Values(std::tuple{Law::published, 9.59, ContactSpread{0.54, 0.045, 0.352, 0.043},
+                                                      1e-4},
+                                           std::tuple{Law::published, 7.02, ContactSpread{0.4, 0.1, 0.4, 0.1}, 4e-4},
+                                           std::tuple{Law::published, 7.02, ContactSpread{0.4, 0.05, 0.3, 0.05}, 1e-4},
+                                           std::tuple{Law::coulomb, 7.02, ContactSpread{0.4, 0.05, 0.45, 0.03}, 5e-4}));
+
+TEST(CollisionDensity, IsTheDerivativeOfItsDistribution) {
+  for (const Law law : {Law::published, Law::coulomb}) {
+    const WheelMap map = uneven(law, 7.02, {0.4, 0.05, 0.36, 0.05});
+    const CollisionDensity fast(map.contact_model(), {0.4, 0.05, 0.36, 0.05});
+    const CollisionChange change{.friction_ratio = 1.1,
+                                 .friction_shift = 0.01,
+                                 .restitution_ratio = 0.9,
+                                 .loss_ratio = 1.05,
+                                 .rebound_lost = 0.3};
+    for (double plus = 3.0; plus < 4.6; plus += 0.1) {
+      const auto at = [&](double w) {
+        return fast.at(map.collision(1, 5.0), inertia_before(map, 1), map.stance(1).inertia, change, w);
+      };
+      EXPECT_NEAR((at(plus + 1e-4).below - at(plus - 1e-4).below) / 2e-4, at(plus).density,
+                  2e-4 + 2e-3 * at(plus).density)
+          << plus;
+    }
+  }
+}
+
+// Drawn collisions with the change applied by hand.
+// Spreads that reach the fastest speeds possible, where the density of a single friction is singular.
+TEST(CollisionDensity, HoldsAllProbabilityUpToTheFastestSpeed) {
+  for (const ContactSpread& contact :
+       {ContactSpread{0.466, 0.187, 0.44, 0.044}, ContactSpread{0.36, 0.079, 0.29, 0.069}}) {
+    const WheelMap map = uneven(Law::published, 7.02, contact);
+    const CollisionDensity fast(map.contact_model(), contact);
+    for (const double exponent : {0.0, 0.4}) {
+      const double omega = 5.2;
+      const CollisionChange change{.restitution_ratio = std::pow(omega / 5, -exponent)};
+      const auto at = [&](double w) {
+        return fast.at(map.collision(2, omega), inertia_before(map, 2), map.stance(2).inertia, change, w);
+      };
+      const double barrier = std::sqrt(map.stance(2).barrier), width = 1e-3;
+      double sum = at(barrier).below, below = sum;
+      for (double plus = barrier; plus < 1.1 * omega; plus += width) {
+        sum += at(plus + width / 2).density * width;
+        const double next = at(plus + width).below;
+        EXPECT_GE(next, below - 1e-4) << plus;
+        below = next;
+      }
+      EXPECT_NEAR(sum, 1, 1e-3);
+    }
+  }
+}
+
+TEST(CollisionDensity, ChangesMeanWhatTheySay) {
+  const ContactSpread contact{0.5, 0.06, 0.38, 0.05};
+  const CollisionChange change{
+      .friction_ratio = 1.2, .friction_shift = -0.02, .restitution_ratio = 0.8, .loss_ratio = 1.1};
+  for (const Law law : {Law::published, Law::coulomb}) {
+    const WheelMap map = uneven(law, 9.59, contact);
+    const CollisionDensity fast(map.contact_model(), contact);
+    std::mt19937_64 generator(7);
+    std::normal_distribution<double> normal;
+    const Collision collision = map.collision(3, 5.5);
+    const double before = inertia_before(map, 3), after = map.stance(3).inertia;
+    const double at = law == Law::published ? 3.1 : 4.1;
+    int below = 0;
+    constexpr int draws = 40000;
+    for (int i = 0; i < draws; ++i) {
+      const Contact drawn{(0.5 + 0.06 * normal(generator)) * 0.8, (0.36 + 0.05 * normal(generator)) * 1.2};
+      const double plus =
+          (before * 5.5 * 5.5 - 2 * 1.1 * collide(map.contact_model(), collision, drawn).total()) / after;
+      below += plus <= at * at;
+    }
+    const double expected = fast.at(collision, before, after, change, at).below;
+    EXPECT_GT(expected, 0.02);
+    EXPECT_LT(expected, 0.98);
+    EXPECT_NEAR(static_cast<double>(below) / draws, expected, 4 * std::sqrt(expected * (1 - expected) / draws));
+  }
+}
+
+TEST(CollisionDensity, RefusesWhatHasNoDistribution) {
+  EXPECT_EQ(test::message_of([] { CollisionDensity(contact_model(Wheel{}, Law::plastic), {}); }),
+            "law: plastic has no restitution and no friction that could be distributed");
+  EXPECT_EQ(test::message_of([] {
+              CollisionDensity(contact_model(Wheel{}, Law::published), {0.4, 0, 0.4, 0.1});
+            }),
+            "contact: the sds of restitution and friction must be > 0");
+}
+
+}  // namespace
+}  // namespace metastable::dynamics

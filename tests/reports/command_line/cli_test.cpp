@@ -1,0 +1,436 @@
+// The program as its users meet it: arguments in, exit code, streams and files out.
+
+#include "reports/command_line/cli.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "reports/output/interrupt.h"
+#include "tests/reports/support.h"
+
+namespace metastable::reports {
+namespace {
+using test::read;
+
+struct Ran {
+  int code = 0;
+  std::string out, err;
+};
+
+Ran metastable(std::vector<std::string> words) {
+  std::vector<const char*> argv{"metastable"};
+  for (const std::string& word : words) argv.push_back(word.c_str());
+  Ran ran;
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  ran.code = run(static_cast<int>(argv.size()), argv.data());
+  ran.out = testing::internal::GetCapturedStdout();
+  ran.err = testing::internal::GetCapturedStderr();
+  return ran;
+}
+
+class CommandLine : public test::InFolder {
+ protected:
+  std::string file(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  std::vector<std::string> left_behind() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_))
+      names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+};
+
+const std::vector<std::string> quick{"--legs", "0.1519", "--cells", "32", "--samples", "256"};
+
+std::vector<std::string> with(std::vector<std::string> words, const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+TEST_F(CommandLine, CertifiedBoundsStandBesideTheEstimate) {
+  const std::vector<std::string> words = with({"steps", "--slope", "9.59", "--certify", "--json"}, {path("c.json")});
+  const Ran ran = metastable(with(words, quick));
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(ran.out.find("certificate"), std::string::npos);
+  EXPECT_NE(ran.out.find("guaranteed"), std::string::npos);
+  const auto certificate = nlohmann::json::parse(read(path("c.json")))["certificate"];
+  EXPECT_TRUE(certificate["exists"]);
+  EXPECT_LT(certificate["expected_steps"]["lower"], 6.1746);
+  EXPECT_GT(certificate["expected_steps"]["upper"], 6.1746);
+  EXPECT_EQ(certificate["per_leg"].size(), 1U);
+
+  const Ran none = metastable(with({"steps", "--slope", "9.59", "--law", "coulomb", "--certify"}, quick));
+  EXPECT_EQ(none.code, 0) << none.err;
+  EXPECT_NE(none.out.find("no certificate: bounds exist for the law published only"), std::string::npos) << none.out;
+}
+
+// A wrong option, key or value: exit code 2 and one line that names it and what is allowed.
+TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
+  struct Case {
+    std::vector<std::string> words;
+    std::string named;
+  };
+  const std::vector<Case> cases = {
+      {{}, "subcommand"},
+      {{"stepz"}, "stepz"},
+      {{"steps", "--bogus", "1"}, "--bogus"},
+      {{"steps", "--slope", "abc"}, "--slope: 'abc' is not a number"},
+      {{"steps", "--slope", "25", "--initial-speed", "7,0.1"}, "slope: 25 deg is outside (0, 22.5) deg"},
+      {{"steps", "--slope", "8"}, "--initial-speed: must be given at 8 deg"},
+      {{"steps", "--slope", "22.5"}, "slope: 22.5 deg is outside (0, 22.5) deg"},
+      {{"steps", "--rebound-lost", "0.5"}, "--rebound-lost: has a meaning under --law coulomb only"},
+      {{"sweep", "--friction-mean", "0.2,0.3", "--contact-list", file("ok.csv", "restitution,friction\n0.4,0.3\n")},
+       "--friction-mean: cannot vary with --contact-list"},
+      {{"steps", "--initial-speed=-3,0.1"}, "initial speed: mean -3 rad/s is below 0"},
+      {{"steps", "--restitution", "0.4,-0.1"}, "--restitution: sd -0.1 is below 0"},
+      {{"steps", "--friction", "-5,0.01"}, "friction"},
+      {{"steps", "--legs", "0.15,0.15"}, "--legs: 2 legs are fewer than 3"},
+      {{"steps", "--legs", "0.15", "--leg-count", "2"}, "--leg-count: '2' is not a whole number in 3..1000"},
+      {{"steps", "--cells", "7"}, "--cells: '7' is not a whole number in 8..4096"},
+      {{"steps", "--tolerance", "2"}, "tolerance: 2 is outside (0, 1)"},
+      {{"steps", "--law", "sticky"}, "published, coulomb"},
+      {{"steps", "--method", "guess"}, "--method: 'guess'"},
+      {{"steps", "--seed", "1", "--seed", "2"}, "--seed: given 2 times"},
+      {{"steps", "--json", path("no/such/folder/x.json")}, "no/such/folder"},
+      {{"steps", "--config", path("missing.toml")}, "missing.toml: cannot be read"},
+      {{"steps", "--config", path("")}, ": cannot be read"},
+      {{"steps", "--contact-list", path("missing.csv")}, "missing.csv: cannot be read"},
+      {{"steps", "--contact-list", path("")}, ": cannot be read"},
+      {{"steps", "--config", file("key.toml", "slope = 7.02\nslop = 3\n")}, "key.toml:2: unknown key 'slop'"},
+      {{"steps", "--config", file("toml.toml", "slope = = 3\n")}, "toml.toml:1"},
+      {{"steps", "--contact-list", file("list.csv", "restitution,friction\n0.4,0.3\n1.4,0.3\n")},
+       "list.csv:3: column restitution"},
+      {{"compare", "--slopes", "7.02"}, "--slopes: 1 given where at least 2"},
+      {{"compare", "--slopes", "7.02,9.59", "--initial-speed", "7,0.1"}, "--initial-speed: 1 values for 2 slopes"},
+      {{"sweep"}, "no range given"},
+      {{"sweep", "--slope", "5:12:0"}, "--slope: range 5:12:0"},
+      {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")}, "slope: 25 deg"},
+      {{"sweep", "--slope", "7:8:1", "--initial-speed", "7,0.1", "--out", path("")}, "is a folder"},
+      {{"sweep", "--slope", "7:8:1", "--initial-speed", "7,0.1", "--out", path("no/s.csv")}, "no/s.csv"},
+      {{"report", "--out", file("report.csv", "")}, "report.csv"},
+      {{"verify", "--out", file("verify.csv", "")}, "verify.csv: Not a directory"},
+      {{"verify", "--export", file("chain.csv", "")}, "chain.csv: Not a directory"},
+      {{"study", "--out", file("study.csv", "")}, "study.csv"},
+      {{"study", "--data", path("none"), "--out", path("study")}, "none: there is no such folder"},
+      {{"describe", path("none"), "--out", path("described")}, "none: there is no such folder"},
+      {{"collisions", path("none")}, "none: there is no such folder"},
+      {{"coast-down", path(""), "--out", path("drum")}, ": cannot be read"},
+      {{"diagnose"}, "DIR"},
+      {{"diagnose", path("none")}, "none: there is no such folder"},
+      {{"lessons", "--data", path("none"), "--out", path("lessons")}, "none: there is no such folder"},
+      {{"diagnose", path("none"), "--catalogue", "leg_contact,lag_contact"}, "--catalogue: "},
+      {{"diagnose", path("none"), "--catalogue", file("ids.csv", "leg_contact\n# more\nlag_contact\n")}, "ids.csv:3: "},
+      {{"effects", "--json", path("no/such/folder/x.json")}, "no/such/folder"},
+      {{"simulate"}, "--out: a folder must be given"},
+      {{"simulate", "--trials", "0", "--out", path("t")}, "--trials: '0' is not a whole number in 1..1000000"},
+  };
+  for (const Case& one : cases) {
+    const Ran ran = metastable(one.words);
+    std::string words;
+    for (const std::string& word : one.words) words += word + " ";
+    EXPECT_EQ(ran.code, 2) << words;
+    EXPECT_NE(ran.err.find(one.named), std::string::npos) << words << "\n" << ran.err;
+    EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << words << "\n" << ran.err;
+    EXPECT_EQ(ran.out, "") << words;
+  }
+  for (const std::string& name : left_behind()) EXPECT_TRUE(name.ends_with(".toml") || name.ends_with(".csv")) << name;
+  EXPECT_FALSE(std::filesystem::exists(path("s.csv")));
+}
+
+TEST_F(CommandLine, StepsWritesTheKeysThatWerePromised) {
+  const Ran ran = metastable({"steps", "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto json = nlohmann::json::parse(ran.out);
+  EXPECT_EQ(json.at("schema"), 1);
+  EXPECT_EQ(json.at("slope_deg"), 7.02);
+  EXPECT_EQ(json.at("method"), "sampled");
+  const auto& steps = json.at("expected_steps");
+  for (const char* key : {"from_start", "from_quasi_stationary", "worst_start", "sd", "median"})
+    EXPECT_TRUE(steps.at(key).is_number()) << key;
+  EXPECT_LT(steps.at("interval_95")[0].get<double>(), steps.at("from_start").get<double>());
+  EXPECT_GT(steps.at("interval_95")[1].get<double>(), steps.at("from_start").get<double>());
+  for (const char* key : {"failure_rate_per_step", "mixing_steps", "reach_ramp_end"})
+    EXPECT_TRUE(json.at(key).is_number()) << key;
+  EXPECT_GE(json.at("eigenvalue_moduli").size(), 3u);
+  EXPECT_TRUE(json.at("quasi_stationary").at("mean_rad_s").is_number());
+  EXPECT_TRUE(json.at("quasi_stationary").at("sd_rad_s").is_number());
+  EXPECT_TRUE(json.at("error").at("discretization").is_number());
+  EXPECT_TRUE(json.at("error").at("sampling").is_number());
+}
+
+TEST_F(CommandLine, InfiniteIsAWord) {
+  const Ran json = metastable(with({"steps", "--law", "coulomb", "--json", "-"}, quick));
+  ASSERT_EQ(json.code, 0) << json.err;
+  EXPECT_EQ(nlohmann::json::parse(json.out).at("expected_steps").at("from_start"), "infinite");
+  const Ran text = metastable(with({"steps", "--law", "coulomb"}, quick));
+  EXPECT_NE(text.out.find("infinite: rest is unreachable"), std::string::npos);
+}
+
+TEST_F(CommandLine, ConfigFileAndOptionsGiveTheSameBytesAndOptionsWin) {
+  const std::string config = file("c.toml",
+                                  "slope = 9.59\nlegs = 0.1519\nfriction = [0.3, 0.1]\ncells = 32\nsamples = 256\n"
+                                  "initial-speed = [5.83, 0.28]\n");
+  const Ran by_file = metastable({"steps", "--config", config});
+  const Ran by_options = metastable(with({"steps", "--slope", "9.59", "--friction", "0.3,0.1"}, quick));
+  ASSERT_EQ(by_file.code, 0) << by_file.err;
+  EXPECT_EQ(by_file.out, by_options.out);
+  const Ran overridden = metastable({"steps", "--config", config, "--friction", "0.4,0.1"});
+  EXPECT_NE(overridden.out, by_file.out);
+  EXPECT_NE(overridden.out.find("mu ~ N(0.4, 0.1^2)"), std::string::npos);
+}
+
+TEST_F(CommandLine, ComparePrintsTheContrast) {
+  const Ran ran = metastable(with({"compare", "--json", path("c.json")}, quick));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(ran.out.find("9.59 deg takes"), std::string::npos);
+  EXPECT_NE(ran.out.find("measured trials of 16 collisions"), std::string::npos);
+  const auto json = nlohmann::json::parse(read(path("c.json")));
+  EXPECT_EQ(json.at("settings").size(), 2u);
+  EXPECT_TRUE(json.at("contrasts")[0].at("ratio").at("value").is_number());
+}
+
+TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
+  const std::vector<std::string> words =
+      with({"sweep", "--friction-sd", "0.1:0.2:0.05", "--friction-mean", "0.3,0.4"}, quick);
+  ASSERT_EQ(metastable(with(words, {"--out", path("whole.csv")})).code, 0);
+  const std::string whole = read(path("whole.csv"));
+  EXPECT_TRUE(std::filesystem::exists(path("whole.svg")));
+  // Cut in the middle of the fourth row.
+  std::size_t at = 0;
+  for (int line = 0; line < 9; ++line) at = whole.find('\n', at) + 1;
+  std::ofstream(path("part.csv.partial")) << whole.substr(0, at + 5);
+  const Ran resumed = metastable(with(words, {"--out", path("part.csv"), "--threads", "1"}));
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_NE(resumed.out.find("taken over"), std::string::npos);
+  EXPECT_EQ(read(path("part.csv")), whole);
+  EXPECT_FALSE(std::filesystem::exists(path("part.csv.partial")));
+  // Nor does one over other contacts of as many pairs.
+  const auto by_list = [&](const std::string& pairs) {
+    return metastable(with({"sweep", "--slope", "7:8:0.5", "--initial-speed", "7,0.2", "--out", path("list.csv"),
+                            "--contact-list", file("pairs.csv", "restitution,friction\n" + pairs)},
+                           quick))
+        .code;
+  };
+  EXPECT_EQ(by_list("0.4,0.4\n0.5,0.3\n"), 0);
+  EXPECT_EQ(by_list("0.4,0.4\n0.5,0.6\n"), 2);
+  // Another sweep does not write over it.
+  const Ran other = metastable(with({"sweep", "--friction-sd", "0.1,0.3"}, with(quick, {"--out", path("part.csv")})));
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.err.find("another sweep"), std::string::npos);
+  EXPECT_EQ(read(path("part.csv")), whole);
+}
+
+TEST_F(CommandLine, SimulateWritesAnExperimentOnce) {
+  const std::vector<std::string> words{"simulate", "--trials", "5", "--out", path("trials")};
+  const Ran ran = metastable(words);
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  for (const char* name : {"experiment.toml", "collisions.csv", "trials.csv"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "trials" / name)) << name;
+  const Ran again = metastable(words);
+  EXPECT_EQ(again.code, 2);
+  EXPECT_NE(again.err.find("already holds"), std::string::npos);
+}
+
+// What it understands gives the same trials on one thread and on two.
+TEST_F(CommandLine, RealityLeavesNothingBehindWhenItIsMisunderstood) {
+  const auto refused = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "simulate");
+    words.insert(words.end(), {"--out", path("lab")});
+    const Ran ran = metastable(words);
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1);
+    return ran.err;
+  };
+  EXPECT_EQ(refused({"--effect", "bounce"}), "metastable: --effect: needs --reality\n");
+  EXPECT_EQ(refused({"--reality", "--effect", "inertia:ratio=9"}),
+            "metastable: effect inertia: ratio: 9 is outside [0.5, 2]\n");
+  EXPECT_EQ(refused({"--reality", "--outside", "planks"}),
+            "metastable: --outside: 'planks' is not of the form ID:SIZE\n");
+  EXPECT_EQ(refused({"--reality", "--outside", "planks:7"}), "metastable: effect planks: size 7 is outside [0, 0.9]\n");
+  EXPECT_TRUE(left_behind().empty());
+  const std::vector<std::string> fine{"simulate",          "--reality", "--effect",
+                                      "inertia:ratio=1.1", "--effect",  "leg_contact:leg=3,friction_ratio=1.4",
+                                      "--trials",          "3",         "--out"};
+  std::vector<std::string> one = fine, two = fine;
+  one.push_back(path("one")), two.push_back(path("two"));
+  two.insert(two.end(), {"--threads", "2"});
+  EXPECT_EQ(metastable(one).code, 0);
+  EXPECT_EQ(metastable(two).code, 0);
+  EXPECT_EQ(read(folder_ / "one" / "collisions.csv"), read(folder_ / "two" / "collisions.csv"));
+}
+
+TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
+  std::string log;
+  double time = 0, square = 900;
+  for (int k = 0; k < 700; ++k) {
+    log += std::to_string(static_cast<long>(time * 1e6)) + ",1," + std::to_string(k) + ",1," + std::to_string(k) + "\n";
+    time += 6.283185307 / std::sqrt(square);
+    square -= 0.2 + 0.002 * square;
+  }
+  const std::string free = file("free.csv", log);
+  EXPECT_EQ(metastable({"coast-down", free, "--out", path("a")}).code, 0);
+  EXPECT_EQ(metastable({"coast-down", free, "--nominal", path("a"), "--out", path("b")}).code, 0);
+  const std::string a = read(folder_ / "a" / "experiment.toml"), b = read(folder_ / "b" / "experiment.toml");
+  EXPECT_EQ(a.substr(a.find("[loss]")), b.substr(b.find("[loss]")));
+  EXPECT_EQ(metastable({"coast-down", free, free, "--out", path("c")}).err,
+            "metastable: " + free + ": a log named so was there before\n");
+  EXPECT_EQ(metastable({"coast-down", path("none.csv"), "--out", path("c")}).err,
+            "metastable: " + path("none.csv") + ": cannot be read\n");
+  EXPECT_FALSE(std::filesystem::exists(path("c")));
+  EXPECT_EQ(metastable({"blind", "shut", path("run")}).err,
+            "metastable: ACTION: 'shut' is none of 'make', 'answer', 'open'\n");
+}
+
+// The whole report, twice, on one thread and on two: the same bytes in every file.
+TEST_F(CommandLine, ReportIsTheSameBytesOnAnyNumberOfThreads) {
+  const auto report = [&](const std::string& name, const std::string& threads) {
+    return metastable(with({"report", "--out", path(name), "--threads", threads, "--energy-trials", "20"}, quick));
+  };
+  const Ran one = report("one", "1"), two = report("two", "2");
+  ASSERT_EQ(one.code, 0) << one.err;
+  ASSERT_EQ(two.code, 0) << two.err;
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ / "one")) {
+    if (!entry.is_regular_file()) continue;
+    ++files;
+    const auto relative = std::filesystem::relative(entry.path(), folder_ / "one");
+    EXPECT_EQ(read(entry.path()), read(folder_ / "two" / relative)) << relative;
+  }
+  EXPECT_EQ(files, 1u + 6 * 3 + 8);  // page; six tables three ways; figures
+  const std::string csv = read(folder_ / "one" / "tables" / "ramps.csv");
+  for (const char* part : {"# seed: 1", "# version: ", "# settings: ", "infinite"})
+    EXPECT_NE(csv.find(part), std::string::npos) << part;
+}
+
+TEST_F(CommandLine, InterruptLeavesNoFileAndItsOwnExitCode) {
+  catch_interrupts();
+  std::raise(SIGINT);  // as if Ctrl-C came before the first result
+  const Ran ran = metastable(with({"steps", "--json", path("x.json")}, quick));
+  clear_interrupt();
+  EXPECT_EQ(ran.code, 130);
+  EXPECT_TRUE(left_behind().empty());
+}
+
+TEST_F(CommandLine, HelpAndVersion) {
+  EXPECT_EQ(metastable({"--help"}).code, 0);
+  const Ran version = metastable({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_TRUE(version.out.starts_with("metastable 0.1.0"));
+  for (const char* command : {"steps", "compare", "sweep", "simulate", "report"}) {
+    const Ran help = metastable({command, "--help"});
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find("--config"), std::string::npos) << command;
+  }
+}
+
+TEST_F(CommandLine, SensitivitiesAndStandardErrorsComeOutRanked) {
+  const Ran ran = metastable({"steps", "--legs", "0.1519", "--cells", "32", "--samples", "256", "--sensitivities",
+                              "--friction-se", "0.01,0.004", "--slope-se", "0.1", "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto json = nlohmann::json::parse(ran.out);
+  const auto& list = json["sensitivities"];
+  ASSERT_EQ(list.size(), 9u);
+  for (std::size_t i = 1; i < list.size(); ++i)
+    EXPECT_GE(std::abs(list[i - 1]["elasticity"].get<double>()), std::abs(list[i]["elasticity"].get<double>()));
+  const auto& apart = json["from_standard_errors"];
+  EXPECT_LT(apart["interval_95"][0], json["expected_steps"]["from_start"]);
+  EXPECT_GT(apart["interval_95"][1], json["expected_steps"]["from_start"]);
+  EXPECT_EQ(apart["variance_shares"].size(), 3u);
+
+  const Ran compared = metastable(
+      {"compare", "--legs", "0.1519", "--cells", "32", "--samples", "256", "--slope-se", "0.1", "--json", "-"});
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  const auto both = nlohmann::json::parse(compared.out);
+  EXPECT_TRUE(both["settings"][1].contains("from_standard_errors"));
+  EXPECT_LT(both["contrasts"][0]["ratio_from_standard_errors"]["interval_95"][0],
+            both["contrasts"][0]["ratio"]["value"]);
+}
+
+TEST_F(CommandLine, StandardErrorsOfWhatDoesNotMatterAreRefused) {
+  const Ran ran = metastable({"steps", "--radius-of-gyration-se", "0.01"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_NE(ran.err.find("radius-of-gyration: a standard error was given"), std::string::npos) << ran.err;
+  EXPECT_EQ(metastable({"steps", "--slope-se", "-1"}).code, 2);
+}
+
+TEST_F(CommandLine, DiagnoseNamesTheKnownEffects) {
+  const Ran ran = metastable({"diagnose", path("none"), "--catalogue", "lag_contact"});
+  EXPECT_EQ(ran.code, 2);
+  for (const char* part : {"\"lag_contact\"", "leg_contact", "slip_reversal"})
+    EXPECT_NE(ran.err.find(part), std::string::npos) << part << "\n" << ran.err;
+}
+
+// A small experiment with a leg that grips more: the same bytes on any number of threads, in every form.
+TEST_F(CommandLine, DiagnoseFindsWhatTheLaboratoryPutIn) {
+  ASSERT_EQ(metastable({"simulate", "--reality", "--slope", "9.59", "--friction", "0.352,0.043", "--restitution",
+                        "0.54,0.045", "--trials", "40", "--effect", "leg_contact:leg=3,friction_ratio=0.8",
+                        "--sensor-noise", "0.01", "--no-flight", "--out", path("wheel")})
+                .code,
+            0);
+  const Ran one = metastable({"diagnose", path("wheel"), "--catalogue", "leg_contact,slope_offset", "--threads", "1",
+                              "--json", path("one.json"), "--out", path("page")});
+  ASSERT_EQ(one.code, 0) << one.err;
+  const auto json = nlohmann::json::parse(read(path("one.json")));
+  EXPECT_EQ(json.at("verdict"), "explained");
+  EXPECT_EQ(json.at("cause_set"), std::vector<std::string>{"leg_contact"});
+  EXPECT_EQ(json.at("causes").at(0).at("parameters").at("leg"), 3);
+  const auto interval = json.at("causes").at(0).at("interval_90").at("friction_ratio");
+  EXPECT_LT(interval.at(0), 0.8);
+  EXPECT_GT(interval.at(1), 0.8);
+  EXPECT_TRUE(std::filesystem::exists(path("page/index.html")));
+  EXPECT_EQ(one.out.find("verdict: explained"), 0U);
+
+  const Ran two = metastable({"diagnose", path("wheel"), "--catalogue",
+                              file("ids.txt", "leg_contact # a leg\nslope_offset\n"), "--threads", "2", "--json", "-"});
+  ASSERT_EQ(two.code, 0) << two.err;
+  auto again = nlohmann::json::parse(two.out), first = json;
+  again.erase("provenance"), first.erase("provenance");
+  EXPECT_EQ(again, first);
+}
+
+// The second system: a drum that loses a tenth more than stated.
+TEST_F(CommandLine, DiagnoseTakesACoastDown) {
+  std::string rows = "trial,collision,time_s,omega_minus_rad_s\n";
+  double x = 10000, time = 0, noise = 0.5;
+  for (int k = 0; k < 1500; ++k) {
+    const double omega = std::sqrt(x);
+    rows += fmt::format("{},{},{:.6f},{:.9g}\n", 1 + k / 50, 1 + k % 50, time, omega);
+    time += 2 * 3.141592653589793 / omega;
+    noise = 3.99 * noise * (1 - noise);  // in (0, 1), mean about a half
+    x -= 0.6 + 0.00165 * x + 0.4 * (noise - 0.5);
+  }
+  std::filesystem::create_directories(path("drum"));
+  std::ofstream(path("drum/collisions.csv")) << rows;
+  std::ofstream(path("drum/experiment.toml"))
+      << "system = \"coast_down\"\ntitle = \"Drum\"\n[rotor]\ninertia_kg_m2 = 1.0\n[loss]\nconstant = 0.15\n"
+         "linear = 0.0\nquadratic = 0.00165\nnoise_sd = 0.14\n[[condition]]\nid = \"drum\"\n";
+  const Ran ran = metastable({"diagnose", path("drum"), "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto json = nlohmann::json::parse(ran.out);
+  EXPECT_NE(json.at("verdict"), "no_gap");
+  EXPECT_LT(json.at("gap").at("p_value_as_given"), 1e-6);
+}
+
+TEST_F(CommandLine, EffectsListsTheCatalogue) {
+  const Ran ran = metastable({"effects", "--json", path("effects.json")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(ran.out.find("leg_contact: one leg has another friction or restitution\n"), std::string::npos) << ran.out;
+  EXPECT_NE(ran.out.find("0.1 to 5, none at 1"), std::string::npos) << ran.out;
+  EXPECT_EQ(nlohmann::json::parse(read(path("effects.json"))).at("schema"), 1);
+}
+
+}  // namespace
+}  // namespace metastable::reports

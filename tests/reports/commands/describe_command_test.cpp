@@ -1,0 +1,65 @@
+#include "reports/commands/describe_command.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "analysis/experiment/input_error.h"
+#include "analysis/experiment/stand_in.h"
+#include "reports/commands/simulate_command.h"
+#include "tests/reports/support.h"
+
+namespace metastable::reports {
+namespace {
+namespace fs = std::filesystem;
+using test::printed;
+using test::read;
+
+class DescribeCommandTest : public test::InFolder {
+ protected:
+  void SetUp() override {
+    InFolder::SetUp();
+    SimulateRequest request;
+    request.setting = analysis::stand_in_setting();
+    request.trials = 12;
+    request.out = path("in");
+    printed([&] { run_simulate(request); });
+  }
+
+  std::string run(const std::string& out) const {
+    DescribeRequest request;
+    request.folder = path("in");
+    request.out = out;
+    request.against = {dynamics::Law::plastic};
+    request.trials = 100;
+    return printed([&] { run_describe(request); });
+  }
+};
+
+TEST_F(DescribeCommandTest, TablesOnTheTerminal) {
+  const std::string said = run("");
+  for (const char* text : {"**The conditions**", "**Restitution and friction by maximum likelihood**", "plastic"})
+    EXPECT_NE(said.find(text), std::string::npos) << text << said;
+  EXPECT_EQ(said.find("seed:"), std::string::npos);
+}
+
+TEST_F(DescribeCommandTest, AFolderWithEverythingTheSameTwice) {
+  const fs::path one = folder_ / "one", two = folder_ / "two";
+  run(one.string());
+  run(two.string());
+  for (const char* file : {"index.html", "tables/conditions.csv", "tables/profiles.tex", "tables/survival.md",
+                           "tables/contact.csv", "tables/laws.csv", "figures/profiles.svg", "figures/survival.svg",
+                           "figures/legs.svg", "figures/return-map-7-02.svg"}) {
+    EXPECT_FALSE(read(one / file).empty()) << file;
+    EXPECT_EQ(read(one / file), read(two / file)) << file;
+  }
+}
+
+TEST_F(DescribeCommandTest, BadFolder) {
+  fs::remove(folder_ / "in/collisions.csv");
+  EXPECT_THROW(run(""), analysis::InputError);
+}
+
+}  // namespace
+}  // namespace metastable::reports

@@ -1,0 +1,271 @@
+// A diagnosis as text, JSON and page, from one filled by hand.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "dynamics/wheel/effect_catalogue.h"
+#include "reports/commands/diagnose_command.h"
+#include "reports/diagnosis/diagnosis_figures.h"
+#include "reports/diagnosis/diagnosis_json.h"
+#include "reports/diagnosis/diagnosis_tables.h"
+#include "reports/diagnosis/diagnosis_text.h"
+#include "reports/output/text_table.h"
+
+namespace metastable::reports {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+analysis::GapCell cell(const std::string& aspect, const std::string& at, double statistic, double p_adjusted) {
+  analysis::GapCell made;
+  made.facet = "leg";
+  made.aspect = aspect;
+  made.at = at;
+  made.stance = at.find("stance") != std::string::npos;
+  made.statistic = statistic;
+  made.p_adjusted = p_adjusted;
+  made.size = 0.02 * statistic;
+  made.band = 0.07;
+  made.unit = "rad/s";
+  made.events = 100;
+  return made;
+}
+
+analysis::Diagnosis sample() {
+  analysis::Diagnosis d;
+  d.verdict = analysis::Verdict::explained;
+  d.sentences = {"One cause explains it: leg_contact."};
+  d.p_as_given = 1e-4;
+  d.p_value = 3e-4;
+  for (analysis::GapMap* map : {&d.as_given, &d.recalibrated, &d.left})
+    map->cells = {cell("mean", "leg 1, collision", 4, 0.02), cell("mean", "leg 3, collision", -8, 0.001),
+                  cell("spread", "leg 3, collision", 3.9, 0.02), cell("mean", "leg 3, stance", 0.3, 0.9)};
+  analysis::Cause leg, both, bounce;
+  leg.effects = {"leg_contact"};
+  leg.probability = 0.6, leg.gain = 80, leg.p_value = 1e-9, leg.evidence = 30;
+  leg.parameters = {{{"leg", 3, 3, 3, false}, {"friction_ratio", 1.6, 1.4, 1.9, true}}};
+  both.effects = {"leg_lengths", "slope_offset"};
+  both.probability = 0.3;
+  both.parameters = {{{"leg_lengths_m", 0.15, 0.149, 0.151, true}, {"leg_lengths_m", 0.16, 0.159, 0.161, true}},
+                     {{"offset_deg", 0.2, 0.1, 0.3, true}}};
+  d.causes = {leg, both};
+  bounce.effects = {"bounce"};
+  bounce.not_decided = "the fit did not converge";
+  d.not_decided = {bounce};
+  d.cause_set = {"leg_contact", "leg_lengths+slope_offset"};
+  d.p_none = 0.08;
+  d.p_recalibrate = 0.02;
+  d.contact = {{"friction_mean", 0.35, 0.34, 0.36, true}};
+  analysis::Shrinkage score, open;
+  score.measure = "held-out log score per collision", score.unit = "nats";
+  score.baseline = 0.41, score.recalibrated = 0.33, score.with_effect = 0.02;
+  score.closed = 0.95, score.closed_lower = 0.88, score.closed_upper = 1.0;
+  open.measure = "error of P(rest)";
+  d.shrinkage = {score, open};
+  d.steps = {.observed = infinity, .observed_lower = 40, .observed_upper = infinity, .baseline = 50, .with_effect = 70};
+  d.visible = {{"leg_contact", "friction_ratio", 0.04, {{"leg_lengths", 0.7}}, ""},
+               {"sensor_noise", "sd_rad_s", 0, {}, "no noise is stated"}};
+  d.missing = {{"leg", {{"leg_contact", "friction_ratio", {}, 0.04, {"friction_patch"}}}}, {"position_m", {}}};
+  d.not_possible = {{"where the gap lies", "7 transitions of a speed; a cell of the map takes 20", 3, true}};
+  d.next = {{"slope 8.5 deg", 21.5}};
+  d.condition_names = {"fast"};
+  for (int k = 1; k <= 3; ++k)
+    d.profile.push_back({.condition = 0,
+                         .collision = k,
+                         .trials = 50,
+                         .measured = 5.5,
+                         .measured_error = 0.02,
+                         .baseline = 5.3,
+                         .with_effect = 5.5,
+                         .band = 0.05});
+  d.notes = {"The noise was taken from the data."};
+  d.trials = 50, d.collisions = 800, d.events = 1600;
+  return d;
+}
+
+const Provenance provenance{"metastable diagnose wheel", "experiment: wheel", 7, "0.1.0"};
+
+nlohmann::json parsed(const analysis::Diagnosis& d) { return nlohmann::json::parse(diagnosis_json(d, provenance)); }
+
+TEST(DiagnosisJson, HasTheKeysOfTheSchema) {
+  const auto json = parsed(sample());
+  EXPECT_EQ(json.at("schema"), 1);
+  EXPECT_EQ(json.at("verdict"), "explained");
+  EXPECT_EQ(json.at("gap").at("p_value_as_given"), 1e-4);
+  EXPECT_EQ(json.at("gap").at("p_value"), 3e-4);
+  EXPECT_EQ(json.at("cause_set"), (std::vector<std::string>{"leg_contact", "leg_lengths+slope_offset"}));
+  for (const char* key :
+       {"measure", "baseline", "recalibrated", "with_effect", "floor", "closed", "closed_interval_90"})
+    EXPECT_TRUE(json.at("shrinkage").contains(key)) << key;
+  EXPECT_EQ(json.at("shrinkage").at("closed_interval_90"), (std::vector<double>{0.88, 1.0}));
+  EXPECT_EQ(json.at("not_decided").at(0).at("reason"), "the fit did not converge");
+  EXPECT_TRUE(json.at("missing_columns").at(0).at("effects").at(0).at("smallest").is_null());
+  EXPECT_EQ(json.at("missing_columns").at(0).at("effects").at(0).at("not_told_from").at(0), "friction_patch");
+  EXPECT_EQ(json.at("not_possible").at(0).at("trials"), 3);
+  EXPECT_EQ(json.at("next_experiment").at(0).at("separation"), 21.5);
+  EXPECT_EQ(json.at("visibility").at(0).at("alike").at("leg_lengths"), 0.7);
+  EXPECT_EQ(json.at("provenance").at("seed"), 7);
+}
+
+TEST(DiagnosisJson, WhereHoldsTheSignificantCellsByPThenByScore) {
+  const auto where = parsed(sample()).at("where");
+  ASSERT_EQ(where.size(), 3U);
+  EXPECT_EQ(where[0].at("at"), "leg 3, collision");
+  EXPECT_EQ(where[0].at("aspect"), "mean");
+  EXPECT_EQ(where[0].at("p_adjusted"), 0.001);
+  EXPECT_EQ(where[0].at("size"), -0.16);
+  EXPECT_EQ(where[0].at("unit"), "rad/s");
+  EXPECT_EQ(where[1].at("at"), "leg 1, collision");
+  EXPECT_EQ(where[2].at("aspect"), "spread");
+}
+
+TEST(DiagnosisJson, CausesCarryProbabilitiesThatSumToOne) {
+  const auto causes = parsed(sample()).at("causes");
+  double sum = 0;
+  for (const auto& cause : causes) sum += cause.at("probability").get<double>();
+  EXPECT_NEAR(sum, 1, 1e-12);
+  ASSERT_EQ(causes.size(), 5U);
+  EXPECT_EQ(causes[0].at("effect"), "leg_contact");
+  EXPECT_TRUE(causes[0].at("parameters").at("leg").is_number_integer());
+  EXPECT_EQ(causes[0].at("parameters").at("friction_ratio"), 1.6);
+  EXPECT_EQ(causes[0].at("interval_90"), nlohmann::json::parse(R"({"friction_ratio": [1.4, 1.9]})"));
+  EXPECT_EQ(causes[1].at("effect"), "leg_lengths+slope_offset");
+  EXPECT_EQ(causes[1].at("parameters"),
+            nlohmann::json::parse(
+                R"({"leg_lengths": {"leg_lengths_m": [0.15, 0.16]}, "slope_offset": {"offset_deg": 0.2}})"));
+  EXPECT_EQ(causes[1].at("interval_90").at("leg_lengths").at("leg_lengths_m").at(1),
+            (std::vector<double>{0.159, 0.161}));
+  EXPECT_EQ(causes[2].at("effect"), "none_of_these");
+  EXPECT_EQ(causes[3].at("effect"), "recalibration");
+  EXPECT_EQ(causes[3].at("parameters").at("friction_mean"), 0.35);
+  EXPECT_EQ(causes[4].at("effect"), "no_gap");
+}
+
+TEST(DiagnosisJson, InfiniteIsAWordAndUnknownIsNull) {
+  const auto json = parsed(sample());
+  EXPECT_EQ(json.at("steps_before_failure").at("observed"), "infinite");
+  EXPECT_TRUE(json.at("steps_before_failure").at("recalibrated").is_null());
+  EXPECT_TRUE(json.at("shrinkage_by_measure").at(1).at("closed").is_null());
+  EXPECT_TRUE(json.at("shrinkage_by_measure").at(1).at("closed_interval_90").is_null());
+  EXPECT_TRUE(json.at("visibility").at(1).at("smallest").is_null());
+  analysis::Diagnosis d = sample();
+  d.shrinkage[0].floor = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(parsed(d).at("shrinkage").at("floor").is_null());
+}
+
+TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
+  const std::string text = diagnosis_text(sample());
+  EXPECT_EQ(text.find("verdict: explained\nOne cause explains it: leg_contact.\n"), 0U);
+  std::size_t last = 0;
+  for (const char* part : {"Is there a gap?",
+                           "Where it lies",
+                           "leg 3, collision",
+                           "Which effect",
+                           "leg 3, friction_ratio 1.6 (1.4 to 1.9)",
+                           "none of these",
+                           "How far it shrinks",
+                           "95 % (88 to 100)",
+                           "not to be said",
+                           "Expected steps before failure",
+                           "infinite",
+                           "What these data could have seen",
+                           "70 % like leg_lengths",
+                           "no noise is stated",
+                           "What missing columns hide",
+                           "friction_patch",
+                           "no effect is much harder to see",
+                           "Not decided",
+                           "the fit did not converge",
+                           "What these data cannot say",
+                           "where the gap lies",
+                           "The next experiment",
+                           "slope 8.5 deg",
+                           "Data",
+                           "The noise was taken"}) {
+    const std::size_t at = text.find(part, last);
+    EXPECT_NE(at, std::string::npos) << part << "\n" << text;
+    if (at != std::string::npos) last = at;
+  }
+}
+
+TEST(DiagnosisText, SaysSoWhenNoCellIsBeyondChance) {
+  analysis::Diagnosis d = sample();
+  for (analysis::GapCell& one : d.recalibrated.cells) one.p_adjusted = 0.5;
+  EXPECT_NE(diagnosis_text(d).find("no cell is beyond chance"), std::string::npos);
+}
+
+TEST(DiagnosisTables, CauseOfAListShowsItsValuesWithoutIntervals) {
+  const Table table = causes_table(sample());
+  EXPECT_EQ(std::get<std::string>(table.rows.at(1).back().value()),
+            "leg_lengths_m 0.15; 0.16 + offset_deg 0.2 (0.1 to 0.3)");
+}
+
+TEST(DiagnosisFigures, MapHasAPhaseAFigureAndRowsFromTheTop) {
+  const std::vector<Figure> figures = map_figures(sample());
+  ASSERT_EQ(figures.size(), 2U);
+  const HeatMap& map = *figures[0].heat_map;
+  EXPECT_EQ(map.y_names, (std::vector<std::string>{"leg 3", "leg 1"}));
+  ASSERT_EQ(map.x_names.size(), 6U);
+  EXPECT_EQ(map.x_names[1], "mean, recalibrated");
+  EXPECT_EQ(map.value[0][1], -8);
+  EXPECT_EQ(map.value[0][4], 3.9);
+  EXPECT_TRUE(std::isnan(map.value[1][4]));
+}
+
+TEST(DiagnosisPage, HoldsFiguresAndTablesAndLoadsNothing) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "diagnosis-page";
+  std::filesystem::remove_all(folder);
+  write_diagnosis(sample(), "Wheel <1>", provenance, folder.string());
+  std::ifstream in(folder / "index.html");
+  const std::string html{std::istreambuf_iterator<char>(in), {}};
+  for (const char* part :
+       {"Wheel &lt;1&gt;", "Verdict: explained.", "figure-map-collisions", "figure-map-stances", "figure-profile-1",
+        "figure-ranking", "figure-shrinkage-1", "table-gap", "table-where", "table-causes", "table-shrinkage",
+        "table-steps", "table-visibility", "table-next-experiment", "table-map", "seed: 7"})
+    EXPECT_NE(html.find(part), std::string::npos) << part;
+  EXPECT_EQ(html.find("<script"), std::string::npos);
+  EXPECT_EQ(html.find("src="), std::string::npos);
+  for (const char* name : {"causes", "parameters", "profile", "not-decided", "contact"})
+    for (const char* ending : {".csv", ".md", ".tex"})
+      EXPECT_TRUE(std::filesystem::exists(folder / "tables" / (std::string(name) + ending))) << name << ending;
+  std::filesystem::remove_all(folder);
+}
+
+TEST(TextTable, AlignsColumnsAndLeavesOutEmptyOnes) {
+  const Table table{.id = "t",
+                    .title = "Title",
+                    .columns = {{"name"}, {"nothing"}, {"η", "rad/s"}},
+                    .rows = {{"a", "", 1.5}, {"long", "", Infinite{}}, {"c", "", 2.0}}};
+  EXPECT_EQ(to_text(table, 2),
+            "Title\n"
+            "  name  η [rad/s]\n"
+            "  a          1.50\n"
+            "  long   infinite\n"
+            "  and 1 more\n");
+  Table bad = table;
+  bad.rows[1][2] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(to_text(bad), std::invalid_argument);
+}
+
+TEST(TextTable, WrapsAtSpaces) { EXPECT_EQ(wrapped("one two three", "  ", 9), "  one two\n  three\n"); }
+
+TEST(EffectsJson, ListsTheCatalogue) {
+  const auto json = nlohmann::json::parse(effects_json());
+  const auto& catalogue = dynamics::effect_catalogue();
+  ASSERT_EQ(json.at("effects").size(), catalogue.size());
+  const auto& leg = *std::find_if(json.at("effects").begin(), json.at("effects").end(),
+                                  [](const auto& effect) { return effect.at("id") == "leg_contact"; });
+  EXPECT_EQ(leg.at("parameters").at(1).at("name"), "friction_ratio");
+  EXPECT_EQ(leg.at("parameters").at(1).at("lower"), 0.1);
+}
+
+}  // namespace
+}  // namespace metastable::reports

@@ -1,0 +1,182 @@
+#include "reports/output/figure.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace metastable::reports {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+
+Figure sample() {
+  return {
+      .id = "map",
+      .title = "It's <a> \"map\" `date` $x_1^2$",
+      .x = {"ω²", "rad²/s²"},
+      .y = {"speed", "rad/s"},
+      .series = {{.label = "mean", .x = {0, 1, 2}, .y = {0, 1.5, 1}},
+                 {.label = "interval", .style = Style::band, .x = {0, 1, 2}, .lower = {0, 1, 0}, .upper = {1, 2, 2}}},
+      .provenance = {"metastable report --a <b>", "", 3, "0.1.0"}};
+}
+
+HeatMap sample_map() {
+  return {.x = {0.05, 0.1},
+          .y = {0.2, 0.3},
+          .value = {{10, 1e9}, {infinity, nan_value}},
+          .label = "steps",
+          .logarithmic = true};
+}
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+std::string error_of(const Figure& figure) {
+  try {
+    gnuplot_script(figure);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Figure, SvgIsWholeAndCarriesTitleAndProvenance) {
+  const std::string svg = render_svg(sample());
+  EXPECT_TRUE(svg.starts_with("<?xml"));
+  EXPECT_TRUE(svg.ends_with("</svg>\n\n") || svg.ends_with("</svg>\n"));
+  EXPECT_NE(svg.find("<title>It&#39;s &lt;a&gt; &quot;map&quot; `date` $x_1^2$</title>"), std::string::npos);
+  EXPECT_NE(svg.find("<desc>command: metastable report --a &lt;b&gt;\nseed: 3\nversion: 0.1.0\n</desc>"),
+            std::string::npos);
+  EXPECT_NE(svg.find("ω² [rad²/s²]"), std::string::npos);
+}
+
+TEST(Figure, TheSameFigureGivesTheSameBytes) {
+  const std::string once = render_svg(sample());
+  setenv("GNUTERM", "dumb", 1);
+  setenv("LC_ALL", "de_DE.UTF-8", 1);
+  EXPECT_EQ(render_svg(sample()), once);
+  unsetenv("GNUTERM");
+  unsetenv("LC_ALL");
+}
+
+TEST(Figure, EveryStyleDraws) {
+  for (const Style style : {Style::line, Style::dashed, Style::points, Style::dots, Style::steps, Style::impulses,
+                            Style::area, Style::band}) {
+    Figure figure = sample();
+    figure.series = {{.label = "only", .style = style, .x = {1, 2, 3}, .y = {1, 4, 2}, .lower = {}, .upper = {}}};
+    if (style == Style::band) {
+      figure.series[0].lower = {1, 2, 1};
+      figure.series[0].upper = {2, 4, 3};
+    }
+    figure.reference_lines = {{true, 1.5, "barrier"}, {false, 2, "one"}};
+    figure.diagonal = Diagonal::yes;
+    const std::string svg = render_svg(figure);
+    EXPECT_NE(svg.find("only"), std::string::npos);
+    EXPECT_NE(svg.find("barrier"), std::string::npos);
+    EXPECT_EQ(svg.find("nan"), std::string::npos);
+    figure.y.logarithmic = true;
+    EXPECT_NE(render_svg(figure).find("only"), std::string::npos);
+  }
+}
+
+TEST(Figure, PointsMayHaveBars) {
+  Figure figure = sample();
+  figure.series = {{.style = Style::points, .x = {1, 2}, .y = {1, 2}, .lower = {0, 1}, .upper = {3, 3}}};
+  EXPECT_NE(gnuplot_script(figure).find("yerrorbars"), std::string::npos);
+  EXPECT_FALSE(render_svg(figure).empty());
+}
+
+TEST(Figure, ValuesThatAreNotFiniteLeaveAGap) {
+  Figure figure = sample();
+  figure.series = {{.x = {0, 1, 2, 3, 4}, .y = {1, 2, nan_value, infinity, 1}}};
+  EXPECT_EQ(count(gnuplot_script(figure), "NaN"), 2u);
+  EXPECT_FALSE(render_svg(figure).empty());
+}
+
+TEST(Figure, HeatMapLabelsCells) {
+  Figure figure{.id = "grid", .title = "", .x = {"sd of μ", ""}, .y = {"sd of η", ""}, .heat_map = sample_map()};
+  const std::string svg = render_svg(figure);
+  for (const char* label : {"10.0", "1.00×10⁹", "∞", "0.05", "steps"})
+    EXPECT_NE(svg.find(label), std::string::npos) << label;
+  figure.heat_map->value = {{5, 5}, {5, 5}};
+  EXPECT_EQ(count(render_svg(figure), ">5.00<"), 4u);
+  figure.heat_map->value = {{infinity, infinity}, {infinity, infinity}};
+  EXPECT_EQ(count(render_svg(figure), "∞"), 4u);
+}
+
+TEST(Figure, HeatMapLabelsShrinkAndThenGo) {
+  const auto script = [](std::size_t n) {
+    HeatMap map{
+        .x = std::vector<double>(n, 1.0), .y = {1.0}, .value = {std::vector<double>(n, 1.234e7)}, .label = "steps"};
+    return gnuplot_script({.id = "grid", .title = "", .x = {}, .y = {}, .heat_map = map});
+  };
+  EXPECT_NE(script(4).find("1.23×10⁷"), std::string::npos);
+  EXPECT_NE(script(4).find("labels noenhanced font ',14'"), std::string::npos);
+  EXPECT_NE(script(12).find("\"1×10⁷\""), std::string::npos);
+  EXPECT_EQ(script(40).find("with labels"), std::string::npos);
+}
+
+TEST(Figure, BadDataIsNamed) {
+  Figure figure = sample();
+  figure.series[0].y.pop_back();
+  EXPECT_EQ(error_of(figure), "figure 'map', series 1 ('mean'): x, y, lower and upper have 3, 2, 0 and 0 values");
+  figure.series.clear();
+  EXPECT_EQ(error_of(figure), "figure 'map' has no series");
+  figure.heat_map = sample_map();
+  figure.heat_map->value[0].pop_back();
+  EXPECT_EQ(error_of(figure), "figure 'map', heat map: 1 cells in a row for 2 values of x");
+  figure.heat_map->value[0] = {0, 1};
+  EXPECT_EQ(error_of(figure), "figure 'map', heat map: 0 has no logarithm");
+}
+
+TEST(Figure, MissingGnuplotIsSaid) {
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", "/nonexistent", 1);
+  std::string message;
+  try {
+    render_svg(sample());
+  } catch (const std::runtime_error& error) {
+    message = error.what();
+  }
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_EQ(message, "gnuplot, which draws the figures, was not found: install the package gnuplot-nox");
+}
+
+TEST(Figure, BarsAreNamedAndValuedTopDown) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  Figure figure{.id = "bars", .title = "", .x = {"p"}, .y = {""}};
+  figure.bars =
+      BarChart{.name = {"leg_contact", "none"}, .value = {0.5, -0.25}, .lower = {0.4, none}, .upper = {0.6, none}};
+  const std::string script = gnuplot_script(figure);
+  for (const char* part :
+       {"0 0 0.5 0 0x0072B2", "-0.25 1 0 1 0x0072B2", "0.5 0 0.4 0.6\nEND", "'leg_contact' 0, 'none' 1"})
+    EXPECT_NE(script.find(part), std::string::npos) << part << "\n" << script;
+  const std::string svg = render_svg(figure);
+  EXPECT_NE(svg.find("leg_contact"), std::string::npos);  // not taken for a subscript
+  figure.bars->value.pop_back();
+  EXPECT_THROW(gnuplot_script(figure), std::invalid_argument);
+}
+
+TEST(Figure, HeatMapTakesNamesAndAScaleAroundZero) {
+  Figure figure{.id = "named", .title = "", .x = {""}, .y = {""}};
+  HeatMap map{
+      .x = {0, 1}, .y = {0}, .value = {{-9, 0.25}}, .label = "score", .digits = 1, .format = NumberFormat::fixed};
+  map.x_names = {"mean", "spread_2"};
+  map.limit = 6;
+  figure.heat_map = map;
+  const std::string script = gnuplot_script(figure);
+  for (const char* part : {"set cbrange [-6:6]", "'mean' 0, 'spread_2' 1", "\"−9.0\"", "\"0.2\""})
+    EXPECT_NE(script.find(part), std::string::npos) << part << "\n" << script;
+  figure.heat_map->x_names.pop_back();
+  EXPECT_THROW(gnuplot_script(figure), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace metastable::reports

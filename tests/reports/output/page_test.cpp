@@ -1,0 +1,66 @@
+#include "reports/output/page.h"
+
+#include <gtest/gtest.h>
+
+#include <regex>
+#include <set>
+#include <string>
+
+#include "reports/output/figure.h"
+
+namespace metastable::reports {
+namespace {
+
+Page sample() {
+  const Figure figure{.id = "a", .title = "", .x = {"x"}, .y = {"y"}, .series = {{.x = {0, 1}, .y = {0, 1}}}};
+  const std::string svg = render_svg(figure);
+  const Table table{.id = "t", .title = "Numbers {{title}}", .columns = {{"x"}}, .rows = {{1}}};
+  return {.title = "Report <1> & {{more}}",
+          .intro = {"First paragraph.", "Second."},
+          .sections = {{.id = "one",
+                        .heading = "A \"heading\"",
+                        .reading = "Read it so.",
+                        .figures = {{"a", svg, "Caption"}, {"b", svg, ""}},
+                        .tables = {{table, {{"CSV", "tables/t.csv?a=1&b=2"}, {"LaTeX", "tables/t.tex"}}}}},
+                       {.id = "two", .heading = "No figures", .reading = "Nothing here."}},
+          .provenance = {"metastable report", "", 1, "0.1.0"}};
+}
+
+TEST(Page, HoldsEverything) {
+  const std::string html = render_page(sample());
+  for (const char* part :
+       {"<!DOCTYPE html>", "<title>Report &lt;1&gt; &amp; {{more}}</title>", "<p>Second.</p>",
+        "<a href=\"#two\">No figures</a>", "<section id=\"one\">", "A &quot;heading&quot;",
+        "<p class=\"reading\">Read it so.</p>", "<figure id=\"figure-a\">", "<figcaption>Caption</figcaption>",
+        "Numbers {{title}}", "<a href=\"tables/t.csv?a=1&amp;b=2\">CSV</a>", "<li>version: 0.1.0</li>", "</html>"}) {
+    EXPECT_NE(html.find(part), std::string::npos) << part;
+  }
+}
+
+TEST(Page, IdsAreUniqueAndLinksInsideResolve) {
+  const std::string html = render_page(sample());
+  std::set<std::string> ids;
+  const std::regex id(R"( id=['"]([^'"]*)['"])");
+  for (std::sregex_iterator match(html.begin(), html.end(), id), end; match != end; ++match) {
+    EXPECT_TRUE(ids.insert((*match)[1]).second) << "twice: " << (*match)[1];
+  }
+  const std::regex link(R"(href=['"]#([^'"]*)['"])");
+  for (std::sregex_iterator match(html.begin(), html.end(), link), end; match != end; ++match) {
+    EXPECT_TRUE(ids.contains((*match)[1])) << "dangling: " << (*match)[1];
+  }
+}
+
+TEST(Page, LoadsNothing) {
+  const std::string html = render_page(sample());
+  for (const char* part : {"<script", "src=", "@import", "<link"})
+    EXPECT_EQ(html.find(part), std::string::npos) << part;
+}
+
+TEST(Page, RefusesWhatIsNoSvg) {
+  Page page = sample();
+  page.sections[0].figures[0].svg = "gnuplot: error";
+  EXPECT_THROW(render_page(page), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace metastable::reports
