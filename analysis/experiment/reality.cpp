@@ -134,7 +134,7 @@ RealityFiles reality_files(const std::vector<RealityCondition>& conditions, cons
   if (told("outcome")) files.trials_csv = "condition,trial,outcome\n";
   std::vector<std::string> recordings(trials.size());
   for (std::size_t t = 0; t < trials.size(); ++t) {
-    const std::string& id = conditions[trials[t].condition].id;
+    const std::string id = csv_field(conditions[trials[t].condition].id);
     auto row = std::back_inserter(files.collisions_csv);
     for (std::size_t k = 0; k < trials[t].collisions.size(); ++k) {
       const dynamics::LaboratoryCollision& c = trials[t].collisions[k];

@@ -6,7 +6,6 @@
 #include "reports/commands/blind_command.h"
 
 namespace metastable::reports {
-
 std::vector<Command> blind_commands() {
   return {{"blind", "The diagnosis tested on cases whose truth is sealed until it has answered: make, answer, open",
            [](Options& o) {
@@ -21,6 +20,7 @@ std::vector<Command> blind_commands() {
              o.add("left-out", "N", "3", "make: cases of each effect with a catalogue that lacks it");
              o.add("tool", "PROGRAM", "",
                    "answer: run 'PROGRAM diagnose CASE --json FILE ...' (default: this program)");
+             o.add_flag("partial", "open: although some cases are not answered");
              o.add_threads();
              o.add("out", "DIR", "", "open: folder of tables and page (default: report in the run's folder)");
            },
@@ -36,6 +36,7 @@ std::vector<Command> blind_commands() {
              request.size.outside = o.count("outside", 0, 5000);
              request.size.left_out_per_effect = o.count("left-out", 0, 1000);
              request.tool = o.text("tool");
+             request.partial = o.flag("partial");
              request.threads = o.threads();
              request.out = o.text("out");
              request.command = line;

@@ -1,14 +1,20 @@
 #include "reports/output/output_file.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <iostream>
 #include <locale>
 #include <string>
 #include <system_error>
+#include <thread>
+
+#include "reports/output/interrupt.h"
 
 namespace metastable::reports {
 namespace fs = std::filesystem;
@@ -22,10 +28,38 @@ fs::path temporary_name(const fs::path& target) {
          ("." + target.filename().string() + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".tmp");
 }
 
-}  // namespace
+// Temporaries of the same target whose writer was killed: nobody holds their lock.
+void remove_left_behind(const fs::path& target) {
+  const std::string begin = "." + target.filename().string() + ".", end = ".tmp";
+  std::error_code error;
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  for (fs::directory_iterator entry(folder, error), last; !error && entry != last; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.size() <= begin.size() + end.size() || !name.starts_with(begin) || !name.ends_with(end)) continue;
+    const std::string_view number =
+        std::string_view(name).substr(begin.size(), name.size() - begin.size() - end.size());
+    if (number.find_first_not_of("0123456789-") != std::string_view::npos) continue;
+    try {
+      const FileLock lock(entry->path(), FileLock::Missing::leave);
+      std::error_code ignored;
+      if (lock.held()) fs::remove(entry->path(), ignored);
+    } catch (const OutputError&) {  // of another user
+    }
+  }
+}
 
-OutputError::OutputError(const fs::path& path, const std::string& reason)
-    : std::invalid_argument("cannot write " + (path.empty() ? std::string("''") : path.string()) + ": " + reason) {}
+// A pipe is opened only once somebody reads it; until then Ctrl-C ends the program.
+void wait_for_reader(const fs::path& pipe) {
+  for (;;) {
+    const int reader = ::open(pipe.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+    if (reader >= 0) ::close(reader);
+    if (reader >= 0 || errno != ENXIO) return;
+    check_interrupt();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+}  // namespace
 
 OutputFile::OutputFile(const fs::path& path) : path_(path) {
   file_.imbue(std::locale::classic());
@@ -38,7 +72,15 @@ OutputFile::OutputFile(const fs::path& path) : path_(path) {
   if (error) throw OutputError(path, error.message());
   if (fs::is_directory(target_, error)) throw OutputError(path, std::strerror(EISDIR));
   const bool in_place = present && !fs::is_regular_file(target_, error);
-  if (!in_place) temporary_ = temporary_name(target_);
+  if (in_place) {
+    if (fs::is_fifo(target_, error)) wait_for_reader(target_);
+  } else {
+    remove_left_behind(target_);
+    do {
+      temporary_ = temporary_name(target_);
+      lock_ = FileLock(temporary_, FileLock::Missing::create);
+    } while (!lock_.held());
+  }
   errno = 0;
   file_.open(in_place ? target_ : temporary_, std::ios::binary);
   if (!file_) throw OutputError(path, last_reason());
@@ -75,6 +117,12 @@ void write_file(const fs::path& path, std::string_view content) {
   OutputFile file(path);
   file.stream().write(content.data(), static_cast<std::streamsize>(content.size()));
   file.commit();
+}
+
+void flush_standard_output() {
+  errno = 0;
+  const bool printed = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (!printed || !std::cout.flush()) throw OutputError("standard output", last_reason());
 }
 
 void make_folder(const fs::path& path) {
