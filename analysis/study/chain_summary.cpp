@@ -16,8 +16,8 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::size_t survival_values = 64;
-constexpr std::size_t violation_draws = 64;  // a state
+constexpr std::size_t least_survival = 64, most_survival = 10000;  // values of the curve
+constexpr std::size_t violation_draws = 64;                        // a state
 constexpr std::size_t slowest_draws = 16384;
 constexpr std::size_t most_forward = 100000;  // steps followed where some launches never rest
 
@@ -115,6 +115,12 @@ Accumulated accumulated(const markov::Moments& moments, std::vector<double> quan
   return {moments.mean, moments.sd, std::move(quantiles)};
 }
 
+// To the end of the course, where that is not too far.
+std::size_t survival_steps(const Problem& problem) {
+  const auto course = static_cast<std::size_t>(problem.last_event.value_or(0)) + 1;
+  return std::clamp(course, least_survival, most_survival);
+}
+
 }  // namespace
 
 ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
@@ -159,8 +165,7 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
   };
   if (!options.brief && !sampled.duration.empty()) result.seconds = reward(sampled.duration);
   if (!options.brief && !sampled.advance.empty()) result.metres = reward(sampled.advance);
-  const std::size_t shown = std::max<std::size_t>(
-      survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
+  const std::size_t shown = survival_steps(problem);
   for (std::size_t n = 0; n < shown; ++n) result.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.reach_end = survival.at(*problem.last_event);
 
@@ -213,8 +218,7 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   // Forward from the launch: survival, visits on the course, and the share that has come to rest when no more do.
   std::vector<double> alive = launch.after, visits(space.size(), 0.0);
   result.survival = {1.0};
-  const std::size_t shown = std::max<std::size_t>(
-      survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
+  const std::size_t shown = survival_steps(problem);
   for (std::size_t n = 1; n < most_forward; ++n) {
     const double surviving = std::min(result.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
     const bool settled = n > 2 * static_cast<std::size_t>(result.period) &&
@@ -235,8 +239,10 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
     result.steps.quantile.push_back(
         reached == result.survival.end() ? infinite : static_cast<double>(reached - result.survival.begin()));
   }
+  if (problem.last_event)  // beyond what was followed nobody rests any more
+    result.reach_end =
+        result.survival[std::min(static_cast<std::size_t>(*problem.last_event), result.survival.size() - 1)];
   result.survival.resize(std::min(result.survival.size(), shown));
-  if (problem.last_event) result.reach_end = result.survival[static_cast<std::size_t>(*problem.last_event)];
   describe_violations(problem, space, stationary, visits, options, result);
 }
 

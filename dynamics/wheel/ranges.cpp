@@ -17,7 +17,7 @@ bool Range::holds(double value) const {
 }
 
 std::string Range::text() const {
-  return fmt::format("{}{}, {}{}", low_open || std::isinf(low) ? '(' : '[', low, high,
+  return fmt::format("{}{:.6g}, {:.6g}{}", low_open || std::isinf(low) ? '(' : '[', low, high,
                      high_open || std::isinf(high) ? ')' : ']');
 }
 
