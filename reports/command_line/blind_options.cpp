@@ -36,7 +36,6 @@ std::vector<Command> blind_commands() {
              request.size.outside = o.count("outside", 0, 5000);
              request.size.left_out_per_effect = o.count("left-out", 0, 1000);
              request.tool = o.text("tool");
-             request.partial = o.flag("partial");
              request.threads = o.threads();
              request.out = o.text("out");
              request.command = line;
@@ -46,7 +45,7 @@ std::vector<Command> blind_commands() {
              else if (action == "answer")
                run_blind_answer(request);
              else if (action == "open")
-               run_blind_open(request);
+               run_blind_open(request, o.flag("partial") ? Unanswered::left_out : Unanswered::refused);
              else
                throw std::invalid_argument(fmt::format("ACTION: '{}' is none of 'make', 'answer', 'open'", action));
            }}};

@@ -26,7 +26,7 @@
 #include "reports/commands/sweep_command.h"
 #include "reports/commands/verify_command.h"
 #include "reports/output/interrupt.h"
-#include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {

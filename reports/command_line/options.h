@@ -39,6 +39,7 @@ class Options {
   /// Nothing that was given may be empty. @throws std::invalid_argument
   void check_given() const;
 
+  bool has(const std::string& name) const { return texts_.contains(name); }
   bool given(const std::string& name) const { return !texts_.at(name).empty(); }
   const std::vector<std::string>& all(const std::string& name) const { return texts_.at(name); }
   /// The one value of an option: given once, or its default ("" if it has none).

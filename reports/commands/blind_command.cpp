@@ -247,7 +247,7 @@ void run_blind_answer(const BlindRequest& request) {
   fmt::print("\n");
 }
 
-void run_blind_open(const BlindRequest& request) {
+void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
   const Places places(request);
   const std::vector<int> numbers = case_numbers(places);
   std::vector<analysis::BlindTruth> truths;
@@ -274,7 +274,7 @@ void run_blind_open(const BlindRequest& request) {
   }
   const auto reached_cases = static_cast<std::size_t>(std::ranges::count_if(
       numbers, [&](int number) { return given.contains(number) || tool_failed(places, number); }));
-  if (reached_cases < numbers.size() && !request.partial && !fs::exists(places.marker))
+  if (reached_cases < numbers.size() && unanswered == Unanswered::refused && !fs::exists(places.marker))
     throw std::invalid_argument(
         fmt::format("{}: {} of {} cases are answered, and opening the truths ends the run: answer the others first "
                     "(`blind answer`),"

@@ -8,13 +8,13 @@
 #include <optional>
 #include <vector>
 
-#include "analysis/experiment/csv_field.h"
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/input_error.h"
 #include "analysis/motion_capture/angle_file.h"
 #include "analysis/motion_capture/collision_comparison.h"
 #include "markov/parallel.h"
 #include "reports/output/output_file.h"
+#include "reports/output/table.h"
 
 namespace metastable::reports {
 namespace {
@@ -44,7 +44,7 @@ Files write_files(const analysis::Experiment& experiment, const std::vector<anal
     const dynamics::WheelMap& map = maps[angles[t].condition];
     double position = 0;  // chord by chord
     for (const FoundCollision& c : found[t].collisions) {
-      const std::string key = fmt::format("{},{},{}", analysis::csv_field(condition.id), angles[t].number, c.number);
+      const std::string key = fmt::format("{},{},{}", csv_field(condition.id), angles[t].number, c.number);
       const int leg = (condition.first_landing_leg + c.number - 1) % experiment.legs();
       fmt::format_to(std::back_inserter(files.collisions), "{},{},{:.6f},{:.6f},{:.6g},{}\n", key, leg,
                      reported_time(c), position, reported_speed(c, peak),

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "reports/output/output_error.h"
+#include "reports/output/output_file.h"
 
 namespace metastable::reports {
 

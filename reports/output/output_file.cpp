@@ -1,6 +1,7 @@
 #include "reports/output/output_file.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -28,23 +29,20 @@ fs::path temporary_name(const fs::path& target) {
          ("." + target.filename().string() + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".tmp");
 }
 
-// Temporaries of the same target whose writer was killed: nobody holds their lock.
+// Temporaries of the same target whose writer was killed.
 void remove_left_behind(const fs::path& target) {
-  const std::string begin = "." + target.filename().string() + ".", end = ".tmp";
+  const std::string begin = "." + target.filename().string() + ".";
   std::error_code error;
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   for (fs::directory_iterator entry(folder, error), last; !error && entry != last; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (name.size() <= begin.size() + end.size() || !name.starts_with(begin) || !name.ends_with(end)) continue;
-    const std::string_view number =
-        std::string_view(name).substr(begin.size(), name.size() - begin.size() - end.size());
-    if (number.find_first_not_of("0123456789-") != std::string_view::npos) continue;
-    try {
-      const FileLock lock(entry->path(), FileLock::Missing::leave);
-      std::error_code ignored;
-      if (lock.held()) fs::remove(entry->path(), ignored);
-    } catch (const OutputError&) {  // of another user
-    }
+    int writer = 0, number = 0, end = 0;
+    if (!name.starts_with(begin) ||
+        std::sscanf(name.c_str() + begin.size(), "%d-%d.tmp%n", &writer, &number, &end) != 2 ||
+        begin.size() + static_cast<std::size_t>(end) != name.size() || writer <= 0)
+      continue;
+    std::error_code ignored;
+    if (::kill(writer, 0) != 0 && errno == ESRCH) fs::remove(entry->path(), ignored);
   }
 }
 
@@ -61,6 +59,9 @@ void wait_for_reader(const fs::path& pipe) {
 
 }  // namespace
 
+OutputError::OutputError(const fs::path& path, const std::string& reason)
+    : std::invalid_argument("cannot write " + (path.empty() ? std::string("''") : path.string()) + ": " + reason) {}
+
 OutputFile::OutputFile(const fs::path& path) : path_(path) {
   file_.imbue(std::locale::classic());
   buffer_.imbue(std::locale::classic());
@@ -76,10 +77,7 @@ OutputFile::OutputFile(const fs::path& path) : path_(path) {
     if (fs::is_fifo(target_, error)) wait_for_reader(target_);
   } else {
     remove_left_behind(target_);
-    do {
-      temporary_ = temporary_name(target_);
-      lock_ = FileLock(temporary_, FileLock::Missing::create);
-    } while (!lock_.held());
+    temporary_ = temporary_name(target_);
   }
   errno = 0;
   file_.open(in_place ? target_ : temporary_, std::ios::binary);
@@ -117,12 +115,6 @@ void write_file(const fs::path& path, std::string_view content) {
   OutputFile file(path);
   file.stream().write(content.data(), static_cast<std::streamsize>(content.size()));
   file.commit();
-}
-
-void flush_standard_output() {
-  errno = 0;
-  const bool printed = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
-  if (!printed || !std::cout.flush()) throw OutputError("standard output", last_reason());
 }
 
 void make_folder(const fs::path& path) {

@@ -4,16 +4,19 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <stdexcept>
 #include <string_view>
-
-#include "reports/output/file_lock.h"
-#include "reports/output/output_error.h"
 
 namespace metastable::reports {
 
+/// An output that cannot be written; the message names the path and the reason. A user error: exit code 2.
+class OutputError : public std::invalid_argument {
+ public:
+  OutputError(const std::filesystem::path& path, const std::string& reason);
+};
+
 /// A file written under a temporary name beside its target and renamed on commit(). Without commit() the target is
-/// left as it was and the temporary is removed; one that a killed program left goes when its target is next written.
-/// "-" is standard output, written on commit(). A target that is no
+/// left as it was and the temporary is removed. "-" is standard output, written on commit(). A target that is no
 /// regular file (a pipe, /dev/null) is written directly; a symbolic link is followed.
 class OutputFile {
  public:
@@ -32,16 +35,12 @@ class OutputFile {
   std::filesystem::path path_;
   std::filesystem::path target_;     // path_ with symbolic links resolved; empty: standard output
   std::filesystem::path temporary_;  // empty: nothing to rename or remove
-  FileLock lock_;                    // of the temporary: its writer lives
   std::ofstream file_;
   std::ostringstream buffer_;  // standard output until commit
 };
 
 /// The whole of `content` into `path` ("-": standard output), or nothing. @throws OutputError
 void write_file(const std::filesystem::path& path, std::string_view content);
-
-/// Sees to it that all that was printed has been written. @throws OutputError
-void flush_standard_output();
 
 /// Creates a folder and its parents where they are missing. @throws OutputError
 void make_folder(const std::filesystem::path& path);

@@ -155,7 +155,7 @@ void append_csv_cell(std::vector<std::string>& fields, const Cell& cell, bool wi
   const std::size_t first = fields.size();
   struct Visitor {
     std::vector<std::string>& fields;
-    void operator()(const std::string& text) const { fields.push_back(analysis::csv_field(text)); }
+    void operator()(const std::string& text) const { fields.push_back(csv_field(text)); }
     void operator()(std::int64_t whole) const { fields.push_back(fmt::format("{}", whole)); }
     void operator()(double number) const { fields.push_back(full_precision(number)); }
     void operator()(const Estimate& e) const {
@@ -444,6 +444,8 @@ std::string escape_html(std::string_view text) {
   return out;
 }
 
+std::string csv_field(const std::string& text) { return analysis::csv_field(text); }
+
 std::string to_csv(const Table& table) {
   validate(table);
   std::string out;
@@ -456,10 +458,10 @@ std::string to_csv(const Table& table) {
   };
   std::vector<std::string> fields;
   for (std::size_t j = 0; j < table.columns.size(); ++j) {
-    fields.push_back(analysis::csv_field(heading(table.columns[j])));
+    fields.push_back(csv_field(heading(table.columns[j])));
     if (!column_has<Estimate>(table, j)) continue;
-    fields.push_back(analysis::csv_field(heading(table.columns[j], " low95")));
-    fields.push_back(analysis::csv_field(heading(table.columns[j], " high95")));
+    fields.push_back(csv_field(heading(table.columns[j], " low95")));
+    fields.push_back(csv_field(heading(table.columns[j], " high95")));
   }
   append_row(fields);
   for (const auto& row : table.rows) {

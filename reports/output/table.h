@@ -78,11 +78,12 @@ struct Table {
 /// All renderings throw std::invalid_argument naming table, row and column for a row of the wrong length or a NaN, and
 /// give the same bytes for the same table in every locale. Text may hold any UTF-8.
 
-/// RFC 4180 quoting with line ends LF, formulas disarmed (analysis/experiment/csv_field.h). Title, notes and provenance
-/// come first as lines that start with "# "; then a header "name [unit]", then the rows at full precision. A column
-/// with an Estimate becomes three: "name [unit]", "name low95 [unit]", "name high95 [unit]". Infinite is the word
-/// "infinite".
+/// RFC 4180 quoting with line ends LF. Title, notes and provenance come first as lines that start with "# "; then a
+/// header "name [unit]", then the rows at full precision. A column with an Estimate becomes three: "name [unit]",
+/// "name low95 [unit]", "name high95 [unit]". Infinite is the word "infinite".
 std::string to_csv(const Table& table);
+/// One field of such a file: in quotes where it holds a comma, a quote or a line end, or starts with '#'.
+std::string csv_field(const std::string& text);
 /// Title as bold text, pipe table, notes, provenance.
 std::string to_markdown(const Table& table);
 /// A floating table for \usepackage{booktabs}, any engine: everything but ASCII is turned into commands where LaTeX

@@ -97,7 +97,7 @@ TEST_F(BlindRun, RefusesASealedFolderThatIsNoCase) {
   const fs::path stray = fs::path(request_.folder) / "cases" / "0001 copy";
   fs::create_directories(stray);
   write(stray / "seal.txt", "");
-  for (const auto command : {run_blind_answer, run_blind_open})
+  for (const auto command : {+run_blind_answer, +[](const BlindRequest& of) { run_blind_open(of); }})
     EXPECT_EQ(message_of([&] { command(request_); }),
               stray.string() + ": holds a seal.txt, but its name is not that of a case (0001, 0002, ...)");
 }
@@ -150,8 +150,7 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
                 ": 2 of 3 cases are answered, and opening the truths ends the run: answer the others first "
                 "(`blind answer`), or give --partial to grade these alone");
   EXPECT_FALSE(fs::exists(request_.folder + "-sealed/opened.csv"));
-  request_.partial = true;
-  run_blind_open(request_);
+  run_blind_open(request_, Unanswered::left_out);
   EXPECT_NE(message_of([&] { run_blind_answer(request_); }).find("was opened"), std::string::npos);
   write(record, all);
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("written after the truths had been opened"),

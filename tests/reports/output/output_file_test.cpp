@@ -52,7 +52,7 @@ TEST_F(OutputFileTest, TwoWritersOfOneTargetDoNotMix) {
   EXPECT_EQ(files(), 1u);
 }
 
-// A killed writer leaves its temporary; nobody holds its lock, so it goes when the target is written again.
+// A killed writer leaves its temporary, which goes when the target is written again.
 TEST_F(OutputFileTest, SweepsUpWhatAKilledWriterLeft) {
   EXPECT_EXIT(
       {
