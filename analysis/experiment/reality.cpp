@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/experiment/csv_field.h"
 #include "analysis/statistics/random.h"
 #include "markov/parallel.h"
 

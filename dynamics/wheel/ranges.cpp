@@ -7,8 +7,8 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr double most_gyration = 10;  // r_g over the mean leg: axle and weights far wider than the wheel
-constexpr double rounding = 1e-3;     // a point mass written with three digits is still one
+constexpr double most_gyration = 3;  // r_g over the mean leg: axle and weights far wider than the wheel
+constexpr double rounding = 1e-3;    // a point mass written with three digits is still one
 
 }  // namespace
 

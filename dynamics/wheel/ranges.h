@@ -45,9 +45,9 @@ inline constexpr Range turned{.low = -1e9, .high = 1e9};            ///< unwrapp
 Range slope_range(int legs);
 
 /// Why the wheel's inertia about the stance foot is none, "" if nothing is wrong with it or it is not given: it is at
-/// least M (mean L)^2, that of the hub's mass alone, and its r_g at most ten mean legs.
+/// least M (mean L)^2, that of the hub's mass alone, and its r_g at most three mean legs.
 std::string inertia_objection(const Wheel& wheel);
-/// Likewise the radius of gyration: at most ten mean legs.
+/// Likewise the radius of gyration: at most three mean legs.
 std::string gyration_objection(const Wheel& wheel);
 
 }  // namespace metastable::dynamics

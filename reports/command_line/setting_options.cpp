@@ -78,10 +78,10 @@ void add_wheel(Options& options) {
   options.add("leg-count", "N", "8", "Number of legs when --legs is one length, 3..1000");
   options.add("mass", "KG", "1.39", "Hub mass M [kg]", range::mass);
   options.add("inertia", "KGM2", "",
-              "About the stance foot [kg m^2], from M (mean L)^2 to 101 times that (default: M (mean L)^2; under "
+              "About the stance foot [kg m^2], from M (mean L)^2 to ten times that (default: M (mean L)^2; under "
               "coulomb and plastic plus M r_g^2)");
   options.add("radius-of-gyration", "M", "",
-              "About the hub [m], at most ten mean legs (default: 0.05 under coulomb, 0 under plastic)",
+              "About the hub [m], at most three mean legs (default: 0.05 under coulomb, 0 under plastic)",
               range::radius_of_gyration);
   options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m] (published)", range::ramp_stiffness);
   options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (published; default: the hub mass)",
@@ -185,6 +185,9 @@ analysis::StudyOptions study_options(const Options& options) {
     throw std::invalid_argument(
         fmt::format("--method: '{}' is neither 'sampled' nor 'integrated'", options.text("method")));
   study.method = analysis::method_from_name(options.text("method"));
+  for (const char* name : {"samples", "sequence", "draws", "tail", "replicates"})
+    if (options.given(name) && study.method != analysis::Method::sampled)
+      throw std::invalid_argument(fmt::format("--{}: has a meaning under --method sampled only", name));
   if (options.given("cells")) study.cells = options.whole("cells", 8, 4096);
   if (options.given("samples")) study.samples = options.whole("samples", 16, 1u << 24);
   study.tolerance = options.number("tolerance");

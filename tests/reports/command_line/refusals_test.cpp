@@ -56,6 +56,7 @@ TEST_F(Refusals, OfOptionsThatDoNothing) {
        "--restitution: has a meaning under --law published and coulomb only"},
       {{"sweep", "--law", "plastic", "--friction-sd", "0.1,0.2", "--out", path("s.csv")},
        "--friction-sd: has no meaning under --law plastic"},
+      {{"steps", "--method", "integrated", "--samples", "256"}, "--samples: has a meaning under --method sampled only"},
       {{"steps", "--json", ""}, "--json: what is given is empty"},
       {{"effects", "--json="}, "--json: what is given is empty"},
       {{"diagnose", ""}, "DIR: what is given is empty"},
@@ -91,9 +92,9 @@ TEST_F(Refusals, OfWhatNoWheelCanHave) {
        "--inertia: 0.0035 kg m^2 is below M (mean L)^2 = 0.03207 kg m^2, the least about the stance foot; if it is the "
        "inertia about the hub, 0.03557 kg m^2 is meant"},
       {{"steps", "--inertia", "1e6"},
-       "--inertia: 1000000 kg m^2 is above 3.239 kg m^2, where the radius of gyration is 10 mean legs"},
+       "--inertia: 1000000 kg m^2 is above 0.3207 kg m^2, where the radius of gyration is 3 mean legs"},
       {{"steps", "--law", "coulomb", "--radius-of-gyration", "2"},
-       "--radius-of-gyration: 2 m is outside [0, 1.519] m (10 mean legs)"},
+       "--radius-of-gyration: 2 m is outside [0, 0.4557] m (3 mean legs)"},
   });
 }
 
@@ -132,7 +133,7 @@ TEST_F(Refusals, DoNotReachTheEndsOfTheRanges) {
                                              {"--mass", "1e-6", "--ramp-stiffness", "1"},
                                              {"--legs", "0.001", "--initial-speed", "1000,0"},
                                              {"--legs", "100", "--initial-speed", "0.3,0.01", "--ramp-length", "3000"},
-                                             {"--inertia", "3.23"},
+                                             {"--inertia", "0.32"},
                                              {"--gravity", "0.001"},
                                              {"--gravity", "1000", "--initial-speed", "70,1"}}) {
     SCOPED_TRACE(fmt::format("{}", fmt::join(words, " ")));
