@@ -36,7 +36,8 @@ set(NARROW
   "analysis/experiment/.*:analysis/study:setting.h"
   "analysis/experiment/.*:dynamics/laboratory:laboratory.h"
   "analysis/experiment/(angle|coast|csv|experiment|input|stand|trial).*:dynamics/laboratory:"
-  "analysis/likelihood/.*:analysis/diagnosis:transition_model.h"
+  "analysis/likelihood/(d[^i]|[^d]).*:analysis/diagnosis:transition_model.h"
+  "analysis/likelihood/diagnose.*:analysis/diagnosis:diagnosis.h"
   "analysis/diagnosis/.*:dynamics/wheel:truncated_normal.h effect_catalogue.h")
 
 set(HEAVY "openssl/|Spectra/|suitesparse/|klu\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
@@ -145,6 +146,7 @@ set(samples
   "analysis/experiment/reality.h|dynamics/laboratory/rolling_motion.h|no"
   "analysis/blind/a.cpp|dynamics/laboratory/laboratory.h|no"    "analysis/diagnosis/a.cpp|dynamics/laboratory/laboratory.h|no"
   "reports/commands/a.cpp|dynamics/laboratory/laboratory.h|no"  "analysis/likelihood/a.h|analysis/diagnosis/transition_model.h|yes"
+  "analysis/likelihood/diagnose.h|analysis/diagnosis/diagnosis.h|yes"
   "analysis/likelihood/a.h|analysis/diagnosis/diagnosis.h|no"   "analysis/diagnosis/a.h|dynamics/wheel/effect_catalogue.h|yes"
   "analysis/diagnosis/a.h|dynamics/wheel/truncated_normal.h|yes" "analysis/diagnosis/a.h|dynamics/wheel/extended_wheel.h|no"
   "analysis/diagnosis/a.h|analysis/experiment/experiment.h|no"
