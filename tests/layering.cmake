@@ -1,32 +1,114 @@
-# Who may include whom, and which headers stay inside .cpp files.
-#   cmake -D ROOT=<source tree> -P layering.cmake                    the tree's includes
-#   cmake -D SELF_TEST=ON -D WORK_DIR=<empty folder> -P layering.cmake   that the check rejects what it should
+# Which room may include which, and which headers stay inside .cpp files.
+#   cmake -D ROOT=<source tree> -P layering.cmake                    checks the tree's includes
+#   cmake -D SELF_TEST=ON -D WORK_DIR=<empty folder> -P layering.cmake   checks that it rejects what it should
 cmake_minimum_required(VERSION 3.25)
 
-set(FORBIDDEN_IN_dynamics "markov/|analysis/|reports/")
-set(FORBIDDEN_IN_markov "dynamics/|analysis/|reports/")
-set(FORBIDDEN_IN_analysis "reports/")
-set(FORBIDDEN_IN_reports "tests/")
+# Every room in the order of dependency, with the rooms it may include beside itself: only rooms further up.
+set(ROOMS
+  "markov:"
+  "markov/chain: markov"
+  "markov/passage: markov markov/chain"
+  "markov/rows: markov markov/chain markov/passage"
+  "dynamics/wheel:"
+  "dynamics/settled: dynamics/wheel"
+  "dynamics/laboratory: dynamics/wheel"
+  "dynamics/return_map: dynamics/wheel"
+  "dynamics/bounds: dynamics/wheel dynamics/return_map"
+  "analysis/statistics: markov dynamics/wheel"
+  "analysis/diagnosis: markov dynamics/wheel analysis/statistics"
+  "analysis/study: markov markov/chain markov/passage markov/rows dynamics/return_map dynamics/bounds analysis/statistics"
+  "analysis/experiment: markov dynamics/wheel dynamics/laboratory dynamics/return_map analysis/statistics analysis/study"
+  "analysis/description: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/study analysis/experiment"
+  "analysis/likelihood: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment"
+  "analysis/blind: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment analysis/likelihood"
+  "analysis/motion_capture: dynamics/wheel dynamics/return_map analysis/statistics analysis/experiment"
+  "analysis/paper: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/study analysis/experiment analysis/description"
+  "analysis/sensitivity: markov markov/chain markov/passage markov/rows dynamics/return_map analysis/statistics analysis/study"
+  "reports/output: analysis/statistics"
+  "reports/description: dynamics/wheel analysis/statistics analysis/description analysis/paper reports/output"
+  "reports/diagnosis: dynamics/wheel analysis/statistics analysis/diagnosis analysis/blind reports/output"
+  "reports/study: markov/rows dynamics/wheel analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
+  "reports/commands: markov markov/passage dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/likelihood analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity reports/output reports/description reports/diagnosis reports/study"
+  "reports/command_line: markov/chain dynamics/wheel analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands")
+
+# Where less than a whole room may be seen: who (a pattern of files), which room, which of its headers.
+set(NARROW
+  "analysis/experiment/.*:analysis/study:setting.h"
+  "analysis/experiment/.*:dynamics/laboratory:laboratory.h"
+  "analysis/experiment/(angle|coast|csv|experiment|input|stand|trial).*:dynamics/laboratory:"
+  "analysis/likelihood/(d[^i]|[^d]).*:analysis/diagnosis:transition_model.h"
+  "analysis/likelihood/diagnose.*:analysis/diagnosis:diagnosis.h"
+  "analysis/diagnosis/.*:dynamics/wheel:truncated_normal.h effect_catalogue.h")
+
 set(HEAVY "openssl/|Spectra/|suitesparse/|klu\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
 
-# Lists in `result` every offending include under `root` as "file: header (reason)".
+set(names "")
+foreach(entry IN LISTS ROOMS)
+  string(REGEX MATCH "^([^:]*): ?(.*)$" _ "${entry}")
+  set(room ${CMAKE_MATCH_1})
+  string(REPLACE " " ";" MAY_${room} "${CMAKE_MATCH_2}")
+  foreach(seen IN LISTS MAY_${room})
+    if(NOT seen IN_LIST names)
+      message(FATAL_ERROR "layering: ${room} may not include ${seen}, which does not stand above it in the list of rooms")
+    endif()
+  endforeach()
+  list(APPEND names ${room})
+endforeach()
+
+# Sets `result` to why `file` must not include `header`, or to nothing.
+function(layering_fault file header result)
+  get_filename_component(room ${file} DIRECTORY)
+  string(REGEX REPLACE "^(\\.\\./)+|^metastable/" "" target "${header}")
+  set(fault "")
+  if(target MATCHES "^(${HEAVY})" AND NOT file MATCHES "\\.cpp$")
+    set(fault "heavy, only in a .cpp file")
+  elseif(target MATCHES "^(markov|dynamics|analysis|reports|tests)/")
+    get_filename_component(target_room ${target} DIRECTORY)
+    get_filename_component(target_name ${target} NAME)
+    if(NOT target_room STREQUAL room AND NOT target_room IN_LIST MAY_${room})
+      set(fault "${room} must not know ${target_room}")
+    endif()
+    foreach(rule IN LISTS NARROW)
+      string(REGEX MATCH "^([^:]*):([^:]*):([^:]*)$" _ "${rule}")
+      set(who ${CMAKE_MATCH_1})
+      set(narrowed ${CMAKE_MATCH_2})
+      string(REPLACE " " ";" headers "${CMAKE_MATCH_3}")
+      if(file MATCHES "^${who}$" AND target_room STREQUAL narrowed AND NOT target_name IN_LIST headers)
+        set(fault "${file} sees of ${narrowed} no more than: ${headers}")
+      endif()
+    endforeach()
+  endif()
+  set(${result} "${fault}" PARENT_SCOPE)
+endfunction()
+
+# Lists in `result` every offending include under `root` as "file: header (reason)", and every file outside the rooms.
 function(layering_violations root result)
   set(violations "")
-  foreach(folder dynamics markov analysis reports)
+  foreach(folder markov dynamics analysis reports)
     file(GLOB_RECURSE files RELATIVE ${root} ${root}/${folder}/*.h ${root}/${folder}/*.hpp ${root}/${folder}/*.cpp)
     foreach(file IN LISTS files)
+      get_filename_component(room ${file} DIRECTORY)
+      if(NOT room IN_LIST names)
+        list(APPEND violations "${file} (${room} is no room)")
+        continue()
+      endif()
       file(STRINGS ${root}/${file} lines REGEX "^[ \t]*#[ \t]*include[ \t]*[<\"]")
       foreach(line IN LISTS lines)
         string(REGEX REPLACE "^[^<\"]*[<\"]([^>\"]*)[>\"].*$" "\\1" header "${line}")
-        string(REGEX REPLACE "^(\\.\\./)+|^metastable/" "" target "${header}")
-        if(target MATCHES "^(${FORBIDDEN_IN_${folder}})")
-          list(APPEND violations "${file}: ${header} (${folder}/ must not know it)")
-        endif()
-        if(target MATCHES "^(${HEAVY})" AND NOT file MATCHES "\\.cpp$")
-          list(APPEND violations "${file}: ${header} (heavy, only in a .cpp file)")
+        layering_fault(${file} ${header} fault)
+        if(fault)
+          list(APPEND violations "${file}: ${header} (${fault})")
         endif()
       endforeach()
     endforeach()
+  endforeach()
+  # Tests mirror the rooms; what several of them share stands at the root of their folder.
+  file(GLOB_RECURSE files RELATIVE ${root}/tests ${root}/tests/*_test.cpp)
+  foreach(file IN LISTS files)
+    get_filename_component(room ${file} DIRECTORY)
+    if(NOT room IN_LIST names)
+      list(APPEND violations "tests/${file} (${room} is no room)")
+    endif()
   endforeach()
   set(${result} "${violations}" PARENT_SCOPE)
 endfunction()
@@ -42,14 +124,43 @@ endif()
 
 # Each sample: file, header, whether it is allowed.
 set(samples
-  "dynamics/a.cpp|markov/chain.h|no"      "dynamics/a.h|analysis/study.h|no"     "dynamics/a.cpp|reports/table.h|no"
-  "markov/a.h|dynamics/wheel.h|no"        "markov/a.cpp|../dynamics/wheel.h|no"  "markov/a.cpp|metastable/analysis/study.h|no"
-  "markov/a.h|reports/table.h|no"         "analysis/a.cpp|reports/table.h|no"    "reports/deep/a.h|kainjow/mustache.hpp|no"
-  "markov/a.h|Spectra/GenEigsSolver.h|no" "markov/a.h|klu.h|no"                  "markov/a.h|suitesparse/klu.h|no"
-  "reports/a.h|nlohmann/json.hpp|no"      "reports/a.h|CLI/CLI.hpp|no"           "analysis/a.h|toml++/toml.h|no"
-  "markov/a.cpp|Spectra/GenEigsSolver.h|yes" "markov/a.cpp|klu.h|yes"            "markov/a.h|markov/chain.h|yes"
-  "analysis/a.h|markov/chain.h|yes"       "analysis/a.h|dynamics/wheel.h|yes"    "reports/a.cpp|nlohmann/json.hpp|yes"
-  "reports/a.h|analysis/study.h|yes"      "dynamics/a.h|vector|yes"              "dynamics/a.h|dynamics/wheel.h|yes")
+  # Folders.
+  "dynamics/wheel/a.cpp|markov/chain/chain.h|no"       "dynamics/wheel/a.h|analysis/study/setting.h|no"
+  "dynamics/wheel/a.cpp|reports/output/table.h|no"     "markov/chain/a.h|dynamics/wheel/wheel.h|no"
+  "markov/chain/a.cpp|../../dynamics/wheel/wheel.h|no" "markov/rows/a.cpp|metastable/analysis/study/setting.h|no"
+  "markov/rows/a.h|reports/output/table.h|no"          "analysis/study/a.cpp|reports/output/table.h|no"
+  "reports/output/a.cpp|tests/reports/support.h|no"    "analysis/study/a.cpp|markov/rows/draws.h|yes"
+  # Rooms of one folder: only upwards in the list.
+  "markov/parallel.h|markov/chain/chain.h|no"          "markov/chain/a.h|markov/passage/first_passage.h|no"
+  "markov/passage/a.h|markov/rows/draws.h|no"          "markov/rows/a.h|markov/passage/first_passage.h|yes"
+  "dynamics/wheel/a.h|dynamics/return_map/trials.h|no" "dynamics/laboratory/a.h|dynamics/return_map/trials.h|no"
+  "dynamics/return_map/a.h|dynamics/bounds/interval.h|no" "dynamics/bounds/a.h|dynamics/return_map/trials.h|yes"
+  "analysis/statistics/a.h|analysis/study/setting.h|no"   "analysis/study/a.h|analysis/statistics/estimate.h|yes"
+  "analysis/study/a.h|analysis/experiment/experiment.h|no" "analysis/description/a.h|analysis/likelihood/wheel_runs.h|no"
+  "analysis/likelihood/a.h|analysis/blind/blind_grade.h|no" "analysis/blind/a.h|analysis/likelihood/wheel_runs.h|yes"
+  "reports/output/a.h|reports/study/study_text.h|no"   "reports/study/a.h|reports/output/table.h|yes"
+  "reports/commands/a.h|reports/command_line/cli.h|no" "reports/command_line/a.h|reports/commands/request.h|yes"
+  # The narrower lines.
+  "analysis/experiment/a.h|analysis/study/setting.h|yes"        "analysis/experiment/a.h|analysis/study/metastability.h|no"
+  "analysis/experiment/reality.h|dynamics/laboratory/laboratory.h|yes" "analysis/experiment/experiment.cpp|dynamics/laboratory/laboratory.h|no"
+  "analysis/experiment/reality.h|dynamics/laboratory/rolling_motion.h|no"
+  "analysis/blind/a.cpp|dynamics/laboratory/laboratory.h|no"    "analysis/diagnosis/a.cpp|dynamics/laboratory/laboratory.h|no"
+  "reports/commands/a.cpp|dynamics/laboratory/laboratory.h|no"  "analysis/likelihood/a.h|analysis/diagnosis/transition_model.h|yes"
+  "analysis/likelihood/diagnose.h|analysis/diagnosis/diagnosis.h|yes"
+  "analysis/likelihood/a.h|analysis/diagnosis/diagnosis.h|no"   "analysis/diagnosis/a.h|dynamics/wheel/effect_catalogue.h|yes"
+  "analysis/diagnosis/a.h|dynamics/wheel/truncated_normal.h|yes" "analysis/diagnosis/a.h|dynamics/wheel/extended_wheel.h|no"
+  "analysis/diagnosis/a.h|analysis/experiment/experiment.h|no"
+  # Nothing outside the rooms.
+  "dynamics/a.h|vector|no"          "analysis/a.cpp|vector|no"       "markov/deep/a.h|vector|no"
+  "tests/markov/a_test.cpp|vector|yes" "tests/analysis/a_test.cpp|vector|no"
+  "tests/analysis/study/a_test.cpp|dynamics/laboratory/laboratory.h|yes"
+  # Heavy headers.
+  "reports/output/a.h|kainjow/mustache.hpp|no"         "markov/chain/a.h|Spectra/GenEigsSolver.h|no"
+  "markov/chain/a.h|klu.h|no"                          "markov/chain/a.h|suitesparse/klu.h|no"
+  "reports/output/a.h|nlohmann/json.hpp|no"            "reports/command_line/a.h|CLI/CLI.hpp|no"
+  "analysis/experiment/a.h|toml++/toml.h|no"           "markov/chain/a.cpp|Spectra/GenEigsSolver.h|yes"
+  "markov/chain/a.cpp|klu.h|yes"                       "reports/study/a.cpp|nlohmann/json.hpp|yes"
+  "dynamics/wheel/a.h|vector|yes"                      "dynamics/wheel/a.h|dynamics/wheel/wheel.h|yes")
 foreach(sample IN LISTS samples)
   string(REPLACE "|" ";" sample "${sample}")
   list(GET sample 0 file)

@@ -9,6 +9,7 @@
 #include <limits>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
 #include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
@@ -326,30 +327,30 @@ Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
 
 // The tests for a gap, together.
 void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated) {
-  d.p_effects = std::max(least_p_value, ranking.p_value);
-  d.p_where = std::max(least_p_value, d.recalibrated.p_value);
-  d.p_recalibration = std::max(least_p_value, d.p_recalibration);
+  d.gap.p_effects = std::max(least_p_value, ranking.p_value);
+  d.gap.p_where = std::max(least_p_value, d.gap.recalibrated.p_value);
+  d.gap.p_recalibration = std::max(least_p_value, d.gap.p_recalibration);
   const double pairs = std::max(least_p_value, pairs_p_value(ranking, candidates, recalibrated));
-  d.p_value =
-      std::min({1.0, d.p_effects / share_for_effects, d.p_where / (1 - share_for_effects), pairs / share_for_pairs});
-  d.p_as_given = std::min(1.0, 2 * std::min(d.p_recalibration, d.p_value));
+  d.gap.p_value = std::min(
+      {1.0, d.gap.p_effects / share_for_effects, d.gap.p_where / (1 - share_for_effects), pairs / share_for_pairs});
+  d.gap.p_as_given = std::min(1.0, 2 * std::min(d.gap.p_recalibration, d.gap.p_value));
 }
 
 void note_what_is_rough(Diagnosis& d, const CauseRanking& ranking, const Fit& recalibrated, double largest_gain) {
   // Where the model is far off its likelihood is rough; what the fit missed is said where it is not next to nothing.
   for (const RankedCause& cause : ranking.singles) largest_gain = std::max(largest_gain, cause.gain);
   if (!recalibrated.converged && recalibrated.promised > settled_rise + settled_share * largest_gain)
-    d.notes.push_back(
+    d.data.notes.push_back(
         fmt::format("the recalibrated parameters did not settle ({}): by its slope the likelihood could rise by {:.2g} "
                     "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
                     recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
   if (!ranking.scan.trials_suffice)
-    d.notes.push_back(fmt::format(
+    d.data.notes.push_back(fmt::format(
         "{} {} of {:.2g} transitions: chance levels come from the model's information alone; from {} trials "
         "of {} transitions on, from the trials' own scatter",
-        d.trials, d.trials == 1 ? "trial" : "trials",
-        static_cast<double>(d.events) / static_cast<double>(std::max<std::size_t>(1, d.trials)), enough_trials,
-        enough_transitions));
+        d.data.trials, d.data.trials == 1 ? "trial" : "trials",
+        static_cast<double>(d.data.events) / static_cast<double>(std::max<std::size_t>(1, d.data.trials)),
+        enough_trials, enough_transitions));
 }
 
 // All hypotheses by falling evidence; those that are not decided go to the diagnosis.
@@ -359,13 +360,13 @@ std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& 
     if (cause.not_decided.empty())
       ordered.push_back(&cause);
     else
-      d.not_decided.push_back(describe(model, cause));
+      d.causes.not_decided.push_back(describe(model, cause));
   }
   for (const RankedCause& pair : ranking.pairs) {
     if (std::isfinite(pair.evidence))
       ordered.push_back(&pair);
     else
-      d.not_decided.push_back(describe(model, pair));
+      d.causes.not_decided.push_back(describe(model, pair));
   }
   std::stable_sort(ordered.begin(), ordered.end(),
                    [](const RankedCause* a, const RankedCause* b) { return a->evidence > b->evidence; });
@@ -383,7 +384,7 @@ struct Chosen {
 Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking, const RankedCause& best,
               const Fit& recalibrated, const DiagnosisOptions& options) {
   Chosen chosen{&best.fit};
-  d.left = gap_map(model, best.fit, options.draws, options.seed + 1);
+  d.gap.left = gap_map(model, best.fit, options.draws, options.seed + 1);
   const Fit& exact = exact_part(ranking.singles, best.terms, recalibrated);
   PhaseGain gained = phase_gain(model, best.fit, exact);
   if (model.refits_noise()) {  // how large the effect is beside the noise that it leaves, not beside what swallowed it
@@ -394,11 +395,11 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
   const double all = best.fit.log_likelihood - recalibrated.log_likelihood;
   if (all > 0) chosen.bent = std::clamp((best.fit.log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
   const double tolerated = model_error * model_error;
-  const double beyond = d.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
-  if (d.left.p_value < left_over_level && beyond > left_over_square)
+  const double beyond = d.gap.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
+  if (d.gap.left.p_value < left_over_level && beyond > left_over_square)
     chosen.none = std::exp(std::min(largest_log_odds, 0.5 * (beyond - left_over_square)));
-  d.together = best.together;
-  if (d.together > most_together) chosen.none = std::max(chosen.none, certain);
+  d.causes.together = best.together;
+  if (d.causes.together > most_together) chosen.none = std::max(chosen.none, certain);
   return chosen;
 }
 
@@ -428,20 +429,20 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const std
   if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
   const double weight_none = (none + none_prior) * (given_gap > 0 ? share * given_gap : even);
   const double sum = weight_null + share * given_gap + weight_none;
-  d.p_none = weight_none / sum;
-  (d.p_recalibration < recalibration_level ? d.p_recalibrate : d.p_no_gap) = weight_null / sum;
+  d.causes.p_none = weight_none / sum;
+  (d.gap.p_recalibration < recalibration_level ? d.causes.p_recalibrate : d.causes.p_no_gap) = weight_null / sum;
   for (const RankedCause* cause : ordered) {
     Cause one = describe(model, *cause);
     one.probability = share * std::exp(cause->evidence - top) / effects / sum;
-    d.causes.push_back(std::move(one));
+    d.causes.ranked.push_back(std::move(one));
   }
   return share * given_gap / sum;
 }
 
 void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) {
   if (!gap) {
-    d.verdict = d.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
-    if (d.verdict == Verdict::recalibrate) d.cause_set = {"contact_distribution"};
+    d.verdict = d.gap.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
+    if (d.verdict == Verdict::recalibrate) d.causes.set = {"contact_distribution"};
     return;
   }
   if (none >= 1) {
@@ -450,10 +451,11 @@ void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) 
   }
   d.verdict = Verdict::explained;
   double covered = 0;
-  for (const Cause& cause : d.causes) {
-    if (covered >= set_share * share_of_effects || cause.probability < least_of_first * d.causes.front().probability)
+  for (const Cause& cause : d.causes.ranked) {
+    if (covered >= set_share * share_of_effects ||
+        cause.probability < least_of_first * d.causes.ranked.front().probability)
       break;
-    d.cause_set.push_back(cause.name());
+    d.causes.set.push_back(cause.name());
     covered += cause.probability;
   }
 }
@@ -491,25 +493,26 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   };
 
   Diagnosis d;
-  d.trials = model.trials();
-  d.events = model.events().size();
-  for (const Event& e : model.events()) d.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
-  for (std::size_t c = 0; c < model.conditions(); ++c) d.condition_names.push_back(model.condition_name(c));
-  d.notes = model.notes();
-  d.refitted = model.recalibrated();
+  d.data.trials = model.trials();
+  d.data.events = model.events().size();
+  for (const Event& e : model.events())
+    d.data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
+  for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
+  d.data.notes = model.notes();
+  d.gap.refitted = model.recalibrated();
 
   progress(0, "the model as given");
   const std::vector<double> nominal = nominal_values(model);
   const Fit as_given = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
   const Fit given = unfitted(model, nominal);
-  d.as_given = gap_map(model, given, options.draws / 2, options.seed);
+  d.gap.as_given = gap_map(model, given, options.draws / 2, options.seed);
   const Fit recalibrated = best_fit(model, nominal, {});
-  d.contact = contact_estimates(model, recalibrated);
+  d.gap.contact = contact_estimates(model, recalibrated);
   const double recalibration_gain = 2 * (recalibrated.penalised - given.log_likelihood);
-  d.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
+  d.gap.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
 
   progress(0.1, "where the gap lies");
-  d.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
+  d.gap.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
 
   CauseRanking ranking = rank_causes(model, recalibrated, candidates,
                                      {.threads = options.threads,
@@ -520,48 +523,57 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   test_for_gap(d, ranking, candidates.size(), recalibrated);
   note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
   // What the data hold no information on is not decided, whatever its evidence.
-  d.visible = visibility(ranking.scan, candidates);
+  d.limits.visible = visibility(ranking.scan, candidates);
   for (std::size_t i = 0; i < ranking.singles.size(); ++i)
-    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && d.visible[i].smallest == 0)
-      ranking.singles[i].not_decided = d.visible[i].undecidable;
+    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() &&
+        d.limits.visible[i].smallest == 0)
+      ranking.singles[i].not_decided = d.limits.visible[i].undecidable;
   const std::vector<const RankedCause*> ordered = hypotheses(d, model, ranking);
-  const bool gap = d.p_value < options.level;
+  const bool gap = d.gap.p_value < options.level;
 
   Chosen chosen{&recalibrated};
   if (gap && !ordered.empty() && ordered.front()->evidence > 0 && !ordered.front()->fit.nuisance.empty()) {
     progress(0.68, "what is left");
     chosen = choose(d, model, ranking, *ordered.front(), recalibrated, options);
   } else {
-    d.left = d.recalibrated;
+    d.gap.left = d.gap.recalibrated;
     if (gap) chosen.none = certain;  // cells of the map stand out, and no effect does
   }
   progress(0.7, "how far it shrinks");
   const bool named = chosen.fit != &recalibrated;
-  if (named) d.size = model.size_in_words(chosen.fit->terms);
-  if (d.trials >= trials_for_folds(options.folds))
-    d.shrinkage = gap_shrinkage(model, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
-                                options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
+  if (named) d.causes.size = model.size_in_words(chosen.fit->terms);
+  if (d.data.trials >= trials_for_folds(options.folds))
+    d.shrinkage.measures =
+        gap_shrinkage(model, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
+                      options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
   // Even a cause that closes nearly all of a huge gap may leave a large one.
-  if (named && !d.shrinkage.empty() &&
-      d.shrinkage[0].with_effect >
-          least_left_over + model_error * model_error * left_over_errors * chosen.bent * d.shrinkage[0].baseline)
+  if (named && !d.shrinkage.measures.empty() &&
+      d.shrinkage.measures[0].with_effect > least_left_over + model_error * model_error * left_over_errors *
+                                                                  chosen.bent * d.shrinkage.measures[0].baseline)
     chosen.none = std::max(chosen.none, certain);
   const double share_of_effects = share_probabilities(d, model, ordered, candidates.size(), gap, chosen.none);
   give_verdict(d, gap, chosen.none, share_of_effects);
 
   progress(0.88, "steps before failure");
-  d.steps = steps_before_failure(model, nominal, recalibrated, *chosen.fit, options.seed);
-  if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.empty())
-    d.shrinkage.push_back(rest_shrinkage(at_risk, rests, d.steps));
-  d.profile = profiles(model, nominal, *chosen.fit, options.seed);
+  d.shrinkage.steps = steps_before_failure(model, nominal, recalibrated, *chosen.fit, options.seed);
+  if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
+    d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
+  d.shrinkage.profile = profiles(model, nominal, *chosen.fit, options.seed);
   progress(0.93, "what could not be seen");
-  d.missing = missing_columns(model, recalibrated, candidates, options.threads, options.seed);
-  d.not_possible = too_few(model, d, options);
-  if (d.verdict == Verdict::explained && d.cause_set.size() > 1 && ordered.size() > 1)
-    d.next = next_experiments(model, ordered[0]->fit, ordered[1]->terms, options.threads, options.seed);
+  d.limits.missing = missing_columns(model, recalibrated, candidates, options.threads, options.seed);
+  d.limits.not_possible = too_few(model, d, options);
+  if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && ordered.size() > 1)
+    d.limits.next = next_experiments(model, ordered[0]->fit, ordered[1]->terms, options.threads, options.seed);
   progress(1, "done");
   d.sentences = sentences(d);
   return d;
+}
+
+Diagnosis diagnose(std::shared_ptr<const TransitionModel> model, const DiagnosisOptions& options) {
+  if (!model) throw std::invalid_argument("diagnose: there is no model");
+  Diagnosis answer = diagnose(*model, options);
+  answer.model = std::move(model);
+  return answer;
 }
 
 }  // namespace metastable::analysis

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -112,33 +113,57 @@ struct NextExperiment {
   double separation = 0;  ///< 2 Delta log likelihood expected between the two leading causes, at the fitted size
 };
 
+/// The answer for one experiment.
 struct Diagnosis {
+  std::shared_ptr<const TransitionModel> model;  ///< diagnosed; nothing where it was passed by reference
   Verdict verdict = Verdict::no_gap;
   std::vector<std::string> sentences;  ///< the verdict in plain words
-  std::string refitted;                ///< what a recalibration refits (TransitionModel::recalibrated)
-  std::string size;                    ///< of the likeliest cause beside the nominal model, a sentence; or empty
-  /// p-values by chance, none below 1e-12: of the model as given (twice the smaller of the next two); of as large a
-  /// gain by recalibration; of a gap after it (the smallest of the tests below, shared out over them, with one of
-  /// pairs); of the best single effect, with the look elsewhere; of the largest cell of the map.
-  double p_as_given = 1, p_recalibration = 1, p_value = 1, p_effects = 1, p_where = 1;
-  GapMap as_given, recalibrated, left;  ///< maps under the nominal, the refitted, and the chosen model
-  std::vector<Cause> causes;            ///< by falling probability; singles, then pairs that were tried among them
-  std::vector<Cause> not_decided;
-  std::vector<std::string> cause_set;  ///< names; empty if unexplained or no gap
-  /// Probabilities. A gap has at least even odds where the tests find one, and at most even odds where they do not.
-  double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
-  double together = 1;  ///< of the best hypothesis, if a pair: its gain over the sum of its effects' (cause_ranking.h)
-  std::vector<EstimatedParameter> contact;  ///< recalibrated
-  std::vector<Shrinkage> shrinkage;         ///< log score first, then CRPS; empty: too few trials
-  StepsBeforeFailure steps;
-  std::vector<Visibility> visible;
-  std::vector<MissingColumn> missing;
-  std::vector<NotPossible> not_possible;
-  std::vector<NextExperiment> next;
-  std::vector<ProfilePoint> profile;
-  std::vector<std::string> condition_names;
-  std::vector<std::string> notes;
-  std::size_t trials = 0, collisions = 0, events = 0;
+
+  /// Is there a gap, and where. p-values by chance, none below 1e-12.
+  struct Gap {
+    double p_as_given = 1;       ///< of the model as given: twice the smaller of the next two
+    double p_recalibration = 1;  ///< of as large a gain by recalibration
+    double p_value = 1;          ///< of a gap after it: the smallest of the next two and one of pairs, shared out
+    double p_effects = 1;        ///< of the best single effect, with the look elsewhere
+    double p_where = 1;          ///< of the largest cell of the map
+    GapMap as_given, recalibrated, left;      ///< maps under the nominal, the refitted, and the chosen model
+    std::string refitted;                     ///< what a recalibration refits (TransitionModel::recalibrated)
+    std::vector<EstimatedParameter> contact;  ///< recalibrated
+  } gap;
+
+  /// Which unmodelled effect causes it.
+  struct Causes {
+    std::vector<Cause> ranked;  ///< by falling probability; singles, then pairs that were tried among them
+    std::vector<Cause> not_decided;
+    std::vector<std::string> set;  ///< names; empty if unexplained or no gap
+    std::string size;              ///< of the likeliest beside the nominal model, a sentence; or empty
+    /// Probabilities. A gap has at least even odds where the tests find one, and at most even odds where they do not.
+    double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
+    double together =
+        1;  ///< of the best hypothesis, if a pair: its gain over the sum of its effects' (cause_ranking.h)
+  } causes;
+
+  /// How far the gap shrinks.
+  struct Shrinkages {
+    std::vector<Shrinkage> measures;  ///< log score first, then CRPS; empty: too few trials
+    StepsBeforeFailure steps;
+    std::vector<ProfilePoint> profile;
+  } shrinkage;
+
+  /// What these data could not tell, and an experiment that would.
+  struct Limits {
+    std::vector<Visibility> visible;
+    std::vector<MissingColumn> missing;
+    std::vector<NotPossible> not_possible;
+    std::vector<NextExperiment> next;
+  } limits;
+
+  /// What was diagnosed.
+  struct Data {
+    std::size_t trials = 0, collisions = 0, events = 0;
+    std::vector<std::string> condition_names;
+    std::vector<std::string> notes;  ///< what is not known, was assumed or is rough, a sentence each
+  } data;
 };
 
 /// Compares the trials with their nominal model and with every effect that the model knows: fits, chance levels,
@@ -146,5 +171,9 @@ struct Diagnosis {
 /// evaluations of all events.
 /// @throws std::invalid_argument for options out of range and unknown ids; what options.progress throws
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options = {});
+
+/// The same, with Diagnosis::model in the answer.
+/// @throws std::invalid_argument also where there is no model
+Diagnosis diagnose(std::shared_ptr<const TransitionModel> model, const DiagnosisOptions& options = {});
 
 }  // namespace metastable::analysis

@@ -32,21 +32,21 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
       break;
     case Verdict::recalibrate:
       s.push_back(
-          fmt::format("There is a gap as given, and other {} remove it: no missing physics shows.", d.refitted));
+          fmt::format("There is a gap as given, and other {} remove it: no missing physics shows.", d.gap.refitted));
       break;
     case Verdict::explained:
-      if (d.cause_set.size() == 1)
+      if (d.causes.set.size() == 1)
         s.push_back(fmt::format("There is a gap that recalibration does not remove, and one cause explains it: {}.",
-                                with_parameters(d.causes.front())));
+                                with_parameters(d.causes.ranked.front())));
       else {
         s.push_back(fmt::format(
             "There is a gap that recalibration does not remove. These data cannot tell {} causes apart: {}.",
-            d.cause_set.size(), fmt::join(d.cause_set, ", ")));
-        s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(d.causes.front()),
-                                d.causes.front().probability));
+            d.causes.set.size(), fmt::join(d.causes.set, ", ")));
+        s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.",
+                                with_parameters(d.causes.ranked.front()), d.causes.ranked.front().probability));
       }
-      if (!d.size.empty()) s.push_back(d.size);
-      if (const auto left = std::count_if(d.left.cells.begin(), d.left.cells.end(),
+      if (!d.causes.size.empty()) s.push_back(d.causes.size);
+      if (const auto left = std::count_if(d.gap.left.cells.begin(), d.gap.left.cells.end(),
                                           [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
         s.push_back(
             fmt::format("It leaves {} {} of the map beyond chance, by no more than the {:.0f} % of its own size "
@@ -55,20 +55,20 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
       break;
     case Verdict::unexplained:
       s.push_back("There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
-      if (d.together > most_together)
+      if (d.causes.together > most_together)
         s.push_back(fmt::format(
             "The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: two "
             "causes would add up, these bend each other into the shape of something else.",
-            d.causes.front().name(), d.together));
-      else if (!d.causes.empty() && d.causes.front().gain > worth_naming)
-        s.push_back(
-            fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.", d.causes.front().name()));
+            d.causes.ranked.front().name(), d.causes.together));
+      else if (!d.causes.ranked.empty() && d.causes.ranked.front().gain > worth_naming)
+        s.push_back(fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.",
+                                d.causes.ranked.front().name()));
       break;
   }
 }
 
 void say_where(std::vector<std::string>& s, const Diagnosis& d) {
-  const GapMap& map = d.verdict == Verdict::unexplained ? d.left : d.recalibrated;
+  const GapMap& map = d.verdict == Verdict::unexplained ? d.gap.left : d.gap.recalibrated;
   if (d.verdict == Verdict::explained || d.verdict == Verdict::unexplained) {
     const auto largest = std::min_element(map.cells.begin(), map.cells.end(), [](const GapCell& a, const GapCell& b) {
       return std::abs(a.statistic) > std::abs(b.statistic);
@@ -80,8 +80,8 @@ void say_where(std::vector<std::string>& s, const Diagnosis& d) {
 }
 
 void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
-  if (!d.shrinkage.empty() && d.shrinkage[0].closed && d.verdict != Verdict::no_gap) {
-    const Shrinkage& log_score = d.shrinkage[0];
+  if (!d.shrinkage.measures.empty() && d.shrinkage.measures[0].closed && d.verdict != Verdict::no_gap) {
+    const Shrinkage& log_score = d.shrinkage.measures[0];
     s.push_back(
         fmt::format("Held out, {:.0f} % of the gap closes (90 %: {:.0f} to {:.0f} %), from {:.2g} to {:.2g} nats a "
                     "collision.",
@@ -91,7 +91,7 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
 }
 
 void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
-  for (const MissingColumn& missing : d.missing) {
+  for (const MissingColumn& missing : d.limits.missing) {
     std::vector<std::string> hidden;
     for (const HiddenEffect& effect : missing.effects)
       if (!effect.smallest) hidden.push_back(effect.effect);
@@ -100,7 +100,7 @@ void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
                               fmt::join(hidden, ", ")));
   }
   std::vector<std::string> too_few;
-  for (const NotPossible& n : d.not_possible)
+  for (const NotPossible& n : d.limits.not_possible)
     if (n.of_the_gap)
       too_few.push_back(n.trials ? fmt::format("{} ({} trials would do)", n.statement, *n.trials) : n.statement);
   if (!too_few.empty()) s.push_back(fmt::format("Too few trials to say {}.", fmt::join(too_few, ", ")));

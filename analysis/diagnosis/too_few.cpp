@@ -22,23 +22,23 @@ std::optional<std::size_t> whole(double trials) {
 
 std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& d, const DiagnosisOptions& options) {
   std::vector<NotPossible> all;
-  const auto trials = static_cast<double>(d.trials);
+  const auto trials = static_cast<double>(d.data.trials);
   const bool gap = d.verdict == Verdict::explained || d.verdict == Verdict::unexplained;
-  if (d.trials < trials_for_folds(options.folds)) {
+  if (d.data.trials < trials_for_folds(options.folds)) {
     all.push_back({"how far the gap shrinks, held out",
-                   fmt::format("{} {} cannot fill {} folds with two each", d.trials, d.trials == 1 ? "trial" : "trials",
-                               options.folds),
+                   fmt::format("{} {} cannot fill {} folds with two each", d.data.trials,
+                               d.data.trials == 1 ? "trial" : "trials", options.folds),
                    trials_for_folds(options.folds), true});
-  } else if (gap && !d.shrinkage.empty() && !d.shrinkage[0].closed) {
-    const Shrinkage& s = d.shrinkage[0];
+  } else if (gap && !d.shrinkage.measures.empty() && !d.shrinkage.measures[0].closed) {
+    const Shrinkage& s = d.shrinkage.measures[0];
     const double size = s.baseline - s.floor, half = 0.5 * (s.baseline_upper - s.baseline_lower);
     all.push_back({"the share of the gap that closes, held out",
                    fmt::format("the held-out gap of {:.2g} {} a collision is not beyond its own uncertainty of {:.2g}",
                                size, s.unit, half),
                    size > 0 ? whole(1.1 * trials * half * half / (size * size)) : std::nullopt, true});
   }
-  const auto speeds = static_cast<double>(d.collisions);
-  if (d.recalibrated.cells.empty() && trials > 0)
+  const auto speeds = static_cast<double>(d.data.collisions);
+  if (d.gap.recalibrated.cells.empty() && trials > 0)
     all.push_back({"where the gap lies",
                    fmt::format("{:.0f} transitions of a speed; a cell of the map takes {}", speeds, least_cell_events),
                    speeds > 0 ? whole(least_cell_events * trials / speeds) : std::nullopt, true});
@@ -47,7 +47,7 @@ std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& 
                    fmt::format("{:.0f} transitions of a speed for {} legs; a cell of the map takes {}", speeds,
                                model.legs(), least_cell_events),
                    whole(least_cell_events * model.legs() * trials / speeds), true});
-  for (const Visibility& v : d.visible)
+  for (const Visibility& v : d.limits.visible)
     if (v.times_more > 1)
       all.push_back({fmt::format("whether {} is at work", v.effect),
                      "at the end of its range it would still be hidden by the recalibration and the noise",
@@ -56,7 +56,7 @@ std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& 
   if (at_risk == 0) {
     all.push_back({"the observed steps before failure", "how the trials ended is not known", std::nullopt});
   } else if (rests == 0) {
-    const double steps = d.steps.with_effect, each = at_risk / trials;
+    const double steps = d.shrinkage.steps.with_effect, each = at_risk / trials;
     const bool known = std::isfinite(steps) && steps > 1;
     all.push_back({"the observed steps before failure but for their lower end",
                    known ? fmt::format("no trial came to rest in {:.0f} collisions; the model expects one in {:.3g}",

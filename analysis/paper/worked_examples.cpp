@@ -42,9 +42,9 @@ std::vector<ChargeOnSticking> charge_on_sticking(std::uint64_t seed, int threads
     ramp.critical_friction = uncharged.sticking_friction(0);
     ramp.share_above =
         1 - dynamics::TruncatedNormal(setting.friction.mean, setting.friction.sd, 0).cdf(ramp.critical_friction);
-    ramp.published = study(setting.problem(), options).from_start;
-    ramp.uncharged = study(without, options).from_start;
-    ramp.coulomb = study(coulomb.problem(), options).from_start;
+    ramp.published = study(setting, options).steps.from_start;
+    ramp.uncharged = study(without, options).steps.from_start;
+    ramp.coulomb = study(coulomb, options).steps.from_start;
   }
   return ramps;
 }

@@ -32,13 +32,13 @@ bool endless(const Metastability& study) {
 
 Contrast contrast(const Comparison& comparison, std::size_t against, std::size_t of, int collisions) {
   const Metastability &a = comparison.studies[against], &b = comparison.studies[of];
-  const std::string name_a = fmt::format("{} deg", comparison.settings[against].slope_deg);
-  const std::string name_b = fmt::format("{} deg", comparison.settings[of].slope_deg);
+  const std::string name_a = fmt::format("{} deg", a.setting->slope_deg);
+  const std::string name_b = fmt::format("{} deg", b.setting->slope_deg);
   Contrast result;
   result.against = against;
   result.of = of;
-  if (!a.survival.empty() && !b.survival.empty())
-    result.trials_needed = trials_to_tell_apart(a.survival, b.survival, collisions);
+  if (!a.steps.survival.empty() && !b.steps.survival.empty())
+    result.trials_needed = trials_to_tell_apart(a.steps.survival, b.steps.survival, collisions);
   if (endless(a) || endless(b)) {
     result.sentence =
         endless(a) && endless(b)
@@ -47,20 +47,22 @@ Contrast contrast(const Comparison& comparison, std::size_t against, std::size_t
     return result;
   }
   std::vector<double> log_ratio, difference;
-  for (std::size_t r = 0; r < a.replicate_log_steps.size(); ++r) {
-    log_ratio.push_back(b.replicate_log_steps[r] - a.replicate_log_steps[r]);
-    difference.push_back(std::exp(b.replicate_log_steps[r]) - std::exp(a.replicate_log_steps[r]));
+  for (std::size_t r = 0; r < a.steps.replicate_logs.size(); ++r) {
+    log_ratio.push_back(b.steps.replicate_logs[r] - a.steps.replicate_logs[r]);
+    difference.push_back(std::exp(b.steps.replicate_logs[r]) - std::exp(a.steps.replicate_logs[r]));
   }
-  const double ratio = b.from_start.value / a.from_start.value;
+  const double ratio = b.steps.from_start.value / a.steps.from_start.value;
   // Integrated studies have no replicates, and no sampling error.
   const auto sampling = [](const std::vector<double>& sample) {
     return sample.empty() ? 0 : t_interval(sample).half_width;
   };
-  const double ratio_half = std::hypot(sampling(log_ratio), a.discretization_error + b.discretization_error);
+  const double ratio_half =
+      std::hypot(sampling(log_ratio), a.steps.discretization_error + b.steps.discretization_error);
   result.ratio = Estimate{ratio, ratio * std::exp(-ratio_half), ratio * std::exp(ratio_half)};
-  const double apart = b.from_start.value - a.from_start.value;
-  const double apart_half = std::hypot(
-      sampling(difference), a.discretization_error * a.from_start.value + b.discretization_error * b.from_start.value);
+  const double apart = b.steps.from_start.value - a.steps.from_start.value;
+  const double apart_half =
+      std::hypot(sampling(difference), a.steps.discretization_error * a.steps.from_start.value +
+                                           b.steps.discretization_error * b.steps.from_start.value);
   result.difference = Estimate{apart, apart - apart_half, apart + apart_half};
   result.sentence = fmt::format(
       "{} takes {:.4g} times the steps of {} (95 % interval {:.4g} to {:.4g}), {:.4g} more ({:.4g} to {:.4g})", name_b,
@@ -87,7 +89,7 @@ std::optional<double> trials_to_tell_apart(const std::vector<double>& survival_a
 
 Comparison compare(const std::vector<Setting>& settings, const StudyOptions& options, int collisions) {
   if (settings.size() < 2) throw std::invalid_argument("compare: fewer than two settings");
-  Comparison comparison{settings, {}, {}};
+  Comparison comparison;
   const auto part = [&](std::size_t index, double from, double to) {
     StudyOptions own = options;
     if (options.progress)
@@ -98,8 +100,8 @@ Comparison compare(const std::vector<Setting>& settings, const StudyOptions& opt
   };
   const auto count = static_cast<double>(settings.size());
   for (std::size_t i = 0; i < settings.size(); ++i)
-    comparison.studies.push_back(study(settings[i].problem(), part(i, 0.6 * static_cast<double>(i) / count,
-                                                                   0.6 * static_cast<double>(i + 1) / count)));
+    comparison.studies.push_back(
+        study(settings[i], part(i, 0.6 * static_cast<double>(i) / count, 0.6 * static_cast<double>(i + 1) / count)));
   // Common random numbers need common resolution.
   std::size_t cells = 0, samples = 0;
   for (const Metastability& one : comparison.studies) {
@@ -116,7 +118,7 @@ Comparison compare(const std::vector<Setting>& settings, const StudyOptions& opt
     own.samples = samples;
     const Status status = one.status;
     const std::string message = one.message;
-    one = study(settings[i].problem(), own);
+    one = study(settings[i], own);
     one.status = status;
     one.message = message;
   }

@@ -23,9 +23,8 @@ struct Contrast {
 };
 
 struct Comparison {
-  std::vector<Setting> settings;
-  std::vector<Metastability> studies;
-  std::vector<Contrast> contrasts;  ///< each later setting against the first
+  std::vector<Metastability> studies;  ///< with their settings
+  std::vector<Contrast> contrasts;     ///< each later setting against the first
 };
 
 /// Studies all settings with the same seed and the same resolution (the finest any of them needed), so that replicate r

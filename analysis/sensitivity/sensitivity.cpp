@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "analysis/sensitivity/pathwise.h"
@@ -69,7 +70,7 @@ std::vector<Sensitivity> by_paths(const Setting& setting, const Metastability& s
   }
   // As deep into the tails as the study had to go.
   StudyOptions own = options;
-  while (own.tail > 1e-300 && std::log(study.failure_rate.value) < 0.6 * std::log(own.tail))
+  while (own.tail > 1e-300 && std::log(study.spectrum.failure_rate.value) < 0.6 * std::log(own.tail))
     own.tail = std::max(1e-300, own.tail * own.tail * own.tail);
   const std::optional<Pilot> pilot = solve_pilot(setting.problem(), own);
   if (!pilot) throw markov::ConvergenceError("sensitivities", 1, "no draw came to rest");
@@ -150,8 +151,10 @@ std::string sensitivity_name(const Sensitivity& one) {
   return one.leg ? fmt::format("leg {}", *one.leg) : std::string(parameter_name(one.parameter));
 }
 
-Sensitivities sensitivities(const Setting& setting, const Metastability& study, const StudyOptions& options) {
-  if (std::isinf(study.from_start.value)) return {{}, "the expected steps are infinite or not resolved"};
+Sensitivities sensitivities(const Metastability& study, const StudyOptions& options) {
+  if (!study.setting) throw std::invalid_argument("sensitivities: the study is not of a wheel's setting");
+  const Setting& setting = *study.setting;
+  if (std::isinf(study.steps.from_start.value)) return {{}, "the expected steps are infinite or not resolved"};
   const dynamics::ContactNoise noise = setting.noise();
   const bool constant =
       noise.is_empirical() ? noise.pairs().size() == 1 : noise.restitution().constant() && noise.friction().constant();

@@ -26,16 +26,18 @@ struct Sensitivities {
   std::string reason;               ///< why there are none, empty otherwise
 };
 
-/// d ln M / d parameter for every parameter that matters(), by the adjoint (markov::Adjoint): the chain is solved once
-/// at the study's resolution, perturbed parameters cost rows but no solves. The launch stays as it is.
+/// d ln M / d parameter for every parameter of the study's setting that matters(), by the adjoint (markov::Adjoint):
+/// the chain is solved once at the study's resolution, perturbed parameters cost rows but no solves. The launch stays
+/// as it is.
 ///
 /// Method::sampled: the derivative of the sampled rows along their draws (PathwiseSlopes), extrapolated from two cell
 /// sizes; error from the replicates and the extrapolation; legs one by one too when they differ.
 /// Method::integrated: fourth-order differences of exact rows on nodes that move with the lowest state of a survivor;
 /// error from the order and from halving the nodes. Cost: six times the rows of the study for every parameter.
 /// No sensitivities, and the reason, where the expected steps are infinite or nothing is random.
-/// @throws markov::ConvergenceError when a solver fails; std::invalid_argument as study()
-Sensitivities sensitivities(const Setting& setting, const Metastability& study, const StudyOptions& options);
+/// @throws markov::ConvergenceError when a solver fails; std::invalid_argument as study(),
+/// and for a study of no Setting
+Sensitivities sensitivities(const Metastability& study, const StudyOptions& options);
 
 /// "friction-mean", "leg 3", ...
 std::string sensitivity_name(const Sensitivity& one);

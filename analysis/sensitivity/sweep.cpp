@@ -58,8 +58,9 @@ void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin
     SweepPoint point;
     const Setting setting = sweep_setting(base, axes, begin + k, &point.at);
     try {
-      point.study = study(setting.problem(), single);
+      point.study = study(setting, single);
     } catch (const markov::ConvergenceError& error) {  // the other points are worth having
+      point.study.setting = setting;
       point.study.status = Status::solver_failed;
       point.study.message = error.what();
       point.failure = std::current_exception();

@@ -24,8 +24,8 @@ std::vector<double> axis_values(double first, double last, double step);
 
 /// One point of a sweep.
 struct SweepPoint {
-  std::vector<double> at;  ///< one value per axis
-  Metastability study;
+  std::vector<double> at;           ///< one value per axis
+  Metastability study;              ///< with its setting
   std::exception_ptr failure = {};  ///< set when a solver did not converge here (study.status is then solver_failed)
 };
 

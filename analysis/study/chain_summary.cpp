@@ -16,6 +16,7 @@
 namespace metastable::analysis {
 namespace {
 
+constexpr double quantile_levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
 constexpr std::size_t survival_values = 64;
 constexpr std::size_t violation_draws = 64;  // a state
 constexpr std::size_t slowest_draws = 16384;
@@ -57,11 +58,11 @@ void describe_survivors(const Problem& problem, const markov::StateSpace& space,
     const MeanSd observed = observe(problem, space, only);
     phase.mean = observed.mean;
     phase.sd = observed.sd;
-    result.quasi_stationary.push_back(std::move(phase));
+    result.survivors.by_phase.push_back(std::move(phase));
   }
   const MeanSd all = observe(problem, space, nu);
-  result.observable_mean = all.mean;
-  result.observable_sd = all.sd;
+  result.survivors.mean = all.mean;
+  result.survivors.sd = all.sd;
 }
 
 // Does the noise leave the landings of the launches alone? Then the chain is an orbit smeared over cells: nilpotent but
@@ -111,8 +112,10 @@ void describe_violations(const Problem& problem, const markov::StateSpace& space
   }
 }
 
-Accumulated accumulated(const markov::Moments& moments, std::vector<double> quantiles) {
-  return {moments.mean, moments.sd, std::move(quantiles)};
+Accumulated accumulated(const markov::Moments& moments, const std::vector<double>& quantiles) {
+  Accumulated total{moments.mean, moments.sd, {}};
+  for (std::size_t i = 0; i < quantiles.size(); ++i) total.quantiles.push_back({quantile_levels[i], quantiles[i]});
+  return total;
 }
 
 }  // namespace
@@ -145,36 +148,37 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
   const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
   const markov::Launch& launch = sampled.launch;
   result.phases = space.phases();
-  result.period = solver.period().period;
+  result.spectrum.period = solver.period().period;
 
   const std::vector<double> mean = markov::mean_first_passage(solver);
   const std::vector<double> second = markov::second_moment(solver, mean);
   const markov::Survival survival(solver, quasi, launch);
   std::vector<double> quantiles;
-  for (const double level : Metastability::levels) quantiles.push_back(survival.quantile(level));
-  result.steps = accumulated(markov::steps_from_launch(launch, mean, second), quantiles);
+  for (const double level : quantile_levels) quantiles.push_back(survival.quantile(level));
+  result.steps.distribution = accumulated(markov::steps_from_launch(launch, mean, second), quantiles);
   const auto reward = [&](const std::vector<double>& pay) {
     return accumulated(markov::reward_from_launch(solver, launch, pay),
-                       markov::reward_quantiles(solver, quasi, launch, pay, Metastability::levels));
+                       markov::reward_quantiles(solver, quasi, launch, pay, quantile_levels));
   };
-  if (!options.brief && !sampled.duration.empty()) result.seconds = reward(sampled.duration);
-  if (!options.brief && !sampled.advance.empty()) result.metres = reward(sampled.advance);
+  if (!options.brief && !sampled.duration.empty()) result.steps.seconds = reward(sampled.duration);
+  if (!options.brief && !sampled.advance.empty()) result.steps.metres = reward(sampled.advance);
   const std::size_t shown = std::max<std::size_t>(
       survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
-  for (std::size_t n = 0; n < shown; ++n) result.survival.push_back(survival.at(static_cast<double>(n)));
-  if (problem.last_event) result.reach_end = survival.at(*problem.last_event);
+  for (std::size_t n = 0; n < shown; ++n) result.steps.survival.push_back(survival.at(static_cast<double>(n)));
+  if (problem.last_event) result.steps.reach_end = survival.at(*problem.last_event);
 
   if (!options.brief) {
-    result.eigenvalue_moduli = moduli_per_step(problem, solver.revolution(), result.period, options.eigenvalues,
-                                               quasi.failure_rate, result.message);
-    result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
-    result.total_variation_steps = markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
+    result.spectrum.moduli = moduli_per_step(problem, solver.revolution(), result.spectrum.period, options.eigenvalues,
+                                             quasi.failure_rate, result.message);
+    result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
+    result.spectrum.total_variation_steps =
+        markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   }
   describe_survivors(problem, space, quasi.distribution, result);
   if (dot(launch.after, launch.after) > 0) {  // otherwise no launch survives its first collision
     const MeanSd restarted = observe(problem, space, markov::stationary_with_restart(solver, launch.after));
-    result.restart_mean = restarted.mean;
-    result.restart_sd = restarted.sd;
+    result.survivors.restart_mean = restarted.mean;
+    result.survivors.restart_sd = restarted.sd;
   }
   if (!options.brief)
     describe_violations(problem, space, quasi.distribution, solver.solve_left(launch.after), options, result);
@@ -183,8 +187,8 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
   const std::vector<double> ones(solver.revolution().size(), 1.0);
   const std::vector<double> by_elimination = solver.revolution_elimination().solve(ones), by_klu = check.solve(ones);
   for (std::size_t i = 0; i < ones.size(); ++i)
-    result.solver_disagreement =
-        std::max(result.solver_disagreement, std::abs(by_klu[i] - by_elimination[i]) / by_elimination[i]);
+    result.steps.solver_disagreement =
+        std::max(result.steps.solver_disagreement, std::abs(by_klu[i] - by_elimination[i]) / by_elimination[i]);
 }
 
 void summarize_endless(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
@@ -192,9 +196,9 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   constexpr double infinite = std::numeric_limits<double>::infinity();
   const markov::Launch& launch = sampled.launch;
   result.phases = space.phases();
-  result.from_start = result.from_quasi_stationary = {infinite, infinite, infinite};
-  result.worst_start = {infinite, infinite, infinite};
-  result.steps = {infinite, infinite, {}};
+  result.steps.from_start = result.steps.from_quasi_stationary = {infinite, infinite, infinite};
+  result.steps.worst_start = {infinite, infinite, infinite};
+  result.steps.distribution = {infinite, infinite, {}};
 
   const std::vector<double> stationary = markov::stationary(sampled.chain, launch.after);
   std::vector<std::uint32_t> recurrent;
@@ -202,41 +206,43 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
     if (stationary[i] > 0) recurrent.push_back(static_cast<std::uint32_t>(i));
   const markov::Chain closed = sampled.chain.restricted_to(recurrent);
   const markov::Period period = markov::find_period(closed);
-  result.period = period.period;
-  result.eigenvalue_moduli = moduli_per_step(problem, markov::revolution_chain(closed, period), period.period,
-                                             options.eigenvalues, 0.0, result.message);
-  result.mixing_steps = markov::spectral_mixing_steps(result.eigenvalue_moduli);
+  result.spectrum.period = period.period;
+  result.spectrum.moduli = moduli_per_step(problem, markov::revolution_chain(closed, period), period.period,
+                                           options.eigenvalues, 0.0, result.message);
+  result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
   describe_survivors(problem, space, stationary, result);
-  result.restart_mean = result.observable_mean;
-  result.restart_sd = result.observable_sd;
+  result.survivors.restart_mean = result.survivors.mean;
+  result.survivors.restart_sd = result.survivors.sd;
 
   // Forward from the launch: survival, visits on the course, and the share that has come to rest when no more do.
   std::vector<double> alive = launch.after, visits(space.size(), 0.0);
-  result.survival = {1.0};
+  result.steps.survival = {1.0};
   const std::size_t shown = std::max<std::size_t>(
       survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
   for (std::size_t n = 1; n < most_forward; ++n) {
-    const double surviving = std::min(result.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
-    const bool settled = n > 2 * static_cast<std::size_t>(result.period) &&
-                         surviving > result.survival[n - static_cast<std::size_t>(result.period)] * (1 - 1e-12);
+    const double surviving = std::min(result.steps.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
+    const bool settled =
+        n > 2 * static_cast<std::size_t>(result.spectrum.period) &&
+        surviving > result.steps.survival[n - static_cast<std::size_t>(result.spectrum.period)] * (1 - 1e-12);
     if (n >= shown && settled) break;
-    result.survival.push_back(surviving);
+    result.steps.survival.push_back(surviving);
     if (n < shown)
       for (std::size_t i = 0; i < visits.size(); ++i) visits[i] += alive[i];
     alive = markov::apply_left(sampled.chain, alive);
   }
-  const double ever_rests = 1 - result.survival.back();
+  const double ever_rests = 1 - result.steps.survival.back();
   if (ever_rests > 1e-9)
     result.message = fmt::format("infinite: rest is unreachable for {:.4g} % of the launches, the others rest",
-                                 100 * result.survival.back());
-  for (const double level : Metastability::levels) {
-    const auto reached = std::find_if(result.survival.begin(), result.survival.end(),
+                                 100 * result.steps.survival.back());
+  for (const double level : quantile_levels) {
+    const auto reached = std::find_if(result.steps.survival.begin(), result.steps.survival.end(),
                                       [&](double surviving) { return surviving <= 1 - level; });
-    result.steps.quantile.push_back(
-        reached == result.survival.end() ? infinite : static_cast<double>(reached - result.survival.begin()));
+    result.steps.distribution.quantiles.push_back(
+        {level, reached == result.steps.survival.end() ? infinite
+                                                       : static_cast<double>(reached - result.steps.survival.begin())});
   }
-  result.survival.resize(std::min(result.survival.size(), shown));
-  if (problem.last_event) result.reach_end = result.survival[static_cast<std::size_t>(*problem.last_event)];
+  result.steps.survival.resize(std::min(result.steps.survival.size(), shown));
+  if (problem.last_event) result.steps.reach_end = result.steps.survival[static_cast<std::size_t>(*problem.last_event)];
   describe_violations(problem, space, stationary, visits, options, result);
 }
 

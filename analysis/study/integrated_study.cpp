@@ -107,18 +107,18 @@ void describe(const Problem& problem, const Level& level, const StudyOptions& op
   const markov::ChainSolver solver(sampled.chain);
   const std::vector<double> nu = markov::quasi_stationary(solver).distribution;
   const std::size_t n = level.space.nodes();
-  for (std::size_t p = 0; p < result.quasi_stationary.size(); ++p) {
+  for (std::size_t p = 0; p < result.survivors.by_phase.size(); ++p) {
     const MeanSd phase = observe(problem, level.space, nu, p * n, (p + 1) * n);
-    result.quasi_stationary[p].mean = phase.mean;
-    result.quasi_stationary[p].sd = phase.sd;
+    result.survivors.by_phase[p].mean = phase.mean;
+    result.survivors.by_phase[p].sd = phase.sd;
   }
   const MeanSd all = observe(problem, level.space, nu, 0, nu.size());
-  result.observable_mean = all.mean;
-  result.observable_sd = all.sd;
+  result.survivors.mean = all.mean;
+  result.survivors.sd = all.sd;
   const std::vector<double> again = markov::stationary_with_restart(solver, sampled.launch.after);
   const MeanSd restarted = observe(problem, level.space, again, 0, again.size());
-  result.restart_mean = restarted.mean;
-  result.restart_sd = restarted.sd;
+  result.survivors.restart_mean = restarted.mean;
+  result.survivors.restart_sd = restarted.sd;
 }
 
 Metastability unresolved(const Problem& problem) {
@@ -128,8 +128,8 @@ Metastability unresolved(const Problem& problem) {
   result.status = Status::rest_unresolved;
   result.phases = problem.map.phases();
   result.message = "rest is possible, but only by noise beyond probabilities of 1e-300";
-  result.from_start = result.from_quasi_stationary = result.worst_start = {infinite, 1.0, infinite};
-  result.failure_rate = {0, 0, 1};
+  result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, 1.0, infinite};
+  result.spectrum.failure_rate = {0, 0, 1};
   return result;
 }
 
@@ -182,17 +182,17 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   Metastability result;
   result.method = Method::integrated;
   result.cells = fine->space.nodes();
-  result.from_start = estimate(fine->from_start, steps_error.error());
-  result.failure_rate = estimate(fine->failure_rate, rate_error.error());
-  result.from_quasi_stationary = estimate(1 / fine->failure_rate, rate_error.error());
-  result.worst_start = estimate(fine->worst_start, worst_error.error());
-  result.discretization_error = error;
-  result.safe_state = reach.safe_state;
-  if (result.discretization_error > options.tolerance) {
+  result.steps.from_start = estimate(fine->from_start, steps_error.error());
+  result.spectrum.failure_rate = estimate(fine->failure_rate, rate_error.error());
+  result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate, rate_error.error());
+  result.steps.worst_start = estimate(fine->worst_start, worst_error.error());
+  result.steps.discretization_error = error;
+  result.steps.safe_state = reach.safe_state;
+  if (result.steps.discretization_error > options.tolerance) {
     result.status = free ? Status::tolerance_not_met : Status::fixed_resolution;
     if (free)
       result.message = fmt::format("tolerance {} not met: the error left is {:.2g} at {} nodes", options.tolerance,
-                                   result.discretization_error, result.cells);
+                                   result.steps.discretization_error, result.cells);
   }
   tell(0.96, "summary");
   describe(problem, *fine, options, result);

@@ -51,7 +51,7 @@ class Study {
   Metastability run() {
     const RestReachability reach = rest_reachability(problem_);
     Metastability result = reach.certain ? finite() : infinite_case();
-    result.safe_state = reach.safe_state;
+    result.steps.safe_state = reach.safe_state;
     return result;
   }
 
@@ -123,20 +123,21 @@ class Study {
       if (!ladder.rest_resolved) return std::nullopt;
       Metastability result = assess(ladder, cells, samples);
       // A failure this rare may hang on noise rarer than the draws reach.
-      if (can_look_deeper() && std::log(result.failure_rate.value) < 0.6 * std::log(options_.tail)) return std::nullopt;
+      if (can_look_deeper() && std::log(result.spectrum.failure_rate.value) < 0.6 * std::log(options_.tail))
+        return std::nullopt;
       // What is read off the finest chain as it is must be within the tolerance too.
-      const double unextrapolated = std::abs(std::log(result.from_start.value / result.steps.mean));
-      const double change = change_over_error * result.discretization_error;
-      const double half = std::hypot(result.discretization_error, result.sampling_error);
+      const double unextrapolated = std::abs(std::log(result.steps.from_start.value / result.steps.distribution.mean));
+      const double change = change_over_error * result.steps.discretization_error;
+      const double half = std::hypot(result.steps.discretization_error, result.steps.sampling_error);
       const auto within = [&](double error) { return std::max(error, unextrapolated) <= options_.tolerance; };
-      const bool met = within(change + result.sampling_error);
+      const bool met = within(change + result.steps.sampling_error);
       bool refined = false;
       if (!met && free_cells && (change > options_.tolerance / 3 || unextrapolated > options_.tolerance) &&
           cells < most_cells) {
         cells *= 2;
         refined = true;
       }
-      if (!met && free_samples && result.sampling_error > options_.tolerance / 2 &&
+      if (!met && free_samples && result.steps.sampling_error > options_.tolerance / 2 &&
           samples < options_.largest_samples) {
         samples *= 4;
         refined = true;
@@ -151,7 +152,7 @@ class Study {
         result.message = fmt::format(
             "tolerance {} not met: the interval's half-width is {:.2g} (discretization {:.2g}, sampling {:.2g}) at {} "
             "cells and {} samples",
-            options_.tolerance, half, result.discretization_error, result.sampling_error, cells, samples);
+            options_.tolerance, half, result.steps.discretization_error, result.steps.sampling_error, cells, samples);
       }
       tell(0.96, "summary");
       summarize(problem_, ladder.spaces.back(), ladder.pooled.back(), options_, result);
@@ -184,15 +185,16 @@ class Study {
       const double half = std::hypot(discretization, sampling);
       return Estimate{std::exp(extrapolated), std::exp(extrapolated - half), std::exp(extrapolated + half)};
     };
-    result.steps.mean = pooled.back().from_start;
+    result.steps.distribution.mean = pooled.back().from_start;
     double unused_d = 0, unused_s = 0;
-    result.from_start = estimate(&ChainSteps::from_start, result.discretization_error, result.sampling_error);
-    result.from_quasi_stationary = estimate(&ChainSteps::from_quasi_stationary, unused_d, unused_s);
-    result.worst_start = estimate(&ChainSteps::worst_start, unused_d, unused_s);
-    const Estimate& quasi = result.from_quasi_stationary;
-    result.failure_rate = {1 / quasi.value, 1 / quasi.upper, 1 / quasi.lower};
+    result.steps.from_start =
+        estimate(&ChainSteps::from_start, result.steps.discretization_error, result.steps.sampling_error);
+    result.steps.from_quasi_stationary = estimate(&ChainSteps::from_quasi_stationary, unused_d, unused_s);
+    result.steps.worst_start = estimate(&ChainSteps::worst_start, unused_d, unused_s);
+    const Estimate& quasi = result.steps.from_quasi_stationary;
+    result.spectrum.failure_rate = {1 / quasi.value, 1 / quasi.upper, 1 / quasi.lower};
     for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
-      result.replicate_log_steps.push_back(
+      result.steps.replicate_logs.push_back(
           extrapolate(std::log(ladder.replicate[2][r].from_start), std::log(ladder.replicate[1][r].from_start)));
     return result;
   }
@@ -225,9 +227,9 @@ class Study {
     result.message = options_.weighting == markov::Weighting::plain
                          ? "rest is possible, but no plain draw came to it: use weighted draws"
                          : "rest is possible, but only by noise beyond probabilities of 1e-300";
-    result.from_start = result.from_quasi_stationary = result.worst_start = {infinite, 1.0, infinite};
-    result.failure_rate = {0, 0, 1};
-    result.sampling_error = infinite;
+    result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, 1.0, infinite};
+    result.spectrum.failure_rate = {0, 0, 1};
+    result.steps.sampling_error = infinite;
     return result;
   }
 
@@ -267,6 +269,18 @@ Metastability study(const Problem& problem, const StudyOptions& options) {
   options.validate();
   if (options.method == Method::integrated) return integrated_study(problem, options);
   return Study(problem, options).run();
+}
+
+Metastability study(const Setting& setting, const StudyOptions& options) {
+  Metastability result = study(setting.problem(), options);
+  result.setting = setting;
+  return result;
+}
+
+std::optional<double> Accumulated::quantile(double level) const {
+  for (const Quantile& one : quantiles)
+    if (one.level == level) return one.value;
+  return std::nullopt;
 }
 
 std::string_view method_name(Method method) { return method == Method::sampled ? "sampled" : "integrated"; }

@@ -11,6 +11,7 @@
 
 #include "analysis/statistics/estimate.h"
 #include "analysis/study/problem.h"
+#include "analysis/study/setting.h"
 #include "markov/rows/draws.h"
 
 namespace metastable::analysis {
@@ -51,10 +52,18 @@ enum class Status {
   rest_unresolved,    ///< rest is possible, but beyond the draws: expected steps exceed from_start.lower
 };
 
-/// Total of something accumulated until rest.
+/// A value below which a share `level` of all launches stay.
+struct Quantile {
+  double level = 0;  ///< in (0, 1)
+  double value = 0;
+};
+
+/// Total of something accumulated from a launch until rest.
 struct Accumulated {
   double mean = 0, sd = 0;
-  std::vector<double> quantile;  ///< at Metastability::levels
+  std::vector<Quantile> quantiles;  ///< at 0.05, 0.25, 0.5, 0.75, 0.95; empty where a study could not resolve them
+  /// The quantile at one of these levels; nothing where it is not among them.
+  std::optional<double> quantile(double level) const;
 };
 
 /// What survivors look like at one phase (one landing leg).
@@ -71,39 +80,53 @@ struct Share {
       0;  ///< of all collisions from the launch to rest (to the end of `survival` where some never rest)
 };
 
-struct Metastability {
-  Status status = Status::converged;
-  std::string message;  ///< one sentence when there is something to say beside the numbers, empty otherwise
-  Method method = Method::sampled;
-  std::size_t cells = 0, samples = 0;
-  int replicates = 0, phases = 1, period = 1;
-
-  Estimate from_start;                      ///< expected steps before failure, from the launch
-  Estimate from_quasi_stationary;           ///< the same from the metastable regime = 1 / failure_rate
-  Estimate worst_start;                     ///< from the slowest survivor of a step
-  Estimate failure_rate;                    ///< 1 - lambda_1 per step
-  double discretization_error = 0;          ///< relative, of from_start: a third of the extrapolation's last change
-  double sampling_error = 0;                ///< relative 95 % half-width of from_start over replicates
-  std::vector<double> replicate_log_steps;  ///< ln(expected steps from the launch), extrapolated
-
-  static constexpr double levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
-  Accumulated steps;                   ///< the last step counted
+/// The steps before failure, and what goes with them until then.
+struct StepsToRest {
+  Estimate from_start;                 ///< expected steps before failure, from the launch
+  Estimate from_quasi_stationary;      ///< the same from the metastable regime = 1 / Spectrum::failure_rate
+  Estimate worst_start;                ///< from the slowest survivor of a step
+  double discretization_error = 0;     ///< relative, of from_start: a third of the extrapolation's last change
+  double sampling_error = 0;           ///< relative 95 % half-width of from_start over replicates
+  double solver_disagreement = 0;      ///< relative difference of the launch's expected steps, elimination against KLU
+  std::vector<double> replicate_logs;  ///< ln(expected steps from the launch) of each replicate, extrapolated
+  Accumulated distribution;            ///< from the launch, the last step counted
   std::optional<Accumulated> seconds;  ///< from collision 1 to the last collision
   std::optional<Accumulated> metres;   ///< from the first foot to the last
   std::vector<double> survival;     ///< P(steps > n), n = 0, 1, ...: up to 64 values, or to the course's end if longer
   std::optional<double> reach_end;  ///< probability of surviving the last event of the course
-
-  std::vector<double> eigenvalue_moduli;            ///< per step, falling; lambda_1 alone for a map without noise
-  double mixing_steps = 0;                          ///< spectral, 1 / ln(lambda_1 / |lambda_2|)
-  std::optional<int> total_variation_steps;         ///< from the launch to within mixing_distance
-  std::vector<PhaseDistribution> quasi_stationary;  ///< per phase
-  double observable_mean = 0, observable_sd = 0;    ///< over all phases (equal shares)
-  double restart_mean = 0, restart_sd = 0;          ///< stationary, with a new launch after each rest
-  std::vector<Share> violations;
-
-  /// State below which a launch may come to rest, when faster ones never do; and the check of the primary solver:
+  /// State below which a launch may come to rest, when faster ones never do.
   std::optional<double> safe_state;
-  double solver_disagreement = 0;  ///< relative difference of the launch's expected steps, elimination against KLU
+};
+
+/// The eigenvalues of the chain: how fast it fails, and how fast it forgets its start.
+struct Spectrum {
+  Estimate failure_rate;                     ///< 1 - lambda_1 per step
+  std::vector<double> moduli;                ///< per step, falling; lambda_1 alone for a map without noise
+  int period = 1;                            ///< steps after which a phase comes again
+  double mixing_steps = 0;                   ///< spectral, 1 / ln(lambda_1 / |lambda_2|)
+  std::optional<int> total_variation_steps;  ///< from the launch to within StudyOptions::mixing_distance
+};
+
+/// The metastable regime: what survivors look like once the start is forgotten.
+struct Survivors {
+  std::vector<PhaseDistribution> by_phase;
+  double mean = 0, sd = 0;                  ///< of the observable over all phases (equal shares)
+  double restart_mean = 0, restart_sd = 0;  ///< stationary, with a new launch after each rest
+};
+
+/// What a study answers, and what it was made with.
+struct Metastability {
+  std::optional<Setting> setting;  ///< studied; nothing for a return map of one's own
+  Status status = Status::converged;
+  std::string message;  ///< one sentence when there is something to say beside the numbers, empty otherwise
+  Method method = Method::sampled;
+  std::size_t cells = 0, samples = 0;
+  int replicates = 0, phases = 1;
+
+  StepsToRest steps;
+  Spectrum spectrum;
+  Survivors survivors;
+  std::vector<Share> violations;  ///< of the return map's assumptions
 };
 
 /// Pilot grid, graded cells, replicated draws, three cell sizes, refinement until the tolerance is met.
@@ -114,7 +137,11 @@ struct Metastability {
 /// of the last two extrapolations of all draws.
 /// Method::integrated: integrated_study().
 /// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails
-Metastability study(const Problem& problem, const StudyOptions& options);
+Metastability study(const Problem& problem, const StudyOptions& options = {});
+
+/// The same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.
+/// @throws std::invalid_argument also for a setting out of range
+Metastability study(const Setting& setting, const StudyOptions& options = {});
 
 /// "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.
 std::string status_text(Status status);

@@ -132,8 +132,8 @@ Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes)
     options.tolerance = benchmark.tolerance;
     options.threads = threads;
     const Metastability other = study(benchmark.problem, options);
-    compare(result.failure_rate, other.failure_rate.value);
-    compare(result.from_start, other.from_start.value);
+    compare(result.failure_rate, other.spectrum.failure_rate.value);
+    compare(result.from_start, other.steps.from_start.value);
   }
   ask_other_solvers(result);
   return result;
@@ -145,7 +145,7 @@ Coverage coverage(const Problem& problem, double from_start, int seeds, int thre
     StudyOptions options;
     options.seed = static_cast<std::uint64_t>(seed);
     options.threads = threads;
-    const Estimate steps = study(problem, options).from_start;
+    const Estimate steps = study(problem, options).steps.from_start;
     ++result.seeds;
     if (steps.lower <= from_start && from_start <= steps.upper) ++result.inside;
     const double half = 0.5 * (steps.upper - steps.lower) / steps.value;

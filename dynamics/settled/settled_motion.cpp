@@ -311,6 +311,7 @@ SettledRoll::Event SettledRoll::carry(bool until_settled) {
     on.way = f.tangential > 0 ? -1 : 1;
     return foot_forces(on, state.angle, state.spin).stiffness <= jams;
   };
+  bool stands = false;  // the landed foot, noted when it began to
   write_back();
   if (state.slip == 0) {
     if (lifts()) return Event::flies;
@@ -325,15 +326,17 @@ SettledRoll::Event SettledRoll::carry(bool until_settled) {
     if (++events_ >= wheel.max_events) return Event::given_up;
     if (on.way == 0) {
       if (state.spin <= 0 && state.angle <= top) return Event::rests;
-      if (foot_ == leg_) {
+      if (foot_ == leg_ && !stands) {
+        stands = true;
         note_stand(foot_, state.angle, state.spin);
         landing_.end = LandingEnd::settled;
         const double energy = foot.energy(state.angle, state.spin);
         if (until_settled && !wheel.drags() && stands_on(foot_, state.angle, energy))
           return state.angle < top && energy <= foot.potential(top) ? Event::rests : Event::settled;
       }
-    } else if (spent()) {
-      return Event::rests;
+    } else {
+      stands = false;
+      if (spent()) return Event::rests;
     }
     // One piece of the motion; what ends it is a value that falls below 0.
     const FootMotion motion = on.from(state);

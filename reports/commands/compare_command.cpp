@@ -24,17 +24,17 @@ std::string trials_text(const analysis::Contrast& contrast, int collisions) {
 // Empty without standard errors, and where some side has no sensitivities.
 CompareExtras from_standard_errors(const CompareRequest& request, const analysis::Comparison& comparison) {
   if (request.standard_errors.empty()) return {};
-  Progress progress("sensitivities", comparison.settings.size());
+  Progress progress("sensitivities", comparison.studies.size());
   std::vector<analysis::Sensitivities> all;
-  for (std::size_t i = 0; i < comparison.settings.size(); ++i) {
-    all.push_back(analysis::sensitivities(comparison.settings[i], comparison.studies[i], request.study));
+  for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
+    all.push_back(analysis::sensitivities(comparison.studies[i], request.study));
     progress.advance();
     if (!all.back().reason.empty()) return {};
   }
   CompareExtras extras;
   for (std::size_t i = 0; i < all.size(); ++i)
     extras.steps.push_back(
-        analysis::propagate(comparison.studies[i].from_start.value, all[i], request.standard_errors));
+        analysis::propagate(comparison.studies[i].steps.from_start.value, all[i], request.standard_errors));
   for (const analysis::Contrast& contrast : comparison.contrasts)
     extras.ratios.push_back(analysis::propagate_ratio(contrast.ratio->value, all[contrast.of], all[contrast.against],
                                                       request.standard_errors));
@@ -54,8 +54,8 @@ void run_compare(const CompareRequest& request) {
   }();
   const CompareExtras extras = from_standard_errors(request, comparison);
   std::vector<RestThresholds> thresholds;
-  for (std::size_t i = 0; i < comparison.settings.size(); ++i)
-    thresholds.push_back(rest_thresholds(comparison.settings[i], comparison.studies[i]));
+  for (std::size_t i = 0; i < comparison.studies.size(); ++i)
+    thresholds.push_back(rest_thresholds(comparison.studies[i]));
   if (json) {
     std::string settings;
     for (const analysis::Setting& setting : request.settings) settings += setting.describe() + "\n";
@@ -64,8 +64,8 @@ void run_compare(const CompareRequest& request) {
     json->commit();
   }
   if (request.json == "-") return;
-  for (std::size_t i = 0; i < comparison.settings.size(); ++i) {
-    fmt::print("{}", study_text(comparison.settings[i], comparison.studies[i], thresholds[i]));
+  for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
+    fmt::print("{}", study_text(comparison.studies[i], thresholds[i]));
     if (!extras.steps.empty())
       fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(extras.steps[i]));
     fmt::print("\n");

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <memory>
 #include <optional>
 
-#include "analysis/likelihood/experiment_model.h"
+#include "analysis/likelihood/diagnose.h"
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_json.h"
 #include "reports/diagnosis/diagnosis_tables.h"
@@ -103,12 +102,11 @@ void run_diagnose(const DiagnoseRequest& request) {
   if (!request.json.empty()) json.emplace(request.json);
   const analysis::Experiment experiment = analysis::read_experiment(request.folder);
   FolderIfDone folder(request.out);
-  const std::unique_ptr<analysis::TransitionModel> model = analysis::transition_model(experiment);
   const analysis::Diagnosis diagnosis = [&] {
     Progress progress("diagnose", study_units);
     analysis::DiagnosisOptions options = request.options;
     options.progress = study_progress(progress);
-    return analysis::diagnose(*model, options);
+    return analysis::diagnose(experiment, options);
   }();
   const Provenance provenance{request.command, "experiment: " + experiment.title, request.options.seed, version()};
   if (!request.out.empty()) write_diagnosis(diagnosis, experiment.title, provenance, request.out);

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
-#include "analysis/likelihood/experiment_model.h"
+#include "analysis/likelihood/diagnose.h"
 #include "analysis/paper/step_balance.h"
 #include "analysis/paper/worked_examples.h"
 #include "analysis/statistics/interval_95.h"
@@ -29,11 +29,10 @@ using analysis::Diagnosis;
 using analysis::Experiment;
 
 Diagnosis diagnosed(const Experiment& experiment, const std::string& what, const LessonsRequest& request) {
-  const auto model = analysis::transition_model(experiment);
   Progress progress(what, study_units);
   analysis::DiagnosisOptions options = request.options;
   options.progress = study_progress(progress);
-  return analysis::diagnose(*model, options);
+  return analysis::diagnose(experiment, options);
 }
 
 Cell steps_cell(double steps) { return steps > 0 ? Cell(steps) : Cell(""); }
@@ -61,12 +60,12 @@ Table answers(const std::string& id, const std::string& title, const std::string
 }
 
 void add_answer(Table& table, const std::string& what, const Diagnosis& d) {
-  std::string causes = fmt::format("{}", fmt::join(d.cause_set, ", "));
-  if (causes.empty() && d.verdict == analysis::Verdict::unexplained && !d.causes.empty())
-    causes = fmt::format("(nearest: {})", d.causes.front().name());
-  std::vector<Cell> row{what, analysis::verdict_name(d.verdict), causes, d.p_as_given};
-  if (d.shrinkage.size() >= 2) {
-    const analysis::Shrinkage &nats = d.shrinkage[0], &crps = d.shrinkage[1];
+  std::string causes = fmt::format("{}", fmt::join(d.causes.set, ", "));
+  if (causes.empty() && d.verdict == analysis::Verdict::unexplained && !d.causes.ranked.empty())
+    causes = fmt::format("(nearest: {})", d.causes.ranked.front().name());
+  std::vector<Cell> row{what, analysis::verdict_name(d.verdict), causes, d.gap.p_as_given};
+  if (d.shrinkage.measures.size() >= 2) {
+    const analysis::Shrinkage &nats = d.shrinkage.measures[0], &crps = d.shrinkage.measures[1];
     row.insert(row.end(), {nats.baseline, nats.recalibrated, nats.with_effect,
                            nats.closed ? Cell(fmt::format("{:.0f} % ({:.0f} to {:.0f})", 100 * *nats.closed,
                                                           100 * *nats.closed_lower, 100 * *nats.closed_upper))
@@ -75,14 +74,14 @@ void add_answer(Table& table, const std::string& what, const Diagnosis& d) {
   } else {
     row.insert(row.end(), {"", "", "", "", "", ""});
   }
-  const analysis::StepsBeforeFailure& s = d.steps;
+  const analysis::StepsBeforeFailure& s = d.shrinkage.steps;
   row.push_back(s.observed > 0 && std::isfinite(s.observed)
                     ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper})
                     : steps_cell(s.observed));
   row.push_back(steps_cell(s.baseline));
   row.push_back(steps_cell(s.with_effect));
   table.rows.push_back(std::move(row));
-  for (const std::string& note : d.notes)
+  for (const std::string& note : d.data.notes)
     if (note.find("did not settle") != std::string::npos) table.notes.push_back(fmt::format("{}: {}.", what, note));
 }
 

@@ -62,16 +62,16 @@ class Report {
   }
 
   void ramps() {
-    std::vector<Studied> studied, published;
+    std::vector<Studied> studied;
     std::vector<analysis::Setting> settings;
     for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb}) {
       for (analysis::Setting setting : request_.settings) {
         setting.law = law;
         analysis::StudyOptions options = request_.study;
         options.progress = study_progress(progress_);
-        Studied one{setting, analysis::study(setting.problem(), options), {}};
+        Studied one{analysis::study(setting, options), {}};
         options.progress(1, "");
-        one.thresholds = rest_thresholds(setting, one.study);
+        one.thresholds = rest_thresholds(one.study);
         settings.push_back(setting);
         studied.push_back(std::move(one));
       }

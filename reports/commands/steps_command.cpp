@@ -20,9 +20,9 @@ void run_steps(const StepsRequest& request) {
     Progress progress("steps", study_units);
     analysis::StudyOptions options = request.study;
     options.progress = study_progress(progress);
-    return analysis::study(request.setting.problem(), options);
+    return analysis::study(request.setting, options);
   }();
-  const RestThresholds thresholds = rest_thresholds(request.setting, study);
+  const RestThresholds thresholds = rest_thresholds(study);
   StepsExtras extras;
   if (request.certify) {
     Progress progress("certificate", study_units);
@@ -34,17 +34,18 @@ void run_steps(const StepsRequest& request) {
     Progress progress("sensitivities", study_units);
     analysis::StudyOptions options = request.study;
     options.progress = study_progress(progress);
-    extras.sensitivities = analysis::sensitivities(request.setting, study, options);
+    extras.sensitivities = analysis::sensitivities(study, options);
     if (!request.standard_errors.empty() && extras.sensitivities->reason.empty())
-      extras.propagated = analysis::propagate(study.from_start.value, *extras.sensitivities, request.standard_errors);
+      extras.propagated =
+          analysis::propagate(study.steps.from_start.value, *extras.sensitivities, request.standard_errors);
   }
   if (json) {
     const Provenance provenance{request.command, request.setting.describe(), request.study.seed, version()};
-    json->stream() << steps_json(request.setting, study, thresholds, provenance, extras);
+    json->stream() << steps_json(study, thresholds, provenance, extras);
     json->commit();
   }
   if (request.json == "-") return;
-  fmt::print("{}", study_text(request.setting, study, thresholds));
+  fmt::print("{}", study_text(study, thresholds));
   if (extras.certified) fmt::print("  {:<38}{}\n", "certificate", analysis::certificate_text(*extras.certified));
   if (extras.propagated)
     fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));

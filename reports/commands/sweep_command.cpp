@@ -59,10 +59,11 @@ std::string row(const analysis::SweepPoint& point) {
   for (const double value : point.at) text += fmt::format("{},", value);
   if (study.status == analysis::Status::solver_failed)
     return text + fmt::format(",,,,,,,,{}\n", analysis::status_text(study.status));
-  return text + fmt::format("{},{},{},{},{},{},{},{},{}\n", number(study.from_start.value),
-                            number(study.from_start.lower), number(study.from_start.upper),
-                            number(study.from_quasi_stationary.value), number(study.failure_rate.value),
-                            study.observable_mean, study.observable_sd, study.reach_end ? number(*study.reach_end) : "",
+  return text + fmt::format("{},{},{},{},{},{},{},{},{}\n", number(study.steps.from_start.value),
+                            number(study.steps.from_start.lower), number(study.steps.from_start.upper),
+                            number(study.steps.from_quasi_stationary.value), number(study.spectrum.failure_rate.value),
+                            study.survivors.mean, study.survivors.sd,
+                            study.steps.reach_end ? number(*study.steps.reach_end) : "",
                             analysis::status_text(study.status));
 }
 

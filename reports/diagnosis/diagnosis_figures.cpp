@@ -85,11 +85,11 @@ Figure map_figure(const std::vector<ModelMap>& models, bool stances, const std::
 }  // namespace
 
 std::vector<Figure> map_figures(const Diagnosis& d) {
-  if (d.recalibrated.cells.empty()) return {};
-  std::vector<ModelMap> models{{"as given", &d.as_given}, {"recalibrated", &d.recalibrated}};
+  if (d.gap.recalibrated.cells.empty()) return {};
+  std::vector<ModelMap> models{{"as given", &d.gap.as_given}, {"recalibrated", &d.gap.recalibrated}};
   const bool with_effect = d.verdict == analysis::Verdict::explained || d.verdict == analysis::Verdict::unexplained;
-  if (with_effect) models.push_back({"with effect", &d.left});
-  const bool two_phases = std::any_of(d.recalibrated.cells.begin(), d.recalibrated.cells.end(),
+  if (with_effect) models.push_back({"with effect", &d.gap.left});
+  const bool two_phases = std::any_of(d.gap.recalibrated.cells.begin(), d.gap.recalibrated.cells.end(),
                                       [](const GapCell& cell) { return cell.stance; });
   std::vector<Figure> figures;
   figures.push_back(map_figure(models, false, "map-collisions", two_phases ? "Collisions" : "Steps"));
@@ -99,7 +99,7 @@ std::vector<Figure> map_figures(const Diagnosis& d) {
 
 std::vector<Figure> profile_figures(const Diagnosis& d) {
   std::vector<Figure> figures;
-  for (std::size_t c = 0; c < d.condition_names.size(); ++c) {
+  for (std::size_t c = 0; c < d.data.condition_names.size(); ++c) {
     Series measured{.label = "measured", .style = Style::points, .x = {}, .y = {}, .colour = floor_colour};
     Series given{.label = "as given", .style = Style::dashed, .x = {}, .y = {}, .colour = given_colour};
     Series effect{.label = d.verdict == analysis::Verdict::explained ? "with effect" : "best model",
@@ -108,7 +108,7 @@ std::vector<Figure> profile_figures(const Diagnosis& d) {
                   .y = {},
                   .colour = effect_colour};
     Series band{.style = Style::band, .x = {}, .lower = {}, .upper = {}, .colour = effect_colour};
-    for (const analysis::ProfilePoint& p : d.profile) {
+    for (const analysis::ProfilePoint& p : d.shrinkage.profile) {
       if (p.condition != c) continue;
       const double x = p.collision;
       measured.x.push_back(x), measured.y.push_back(p.measured);
@@ -122,7 +122,7 @@ std::vector<Figure> profile_figures(const Diagnosis& d) {
     }
     if (measured.x.empty()) continue;
     Figure figure{.id = fmt::format("profile-{}", c + 1),
-                  .title = d.condition_names[c],
+                  .title = d.data.condition_names[c],
                   .x = {.label = "collision", .low = measured.x.front() - 0.5, .high = measured.x.back() + 0.5},
                   .y = {"mean speed before it", "rad/s"}};
     for (Series* series : {&band, &given, &effect, &measured})
@@ -134,10 +134,10 @@ std::vector<Figure> profile_figures(const Diagnosis& d) {
 }
 
 std::vector<Figure> ranking_figures(const Diagnosis& d) {
-  std::vector<std::tuple<double, std::string, int>> all{{d.p_no_gap, "no gap", floor_colour},
-                                                        {d.p_recalibrate, "recalibration", recalibrated_colour},
-                                                        {d.p_none, "none of these", given_colour}};
-  for (const analysis::Cause& cause : d.causes) all.emplace_back(cause.probability, cause.name(), effect_colour);
+  std::vector<std::tuple<double, std::string, int>> all{{d.causes.p_no_gap, "no gap", floor_colour},
+                                                        {d.causes.p_recalibrate, "recalibration", recalibrated_colour},
+                                                        {d.causes.p_none, "none of these", given_colour}};
+  for (const analysis::Cause& cause : d.causes.ranked) all.emplace_back(cause.probability, cause.name(), effect_colour);
   std::stable_sort(all.begin(), all.end(),
                    [](const auto& a, const auto& b) { return std::get<0>(a) > std::get<0>(b); });
   BarChart bars{.name = {}, .value = {}};
@@ -156,8 +156,8 @@ std::vector<Figure> ranking_figures(const Diagnosis& d) {
 std::vector<Figure> shrinkage_figures(const Diagnosis& d) {
   std::vector<Figure> figures;
   const double none = std::numeric_limits<double>::quiet_NaN();
-  for (std::size_t i = 0; i < d.shrinkage.size(); ++i) {
-    const analysis::Shrinkage& s = d.shrinkage[i];
+  for (std::size_t i = 0; i < d.shrinkage.measures.size(); ++i) {
+    const analysis::Shrinkage& s = d.shrinkage.measures[i];
     Figure figure{.id = fmt::format("shrinkage-{}", i + 1), .title = s.measure, .x = {"gap", s.unit}, .y = {""}};
     figure.bars = BarChart{.name = {"as given", "recalibrated", "with effect", "floor"},
                            .value = {s.baseline, s.recalibrated, s.with_effect, s.floor},

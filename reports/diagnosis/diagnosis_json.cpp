@@ -76,17 +76,17 @@ Json cause_json(const analysis::Cause& cause) {
 
 Json causes_json(const analysis::Diagnosis& d) {
   std::vector<Json> all;
-  for (const analysis::Cause& cause : d.causes) all.push_back(cause_json(cause));
-  const Named contact = named("contact_distribution", d.contact);
+  for (const analysis::Cause& cause : d.causes.ranked) all.push_back(cause_json(cause));
+  const Named contact = named("contact_distribution", d.gap.contact);
   const auto other = [&](const char* name, double probability, const Named& parameters) {
     all.push_back({{"effect", name},
                    {"probability", number(probability)},
                    {"parameters", parameters.values},
                    {"interval_90", parameters.intervals}});
   };
-  other("no_gap", d.p_no_gap, {});
-  other("recalibration", d.p_recalibrate, contact);
-  other("none_of_these", d.p_none, {});
+  other("no_gap", d.causes.p_no_gap, {});
+  other("recalibration", d.causes.p_recalibrate, contact);
+  other("none_of_these", d.causes.p_none, {});
   std::stable_sort(all.begin(), all.end(), [](const Json& a, const Json& b) {
     return a["probability"].is_number() && (!b["probability"].is_number() || a["probability"] > b["probability"]);
   });
@@ -160,32 +160,33 @@ Json list_json(const Values& values, Convert convert) {
 }  // namespace
 
 std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& provenance) {
-  const std::vector<analysis::GapCell> as_given = beyond_chance(d.as_given),
-                                       recalibrated = beyond_chance(d.recalibrated), left = beyond_chance(d.left);
+  const std::vector<analysis::GapCell> as_given = beyond_chance(d.gap.as_given),
+                                       recalibrated = beyond_chance(d.gap.recalibrated),
+                                       left = beyond_chance(d.gap.left);
   Json json;
   json["schema"] = 1;
   json["verdict"] = analysis::verdict_name(d.verdict);
   json["sentences"] = d.sentences;
-  json["gap"] = {{"p_value_as_given", number(d.p_as_given)},
-                 {"p_value", number(d.p_value)},
-                 {"p_value_recalibration", number(d.p_recalibration)},
-                 {"p_value_effects", number(d.p_effects)},
-                 {"p_value_where", number(d.p_where)}};
+  json["gap"] = {{"p_value_as_given", number(d.gap.p_as_given)},
+                 {"p_value", number(d.gap.p_value)},
+                 {"p_value_recalibration", number(d.gap.p_recalibration)},
+                 {"p_value_effects", number(d.gap.p_effects)},
+                 {"p_value_where", number(d.gap.p_where)}};
   json["where"] = where_json(recalibrated);
   json["where_as_given"] = where_json(as_given);
   json["where_left"] = where_json(left);
   json["causes"] = causes_json(d);
-  json["cause_set"] = d.cause_set;
-  json["not_decided"] = list_json(d.not_decided, [](const auto& cause) {
+  json["cause_set"] = d.causes.set;
+  json["not_decided"] = list_json(d.causes.not_decided, [](const auto& cause) {
     return Json{{"effect", cause.name()}, {"reason", cause.not_decided}};
   });
-  const Named contact = named("contact_distribution", d.contact);
+  const Named contact = named("contact_distribution", d.gap.contact);
   json["contact"] = {{"parameters", contact.values}, {"interval_90", contact.intervals}};
-  json["shrinkage"] = shrinkage_json(d.shrinkage.empty() ? unknown_shrinkage() : d.shrinkage.front());
-  json["shrinkage_by_measure"] = list_json(d.shrinkage, shrinkage_json);
-  json["steps_before_failure"] = steps_json(d.steps);
-  json["visibility"] = list_json(d.visible, visibility_json);
-  json["missing_columns"] = list_json(d.missing, [](const analysis::MissingColumn& missing) {
+  json["shrinkage"] = shrinkage_json(d.shrinkage.measures.empty() ? unknown_shrinkage() : d.shrinkage.measures.front());
+  json["shrinkage_by_measure"] = list_json(d.shrinkage.measures, shrinkage_json);
+  json["steps_before_failure"] = steps_json(d.shrinkage.steps);
+  json["visibility"] = list_json(d.limits.visible, visibility_json);
+  json["missing_columns"] = list_json(d.limits.missing, [](const analysis::MissingColumn& missing) {
     return Json{{"column", missing.column}, {"effects", list_json(missing.effects, [](const auto& effect) {
                                                return Json{{"effect", effect.effect},
                                                            {"parameter", effect.parameter},
@@ -194,15 +195,15 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
                                                            {"not_told_from", effect.not_told_from}};
                                              })}};
   });
-  json["not_possible"] = list_json(d.not_possible, [](const analysis::NotPossible& n) {
+  json["not_possible"] = list_json(d.limits.not_possible, [](const analysis::NotPossible& n) {
     return Json{
         {"statement", n.statement}, {"because", n.because}, {"trials", n.trials ? Json(*n.trials) : Json(nullptr)}};
   });
-  json["next_experiment"] = list_json(d.next, [](const analysis::NextExperiment& next) {
+  json["next_experiment"] = list_json(d.limits.next, [](const analysis::NextExperiment& next) {
     return Json{{"change", next.change}, {"separation", number(next.separation)}};
   });
-  json["data"] = {{"trials", d.trials}, {"collisions", d.collisions}, {"transitions", d.events}};
-  json["notes"] = d.notes;
+  json["data"] = {{"trials", d.data.trials}, {"collisions", d.data.collisions}, {"transitions", d.data.events}};
+  json["notes"] = d.data.notes;
   json["provenance"] = {{"command", provenance.command},
                         {"settings", provenance.settings},
                         {"seed", provenance.seed},

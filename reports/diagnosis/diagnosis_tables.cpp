@@ -72,8 +72,8 @@ std::vector<GapCell> beyond_chance(const analysis::GapMap& map) {
 
 Table data_table(const Diagnosis& d) {
   Table table{
-      .id = "data", .title = "Data", .notes = d.notes, .columns = {{"trials"}, {"collisions"}, {"transitions"}}};
-  table.rows.push_back({d.trials, d.collisions, d.events});
+      .id = "data", .title = "Data", .notes = d.data.notes, .columns = {{"trials"}, {"collisions"}, {"transitions"}}};
+  table.rows.push_back({d.data.trials, d.data.collisions, d.data.events});
   return table;
 }
 
@@ -82,18 +82,18 @@ Table gap_table(const Diagnosis& d) {
           .title = "Is there a gap?",
           .notes = {"The chance levels are not followed below 10⁻¹²: a p of one or two of those is at most that."},
           .columns = {{"model"}, {"against"}, {"p", "", NumberFormat::significant, 2}},
-          .rows = {{"as given", "anything, the launch and the contact included", d.p_as_given},
-                   {"as given", "other contact parameters", d.p_recalibration},
-                   {"recalibrated", "anything else", d.p_value},
-                   {"recalibrated", "the effects of the catalogue", d.p_effects},
-                   {"recalibrated", "the cells of the map", d.p_where}}};
+          .rows = {{"as given", "anything, the launch and the contact included", d.gap.p_as_given},
+                   {"as given", "other contact parameters", d.gap.p_recalibration},
+                   {"recalibrated", "anything else", d.gap.p_value},
+                   {"recalibrated", "the effects of the catalogue", d.gap.p_effects},
+                   {"recalibrated", "the cells of the map", d.gap.p_where}}};
 }
 
 Table contact_table(const Diagnosis& d) {
   Table table{.id = "contact",
               .title = "Recalibrated parameters",
               .columns = {{"parameter"}, {"value"}, {"low 90 %"}, {"high 90 %"}}};
-  for (const EstimatedParameter& p : d.contact)
+  for (const EstimatedParameter& p : d.gap.contact)
     table.rows.push_back(
         {p.name, known(p.value), p.fitted ? known(p.lower) : Cell(""), p.fitted ? known(p.upper) : Cell("")});
   return table;
@@ -110,7 +110,7 @@ Table where_table(const Diagnosis& d) {
                           {"of"},
                           {"score"},
                           {"adjusted p", "", NumberFormat::significant, 2}}};
-  for (const GapCell& cell : beyond_chance(d.recalibrated))
+  for (const GapCell& cell : beyond_chance(d.gap.recalibrated))
     table.rows.push_back({cell.facet, cell.aspect, cell.at,
                           Estimate{cell.size, cell.size - cell.band, cell.size + cell.band}, cell.unit, cell.statistic,
                           cell.p_adjusted});
@@ -140,11 +140,11 @@ Table map_table(const Diagnosis& d) {
                       map.cells[i].aspect == cell.aspect;
     return same ? known(map.cells[i].statistic) : Cell("");
   };
-  for (std::size_t i = 0; i < d.recalibrated.cells.size(); ++i) {
-    const GapCell& cell = d.recalibrated.cells[i];
-    table.rows.push_back({cell.facet, cell.aspect, cell.at, cell.events, score_of(d.as_given, i, cell), cell.statistic,
-                          score_of(d.left, i, cell), cell.size, cell.band, cell.unit, cell.p_adjusted,
-                          cell.false_discovery});
+  for (std::size_t i = 0; i < d.gap.recalibrated.cells.size(); ++i) {
+    const GapCell& cell = d.gap.recalibrated.cells[i];
+    table.rows.push_back({cell.facet, cell.aspect, cell.at, cell.events, score_of(d.gap.as_given, i, cell),
+                          cell.statistic, score_of(d.gap.left, i, cell), cell.size, cell.band, cell.unit,
+                          cell.p_adjusted, cell.false_discovery});
   }
   return table;
 }
@@ -161,15 +161,16 @@ Table causes_table(const Diagnosis& d) {
                           {"ln Bayes factor", "", NumberFormat::fixed, 1},
                           {"parameters (90 % intervals)"}}};
   std::vector<std::pair<double, std::vector<Cell>>> rows;
-  for (const Cause& cause : d.causes) {
+  for (const Cause& cause : d.causes.ranked) {
     const std::string name = cause.name();
-    const bool inside = std::find(d.cause_set.begin(), d.cause_set.end(), name) != d.cause_set.end();
+    const bool inside = std::find(d.causes.set.begin(), d.causes.set.end(), name) != d.causes.set.end();
     rows.push_back({cause.probability,
                     {name, cause.probability, inside ? "in" : "", known(cause.gain), known(cause.p_value),
                      known(cause.evidence), parameters_text(cause)}});
   }
-  for (const auto& [name, p] : {std::pair("no gap", d.p_no_gap), std::pair("recalibration", d.p_recalibrate),
-                                std::pair("none of these", d.p_none)})
+  for (const auto& [name, p] :
+       {std::pair("no gap", d.causes.p_no_gap), std::pair("recalibration", d.causes.p_recalibrate),
+        std::pair("none of these", d.causes.p_none)})
     rows.push_back({p, {name, p, "", "", "", "", ""}});
   std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   for (auto& [probability, row] : rows) table.rows.push_back(std::move(row));
@@ -181,7 +182,7 @@ Table parameters_table(const Diagnosis& d) {
               .title = "Parameters of the effects",
               .notes = {"Without interval: chosen from a list (a leg, an interval, a frequency)."},
               .columns = {{"cause"}, {"effect"}, {"parameter"}, {"value"}, {"low 90 %"}, {"high 90 %"}, {"unit"}}};
-  for (const Cause& cause : d.causes)
+  for (const Cause& cause : d.causes.ranked)
     for (std::size_t e = 0; e < cause.parameters.size(); ++e)
       for (const EstimatedParameter& p : cause.parameters[e])
         table.rows.push_back({cause.name(), cause.effects.at(e), p.name, known(p.value),
@@ -206,7 +207,7 @@ Table shrinkage_table(const Diagnosis& d) {
                           {"closed"},
                           {"closed, low 90 %"},
                           {"closed, high 90 %"}}};
-  for (const analysis::Shrinkage& s : d.shrinkage)
+  for (const analysis::Shrinkage& s : d.shrinkage.measures)
     table.rows.push_back({s.measure, s.unit, known(s.baseline), known(s.baseline_lower), known(s.baseline_upper),
                           known(s.recalibrated), known(s.with_effect), known(s.floor), known(s.closed),
                           known(s.closed_lower), known(s.closed_upper)});
@@ -214,7 +215,7 @@ Table shrinkage_table(const Diagnosis& d) {
 }
 
 Table steps_table(const Diagnosis& d) {
-  const analysis::StepsBeforeFailure& s = d.steps;
+  const analysis::StepsBeforeFailure& s = d.shrinkage.steps;
   return {.id = "steps",
           .title = "Expected steps before failure",
           .columns = {{"observed"},
@@ -238,9 +239,9 @@ Table profile_table(const Diagnosis& d) {
                           {"as given", "rad/s", NumberFormat::significant, 4},
                           {"with effect", "rad/s", NumberFormat::significant, 4},
                           {"band", "rad/s"}}};
-  for (const analysis::ProfilePoint& p : d.profile) {
+  for (const analysis::ProfilePoint& p : d.shrinkage.profile) {
     const double half = analysis::normal_95 * p.measured_error;
-    table.rows.push_back({d.condition_names.at(p.condition), p.collision, p.trials,
+    table.rows.push_back({d.data.condition_names.at(p.condition), p.collision, p.trials,
                           std::isnan(p.measured) ? Cell("")
                           : std::isnan(half)     ? Cell(p.measured)
                                                  : Cell(Estimate{p.measured, p.measured - half, p.measured + half}),
@@ -255,7 +256,7 @@ Table visibility_table(const Diagnosis& d) {
               .notes = {"Smallest: the size that most experiments like this one would find (2 Δ ln L of 16). Alike: "
                         "effects that imitate more than half of its information."},
               .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"alike"}, {"cannot be told because"}}};
-  for (const analysis::Visibility& v : d.visible) {
+  for (const analysis::Visibility& v : d.limits.visible) {
     std::string alike;
     for (const auto& [effect, share] : v.alike)
       alike += fmt::format("{}{} {:.0f} %", alike.empty() ? "" : ", ", effect, 100 * share);
@@ -274,7 +275,7 @@ Table missing_table(const Diagnosis& d) {
                 "of it without the column and less than eight with it."},
       .columns = {
           {"column"}, {"effect"}, {"parameter"}, {"smallest without"}, {"smallest with"}, {"unit"}, {"not told from"}}};
-  for (const analysis::MissingColumn& m : d.missing) {
+  for (const analysis::MissingColumn& m : d.limits.missing) {
     if (m.effects.empty()) table.rows.push_back({m.column, "no effect is much harder to see", "", "", "", "", ""});
     for (const analysis::HiddenEffect& e : m.effects) {
       table.rows.push_back({m.column, e.effect, e.parameter, known(e.smallest), known(e.smallest_with_it),
@@ -290,14 +291,14 @@ Table not_possible_table(const Diagnosis& d) {
               .title = "What these data cannot say",
               .notes = {"Trials: of this kind that would do; empty where no number of them would."},
               .columns = {{"statement"}, {"because"}, {"trials"}}};
-  for (const analysis::NotPossible& n : d.not_possible)
+  for (const analysis::NotPossible& n : d.limits.not_possible)
     table.rows.push_back({n.statement, n.because, n.trials ? Cell(*n.trials) : Cell("")});
   return table;
 }
 
 Table undecided_table(const Diagnosis& d) {
   Table table{.id = "not-decided", .title = "Not decided", .columns = {{"effect"}, {"because"}}};
-  for (const Cause& cause : d.not_decided) table.rows.push_back({cause.name(), cause.not_decided});
+  for (const Cause& cause : d.causes.not_decided) table.rows.push_back({cause.name(), cause.not_decided});
   return table;
 }
 
@@ -307,7 +308,7 @@ Table next_table(const Diagnosis& d) {
               .notes = {"Separation: 2 Δ ln L to be expected between the two leading causes, at the fitted size; from "
                         "16 on they are told apart."},
               .columns = {{"change"}, {"separation"}}};
-  for (const analysis::NextExperiment& n : d.next) table.rows.push_back({n.change, known(n.separation)});
+  for (const analysis::NextExperiment& n : d.limits.next) table.rows.push_back({n.change, known(n.separation)});
   return table;
 }
 

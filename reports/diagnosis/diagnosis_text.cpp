@@ -21,7 +21,7 @@ Table visibility_lines(const analysis::Diagnosis& d) {
   Table table{.id = "visibility",
               .title = "What these data could have seen (the size most experiments like this one find)",
               .columns = {{"effect"}, {"parameter"}, {"smallest"}, {"unit"}, {"remark"}}};
-  for (const analysis::Visibility& v : d.visible) {
+  for (const analysis::Visibility& v : d.limits.visible) {
     std::string remark = v.undecidable;
     if (remark.empty() && !v.alike.empty()) {
       remark = fmt::format("{:.0f} % like {}", 100 * v.alike.front().second, v.alike.front().first);
@@ -43,7 +43,7 @@ Table shrinkage_lines(const analysis::Diagnosis& d) {
           {"measure"}, {"unit"}, {"as given"}, {"recalibrated"}, {"with effect"}, {"floor"}, {"closed (90 %)"}}};
   const auto percent = [](double share) { return fmt::format("{:.0f}", 100 * share); };
   const auto known = [](double value) { return std::isnan(value) ? Cell("") : Cell(value); };
-  for (const analysis::Shrinkage& s : d.shrinkage)
+  for (const analysis::Shrinkage& s : d.shrinkage.measures)
     table.rows.push_back(
         {s.measure, s.unit, known(s.baseline), known(s.recalibrated), known(s.with_effect), known(s.floor),
          s.closed && s.closed_lower && s.closed_upper
@@ -69,7 +69,7 @@ std::string diagnosis_text(const analysis::Diagnosis& d) {
       where.rows.empty() ? "\nWhere it lies, after recalibration: no cell is beyond chance\n" : part(where, most_cells);
 
   Table causes = causes_table(d);
-  const std::string nearest = d.causes.empty() ? "" : d.causes.front().name();
+  const std::string nearest = d.causes.ranked.empty() ? "" : d.causes.ranked.front().name();
   std::erase_if(causes.rows, [&](const std::vector<Cell>& row) {
     return std::get<double>(row[1].value()) < shown_probability && std::get<std::string>(row[0].value()) != nearest;
   });

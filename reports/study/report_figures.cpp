@@ -26,13 +26,13 @@ std::string label(const analysis::Setting& setting) {
 // Cells carry mass over x = omega^2; spread evenly over equal bins of omega.
 Series density(const analysis::Metastability& study, int colour) {
   double low = std::numeric_limits<double>::infinity(), high = 0;
-  for (const analysis::PhaseDistribution& phase : study.quasi_stationary) {
+  for (const analysis::PhaseDistribution& phase : study.survivors.by_phase) {
     low = std::min(low, std::sqrt(std::max(0.0, phase.edges.front())));
     high = std::max(high, std::sqrt(phase.edges.back()));
   }
   const double width = (high - low) / static_cast<double>(density_bins);
   std::vector<double> bins(density_bins, 0.0);
-  for (const analysis::PhaseDistribution& phase : study.quasi_stationary) {
+  for (const analysis::PhaseDistribution& phase : study.survivors.by_phase) {
     for (std::size_t c = 0; c < phase.mass.size(); ++c) {
       const double a = std::sqrt(std::max(0.0, phase.edges[c])), b = std::sqrt(phase.edges[c + 1]);
       const auto first = static_cast<std::size_t>(std::clamp((a - low) / width, 0.0, density_bins - 1.0));
@@ -45,7 +45,7 @@ Series density(const analysis::Metastability& study, int colour) {
   }
   Series series{"", Style::line, {}, {}, {}, {}, colour};
   for (std::size_t k = 0; k < density_bins; ++k) {
-    const double share = bins[k] / static_cast<double>(study.quasi_stationary.size()) / width;
+    const double share = bins[k] / static_cast<double>(study.survivors.by_phase.size()) / width;
     if (share < 1e-6) continue;
     series.x.push_back(low + width * (static_cast<double>(k) + 0.5));
     series.y.push_back(share);
@@ -65,7 +65,7 @@ Figure density_figure(const std::vector<Studied>& settings, const Provenance& pr
   figure.provenance = provenance;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     Series series = density(settings[i].study, static_cast<int>(i));
-    series.label = label(settings[i].setting);
+    series.label = label(*settings[i].study.setting);
     figure.series.push_back(std::move(series));
   }
   return figure;
@@ -82,13 +82,13 @@ Figure survival_figure(const std::vector<Studied>& settings, const Provenance& p
   bool any_endless = false;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const bool endless = settings[i].study.status == analysis::Status::rest_unreachable;
-    Series series{label(settings[i].setting), Style::steps, {}, {}, {}, {}, static_cast<int>(i)};
+    Series series{label(*settings[i].study.setting), Style::steps, {}, {}, {}, {}, static_cast<int>(i)};
     if (endless) {
       series.label += " (never rests)";
       if (any_endless) series.style = Style::dashed;  // over the one before it
       any_endless = true;
     }
-    const std::vector<double>& survival = settings[i].study.survival;
+    const std::vector<double>& survival = settings[i].study.steps.survival;
     for (std::size_t n = 0; n < std::min(survival.size(), survival_steps); ++n) {
       series.x.push_back(static_cast<double>(n));
       series.y.push_back(survival[n]);
@@ -160,7 +160,7 @@ Figure grid_figure(const std::string& id, const std::string& title, const analys
   for (std::size_t i = 0; i < down.values.size(); ++i) {
     map.value.emplace_back();
     for (std::size_t j = 0; j < across.values.size(); ++j)
-      map.value.back().push_back(studies[i * across.values.size() + j].from_start.value);
+      map.value.back().push_back(studies[i * across.values.size() + j].steps.from_start.value);
   }
   figure.heat_map = std::move(map);
   return figure;

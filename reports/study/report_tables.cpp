@@ -29,8 +29,9 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   table.provenance = provenance;
   table.columns = {{"quantity"}, {"unit"}};
   for (const Studied& one : columns)
-    table.columns.push_back({fmt::format("{}, {} deg", dynamics::law_name(one.setting.law), one.setting.slope_deg), "",
-                             NumberFormat::general, 4});
+    table.columns.push_back(
+        {fmt::format("{}, {} deg", dynamics::law_name(one.study.setting->law), one.study.setting->slope_deg), "",
+         NumberFormat::general, 4});
   const auto add = [&](const std::string& name, const std::string& unit,
                        const std::function<Cell(const Studied&)>& of) {
     std::vector<Cell> row{name, unit};
@@ -38,24 +39,28 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
     table.rows.push_back(std::move(row));
   };
   using S = const Studied&;
-  add("expected steps before failure, from the launch", "steps", [](S s) { return cell(s.study.from_start); });
-  add("the same from the metastable regime", "steps", [](S s) { return cell(s.study.from_quasi_stationary); });
-  add("the same from the worst start", "steps", [](S s) { return cell(s.study.worst_start); });
-  add("standard deviation of the steps", "steps", [](S s) { return Cell(s.study.steps.sd); });
-  add("median of the steps", "steps",
-      [](S s) { return s.study.steps.quantile.empty() ? Cell(Infinite{}) : Cell(s.study.steps.quantile[2]); });
+  add("expected steps before failure, from the launch", "steps", [](S s) { return cell(s.study.steps.from_start); });
+  add("the same from the metastable regime", "steps", [](S s) { return cell(s.study.steps.from_quasi_stationary); });
+  add("the same from the worst start", "steps", [](S s) { return cell(s.study.steps.worst_start); });
+  add("standard deviation of the steps", "steps", [](S s) { return Cell(s.study.steps.distribution.sd); });
+  add("median of the steps", "steps", [](S s) {
+    const std::optional<double> median = s.study.steps.distribution.quantile(0.5);
+    return median ? Cell(*median) : Cell(Infinite{});
+  });
   add("mean time to failure", "s",
-      [](S s) { return s.study.seconds ? Cell(s.study.seconds->mean) : Cell(Infinite{}); });
+      [](S s) { return s.study.steps.seconds ? Cell(s.study.steps.seconds->mean) : Cell(Infinite{}); });
   add("mean distance to failure", "m",
-      [](S s) { return s.study.metres ? Cell(s.study.metres->mean) : Cell(Infinite{}); });
-  add("failure rate per step, 1 − λ₁", "1", [](S s) { return Cell(s.study.failure_rate.value); });
-  add("mixing, spectral", "steps", [](S s) { return Cell(s.study.mixing_steps); });
-  add("mixing from the launch, total variation", "steps",
-      [](S s) { return s.study.total_variation_steps ? Cell(*s.study.total_variation_steps) : Cell(""); });
-  add("reaches the end of the ramp", "1", [](S s) { return cell(s.study.reach_end); });
-  add("speed before a collision, long-run mean", "rad/s", [](S s) { return Cell(s.study.observable_mean); });
-  add("its standard deviation", "rad/s", [](S s) { return Cell(s.study.observable_sd); });
-  add("the same mean with a new launch after each rest", "rad/s", [](S s) { return Cell(s.study.restart_mean); });
+      [](S s) { return s.study.steps.metres ? Cell(s.study.steps.metres->mean) : Cell(Infinite{}); });
+  add("failure rate per step, 1 − λ₁", "1", [](S s) { return Cell(s.study.spectrum.failure_rate.value); });
+  add("mixing, spectral", "steps", [](S s) { return Cell(s.study.spectrum.mixing_steps); });
+  add("mixing from the launch, total variation", "steps", [](S s) {
+    return s.study.spectrum.total_variation_steps ? Cell(*s.study.spectrum.total_variation_steps) : Cell("");
+  });
+  add("reaches the end of the ramp", "1", [](S s) { return cell(s.study.steps.reach_end); });
+  add("speed before a collision, long-run mean", "rad/s", [](S s) { return Cell(s.study.survivors.mean); });
+  add("its standard deviation", "rad/s", [](S s) { return Cell(s.study.survivors.sd); });
+  add("the same mean with a new launch after each rest", "rad/s",
+      [](S s) { return Cell(s.study.survivors.restart_mean); });
   add("rest is unreachable for launches from", "rad/s", [](S s) { return cell(s.thresholds.safe_speed); });
   add("slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); });
   const std::vector<analysis::Share>& shares = columns.front().study.violations;
@@ -93,7 +98,7 @@ Table grid_table(const std::string& id, const std::string& title, const analysis
   for (std::size_t i = 0; i < down.values.size(); ++i) {
     std::vector<Cell> row{down.values[i]};
     for (std::size_t j = 0; j < across.values.size(); ++j)
-      row.push_back(cell(studies[i * across.values.size() + j].from_start));
+      row.push_back(cell(studies[i * across.values.size() + j].steps.from_start));
     table.rows.push_back(std::move(row));
   }
   table.notes = {"Expected steps before failure from the launch, with 95 % intervals."};

@@ -7,15 +7,13 @@
 #include "analysis/paper/energy_losses.h"
 #include "analysis/sensitivity/sweep.h"
 #include "analysis/study/metastability.h"
-#include "analysis/study/setting.h"
 #include "reports/output/table.h"
 #include "reports/study/study_json.h"
 
 namespace metastable::reports {
 
-/// A setting with its study.
+/// A study of a setting with what else is known of its rest.
 struct Studied {
-  analysis::Setting setting;
   analysis::Metastability study;
   RestThresholds thresholds;
 };

@@ -23,8 +23,8 @@ Json optional_number(const std::optional<double>& value) { return value ? number
 Json accumulated(const analysis::Accumulated& total) {
   Json json = {{"mean", number(total.mean)}, {"sd", number(total.sd)}};
   Json quantiles = Json::object();
-  for (std::size_t i = 0; i < total.quantile.size(); ++i)
-    quantiles[format_number(analysis::Metastability::levels[i], NumberFormat::general, 3)] = number(total.quantile[i]);
+  for (const analysis::Quantile& one : total.quantiles)
+    quantiles[format_number(one.level, NumberFormat::general, 3)] = number(one.value);
   json["quantiles"] = quantiles;
   return json;
 }
@@ -76,72 +76,74 @@ Json provenance_json(const Provenance& provenance) {
           {"version", provenance.version}};
 }
 
-Json study_json(const analysis::Setting& setting, const analysis::Metastability& study,
-                const RestThresholds& thresholds) {
+Json study_json(const analysis::Metastability& study, const RestThresholds& thresholds) {
+  const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
-  const double median = study.steps.quantile.empty() ? study.from_start.value : study.steps.quantile[2];
+  const double median = study.steps.distribution.quantile(0.5).value_or(study.steps.from_start.value);
   Json json;
   json["slope_deg"] = setting.slope_deg;
   json["law"] = dynamics::law_name(setting.law);
   json["method"] = analysis::method_name(study.method);
   json["status"] = analysis::status_text(study.status);
   if (!study.message.empty()) json["message"] = study.message;
-  json["expected_steps"] = {{"from_start", number(study.from_start.value)},
-                            {"interval_95", interval(study.from_start)},
-                            {"from_quasi_stationary", number(study.from_quasi_stationary.value)},
-                            {"from_quasi_stationary_interval_95", interval(study.from_quasi_stationary)},
-                            {"worst_start", number(study.worst_start.value)},
-                            {"worst_start_interval_95", interval(study.worst_start)},
-                            {"sd", number(study.steps.sd)},
+  json["expected_steps"] = {{"from_start", number(study.steps.from_start.value)},
+                            {"interval_95", interval(study.steps.from_start)},
+                            {"from_quasi_stationary", number(study.steps.from_quasi_stationary.value)},
+                            {"from_quasi_stationary_interval_95", interval(study.steps.from_quasi_stationary)},
+                            {"worst_start", number(study.steps.worst_start.value)},
+                            {"worst_start_interval_95", interval(study.steps.worst_start)},
+                            {"sd", number(study.steps.distribution.sd)},
                             {"median", number(median)},
-                            {"quantiles", accumulated(study.steps)["quantiles"]}};
-  json["failure_rate_per_step"] = study.failure_rate.value;
-  json["failure_rate_interval_95"] = interval(study.failure_rate);
+                            {"quantiles", accumulated(study.steps.distribution)["quantiles"]}};
+  json["failure_rate_per_step"] = study.spectrum.failure_rate.value;
+  json["failure_rate_interval_95"] = interval(study.spectrum.failure_rate);
   json["seconds_before_failure"] =
-      study.seconds ? accumulated(*study.seconds) : Json(endless ? "infinite" : Json(nullptr));
+      study.steps.seconds ? accumulated(*study.steps.seconds) : Json(endless ? "infinite" : Json(nullptr));
   json["metres_before_failure"] =
-      study.metres ? accumulated(*study.metres) : Json(endless ? "infinite" : Json(nullptr));
-  json["survival"] = study.survival;
-  json["eigenvalue_moduli"] = study.eigenvalue_moduli;
-  json["mixing_steps"] = number(study.mixing_steps);
+      study.steps.metres ? accumulated(*study.steps.metres) : Json(endless ? "infinite" : Json(nullptr));
+  json["survival"] = study.steps.survival;
+  json["eigenvalue_moduli"] = study.spectrum.moduli;
+  json["mixing_steps"] = number(study.spectrum.mixing_steps);
   json["total_variation_mixing_steps"] =
-      study.total_variation_steps ? Json(*study.total_variation_steps) : Json(nullptr);
+      study.spectrum.total_variation_steps ? Json(*study.spectrum.total_variation_steps) : Json(nullptr);
   Json legs = Json::array();
-  for (const analysis::PhaseDistribution& phase : study.quasi_stationary)
+  for (const analysis::PhaseDistribution& phase : study.survivors.by_phase)
     legs.push_back({{"mean_rad_s", phase.mean}, {"sd_rad_s", phase.sd}});
   json["quasi_stationary"] = {
-      {"mean_rad_s", study.observable_mean}, {"sd_rad_s", study.observable_sd}, {"per_leg", legs}};
-  json["stationary_with_restart"] = {{"mean_rad_s", study.restart_mean}, {"sd_rad_s", study.restart_sd}};
-  json["reach_ramp_end"] = optional_number(study.reach_end);
+      {"mean_rad_s", study.survivors.mean}, {"sd_rad_s", study.survivors.sd}, {"per_leg", legs}};
+  json["stationary_with_restart"] = {{"mean_rad_s", study.survivors.restart_mean},
+                                     {"sd_rad_s", study.survivors.restart_sd}};
+  json["reach_ramp_end"] = optional_number(study.steps.reach_end);
   Json shares = Json::object();
   for (const analysis::Share& share : study.violations)
     shares[share.name] = {{"quasi_stationary", share.quasi_stationary}, {"until_rest", share.until_rest}};
   json["outside_assumptions"] = shares;
   json["rest_unreachable_above"] = {{"speed_rad_s", optional_number(thresholds.safe_speed)},
                                     {"slope_deg", optional_number(thresholds.safe_slope_deg)}};
-  json["error"] = {{"discretization", number(study.discretization_error)}, {"sampling", number(study.sampling_error)}};
+  json["error"] = {{"discretization", number(study.steps.discretization_error)},
+                   {"sampling", number(study.steps.sampling_error)}};
   json["resolution"] = {{"cells", study.cells},
                         {"samples", study.samples},
                         {"replicates", study.replicates},
                         {"phases", study.phases},
-                        {"period", study.period}};
-  json["solver_disagreement"] = study.solver_disagreement;
+                        {"period", study.spectrum.period}};
+  json["solver_disagreement"] = study.steps.solver_disagreement;
   return json;
 }
 
 }  // namespace
 
-RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis::Metastability& study) {
+RestThresholds rest_thresholds(const analysis::Metastability& study) {
   RestThresholds thresholds;
-  if (study.safe_state) thresholds.safe_speed = std::sqrt(*study.safe_state);
-  thresholds.safe_slope_deg = analysis::safe_slope_deg(setting);
+  if (study.steps.safe_state) thresholds.safe_speed = std::sqrt(*study.steps.safe_state);
+  thresholds.safe_slope_deg = analysis::safe_slope_deg(study.setting.value());
   return thresholds;
 }
 
-std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
-                       const RestThresholds& thresholds, const Provenance& provenance, const StepsExtras& extras) {
+std::string steps_json(const analysis::Metastability& study, const RestThresholds& thresholds,
+                       const Provenance& provenance, const StepsExtras& extras) {
   Json json = {{"schema", 1}};
-  json.update(study_json(setting, study, thresholds));
+  json.update(study_json(study, thresholds));
   if (extras.certified) json["certificate"] = certificate_json(*extras.certified);
   if (extras.sensitivities) json["sensitivities"] = sensitivities_json(*extras.sensitivities);
   if (extras.propagated) json["from_standard_errors"] = propagated_json(*extras.propagated);
@@ -152,8 +154,8 @@ std::string steps_json(const analysis::Setting& setting, const analysis::Metasta
 std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,
                          const Provenance& provenance, const CompareExtras& extras) {
   Json json = {{"schema", 1}, {"settings", Json::array()}, {"contrasts", Json::array()}};
-  for (std::size_t i = 0; i < comparison.settings.size(); ++i) {
-    json["settings"].push_back(study_json(comparison.settings[i], comparison.studies[i], thresholds[i]));
+  for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
+    json["settings"].push_back(study_json(comparison.studies[i], thresholds[i]));
     if (!extras.steps.empty()) json["settings"].back()["from_standard_errors"] = propagated_json(extras.steps[i]);
   }
   const auto estimate = [](const std::optional<analysis::Estimate>& value) {
@@ -161,8 +163,8 @@ std::string compare_json(const analysis::Comparison& comparison, const std::vect
   };
   for (std::size_t i = 0; i < comparison.contrasts.size(); ++i) {
     const analysis::Contrast& contrast = comparison.contrasts[i];
-    json["contrasts"].push_back({{"slope_deg", comparison.settings[contrast.of].slope_deg},
-                                 {"against_slope_deg", comparison.settings[contrast.against].slope_deg},
+    json["contrasts"].push_back({{"slope_deg", comparison.studies[contrast.of].setting->slope_deg},
+                                 {"against_slope_deg", comparison.studies[contrast.against].setting->slope_deg},
                                  {"ratio", estimate(contrast.ratio)},
                                  {"difference", estimate(contrast.difference)},
                                  {"trials_needed", optional_number(contrast.trials_needed)},

@@ -10,7 +10,6 @@
 #include "analysis/sensitivity/sensitivity.h"
 #include "analysis/study/certify.h"
 #include "analysis/study/metastability.h"
-#include "analysis/study/setting.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {
@@ -20,7 +19,7 @@ struct RestThresholds {
   std::optional<double> safe_speed;      ///< launches at least this fast never come to rest [rad/s]
   std::optional<double> safe_slope_deg;  ///< steeper ramps have such launches [deg]
 };
-RestThresholds rest_thresholds(const analysis::Setting& setting, const analysis::Metastability& study);
+RestThresholds rest_thresholds(const analysis::Metastability& study);
 
 /// What `steps` finds beyond the study, where it is asked for.
 struct StepsExtras {
@@ -37,8 +36,8 @@ struct CompareExtras {
 
 /// The result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as many
 /// digits as a double holds. Keys as in the README ("steps --json").
-std::string steps_json(const analysis::Setting& setting, const analysis::Metastability& study,
-                       const RestThresholds& thresholds, const Provenance& provenance, const StepsExtras& extras = {});
+std::string steps_json(const analysis::Metastability& study, const RestThresholds& thresholds,
+                       const Provenance& provenance, const StepsExtras& extras = {});
 
 /// The result of `compare`: "settings" (each as in steps_json) and "contrasts".
 std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,

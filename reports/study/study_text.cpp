@@ -19,9 +19,13 @@ std::string to_the_digit(double value, double half_width) {
 
 std::string line(const std::string& name, const std::string& value) { return fmt::format("  {:<38}{}\n", name, value); }
 
+std::string spread_text(const analysis::Accumulated& total) {
+  return fmt::format("sd {}, median {}, 5 to 95 %: {} to {}", show(total.sd), show(*total.quantile(0.5)),
+                     show(*total.quantile(0.05)), show(*total.quantile(0.95)));
+}
+
 std::string total_line(const std::string& name, const analysis::Accumulated& total) {
-  return line(name, fmt::format("mean {}, sd {}, median {}, 5 to 95 %: {} to {}", show(total.mean), show(total.sd),
-                                show(total.quantile[2]), show(total.quantile.front()), show(total.quantile.back())));
+  return line(name, fmt::format("mean {}, {}", show(total.mean), spread_text(total)));
 }
 
 }  // namespace
@@ -66,35 +70,33 @@ std::string thresholds_text(const RestThresholds& thresholds) {
   return text;
 }
 
-std::string study_text(const analysis::Setting& setting, const analysis::Metastability& study,
-                       const RestThresholds& thresholds) {
+std::string study_text(const analysis::Metastability& study, const RestThresholds& thresholds) {
+  const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
   std::string text = setting.describe() + "\n\n";
   if (study.status == analysis::Status::rest_unresolved) return text + "  " + study.message + "\n";
   if (endless) {
     text += line("expected steps before failure", study.message);
   } else {
-    text += line("expected steps before failure", estimate_text(study.from_start));
-    text += line("  from the metastable regime", estimate_text(study.from_quasi_stationary));
-    text += line("  from the worst start", estimate_text(study.worst_start));
-    text += line("failure rate per step", fmt::format("{:.6g}", study.failure_rate.value));
-    text += line("steps", fmt::format("sd {}, median {}, 5 to 95 %: {} to {}", show(study.steps.sd),
-                                      show(study.steps.quantile[2]), show(study.steps.quantile.front()),
-                                      show(study.steps.quantile.back())));
-    if (study.seconds) text += total_line("seconds", *study.seconds);
-    if (study.metres) text += total_line("metres", *study.metres);
+    text += line("expected steps before failure", estimate_text(study.steps.from_start));
+    text += line("  from the metastable regime", estimate_text(study.steps.from_quasi_stationary));
+    text += line("  from the worst start", estimate_text(study.steps.worst_start));
+    text += line("failure rate per step", fmt::format("{:.6g}", study.spectrum.failure_rate.value));
+    text += line("steps", spread_text(study.steps.distribution));
+    if (study.steps.seconds) text += total_line("seconds", *study.steps.seconds);
+    if (study.steps.metres) text += total_line("metres", *study.steps.metres);
   }
-  if (study.reach_end)
-    text += line(fmt::format("reaches the end of {} m", setting.ramp_length), show(*study.reach_end));
+  if (study.steps.reach_end)
+    text += line(fmt::format("reaches the end of {} m", setting.ramp_length), show(*study.steps.reach_end));
   text += line(endless ? "stationary speed" : "quasi-stationary speed",
-               fmt::format("{:.4f} rad/s, sd {:.4f}", study.observable_mean, study.observable_sd));
+               fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.mean, study.survivors.sd));
   if (!endless)
     text += line("stationary speed, relaunched",
-                 fmt::format("{:.4f} rad/s, sd {:.4f}", study.restart_mean, study.restart_sd));
-  text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.eigenvalue_moduli, ", ")));
-  std::string mixing = fmt::format("{:.4g} steps (spectral)", study.mixing_steps);
-  if (study.total_variation_steps)
-    mixing += fmt::format(", {} from the launch (total variation)", *study.total_variation_steps);
+                 fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.restart_mean, study.survivors.restart_sd));
+  text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.spectrum.moduli, ", ")));
+  std::string mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);
+  if (study.spectrum.total_variation_steps)
+    mixing += fmt::format(", {} from the launch (total variation)", *study.spectrum.total_variation_steps);
   text += line("mixing", mixing);
   text += "\n";
   text += line("rest", thresholds_text(thresholds));
@@ -111,8 +113,9 @@ std::string study_text(const analysis::Setting& setting, const analysis::Metasta
                                                                     : std::string("one randomisation")));
   if (!endless) {
     text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)",
-                                               study.discretization_error, study.sampling_error));
-    text += line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.solver_disagreement));
+                                               study.steps.discretization_error, study.steps.sampling_error));
+    text +=
+        line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.steps.solver_disagreement));
     if (!study.message.empty()) text += "\n" + study.message + "\n";
   }
   return text;

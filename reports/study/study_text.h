@@ -4,14 +4,12 @@
 #include <string>
 
 #include "analysis/study/metastability.h"
-#include "analysis/study/setting.h"
 #include "reports/study/study_json.h"
 
 namespace metastable::reports {
 
 /// Everything `metastable steps` prints.
-std::string study_text(const analysis::Setting& setting, const analysis::Metastability& study,
-                       const RestThresholds& thresholds);
+std::string study_text(const analysis::Metastability& study, const RestThresholds& thresholds);
 
 /// The sensitivities as a table, ranked, or why there are none.
 std::string sensitivities_text(const analysis::Sensitivities& sensitivities);

@@ -72,7 +72,7 @@ TEST(BlindCheck, HoldsTheCauseOfStrongEffects) {
   std::string missed;
   for (const Outcome& o : check(plans_of(BlindKind::effect, 4, 91), 91)) {
     ++cases;
-    const auto& set = o.diagnosis.cause_set;
+    const auto& set = o.diagnosis.causes.set;
     const bool holds = std::any_of(set.begin(), set.end(), [&](const std::string& name) {
       return name.find(o.truth.effects[0].id) != std::string::npos;
     });

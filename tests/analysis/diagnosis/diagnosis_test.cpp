@@ -35,18 +35,18 @@ std::unique_ptr<TransitionModel> data(
 
 // Where the verdict is a gap, a gap is the likelier; where it is none, none is.
 void expect_probabilities_to_agree(const Diagnosis& d) {
-  const double null = d.p_no_gap + d.p_recalibrate;
+  const double null = d.causes.p_no_gap + d.causes.p_recalibrate;
   const bool gap = d.verdict == Verdict::explained || d.verdict == Verdict::unexplained;
   EXPECT_TRUE(gap ? null <= 0.5 + 1e-9 : null >= 0.5 - 1e-9) << verdict_name(d.verdict) << " " << null;
-  double sum = null + d.p_none;
-  for (const Cause& cause : d.causes) sum += cause.probability;
+  double sum = null + d.causes.p_none;
+  for (const Cause& cause : d.causes.ranked) sum += cause.probability;
   EXPECT_NEAR(sum, 1, 1e-9);
 }
 
 TEST(Diagnosis, FindsNoGapWhereThereIsNone) {
   const Diagnosis d = diagnose(*data({}, 21), quick());
   EXPECT_EQ(d.verdict, Verdict::no_gap);
-  EXPECT_TRUE(d.cause_set.empty());
+  EXPECT_TRUE(d.causes.set.empty());
   EXPECT_FALSE(d.sentences.empty());
   expect_probabilities_to_agree(d);
 }
@@ -71,27 +71,27 @@ TEST(Diagnosis, CallsOtherContactParametersRecalibration) {
   contact[2] += 0.05;  // friction's mean
   const Diagnosis d = diagnose(*data({}, 22, contact), quick());
   EXPECT_EQ(d.verdict, Verdict::recalibrate);
-  EXPECT_LT(d.p_recalibration, 1e-6);
+  EXPECT_LT(d.gap.p_recalibration, 1e-6);
   // The loss tells one number of the two means: recalibrated and true model agree on the steps.
-  EXPECT_GT(d.shrinkage[0].baseline, 10 * std::abs(d.shrinkage[0].recalibrated));
+  EXPECT_GT(d.shrinkage.measures[0].baseline, 10 * std::abs(d.shrinkage.measures[0].recalibrated));
 }
 
 TEST(Diagnosis, NamesTheCauseItsSizeAndWhatItCloses) {
   const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.3}}}}, 23), quick());
   EXPECT_EQ(d.verdict, Verdict::explained);
-  EXPECT_EQ(d.cause_set, std::vector<std::string>{"leg_contact"});
-  ASSERT_FALSE(d.causes.empty());
-  const auto& parameters = d.causes[0].parameters[0];
+  EXPECT_EQ(d.causes.set, std::vector<std::string>{"leg_contact"});
+  ASSERT_FALSE(d.causes.ranked.empty());
+  const auto& parameters = d.causes.ranked[0].parameters[0];
   EXPECT_EQ(parameters[0].value, 3);
   const double half = (parameters[1].upper - parameters[1].lower) / 2;
   EXPECT_NEAR(parameters[1].value, 1.3, 2.5 * half);  // half: 1.64 standard errors
   EXPECT_LT(half, 0.1);
-  ASSERT_TRUE(d.shrinkage[0].closed);
-  EXPECT_GT(*d.shrinkage[0].closed, 0.8);
-  EXPECT_LT(d.p_value, 1e-6);
+  ASSERT_TRUE(d.shrinkage.measures[0].closed);
+  EXPECT_GT(*d.shrinkage.measures[0].closed, 0.8);
+  EXPECT_LT(d.gap.p_value, 1e-6);
   // Where: leg 3 comes first.
   const auto first = std::min_element(
-      d.recalibrated.cells.begin(), d.recalibrated.cells.end(),
+      d.gap.recalibrated.cells.begin(), d.gap.recalibrated.cells.end(),
       [](const GapCell& a, const GapCell& b) { return std::abs(a.statistic) > std::abs(b.statistic); });
   EXPECT_EQ(first->facet, "leg");
   EXPECT_EQ(first->at.substr(0, 5), "leg 3");
@@ -108,19 +108,19 @@ TEST(Diagnosis, SizesOnTheMapAreThoseOfTheCause) {
     ADD_FAILURE() << "no cell of leg 3";
     return 0.0;
   };
-  EXPECT_NEAR(size(d.as_given), -0.87, 0.2);
-  EXPECT_NEAR(size(d.recalibrated), -0.87, 0.2);
+  EXPECT_NEAR(size(d.gap.as_given), -0.87, 0.2);
+  EXPECT_NEAR(size(d.gap.recalibrated), -0.87, 0.2);
 }
 
 TEST(Diagnosis, NamesBothOfTwoCauses) {
   const Diagnosis d =
       diagnose(*data({{"contact_memory", {{}, {0.4}}}, {"rolling_resistance", {{}, {0.003}}}}, 24), quick());
   EXPECT_EQ(d.verdict, Verdict::explained);
-  ASSERT_FALSE(d.causes.empty());
-  const std::string name = d.causes[0].name();
+  ASSERT_FALSE(d.causes.ranked.empty());
+  const std::string name = d.causes.ranked[0].name();
   EXPECT_NE(name.find("contact_memory"), std::string::npos) << name;
-  EXPECT_EQ(d.causes[0].effects.size(), 2u) << name;
-  EXPECT_LT(d.together, most_together);
+  EXPECT_EQ(d.causes.ranked[0].effects.size(), 2u) << name;
+  EXPECT_LT(d.causes.together, most_together);
 }
 
 // Without the true effect in the catalogue the answer is that nothing explains it.
@@ -129,7 +129,7 @@ TEST(Diagnosis, SaysUnexplainedWhenTheCatalogueLacksTheCause) {
   options.catalogue = {"initial_speed", "inertia", "trial_spread", "friction_patch", "air_drag"};
   const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.5}}}}, 25), options);
   EXPECT_EQ(d.verdict, Verdict::unexplained);
-  EXPECT_TRUE(d.cause_set.empty());
+  EXPECT_TRUE(d.causes.set.empty());
 }
 
 // A pair that nothing promises is tried where it is asked for; alone it extends the whole catalogue.
@@ -138,12 +138,12 @@ TEST(Diagnosis, TriesThePairsAskedFor) {
   DiagnosisOptions options = quick();
   options.catalogue = {"leg_contact", "trial_drift", "trial_drift+leg_contact"};
   const Diagnosis d = diagnose(*experiment, options);
-  const auto pair =
-      std::find_if(d.causes.begin(), d.causes.end(), [](const Cause& c) { return c.effects.size() == 2; });
-  ASSERT_NE(pair, d.causes.end());
+  const auto pair = std::find_if(d.causes.ranked.begin(), d.causes.ranked.end(),
+                                 [](const Cause& c) { return c.effects.size() == 2; });
+  ASSERT_NE(pair, d.causes.ranked.end());
   EXPECT_EQ(pair->name(), "trial_drift+leg_contact");
-  EXPECT_GE(pair->gain, d.causes[0].gain - 1e-6);
-  EXPECT_EQ(d.causes[0].name(), "leg_contact");
+  EXPECT_GE(pair->gain, d.causes.ranked[0].gain - 1e-6);
+  EXPECT_EQ(d.causes.ranked[0].name(), "leg_contact");
   options.catalogue = {"trial_drift+trial_drift"};
   EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
 }
@@ -159,11 +159,11 @@ TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   DiagnosisOptions options = quick();
   options.catalogue = {"speed_dependent_restitution", "speed_dependent_friction", "leg_contact"};
   const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
-  ASSERT_FALSE(d.causes.empty());
-  EXPECT_EQ(d.causes[0].effects.size(), 2U) << d.causes[0].name();
-  EXPECT_GT(d.together, most_together);
+  ASSERT_FALSE(d.causes.ranked.empty());
+  EXPECT_EQ(d.causes.ranked[0].effects.size(), 2U) << d.causes.ranked[0].name();
+  EXPECT_GT(d.causes.together, most_together);
   EXPECT_EQ(d.verdict, Verdict::unexplained);
-  EXPECT_TRUE(d.cause_set.empty());
+  EXPECT_TRUE(d.causes.set.empty());
   ASSERT_GE(d.sentences.size(), 2U);
   EXPECT_NE(d.sentences[1].find("as much together as alone"), std::string::npos) << d.sentences[1];
 }
@@ -174,13 +174,13 @@ TEST(Diagnosis, IsTheSameOnAnyNumberOfThreads) {
   one.threads = 1;
   two.threads = 2;
   const Diagnosis a = diagnose(*experiment, one), b = diagnose(*experiment, two);
-  ASSERT_EQ(a.causes.size(), b.causes.size());
-  for (std::size_t i = 0; i < a.causes.size(); ++i) {
-    EXPECT_EQ(a.causes[i].name(), b.causes[i].name());
-    EXPECT_EQ(a.causes[i].probability, b.causes[i].probability);
+  ASSERT_EQ(a.causes.ranked.size(), b.causes.ranked.size());
+  for (std::size_t i = 0; i < a.causes.ranked.size(); ++i) {
+    EXPECT_EQ(a.causes.ranked[i].name(), b.causes.ranked[i].name());
+    EXPECT_EQ(a.causes.ranked[i].probability, b.causes.ranked[i].probability);
   }
-  EXPECT_EQ(a.p_value, b.p_value);
-  EXPECT_EQ(a.shrinkage[0].with_effect, b.shrinkage[0].with_effect);
+  EXPECT_EQ(a.gap.p_value, b.gap.p_value);
+  EXPECT_EQ(a.shrinkage.measures[0].with_effect, b.shrinkage.measures[0].with_effect);
 }
 
 TEST(Diagnosis, RefusesOptionsOutOfRange) {
@@ -208,9 +208,9 @@ TEST(Diagnosis, NamesTheTorqueOnARotor) {
       design->simulate(nominal_values(*design), std::vector{term(*design, "rolling_resistance", {}, {0.02})}, 5);
   const Diagnosis d = diagnose(*dragged, quick());
   EXPECT_EQ(d.verdict, Verdict::explained);
-  ASSERT_FALSE(d.causes.empty());
-  EXPECT_EQ(d.causes[0].name(), "rolling_resistance");
-  EXPECT_NEAR(d.causes[0].parameters[0][0].value, 0.02, 0.002);
+  ASSERT_FALSE(d.causes.ranked.empty());
+  EXPECT_EQ(d.causes.ranked[0].name(), "rolling_resistance");
+  EXPECT_NEAR(d.causes.ranked[0].parameters[0][0].value, 0.02, 0.002);
   const Diagnosis none = diagnose(*design->simulate(nominal_values(*design), {}, 6), quick());
   EXPECT_EQ(none.verdict, Verdict::no_gap);
 }

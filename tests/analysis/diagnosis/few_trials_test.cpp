@@ -25,18 +25,18 @@ TEST(FewTrials, AreNotTakenForAGap) {
   for (const auto& [trials, collisions] : {std::pair{1, 2}, {2, 10}, {3, 6}, {5, 3}, {100, 1}})
     for (std::uint64_t seed = 1; seed <= 2; ++seed)
       alarms +=
-          without_gap(static_cast<std::size_t>(trials), static_cast<std::size_t>(collisions), seed).p_value < 0.04;
+          without_gap(static_cast<std::size_t>(trials), static_cast<std::size_t>(collisions), seed).gap.p_value < 0.04;
   EXPECT_LE(alarms, 2);  // of 10, each with 4 %
 }
 
 const NotPossible* find(const Diagnosis& d, const std::string& words) {
-  for (const NotPossible& n : d.not_possible)
+  for (const NotPossible& n : d.limits.not_possible)
     if (n.statement.find(words) != std::string::npos) return &n;
   return nullptr;
 }
 
 const Cause* undecided(const Diagnosis& d, const std::string& id) {
-  for (const Cause& cause : d.not_decided)
+  for (const Cause& cause : d.causes.not_decided)
     if (cause.name() == id) return &cause;
   return nullptr;
 }
@@ -47,7 +47,7 @@ TEST(FewTrials, SayWhatTheyCannotAndHowManyWouldDo) {
     for (const std::size_t collisions : {1, 12}) {
       const Diagnosis d = without_gap(trials, collisions, 7);
       SCOPED_TRACE(trials * 100 + collisions);
-      EXPECT_TRUE(d.shrinkage.empty());
+      EXPECT_TRUE(d.shrinkage.measures.empty());
       const NotPossible* shrinkage = find(d, "how far the gap shrinks");
       ASSERT_TRUE(shrinkage);
       EXPECT_EQ(shrinkage->trials, 10u);  // two in each of five folds
@@ -61,7 +61,7 @@ TEST(FewTrials, SayWhatTheyCannotAndHowManyWouldDo) {
         ASSERT_TRUE(where);
         EXPECT_EQ(where->trials, 20u);  // one collision each, twenty a cell
       }
-      for (const Cause& cause : d.causes)
+      for (const Cause& cause : d.causes.ranked)
         for (const auto& parameters : cause.parameters)
           for (const EstimatedParameter& p : parameters) EXPECT_FALSE(std::isnan(p.value)) << cause.name();
     }
@@ -73,7 +73,7 @@ TEST(FewTrials, OfWhichNoneRestedGiveALowerEndOnly) {
   const NotPossible* steps = find(d, "observed steps before failure");
   ASSERT_TRUE(steps);
   ASSERT_TRUE(steps->trials) << steps->because;
-  const double none = std::pow(1 - 1 / d.steps.with_effect, 6.0 * static_cast<double>(*steps->trials));
+  const double none = std::pow(1 - 1 / d.shrinkage.steps.with_effect, 6.0 * static_cast<double>(*steps->trials));
   EXPECT_LE(none, 0.05 + 1e-6);
   EXPECT_GT(none, 0.045);
 }
@@ -142,12 +142,12 @@ TEST(NotDecided, AnEffectWhoseLikelihoodFailsToMaximiseIsListedWithTheReason) {
   const Cause* cause = undecided(d, "trial_drift");
   ASSERT_TRUE(cause);
   EXPECT_FALSE(cause->not_decided.empty());
-  for (const Cause& other : d.causes) EXPECT_NE(other.name(), "trial_drift");
+  for (const Cause& other : d.causes.ranked) EXPECT_NE(other.name(), "trial_drift");
 }
 
 std::vector<std::string> hidden_by(const Diagnosis& d, const std::string& column) {
   std::vector<std::string> effects;
-  for (const MissingColumn& m : d.missing)
+  for (const MissingColumn& m : d.limits.missing)
     if (m.column == column)
       for (const HiddenEffect& e : m.effects)
         if (!e.smallest) effects.push_back(e.effect);
@@ -164,12 +164,12 @@ TEST(MissingColumns, WithoutLegsNoEffectOfALegIsTold) {
   options.catalogue = {"leg_contact", "leg_lengths", "hub_eccentricity", "slope_offset", "sensor_bias"};
   const auto design = wheel_transitions(e);
   const Diagnosis d = diagnose(*design->simulate(nominal_values(*design), {}, 4), options);
-  ASSERT_EQ(d.missing.size(), 2u);
+  ASSERT_EQ(d.limits.missing.size(), 2u);
   EXPECT_EQ(hidden_by(d, "leg"), (std::vector<std::string>{"leg_contact", "hub_eccentricity"}));
   EXPECT_EQ(hidden_by(d, "omega_plus_rad_s"),
             (std::vector<std::string>{"leg_lengths", "leg_contact", "hub_eccentricity"}));
   // The speed after the collision sees a slope a hundred times smaller: the stance has no contact noise.
-  for (const HiddenEffect& effect : d.missing[1].effects)
+  for (const HiddenEffect& effect : d.limits.missing[1].effects)
     if (effect.effect == "slope_offset") {
       ASSERT_TRUE(effect.smallest);
       EXPECT_GT(*effect.smallest, 20 * effect.smallest_with_it);
@@ -185,7 +185,7 @@ TEST(MissingColumns, NothingIsSaidOfColumnsThatAreThere) {
   DiagnosisOptions options;
   options.draws = 200;
   options.catalogue = {"air_drag"};
-  EXPECT_TRUE(diagnose(*design->simulate(nominal_values(*design), {}, 4), options).missing.empty());
+  EXPECT_TRUE(diagnose(*design->simulate(nominal_values(*design), {}, 4), options).limits.missing.empty());
 }
 
 }  // namespace

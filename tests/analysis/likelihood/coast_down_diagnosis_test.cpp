@@ -58,8 +58,8 @@ const Rig rough{.constant = 2.1, .linear = 0.006, .quadratic = 0.0021, .tyre = 0
 
 // The likeliest cause holds the torque, in its size [N m of 1 kg m^2].
 void expect_the_torque(const Diagnosis& d) {
-  ASSERT_FALSE(d.causes.empty());
-  const Cause& cause = d.causes.front();
+  ASSERT_FALSE(d.causes.ranked.empty());
+  const Cause& cause = d.causes.ranked.front();
   double torque = 0;
   for (std::size_t e = 0; e < cause.effects.size(); ++e)
     if (cause.effects[e] == "rolling_resistance") torque = cause.parameters[e][0].value;
@@ -72,8 +72,8 @@ TEST(CoastDownDiagnosis, NamesTheRollingResistanceOfATyre) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     EXPECT_EQ(d.verdict, Verdict::explained);
     expect_the_torque(d);
-    for (const std::string& name : d.cause_set) EXPECT_NE(name.find("rolling_resistance"), std::string::npos) << name;
-    EXPECT_NE(d.size.find("rolling_resistance +"), std::string::npos) << d.size;
+    for (const std::string& name : d.causes.set) EXPECT_NE(name.find("rolling_resistance"), std::string::npos) << name;
+    EXPECT_NE(d.causes.size.find("rolling_resistance +"), std::string::npos) << d.causes.size;
   }
 }
 
@@ -89,17 +89,18 @@ TEST(CoastDownDiagnosis, NamesNothingLargeWhereNothingWasAdded) {
   again.constant *= 1.05;
   again.quadratic *= 0.97;
   const Diagnosis d = diagnosed(free, true, {measured(again, 2, "again")});
-  EXPECT_TRUE(d.verdict == Verdict::no_gap || d.verdict == Verdict::recalibrate) << verdict_name(d.verdict) << d.size;
+  EXPECT_TRUE(d.verdict == Verdict::no_gap || d.verdict == Verdict::recalibrate)
+      << verdict_name(d.verdict) << d.causes.size;
 }
 
 // Numbers that cannot be negative have intervals that are not; the map speaks of the shifts that a drum makes.
 TEST(CoastDownDiagnosis, ItsNumbersArePhysical) {
   const Diagnosis d = diagnosed(measured({}, 1, "free"), true, {measured(tyre, 11, "tyre")});
-  for (const EstimatedParameter& p : d.contact)
+  for (const EstimatedParameter& p : d.gap.contact)
     if (p.value > 0 && p.name != "linear" && p.name != "quadratic" && p.name != "constant") {
       EXPECT_GE(p.lower, 0) << p.name;
     }
-  for (const GapCell& cell : d.as_given.cells) {
+  for (const GapCell& cell : d.gap.as_given.cells) {
     if (cell.unit == "rad/s") {
       EXPECT_LT(std::abs(cell.size), 0.5) << cell.at;  // a revolution loses 0.03 to 0.3
     }

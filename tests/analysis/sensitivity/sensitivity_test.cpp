@@ -19,7 +19,7 @@ const Sensitivity& find(const Sensitivities& all, const std::string& name) {
 }
 
 Sensitivities by_adjoint(const Setting& setting, const StudyOptions& options) {
-  return sensitivities(setting, study(setting.problem(), options), options);
+  return sensitivities(study(setting, options), options);
 }
 
 // d ln M / d parameter by re-solving on either side, with rows integrated.
@@ -28,8 +28,7 @@ double by_solves(const Setting& setting, Parameter parameter, double step) {
   for (int side : {0, 1}) {
     Setting moved = setting;
     set_parameter(moved, parameter, parameter_value(setting, parameter) + (side == 0 ? -step : step));
-    log_steps[side] =
-        std::log(study(moved.problem(), {.method = Method::integrated, .tolerance = 1e-4}).from_start.value);
+    log_steps[side] = std::log(study(moved, {.method = Method::integrated, .tolerance = 1e-4}).steps.from_start.value);
   }
   return (log_steps[1] - log_steps[0]) / (2 * step);
 }
@@ -88,7 +87,7 @@ TEST(Sensitivity, CoulombAgreesWithDifferencesOfFullSolves) {
     for (int side : {0, 1}) {
       Setting moved = setting;
       set_parameter(moved, parameter, parameter_value(setting, parameter) + (side == 0 ? -step : step));
-      log_steps[side] = std::log(study(moved.problem(), {.cells = 256, .samples = 4096}).from_start.value);
+      log_steps[side] = std::log(study(moved, {.cells = 256, .samples = 4096}).steps.from_start.value);
     }
     return (log_steps[1] - log_steps[0]) / (2 * step);
   };
@@ -139,8 +138,11 @@ TEST(Sensitivity, SaysWhyThereAreNone) {
             "the expected steps are infinite or not resolved");
   Setting exact = paper_setting(7.02, true);
   exact.restitution.sd = exact.friction.sd = 0;
-  const Metastability any;
-  EXPECT_NE(sensitivities(exact, any, {}).reason.find("without noise"), std::string::npos);
+  Metastability any;
+  any.setting = exact;
+  EXPECT_NE(sensitivities(any, {}).reason.find("without noise"), std::string::npos);
+  EXPECT_THROW(sensitivities(study(gentle_coulomb().problem(), {.cells = 32, .samples = 256}), {}),
+               std::invalid_argument);
 }
 
 }  // namespace

@@ -42,9 +42,9 @@ TEST(Sweep, PointsComeInOrderAndEqualSingleStudies) {
   sweep(base, axes, 1, options, [&](std::size_t index, const SweepPoint& point) {
     EXPECT_EQ(index, expected++);
     EXPECT_EQ(point.at, std::vector<double>{axes[0].values[index]});
-    EXPECT_EQ(point.study.from_start.value,
-              study(sweep_setting(base, axes, index).problem(), options).from_start.value);
-    last = point.study.from_start.value;
+    EXPECT_EQ(point.study.steps.from_start.value,
+              study(sweep_setting(base, axes, index), options).steps.from_start.value);
+    last = point.study.steps.from_start.value;
   });
   EXPECT_EQ(expected, 5u);
   EXPECT_GT(last, 1.0);

@@ -26,7 +26,7 @@ Metastability integrated(const Setting& setting, double tolerance, std::size_t c
   options.method = Method::integrated;
   options.tolerance = tolerance;
   options.cells = cells;
-  return study(setting.problem(), options);
+  return study(setting, options);
 }
 
 TEST(IntegratedStudy, GivesTheKnownAnswersOfThePapersWheel) {
@@ -35,10 +35,10 @@ TEST(IntegratedStudy, GivesTheKnownAnswersOfThePapersWheel) {
   const Metastability flat = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-3);
   EXPECT_EQ(flat.method, Method::integrated);
   EXPECT_EQ(flat.status, Status::converged);
-  EXPECT_EQ(flat.sampling_error, 0);
-  EXPECT_NEAR(flat.from_start.value, 4.2585, 1e-4);
-  EXPECT_NEAR(flat.steps.mean / flat.from_start.value, 1, 1e-12);
-  EXPECT_NEAR(integrated(equal_legs(9.59, {0.4, 0.1}), 1e-3).from_start.value, 6.1746, 2e-4);
+  EXPECT_EQ(flat.steps.sampling_error, 0);
+  EXPECT_NEAR(flat.steps.from_start.value, 4.2585, 1e-4);
+  EXPECT_NEAR(flat.steps.distribution.mean / flat.steps.from_start.value, 1, 1e-12);
+  EXPECT_NEAR(integrated(equal_legs(9.59, {0.4, 0.1}), 1e-3).steps.from_start.value, 6.1746, 2e-4);
 }
 
 TEST(IntegratedStudy, GivesEightDigitsWithFewNodes) {
@@ -46,20 +46,21 @@ TEST(IntegratedStudy, GivesEightDigitsWithFewNodes) {
   const Metastability result = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-8);
   EXPECT_EQ(result.status, Status::converged);
   EXPECT_LE(result.cells, 128u);
-  EXPECT_NEAR(result.from_start.value / 4.2584828629, 1, 1e-8);
+  EXPECT_NEAR(result.steps.from_start.value / 4.2584828629, 1, 1e-8);
 }
 
 TEST(IntegratedStudy, IsRightWhereFailuresAreRare) {
   // Sampled and extrapolated: 46577.7(50).
-  EXPECT_NEAR(integrated(equal_legs(9.59, {0.3, 0.05}), 1e-3).from_start.value, 46577.7, 5);
+  EXPECT_NEAR(integrated(equal_legs(9.59, {0.3, 0.05}), 1e-3).steps.from_start.value, 46577.7, 5);
 }
 
 TEST(IntegratedStudy, ErrorCoversFinerNodes) {
   const Setting setting = equal_legs(7.02, {0.3, 0.05});
   const Metastability coarse = integrated(setting, 0.5, 48), fine = integrated(setting, 0.5, 96);
   EXPECT_EQ(coarse.cells, 48u);
-  EXPECT_LT(std::abs(std::log(coarse.from_start.value / fine.from_start.value)), coarse.discretization_error);
-  EXPECT_LT(fine.discretization_error, 0.1 * coarse.discretization_error + 1e-5);  // the rows' own
+  EXPECT_LT(std::abs(std::log(coarse.steps.from_start.value / fine.steps.from_start.value)),
+            coarse.steps.discretization_error);
+  EXPECT_LT(fine.steps.discretization_error, 0.1 * coarse.steps.discretization_error + 1e-5);  // the rows' own
 }
 
 TEST(IntegratedStudy, ReproducesTheSixtyDigitValuesOfRoughTerrain) {
@@ -72,8 +73,8 @@ TEST(IntegratedStudy, ReproducesTheSixtyDigitValuesOfRoughTerrain) {
   const Metastability result =
       study({wheel, {[start](double) { return start; }, 0}, [](double x) { return x; }, {}}, options);
   EXPECT_EQ(result.status, Status::converged);
-  EXPECT_NEAR(result.failure_rate.value / 1.5280057867965971e-6, 1, 1e-11);
-  EXPECT_NEAR(result.from_start.value / 654449.43992398285, 1, 1e-11);
+  EXPECT_NEAR(result.spectrum.failure_rate.value / 1.5280057867965971e-6, 1, 1e-11);
+  EXPECT_NEAR(result.steps.from_start.value / 654449.43992398285, 1, 1e-11);
 }
 
 TEST(IntegratedStudy, ComparisonsHaveNoSamplingError) {
@@ -108,9 +109,9 @@ TEST(IntegratedStudy, IntervalsHoldTheValueOfATighterTolerance) {
       EXPECT_EQ(coarse.status, Status::converged);
       EXPECT_LE(coarse.cells, tolerance < 2e-5 ? 192u : 128u)
           << c.slope_deg << ' ' << c.friction.mean << ' ' << c.friction.sd;
-      for (const auto& [rough, exact] : {std::pair(coarse.from_start, fine.from_start),
-                                         {coarse.failure_rate, fine.failure_rate},
-                                         {coarse.worst_start, fine.worst_start}}) {
+      for (const auto& [rough, exact] : {std::pair(coarse.steps.from_start, fine.steps.from_start),
+                                         {coarse.spectrum.failure_rate, fine.spectrum.failure_rate},
+                                         {coarse.steps.worst_start, fine.steps.worst_start}}) {
         EXPECT_LE(rough.lower, exact.value) << c.slope_deg << ' ' << c.friction.mean << ' ' << tolerance;
         EXPECT_GE(rough.upper, exact.value) << c.slope_deg << ' ' << c.friction.mean << ' ' << tolerance;
       }
@@ -126,8 +127,8 @@ TEST(IntegratedStudy, TakesLaunchesSlowerThanAnySurvivor) {
     EXPECT_EQ(fine.status, Status::converged);
     StudyOptions sampled;
     sampled.tolerance = 0.01;
-    const Metastability drawn = study(setting.problem(), sampled);
-    EXPECT_NEAR(fine.from_start.value / drawn.from_start.value, 1, 0.01) << friction;
+    const Metastability drawn = study(setting, sampled);
+    EXPECT_NEAR(fine.steps.from_start.value / drawn.steps.from_start.value, 1, 0.01) << friction;
   }
 }
 
@@ -139,10 +140,10 @@ TEST(IntegratedStudy, TakesCoulomb) {
   EXPECT_EQ(result.status, Status::converged);
   // Direct simulation: 24.68 (s.e. 0.03), tests/dynamics/return_map/trials_test.cpp. The digits: 24 panels of 16 nodes
   // between edges of three generations, and 30 points a panel of eta and mu: 24.67743312.
-  EXPECT_NEAR(result.from_start.value, 24.68, 0.09);
-  EXPECT_NEAR(result.from_start.value / 24.67743312, 1, 1e-9);
-  EXPECT_NEAR(result.steps.mean / result.from_start.value, 1, 1e-12);
-  EXPECT_LT(result.solver_disagreement, 1e-12);
+  EXPECT_NEAR(result.steps.from_start.value, 24.68, 0.09);
+  EXPECT_NEAR(result.steps.from_start.value / 24.67743312, 1, 1e-9);
+  EXPECT_NEAR(result.steps.distribution.mean / result.steps.from_start.value, 1, 1e-12);
+  EXPECT_LT(result.steps.solver_disagreement, 1e-12);
 }
 
 // Constant friction, constant restitution, spreads that reach their bounds.
@@ -163,8 +164,8 @@ TEST(IntegratedStudy, TakesAnyNoise) {
     setting.initial_speed = c.speed;
     const Metastability fine = integrated(setting, 1e-8), coarse = integrated(setting, 1e-4);
     EXPECT_EQ(fine.status, Status::converged) << law_name(c.law) << ' ' << c.restitution.sd << ' ' << c.friction.sd;
-    EXPECT_LE(coarse.from_start.lower, fine.from_start.value);
-    EXPECT_GE(coarse.from_start.upper, fine.from_start.value);
+    EXPECT_LE(coarse.steps.from_start.lower, fine.steps.from_start.value);
+    EXPECT_GE(coarse.steps.from_start.upper, fine.steps.from_start.value);
   }
 }
 
@@ -174,7 +175,7 @@ TEST(IntegratedStudy, TakesAnyNoise) {
 TEST(IntegratedStudy, OfConstantFrictionAgreesWithSampling) {
   Setting setting = equal_legs(7.02, {0.45, 0});
   setting.restitution = {0.4, 0.2};
-  EXPECT_NEAR(integrated(setting, 1e-3).from_start.value, 3.33529, 9e-4);
+  EXPECT_NEAR(integrated(setting, 1e-3).steps.from_start.value, 3.33529, 9e-4);
 }
 
 // Densities and collocation share the law's formula and nothing else.
@@ -182,8 +183,8 @@ TEST(IntegratedStudy, DensitiesAgreeWithCollocation) {
   for (const Spread& friction : {Spread{0.4, 0.1}, {0.3, 0.05}}) {
     const Metastability densities = integrated(equal_legs(7.02, friction), 2e-5, 128),
                         points = integrated(equal_legs(7.02, friction), 1e-8);
-    EXPECT_NEAR(densities.from_start.value / points.from_start.value, 1, 1e-8);
-    EXPECT_NEAR(densities.failure_rate.value / points.failure_rate.value, 1, 1e-8);
+    EXPECT_NEAR(densities.steps.from_start.value / points.steps.from_start.value, 1, 1e-8);
+    EXPECT_NEAR(densities.spectrum.failure_rate.value / points.spectrum.failure_rate.value, 1, 1e-8);
   }
 }
 

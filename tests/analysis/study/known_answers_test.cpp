@@ -30,11 +30,11 @@ TEST_P(PublishedWheel, ExpectedStepsAreInsideTheStudysOwnInterval) {
   const Row row = GetParam();
   Setting setting = paper_setting(row.slope_deg, true);
   setting.friction = {row.friction_mean, row.friction_sd};
-  const Metastability result = study(setting.problem(), {});
+  const Metastability result = study(setting);
   EXPECT_EQ(result.status, Status::converged);
-  EXPECT_GE(result.from_start.upper, row.steps * (1 - row.relative_error));
-  EXPECT_LE(result.from_start.lower, row.steps * (1 + row.relative_error));
-  EXPECT_LT(result.from_start.upper / result.from_start.lower - 1, 0.021);
+  EXPECT_GE(result.steps.from_start.upper, row.steps * (1 - row.relative_error));
+  EXPECT_LE(result.steps.from_start.lower, row.steps * (1 + row.relative_error));
+  EXPECT_LT(result.steps.from_start.upper / result.steps.from_start.lower - 1, 0.021);
 }
 
 INSTANTIATE_TEST_SUITE_P(KnownAnswers, PublishedWheel,
@@ -45,8 +45,9 @@ INSTANTIATE_TEST_SUITE_P(KnownAnswers, PublishedWheel,
 TEST(KnownAnswers, CoulombOnAGentleSlope) {
   StudyOptions options;
   options.tolerance = 0.003;
-  const Metastability result = study(gentle_coulomb().problem(), options);
-  EXPECT_NEAR(result.from_start.value, 24.68, 3 * 0.03 + 0.5 * (result.from_start.upper - result.from_start.lower));
+  const Metastability result = study(gentle_coulomb(), options);
+  EXPECT_NEAR(result.steps.from_start.value, 24.68,
+              3 * 0.03 + 0.5 * (result.steps.from_start.upper - result.steps.from_start.lower));
 }
 
 // The wheel of Byl and Tedrake (IJRR 28, 2009) at a mean slope of 8 deg: its integral equation solved with numbers of
@@ -74,10 +75,10 @@ TEST_P(RoughTerrain, StudyHoldsTheReferenceInItsInterval) {
     options.seed = static_cast<std::uint64_t>(seed);
     const Metastability result = study(problem(), options);
     EXPECT_EQ(result.status, Status::converged);
-    EXPECT_NEAR(result.from_start.value / GetParam().from_fixed_point, 1, options.tolerance);
-    from_start += inside(result.from_start, GetParam().from_fixed_point);
-    from_quasi_stationary += inside(result.from_quasi_stationary, GetParam().from_quasi_stationary);
-    rate += inside(result.failure_rate, GetParam().rate);
+    EXPECT_NEAR(result.steps.from_start.value / GetParam().from_fixed_point, 1, options.tolerance);
+    from_start += inside(result.steps.from_start, GetParam().from_fixed_point);
+    from_quasi_stationary += inside(result.steps.from_quasi_stationary, GetParam().from_quasi_stationary);
+    rate += inside(result.spectrum.failure_rate, GetParam().rate);
   }
   EXPECT_GE(from_start, seeds - 1);
   EXPECT_GE(from_quasi_stationary, seeds - 1);
@@ -110,13 +111,13 @@ TEST(KnownAnswers, RoughTerrainOnSampledCellsToOneInAThousand) {
 TEST(KnownAnswers, RareFailuresAreSeen) {
   Setting setting = paper_setting(7.02, true);
   setting.friction = {0.3, 0.03};
-  const Metastability rare = study(setting.problem(), {});
+  const Metastability rare = study(setting);
   EXPECT_EQ(rare.status, Status::converged);
-  EXPECT_GT(rare.from_start.lower, 1e7);
+  EXPECT_GT(rare.steps.from_start.lower, 1e7);
   setting.friction = {0.3, 0.02};
-  const Metastability rarer = study(setting.problem(), {});
-  EXPECT_GT(rarer.from_start.value, 1e12);
-  EXPECT_LT(rarer.from_start.upper / rarer.from_start.lower, 1.1);
+  const Metastability rarer = study(setting);
+  EXPECT_GT(rarer.steps.from_start.value, 1e12);
+  EXPECT_LT(rarer.steps.from_start.upper / rarer.steps.from_start.lower, 1.1);
 }
 
 }  // namespace

@@ -41,7 +41,7 @@ TEST(Metastability, AgreesWithMonteCarloTrials) {
   const Metastability chain = [&] {
     Setting on_ramp = setting;
     on_ramp.ramp_length = 3.66;
-    return study(on_ramp.problem(), {});
+    return study(on_ramp);
   }();
   constexpr int count = 40000;
   const auto trials = simulate_trials(setting, {.trials = count, .collisions = 100000, .seed = 5});
@@ -69,28 +69,29 @@ TEST(Metastability, AgreesWithMonteCarloTrials) {
     EXPECT_NEAR(total.mean, s.mean, 4 * s.error + slack * s.mean);
     EXPECT_NEAR(total.sd, s.sd, 0.03 * s.sd);
     std::sort(values.begin(), values.end());
-    for (std::size_t i = 0; i < std::size(Metastability::levels); ++i) {
+    ASSERT_EQ(total.quantiles.size(), 5u);
+    for (const auto& [level, value] : total.quantiles) {
       // The chain's quantile has the level it claims among the trials, up to sampling and the lumps of whole steps.
       const auto below = [&](double v) {
         return static_cast<double>(std::upper_bound(values.begin(), values.end(), v) - values.begin()) / count;
       };
-      const double level = Metastability::levels[i];
-      EXPECT_GE(below(total.quantile[i] * (1 + 1e-3) + 1e-6), level - 0.02);
-      EXPECT_LE(below(total.quantile[i] * (1 - 1e-3) - 1e-6), level + 0.02);
+      EXPECT_GE(below(value * (1 + 1e-3) + 1e-6), level - 0.02);
+      EXPECT_LE(below(value * (1 - 1e-3) - 1e-6), level + 0.02);
     }
   };
-  check(chain.steps, steps, 0.002);
-  ASSERT_TRUE(chain.seconds && chain.metres);
-  check(*chain.seconds, seconds, 0.002);
-  check(*chain.metres, metres, 0.002);
+  check(chain.steps.distribution, steps, 0.002);
+  ASSERT_TRUE(chain.steps.seconds && chain.steps.metres);
+  check(*chain.steps.seconds, seconds, 0.002);
+  check(*chain.steps.metres, metres, 0.002);
   const Sample s = sample(steps);
-  EXPECT_NEAR(chain.from_start.value, s.mean, 4 * s.error + 0.002 * s.mean);
-  ASSERT_TRUE(chain.reach_end);
-  EXPECT_NEAR(*chain.reach_end, beyond_end / count, 4 * std::sqrt(beyond_end) / count + 1e-4);
+  EXPECT_NEAR(chain.steps.from_start.value, s.mean, 4 * s.error + 0.002 * s.mean);
+  ASSERT_TRUE(chain.steps.reach_end);
+  EXPECT_NEAR(*chain.steps.reach_end, beyond_end / count, 4 * std::sqrt(beyond_end) / count + 1e-4);
   for (const int n : {1, 3, 10}) {
     const double alive =
         static_cast<double>(std::count_if(steps.begin(), steps.end(), [&](double v) { return v > n; })) / count;
-    EXPECT_NEAR(chain.survival[static_cast<std::size_t>(n)], alive, 4 * std::sqrt(alive * (1 - alive) / count) + 5e-4);
+    EXPECT_NEAR(chain.steps.survival[static_cast<std::size_t>(n)], alive,
+                4 * std::sqrt(alive * (1 - alive) / count) + 5e-4);
   }
   ASSERT_FALSE(chain.violations.empty());
   EXPECT_NEAR(chain.violations[0].until_rest, lifted / collisions, 0.01);
@@ -124,14 +125,14 @@ TEST(Metastability, EqualLegsInOnePhaseAndNearlyEqualLegsInEightAgree) {
   eight.wheel.leg_length[3] *= 1 + 1e-9;
   StudyOptions options;
   options.tolerance = 0.003;
-  const Metastability a = study(one.problem(), options), b = study(eight.problem(), options);
+  const Metastability a = study(one, options), b = study(eight, options);
   EXPECT_EQ(a.phases, 1);
   EXPECT_EQ(b.phases, 8);
-  EXPECT_EQ(b.period, 8);
-  EXPECT_NEAR(a.from_start.value / b.from_start.value, 1.0, 0.006);
-  EXPECT_NEAR(a.observable_mean, b.observable_mean, 0.01);
-  EXPECT_NEAR(a.eigenvalue_moduli[0], b.eigenvalue_moduli[0], 2e-3);
-  EXPECT_NEAR(a.mixing_steps / b.mixing_steps, 1.0, 0.1);
+  EXPECT_EQ(b.spectrum.period, 8);
+  EXPECT_NEAR(a.steps.from_start.value / b.steps.from_start.value, 1.0, 0.006);
+  EXPECT_NEAR(a.survivors.mean, b.survivors.mean, 0.01);
+  EXPECT_NEAR(a.spectrum.moduli[0], b.spectrum.moduli[0], 2e-3);
+  EXPECT_NEAR(a.spectrum.mixing_steps / b.spectrum.mixing_steps, 1.0, 0.1);
 }
 
 // Cells are small where they matter: at the same number of cells the graded ones are the better ones.
@@ -165,27 +166,27 @@ TEST(Metastability, BitsDoNotDependOnThreads) {
   for (const int threads : {2, 3}) {
     options.threads = threads;
     const Metastability other = study(problem, options);
-    EXPECT_EQ(one.from_start.value, other.from_start.value);
-    EXPECT_EQ(one.from_start.upper, other.from_start.upper);
-    EXPECT_EQ(one.eigenvalue_moduli, other.eigenvalue_moduli);
-    EXPECT_EQ(one.survival, other.survival);
-    EXPECT_EQ(one.quasi_stationary.back().mass, other.quasi_stationary.back().mass);
+    EXPECT_EQ(one.steps.from_start.value, other.steps.from_start.value);
+    EXPECT_EQ(one.steps.from_start.upper, other.steps.from_start.upper);
+    EXPECT_EQ(one.spectrum.moduli, other.spectrum.moduli);
+    EXPECT_EQ(one.steps.survival, other.steps.survival);
+    EXPECT_EQ(one.survivors.by_phase.back().mass, other.survivors.by_phase.back().mass);
   }
 }
 
 TEST(Metastability, ResultsHangTogether) {
-  const Metastability result = study(paper_setting(9.59, false).problem(), {});
+  const Metastability result = study(paper_setting(9.59, false), {});
   EXPECT_EQ(result.status, Status::converged);
-  EXPECT_DOUBLE_EQ(result.failure_rate.value * result.from_quasi_stationary.value, 1.0);
-  EXPECT_LE(result.worst_start.value, result.from_quasi_stationary.value);
-  EXPECT_NEAR(result.eigenvalue_moduli.front(), 1 - result.failure_rate.value, 2e-3);
-  EXPECT_TRUE(std::is_sorted(result.eigenvalue_moduli.rbegin(), result.eigenvalue_moduli.rend()));
-  EXPECT_TRUE(std::is_sorted(result.survival.rbegin(), result.survival.rend()));
-  EXPECT_EQ(result.survival.front(), 1.0);
-  EXPECT_NEAR(result.steps.mean / result.from_start.value, 1.0, 0.01);
-  EXPECT_LT(result.solver_disagreement, 1e-9);
-  EXPECT_EQ(result.quasi_stationary.size(), 8u);
-  for (const PhaseDistribution& phase : result.quasi_stationary)
+  EXPECT_DOUBLE_EQ(result.spectrum.failure_rate.value * result.steps.from_quasi_stationary.value, 1.0);
+  EXPECT_LE(result.steps.worst_start.value, result.steps.from_quasi_stationary.value);
+  EXPECT_NEAR(result.spectrum.moduli.front(), 1 - result.spectrum.failure_rate.value, 2e-3);
+  EXPECT_TRUE(std::is_sorted(result.spectrum.moduli.rbegin(), result.spectrum.moduli.rend()));
+  EXPECT_TRUE(std::is_sorted(result.steps.survival.rbegin(), result.steps.survival.rend()));
+  EXPECT_EQ(result.steps.survival.front(), 1.0);
+  EXPECT_NEAR(result.steps.distribution.mean / result.steps.from_start.value, 1.0, 0.01);
+  EXPECT_LT(result.steps.solver_disagreement, 1e-9);
+  EXPECT_EQ(result.survivors.by_phase.size(), 8u);
+  for (const PhaseDistribution& phase : result.survivors.by_phase)
     EXPECT_NEAR(std::accumulate(phase.mass.begin(), phase.mass.end(), 0.0), 1.0, 1e-9);
 }
 
@@ -200,9 +201,9 @@ TEST(Metastability, RandomAndPlainDrawsGiveWiderIntervalsAroundTheSameAnswer) {
   options.weighting = markov::Weighting::plain;
   const Metastability plain = study(problem, options);
   for (const Metastability* other : {&random, &plain}) {
-    EXPECT_GT(other->sampling_error, best.sampling_error);
-    EXPECT_LE(other->from_start.lower, best.from_start.upper);
-    EXPECT_GE(other->from_start.upper, best.from_start.lower);
+    EXPECT_GT(other->steps.sampling_error, best.steps.sampling_error);
+    EXPECT_LE(other->steps.from_start.lower, best.steps.from_start.upper);
+    EXPECT_GE(other->steps.from_start.upper, best.steps.from_start.lower);
   }
 }
 
@@ -213,11 +214,11 @@ TEST(Metastability, FastLaunchesStayOnTheGridOnEveryLeg) {
   plastic.law = dynamics::Law::plastic;
   plastic.slope_deg = 4.2;
   plastic.initial_speed = {5, 0.2};
-  EXPECT_DOUBLE_EQ(study(plastic.problem(), {}).from_start.value, 15.0);
+  EXPECT_DOUBLE_EQ(study(plastic).steps.from_start.value, 15.0);
   Setting list = paper_setting(7.02, false);
   list.pairs = {{0.4, 0.4}, {0.3, 0.5}, {0.5, 0.2}, {0.45, 0.6}};
-  const Metastability result = study(list.problem(), {});
-  EXPECT_NEAR(result.from_start.value, 2.66323, 4 * 0.0016);  // a million trials
+  const Metastability result = study(list);
+  EXPECT_NEAR(result.steps.from_start.value, 2.66323, 4 * 0.0016);  // a million trials
 }
 
 // Restitution near one under little friction gains energy: survivors' speeds spread over decades, and equal cells over
@@ -226,9 +227,9 @@ TEST(Metastability, ContactsThatGainEnergySpreadTheCells) {
   Setting setting = paper_setting(9.59, false);
   setting.restitution = {0.7, 0.15};
   setting.friction = {0.3, 0.15};
-  const Metastability result = study(setting.problem(), {});
+  const Metastability result = study(setting);
   EXPECT_EQ(result.status, Status::converged);
-  EXPECT_NEAR(result.from_start.value, 13.274, 4 * 0.029);
+  EXPECT_NEAR(result.steps.from_start.value, 13.274, 4 * 0.029);
 }
 
 TEST(Metastability, SettingsThatSoonRestAreAnswered) {
@@ -239,7 +240,7 @@ TEST(Metastability, SettingsThatSoonRestAreAnswered) {
     setting.initial_speed = launch;
     setting.restitution = restitution;
     setting.friction = friction;
-    return study(setting.problem(), {}).from_start.value;
+    return study(setting).steps.from_start.value;
   };
   using dynamics::Law;
   // Without noise: the launch's distribution decides. By trials: 3.852.
@@ -266,9 +267,9 @@ TEST(Metastability, FailuresRarerThanTheDrawsReachDeepenTheTail) {
   const Metastability by_itself = study(rough(0.6), options);
   options.tail = 1e-120;
   const Metastability told = study(rough(0.6), options);
-  EXPECT_GT(by_itself.from_start.value, 1e31);
-  EXPECT_LE(by_itself.from_start.lower, told.from_start.upper);
-  EXPECT_GE(by_itself.from_start.upper, told.from_start.lower);
+  EXPECT_GT(by_itself.steps.from_start.value, 1e31);
+  EXPECT_LE(by_itself.steps.from_start.lower, told.steps.from_start.upper);
+  EXPECT_GE(by_itself.steps.from_start.upper, told.steps.from_start.lower);
 }
 
 TEST(Metastability, PlainDrawsThatSeeNoRestSaySo) {
@@ -278,7 +279,7 @@ TEST(Metastability, PlainDrawsThatSeeNoRestSaySo) {
   options.weighting = markov::Weighting::plain;
   options.cells = 64;
   options.samples = 4096;
-  const Metastability result = study(setting.problem(), options);
+  const Metastability result = study(setting, options);
   EXPECT_EQ(result.status, Status::rest_unresolved);
   EXPECT_NE(result.message.find("plain"), std::string::npos);
 }
@@ -288,10 +289,10 @@ TEST(Metastability, ToleranceThatCannotBeMetIsSaidAndTheResultKept) {
   options.tolerance = 1e-6;
   options.largest_cells = 128;
   options.largest_samples = 4096;
-  const Metastability result = study(paper_setting(7.02, true).problem(), options);
+  const Metastability result = study(paper_setting(7.02, true), options);
   EXPECT_EQ(result.status, Status::tolerance_not_met);
   EXPECT_NE(result.message.find("not met"), std::string::npos);
-  EXPECT_NEAR(result.from_start.value, 4.26, 0.02);
+  EXPECT_NEAR(result.steps.from_start.value, 4.26, 0.02);
 }
 
 TEST(Metastability, RefusesOptionsOutOfRange) {

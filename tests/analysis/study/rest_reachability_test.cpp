@@ -53,16 +53,16 @@ TEST(RestReachability, PlasticThresholdIsTheBarrierOfTheFirstStep) {
 }
 
 TEST(RestReachability, AStudyOfAnEndlessWheelIsInfiniteNotLarge) {
-  const Metastability result = study(coulomb(7.02).problem(), {.cells = 128, .samples = 4096});
+  const Metastability result = study(coulomb(7.02), {.cells = 128, .samples = 4096});
   EXPECT_EQ(result.status, Status::rest_unreachable);
   EXPECT_EQ(result.message, "infinite: rest is unreachable");
-  EXPECT_TRUE(std::isinf(result.from_start.value));
-  EXPECT_EQ(result.failure_rate.value, 0.0);
-  EXPECT_NEAR(result.eigenvalue_moduli.front(), 1.0, 1e-9);
-  EXPECT_GT(result.mixing_steps, 0.0);
-  EXPECT_GT(result.observable_mean, 4.0);
-  ASSERT_TRUE(result.reach_end);
-  EXPECT_NEAR(*result.reach_end, 1.0, 1e-9);
+  EXPECT_TRUE(std::isinf(result.steps.from_start.value));
+  EXPECT_EQ(result.spectrum.failure_rate.value, 0.0);
+  EXPECT_NEAR(result.spectrum.moduli.front(), 1.0, 1e-9);
+  EXPECT_GT(result.spectrum.mixing_steps, 0.0);
+  EXPECT_GT(result.survivors.mean, 4.0);
+  ASSERT_TRUE(result.steps.reach_end);
+  EXPECT_NEAR(*result.steps.reach_end, 1.0, 1e-9);
 }
 
 // Some launches rest, the others never do: both are said.
@@ -70,13 +70,13 @@ TEST(RestReachability, SlowLaunchesOfAnEndlessWheelRest) {
   Setting setting = paper_setting(7.02, true);
   setting.law = dynamics::Law::plastic;
   setting.initial_speed = {3, 0.1};
-  const Metastability result = study(setting.problem(), {});
-  EXPECT_TRUE(std::isinf(result.from_start.value));
+  const Metastability result = study(setting);
+  EXPECT_TRUE(std::isinf(result.steps.from_start.value));
   EXPECT_NE(result.message.find("the others rest"), std::string::npos);
   // Rest at once below the threshold speed of the barrier: P(omega_0 < 3.061) for N(3, 0.1^2).
-  const double threshold = std::sqrt(*result.safe_state);
-  EXPECT_NEAR(*result.reach_end, 0.5 * std::erfc((threshold - 3) / 0.1 / std::sqrt(2.0)), 2e-3);
-  EXPECT_EQ(result.steps.quantile[2], 1.0);
+  const double threshold = std::sqrt(*result.steps.safe_state);
+  EXPECT_NEAR(*result.steps.reach_end, 0.5 * std::erfc((threshold - 3) / 0.1 / std::sqrt(2.0)), 2e-3);
+  EXPECT_EQ(result.steps.distribution.quantile(0.5), 1.0);
 }
 
 }  // namespace

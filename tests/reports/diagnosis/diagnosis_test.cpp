@@ -43,9 +43,9 @@ analysis::Diagnosis sample() {
   analysis::Diagnosis d;
   d.verdict = analysis::Verdict::explained;
   d.sentences = {"One cause explains it: leg_contact."};
-  d.p_as_given = 1e-4;
-  d.p_value = 3e-4;
-  for (analysis::GapMap* map : {&d.as_given, &d.recalibrated, &d.left})
+  d.gap.p_as_given = 1e-4;
+  d.gap.p_value = 3e-4;
+  for (analysis::GapMap* map : {&d.gap.as_given, &d.gap.recalibrated, &d.gap.left})
     map->cells = {cell("mean", "leg 1, collision", 4, 0.02), cell("mean", "leg 3, collision", -8, 0.001),
                   cell("spread", "leg 3, collision", 3.9, 0.02), cell("mean", "leg 3, stance", 0.3, 0.9)};
   analysis::Cause leg, both, bounce;
@@ -56,38 +56,39 @@ analysis::Diagnosis sample() {
   both.probability = 0.3;
   both.parameters = {{{"leg_lengths_m", 0.15, 0.149, 0.151, true}, {"leg_lengths_m", 0.16, 0.159, 0.161, true}},
                      {{"offset_deg", 0.2, 0.1, 0.3, true}}};
-  d.causes = {leg, both};
+  d.causes.ranked = {leg, both};
   bounce.effects = {"bounce"};
   bounce.not_decided = "the fit did not converge";
-  d.not_decided = {bounce};
-  d.cause_set = {"leg_contact", "leg_lengths+slope_offset"};
-  d.p_none = 0.08;
-  d.p_recalibrate = 0.02;
-  d.contact = {{"friction_mean", 0.35, 0.34, 0.36, true}};
+  d.causes.not_decided = {bounce};
+  d.causes.set = {"leg_contact", "leg_lengths+slope_offset"};
+  d.causes.p_none = 0.08;
+  d.causes.p_recalibrate = 0.02;
+  d.gap.contact = {{"friction_mean", 0.35, 0.34, 0.36, true}};
   analysis::Shrinkage score, open;
   score.measure = "held-out log score per collision", score.unit = "nats";
   score.baseline = 0.41, score.recalibrated = 0.33, score.with_effect = 0.02;
   score.closed = 0.95, score.closed_lower = 0.88, score.closed_upper = 1.0;
   open.measure = "error of P(rest)";
-  d.shrinkage = {score, open};
-  d.steps = {.observed = infinity, .observed_lower = 40, .observed_upper = infinity, .baseline = 50, .with_effect = 70};
-  d.visible = {{"leg_contact", "friction_ratio", 0.04, {{"leg_lengths", 0.7}}, ""},
-               {"sensor_noise", "sd_rad_s", 0, {}, "no noise is stated"}};
-  d.missing = {{"leg", {{"leg_contact", "friction_ratio", {}, 0.04, {"friction_patch"}}}}, {"position_m", {}}};
-  d.not_possible = {{"where the gap lies", "7 transitions of a speed; a cell of the map takes 20", 3, true}};
-  d.next = {{"slope 8.5 deg", 21.5}};
-  d.condition_names = {"fast"};
+  d.shrinkage.measures = {score, open};
+  d.shrinkage.steps = {
+      .observed = infinity, .observed_lower = 40, .observed_upper = infinity, .baseline = 50, .with_effect = 70};
+  d.limits.visible = {{"leg_contact", "friction_ratio", 0.04, {{"leg_lengths", 0.7}}, ""},
+                      {"sensor_noise", "sd_rad_s", 0, {}, "no noise is stated"}};
+  d.limits.missing = {{"leg", {{"leg_contact", "friction_ratio", {}, 0.04, {"friction_patch"}}}}, {"position_m", {}}};
+  d.limits.not_possible = {{"where the gap lies", "7 transitions of a speed; a cell of the map takes 20", 3, true}};
+  d.limits.next = {{"slope 8.5 deg", 21.5}};
+  d.data.condition_names = {"fast"};
   for (int k = 1; k <= 3; ++k)
-    d.profile.push_back({.condition = 0,
-                         .collision = k,
-                         .trials = 50,
-                         .measured = 5.5,
-                         .measured_error = 0.02,
-                         .baseline = 5.3,
-                         .with_effect = 5.5,
-                         .band = 0.05});
-  d.notes = {"The noise was taken from the data."};
-  d.trials = 50, d.collisions = 800, d.events = 1600;
+    d.shrinkage.profile.push_back({.condition = 0,
+                                   .collision = k,
+                                   .trials = 50,
+                                   .measured = 5.5,
+                                   .measured_error = 0.02,
+                                   .baseline = 5.3,
+                                   .with_effect = 5.5,
+                                   .band = 0.05});
+  d.data.notes = {"The noise was taken from the data."};
+  d.data.trials = 50, d.data.collisions = 800, d.data.events = 1600;
   return d;
 }
 
@@ -157,7 +158,7 @@ TEST(DiagnosisJson, InfiniteIsAWordAndUnknownIsNull) {
   EXPECT_TRUE(json.at("shrinkage_by_measure").at(1).at("closed_interval_90").is_null());
   EXPECT_TRUE(json.at("visibility").at(1).at("smallest").is_null());
   analysis::Diagnosis d = sample();
-  d.shrinkage[0].floor = std::numeric_limits<double>::quiet_NaN();
+  d.shrinkage.measures[0].floor = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(parsed(d).at("shrinkage").at("floor").is_null());
 }
 
@@ -198,7 +199,7 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
 
 TEST(DiagnosisText, SaysSoWhenNoCellIsBeyondChance) {
   analysis::Diagnosis d = sample();
-  for (analysis::GapCell& one : d.recalibrated.cells) one.p_adjusted = 0.5;
+  for (analysis::GapCell& one : d.gap.recalibrated.cells) one.p_adjusted = 0.5;
   EXPECT_NE(diagnosis_text(d).find("no cell is beyond chance"), std::string::npos);
 }
 

@@ -1,0 +1,15 @@
+#include "analysis/likelihood/diagnose.h"
+
+#include "analysis/likelihood/experiment_model.h"
+
+namespace metastable::analysis {
+
+Diagnosis diagnose(const Experiment& experiment, const DiagnosisOptions& options) {
+  return diagnose(transition_model(experiment), options);
+}
+
+Diagnosis diagnose(const std::filesystem::path& folder, const DiagnosisOptions& options) {
+  return diagnose(read_experiment(folder), options);
+}
+
+}  // namespace metastable::analysis
