@@ -10,6 +10,7 @@ set(ROOMS
   "markov/passage: markov markov/chain"
   "markov/rows: markov markov/chain markov/passage"
   "dynamics/wheel:"
+  "dynamics/settled: dynamics/wheel"
   "dynamics/laboratory: dynamics/wheel"
   "dynamics/return_map: dynamics/wheel"
   "dynamics/bounds: dynamics/wheel dynamics/return_map"

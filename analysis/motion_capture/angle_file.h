@@ -1,5 +1,5 @@
 #pragma once
-// angle.csv of an experiment folder.
+// Reads angle.csv of an experiment folder.
 
 #include <cstddef>
 #include <vector>

@@ -27,7 +27,7 @@ struct CollisionComparison {
 
 /// A collision is found if one of its trial and number is, within 0.1 s where the known one has a time. Trials that are
 /// not known are left out. O(collisions)
-/// @param found  entry t: in angles[t]
+/// @param found  entry t holds the collisions found in angles[t]
 /// @param peak   omega_minus is written as the smoothed speed's peak (reported_speed())
 /// @param most   collisions of a trial that were asked for, >= 1
 CollisionComparison compare_collisions(const Experiment& known, const std::vector<MeasuredAngle>& angles,

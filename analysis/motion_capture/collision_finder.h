@@ -1,5 +1,5 @@
 #pragma once
-// From the wheel's angle over time to its collisions (the paper's Sec. III).
+// Finds a wheel's collisions in its angle over time (the paper's Sec. III).
 
 #include <optional>
 #include <string>

@@ -45,7 +45,7 @@ class Residuals {
   const dynamics::Stance &before_, &after_;
 };
 
-// From one guess; the second: the sum of squares.
+// Fits from one guess; the second number is the sum of squares.
 std::optional<std::pair<StanceFit, double>> descend(const Residuals& residuals, StanceFit guess, double earliest,
                                                     double latest) {
   constexpr std::array<double, 4> increment{1e-6, 1e-6, 1e-5, 1e-5};

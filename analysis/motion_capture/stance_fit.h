@@ -1,5 +1,5 @@
 #pragma once
-// One collision seen by a camera: the stance motions before and after it, joined at a kink, fitted to angle samples.
+// Fits one collision to angle samples: the stance motions before and after it are joined at a kink.
 
 #include <cstddef>
 #include <optional>

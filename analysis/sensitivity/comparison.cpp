@@ -16,7 +16,7 @@ struct MeanVariance {
   double mean = 0, variance = 0;
 };
 
-// Of min(steps, collisions + 1): the mean is the sum of P(steps > n) over n = 0 .. collisions.
+// These are the moments of min(steps, collisions + 1): the mean is the sum of P(steps > n) over n = 0 .. collisions.
 MeanVariance limited_steps(const std::vector<double>& survival, int collisions) {
   double first = 0, second = 0;
   for (int n = 0; n <= collisions; ++n) {

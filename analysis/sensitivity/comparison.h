@@ -10,7 +10,7 @@
 
 namespace metastable::analysis {
 
-/// One setting against the first of the list.
+/// Compares one setting with the first of the list.
 struct Contrast {
   std::size_t against = 0, of = 0;  ///< indices: `of` compared with `against`
   std::optional<Estimate> ratio;    ///< expected steps of `of` over those of `against`; nothing if a side is infinite

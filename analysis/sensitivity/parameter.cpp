@@ -101,7 +101,7 @@ void set_parameter(Setting& setting, Parameter parameter, double value) {
       return;
     }
     case Parameter::inertia:
-      // Under `coulomb` and `plastic` the law would otherwise take its r_g from the new inertia.
+      // `coulomb` and `plastic` would otherwise take its r_g from the new inertia.
       if (setting.law != dynamics::Law::published) wheel.radius_of_gyration = model(setting).radius_of_gyration;
       wheel.inertia = value;
       return;

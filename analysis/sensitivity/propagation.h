@@ -1,5 +1,5 @@
 #pragma once
-// From standard errors of parameters to an interval of the expected steps.
+// Turns standard errors of parameters into an interval of the expected steps.
 
 #include <vector>
 

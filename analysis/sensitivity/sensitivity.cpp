@@ -68,7 +68,7 @@ std::vector<Sensitivity> by_paths(const Setting& setting, const Metastability& s
     const double step = pathwise_step * width(setting, one.parameter);
     neighbours.push_back({moved(setting, one, -step), moved(setting, one, step), 2 * step});
   }
-  // As deep into the tails as the study had to go.
+  // The draws reach as deep into the tails as the study had to go.
   StudyOptions own = options;
   while (own.tail > 1e-300 && std::log(study.spectrum.failure_rate.value) < 0.6 * std::log(own.tail))
     own.tail = std::max(1e-300, own.tail * own.tail * own.tail);
@@ -106,7 +106,7 @@ class IntegratedRows {
     adjoint_ = markov::adjoint(markov::ChainSolver(here.chain), here.launch);
   }
 
-  // d ln M by the central difference of step `step`.
+  // Takes d ln M by the central difference of step `step`.
   double difference(const Sensitivity& one, double step) const {
     const markov::SampledChain low = chain(moved(setting_, one, -step)), high = chain(moved(setting_, one, step));
     return markov::steps_change(adjoint_, low.chain, low.launch, high.chain, high.launch) / (2 * step * adjoint_.steps);

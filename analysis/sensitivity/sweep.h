@@ -18,11 +18,11 @@ struct Axis {
   std::vector<double> values;  ///< ascending, not empty
 };
 
-/// Values first, first + step, ..., up to last (with a rounding allowance of a thousandth of a step).
+/// A range takes the values first, first + step, ..., up to last (with a rounding allowance of a thousandth of a step).
 /// @throws std::invalid_argument for step <= 0, last < first or more than 100000 values
 std::vector<double> axis_values(double first, double last, double step);
 
-/// One point of a sweep.
+/// What a sweep says of one point.
 struct SweepPoint {
   std::vector<double> at;           ///< one value per axis
   Metastability study;              ///< with its setting

@@ -162,7 +162,7 @@ std::vector<Command> commands() {
   return all;
 }
 
-// For provenance: without the options that leave the results as they are, so that equal results are equal bytes.
+// The provenance leaves out the options that leave the results as they are, so that equal results are equal bytes.
 std::string command_line(int argc, const char* const* argv) {
   std::string line = "metastable";
   for (int i = 1; i < argc; ++i) {

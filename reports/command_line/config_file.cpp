@@ -25,7 +25,7 @@ std::string scalar(const std::filesystem::path& file, std::string_view key, cons
       fmt::format("{}: {}: expected a string, a number, a boolean or an array", place(file, node.source()), key));
 }
 
-// A list inside a list: 7.35,0.19.
+// A list inside a list is written 7.35,0.19.
 std::string joined(const std::filesystem::path& file, std::string_view key, const toml::node& node) {
   const toml::array* list = node.as_array();
   if (list == nullptr) return scalar(file, key, node);

@@ -1,5 +1,5 @@
 #pragma once
-// Options from a TOML file.
+// Reads options from a TOML file.
 
 #include <filesystem>
 #include <string>

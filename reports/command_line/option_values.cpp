@@ -21,7 +21,7 @@ namespace {
   throw std::invalid_argument(fmt::format("--{}: '{}' is not {}", name, text, wanted));
 }
 
-// The whole text as a finite number.
+// Reads the whole text as a finite number.
 bool parse(std::string_view text, double& value) {
   if (text.starts_with('+')) text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

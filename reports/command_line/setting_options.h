@@ -23,7 +23,7 @@ void add_standard_errors(Options& options);
 analysis::Setting common_setting(const Options& options);
 /// `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
 analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);
-/// With --slope and --initial-speed, checked.
+/// Reads --slope and --initial-speed too, and checks them.
 analysis::Setting one_setting(const Options& options);
 /// One a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
 std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least);

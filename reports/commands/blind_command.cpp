@@ -62,7 +62,7 @@ struct Places {
   fs::path errors(int number) const { return answer(number).string() + ".err"; }
 };
 
-// The number of a case by the name of its folder.
+// A folder's name tells the number of its case.
 int case_number(const fs::path& folder) {
   const std::string name = folder.filename().string();
   int number = 0;

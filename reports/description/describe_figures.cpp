@@ -108,7 +108,7 @@ std::optional<Figure> legs_figure(const analysis::Description& description, cons
     for (std::size_t leg = 0; leg < c.legs->size(); ++leg) {
       const analysis::SpeedSummary& s = (*c.legs)[leg];
       if (s.count < 2) continue;
-      // Conditions beside each other about the leg's place.
+      // Conditions stand beside each other about the leg's place.
       series.x.push_back(static_cast<double>(leg) +
                          0.12 *
                              (static_cast<double>(i) - 0.5 * static_cast<double>(description.conditions.size() - 1)));

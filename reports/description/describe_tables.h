@@ -17,11 +17,11 @@ Table profiles_table(const analysis::Description& description, const Provenance&
 Table legs_table(const analysis::Description& description, const Provenance& provenance);
 /// Every test on every pair of conditions.
 Table tests_table(const analysis::Description& description, const Provenance& provenance);
-/// Survival step by step.
+/// Lists survival step by step.
 Table survival_table(const analysis::Description& description, const Provenance& provenance);
-/// Restitution and friction by maximum likelihood.
+/// Lists restitution and friction by maximum likelihood.
 Table fits_table(const analysis::Description& description, const Provenance& provenance);
-/// Measured beside predicted: speeds, spread, share of trials that rest.
+/// Puts measured beside predicted: speeds, spread, share of trials that rest.
 Table laws_table(const analysis::LawComparison& comparison, const Provenance& provenance);
 
 /// Mean of two values or more with its t-interval.

@@ -8,7 +8,7 @@
 
 namespace metastable::reports {
 
-/// One figure a panel of the paper's, for one variant.
+/// Draws one figure a panel of the paper's, for one variant.
 std::vector<Figure> fig4_figures(const analysis::VariantStudy& study, const Provenance& provenance);
 std::vector<Figure> fig6_figures(const analysis::VariantStudy& study, const analysis::PaperExperiments& experiments,
                                  const Provenance& provenance);

@@ -11,11 +11,11 @@ namespace metastable::reports {
 /// Scores of the map's cells under the three models, a figure for the collisions and one for the stances (or one for
 /// whole steps).
 std::vector<Figure> map_figures(const analysis::Diagnosis& diagnosis);
-/// Mean speed by collision, measured and simulated, a figure a condition.
+/// Draws the mean speed by collision, measured and simulated, a figure a condition.
 std::vector<Figure> profile_figures(const analysis::Diagnosis& diagnosis);
-/// Causes by probability.
+/// Draws the causes by probability.
 std::vector<Figure> ranking_figures(const analysis::Diagnosis& diagnosis);
-/// Bars of each held-out measure, its floor as a line.
+/// Draws bars of each held-out measure, its floor as a line.
 std::vector<Figure> shrinkage_figures(const analysis::Diagnosis& diagnosis);
 
 }  // namespace metastable::reports

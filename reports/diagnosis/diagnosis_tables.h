@@ -22,7 +22,7 @@ Table data_table(const analysis::Diagnosis& diagnosis);     ///< what was there;
 Table gap_table(const analysis::Diagnosis& diagnosis);      ///< p-values
 Table contact_table(const analysis::Diagnosis& diagnosis);  ///< recalibrated parameters
 Table where_table(const analysis::Diagnosis& diagnosis);    ///< beyond chance after recalibration
-/// Every cell under the nominal, the refitted and the chosen model.
+/// Lists every cell under the nominal, the refitted and the chosen model.
 Table map_table(const analysis::Diagnosis& diagnosis);
 Table causes_table(const analysis::Diagnosis& diagnosis);      ///< with "no gap", "recalibration", "none of these"
 Table parameters_table(const analysis::Diagnosis& diagnosis);  ///< of every cause

@@ -321,7 +321,7 @@ void append_bars(std::string& script, const BarChart& bars, const Axis& x, const
   }
   script += boxes + "END\n" + labels + "END\n";
   if (!whiskers.empty()) script += "$whiskers << END\n" + whiskers + "END\n";
-  // Room for the number behind the longest bar.
+  // This leaves room for the number behind the longest bar.
   const double room = 0.15 * (most > least ? most - least : 1);
   script += x.low || x.high ? fmt::format("set xrange {}\n", ends)
                             : fmt::format("set xrange [{}:{}]\n", least < 0 ? least - 0.3 * room : 0, most + room);
@@ -373,7 +373,7 @@ std::string run_gnuplot(const std::string& script) {
   posix_spawn_file_actions_adddup2(&actions, fileno(input.get()), STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, fileno(output.get()), STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, fileno(errors.get()), STDERR_FILENO);
-  // -d: no start-up file of the user's changes the figure.
+  // With -d no start-up file of the user's changes the figure.
   std::string program = "gnuplot", option = "-d", standard_input = "-";
   char* const arguments[] = {program.data(), option.data(), standard_input.data(), nullptr};
   pid_t child = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// Figures as data, drawn by gnuplot into SVG.
+// A figure is data, drawn by gnuplot into SVG.
 
 #include <optional>
 #include <string>

@@ -18,7 +18,7 @@ class Interrupted : public std::runtime_error {
 /// From here on the first SIGINT or SIGTERM only sets a flag; a second one ends the program at once.
 void catch_interrupts();
 
-/// Call often in long work; from any thread. @throws Interrupted once a signal has come
+/// Long work calls this often, from any thread. @throws Interrupted once a signal has come
 void check_interrupt();
 
 /// Forgets a signal that has come.

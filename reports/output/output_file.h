@@ -15,7 +15,7 @@ class OutputError : public std::invalid_argument {
   OutputError(const std::filesystem::path& path, const std::string& reason);
 };
 
-/// A file written under a temporary name beside its target and renamed on commit(). Without commit() the target is
+/// A file is written under a temporary name beside its target and renamed on commit(). Without commit() the target is
 /// left as it was and the temporary is removed. "-" is standard output, written on commit(). A target that is no
 /// regular file (a pipe, /dev/null) is written directly; a symbolic link is followed.
 class OutputFile {
@@ -26,7 +26,7 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Where to write. Formatting is independent of the locale.
+  /// Returns where to write. Formatting is independent of the locale.
   std::ostream& stream();
   /// @throws OutputError if anything could not be written. Call once; the stream is closed afterwards.
   void commit();
@@ -39,7 +39,7 @@ class OutputFile {
   std::ostringstream buffer_;  // standard output until commit
 };
 
-/// The whole of `content` into `path` ("-": standard output), or nothing. @throws OutputError
+/// Writes the whole of `content` into `path` ("-": standard output), or nothing. @throws OutputError
 void write_file(const std::filesystem::path& path, std::string_view content);
 
 /// Creates a folder and its parents where they are missing. @throws OutputError

@@ -94,8 +94,8 @@ footer ul { margin: 0; padding: .8rem 1rem; list-style: none; background: #f5f7f
 </html>
 )html";
 
-/// The SVG element alone, with every id made unique by `prefix`: pages hold many figures, and gnuplot gives all of
-/// them the same ids.
+/// Returns the SVG element alone, with every id made unique by `prefix`: pages hold many figures, and gnuplot gives all
+/// of them the same ids.
 std::string inline_svg(std::string_view svg, const std::string& prefix) {
   const std::size_t start = svg.find("<svg");
   if (start == std::string_view::npos) throw std::invalid_argument("figure '" + prefix + "' is no SVG");

@@ -1,5 +1,5 @@
 #pragma once
-// The index page of a report: one self-contained HTML file with its figures and tables inside.
+// Renders the index page of a report: one self-contained HTML file with its figures and tables inside.
 
 #include <string>
 #include <vector>
@@ -40,8 +40,8 @@ struct Page {
   Provenance provenance = {};
 };
 
-/// The page as HTML: no script, nothing loaded from elsewhere, fit for a phone and for print; the same bytes for the
-/// same page. Text is escaped. @throws std::invalid_argument for a table that cannot be rendered (see table.h)
+/// Renders the page as HTML: no script, nothing loaded from elsewhere, fit for a phone and for print; the same bytes
+/// for the same page. Text is escaped. @throws std::invalid_argument for a table that cannot be rendered (see table.h)
 std::string render_page(const Page& page);
 
 }  // namespace metastable::reports

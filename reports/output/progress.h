@@ -16,9 +16,9 @@ bool stderr_is_terminal();
 /// at the end. Writes nothing where there is no terminal. advance() may be called from any thread.
 class Progress {
  public:
-  /// On standard error. @param total units of work, >= 1
+  /// Writes on standard error. @param total units of work, >= 1
   Progress(std::string label, std::size_t total);
-  /// On any stream. @param visible false: write nothing
+  /// Writes on any stream. @param visible false: write nothing
   Progress(std::string label, std::size_t total, std::ostream& out, bool visible);
   ~Progress();
   Progress(const Progress&) = delete;

@@ -1,5 +1,5 @@
 #pragma once
-// A table for the terminal.
+// Renders a table for the terminal.
 
 #include <cstddef>
 #include <string>

@@ -1,5 +1,5 @@
 #pragma once
-// Which version of the toolkit made a result.
+// Says which version of the toolkit made a result.
 
 #include <string>
 

@@ -16,7 +16,8 @@ Figure density_figure(const std::vector<Studied>& settings, const Provenance& pr
 /// P(steps > n) on a logarithmic axis, one curve a setting.
 Figure survival_figure(const std::vector<Studied>& settings, const Provenance& provenance);
 
-/// Speed before a collision against speed before the next: a cloud of simulated steps and the mean of the survivors.
+/// Draws the speed before a collision against the speed before the next: a cloud of simulated steps and the mean of the
+/// survivors.
 Figure return_map_figure(const analysis::Setting& setting, const Provenance& provenance);
 
 /// Expected steps over two parameters as a labelled map. Arguments as grid_table().

@@ -106,7 +106,8 @@ Table grid_table(const std::string& id, const std::string& title, const analysis
 }
 
 Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Provenance& provenance) {
-  // Printed with Fig. 8: tangential from N(0.05, 0.03^2) to N(0.11, 0.19^2), normal about 0.17 with sd 0.06 to 0.1.
+  // The paper prints with Fig. 8: tangential from N(0.05, 0.03^2) to N(0.11, 0.19^2), normal about 0.17 with sd 0.06 to
+  // 0.1.
   struct Printed {
     const char *tangential, *tangential_sd, *normal, *normal_sd;
   };

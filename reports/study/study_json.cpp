@@ -36,7 +36,7 @@ Json certificate_json(const analysis::CertifiedSteps& certified) {
   json["expected_steps"] = {{"lower", number(certified.lower)}, {"upper", number(certified.upper)}};
   json["relative_width"] = number(certified.width());
   json["cells"] = certified.cells;
-  // From any omega^2 just before a collision: linear between states.
+  // Interpolates from any omega^2 just before a collision: linear between states.
   Json legs = Json::array();
   const markov::Certificate& all = certified.from_state;
   for (std::size_t p = 0; p < all.nodes.size(); ++p)

@@ -17,7 +17,7 @@ std::string sensitivities_text(const analysis::Sensitivities& sensitivities);
 /// "3.9 to 4.6 (from friction-mean 93 %, slope 7 %)": the interval of the parameters' standard errors alone.
 std::string propagated_text(const analysis::Propagated& propagated);
 
-/// "4.256 (95 % interval 4.254 to 4.258)", or "infinite".
+/// Writes "4.256 (95 % interval 4.254 to 4.258)", or "infinite".
 std::string estimate_text(const analysis::Estimate& estimate);
 
 /// What the thresholds mean, one sentence.

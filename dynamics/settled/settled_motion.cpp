@@ -1,0 +1,478 @@
+#include "dynamics/settled/settled_motion.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "dynamics/settled/foot_motion.h"
+
+namespace metastable::dynamics {
+namespace {
+
+// Shares of M g (mean length): kinetic energy that counts as none (1e-3 J for the paper's wheel) and the height under
+// the barrier that it cannot climb.
+constexpr double still_share = 4.8e-4, deep_share = 4.8e-3;
+
+// The time for which a foot that lifts without speed is let go [s]; how far the wheel turns between two looks at where
+// its tips are [rad].
+constexpr double lift_off = 1e-6, steady_turn = 0.1;
+
+// Sine and cosine, without the library's where the angle is small: hops ask for many.
+std::pair<double, double> sine_cosine(double angle) {
+  if (std::abs(angle) > 0.06) return {std::sin(angle), std::cos(angle)};
+  const double q = angle * angle;
+  return {angle * (1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72)))),
+          1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56 * (1 - q / 90))))};
+}
+
+void require_range(const char* name, double value, bool fine, const char* range) {
+  if (!fine) throw std::invalid_argument(fmt::format("settled: {}: {} is outside {}", name, value, range));
+}
+
+void check(const Contact& contact) {
+  require_range("restitution", contact.restitution, contact.restitution >= 0 && contact.restitution < 1, "[0, 1)");
+  require_range("friction", contact.friction, contact.friction >= 0 && std::isfinite(contact.friction), "[0, inf)");
+}
+
+}  // namespace
+
+SettledMotion::SettledMotion(SettledWheel wheel) : wheel_(std::move(wheel)) {
+  wheel_.validate();
+  for (int leg = 0; leg < wheel_.legs(); ++leg) foot_.emplace_back(wheel_, leg);
+}
+
+const StandingFoot& SettledMotion::foot(int leg) const {
+  const int index = leg % wheel_.legs();
+  return foot_[static_cast<std::size_t>(index < 0 ? index + wheel_.legs() : index)];
+}
+
+Landing SettledMotion::land(int leg, double omega_minus, const Contact& landed, const Contact& old) const {
+  return SettledRoll(*this, leg, omega_minus, landed, old).land();
+}
+
+Step SettledMotion::step(int leg, double omega_minus, const Contact& landed, const Contact& old) const {
+  return SettledRoll(*this, leg, omega_minus, landed, old).step();
+}
+
+SettledRoll::SettledRoll(const SettledMotion& motion, int leg, double omega_minus, const Contact& landed,
+                         const Contact& old)
+    : motion_(&motion),
+      leg_(leg),
+      contact_(static_cast<std::size_t>(motion.wheel().legs()), old),
+      sine_(motion.wheel().gravity * std::sin(motion.wheel().slope)),
+      cosine_(motion.wheel().gravity * std::cos(motion.wheel().slope)) {
+  require_range("omega-", omega_minus, omega_minus > 0 && std::isfinite(omega_minus), "(0, inf) rad/s");
+  check(old);
+  set_contact(landed);
+  const SettledWheel& wheel = motion.wheel();
+  angle_ = motion.foot(leg).landing_angle();
+  height_ = wheel.length(leg) * std::cos(angle_) + wheel.tip_radius;
+  along_ = wheel.length(leg) * std::sin(angle_);
+  const double behind = wheel.length(leg - 1) * std::sin(motion.foot(leg - 1).next_angle());
+  velocity_ = {omega_minus * height_, -omega_minus * behind, omega_minus};
+  foot_ = leg_;
+  other_ = leg_ - 1;
+  has_other_ = true;
+}
+
+const Contact& SettledRoll::contact_of(int leg) const {
+  const int legs = motion_->wheel().legs(), index = leg % legs;
+  return contact_[static_cast<std::size_t>(index < 0 ? index + legs : index)];
+}
+
+void SettledRoll::set_contact(const Contact& contact) {
+  check(contact);
+  const int legs = motion_->wheel().legs(), index = leg_ % legs;
+  contact_[static_cast<std::size_t>(index < 0 ? index + legs : index)] = contact;
+}
+
+void SettledRoll::set_slope(double slope) {
+  sine_ = motion_->wheel().gravity * std::sin(slope);
+  cosine_ = motion_->wheel().gravity * std::cos(slope);
+}
+
+double SettledRoll::angle_of(int leg) const { return angle_ - (leg - leg_) * motion_->wheel().leg_angle(); }
+
+ContactLever SettledRoll::lever(int leg) const {
+  return {motion_->wheel().length(leg) * std::sin(angle_of(leg)), height_, motion_->wheel().gyration_sq()};
+}
+
+double SettledRoll::tip_along(int leg) const { return along_ - motion_->wheel().length(leg) * std::sin(angle_of(leg)); }
+
+double SettledRoll::position() const { return tip_along(leg_); }
+
+double SettledRoll::energy() const {
+  const double square = velocity_.along * velocity_.along + velocity_.out * velocity_.out +
+                        motion_->wheel().gyration_sq() * velocity_.spin * velocity_.spin;
+  return motion_->wheel().mass * (square / 2 - sine_ * along_ + cosine_ * height_);
+}
+
+// Top of the barrier over the foot of a leg [rad].
+double SettledRoll::apex(int leg) const {
+  const SettledWheel& wheel = motion_->wheel();
+  const double part = wheel.tip_radius / wheel.length(leg) * sine_ / wheel.gravity;
+  return -std::atan2(sine_, cosine_) - (part > 0 ? std::asin(part) : 0);
+}
+
+// No motion left, and far below the barrier.
+bool SettledRoll::spent() const {
+  const SettledWheel& wheel = motion_->wheel();
+  const double square = velocity_.along * velocity_.along + velocity_.out * velocity_.out +
+                        wheel.gyration_sq() * velocity_.spin * velocity_.spin;
+  const double scale = wheel.gravity * wheel.length(leg_);
+  if (square / 2 > still_share * scale) return false;
+  const double lean = angle_ + std::atan2(sine_, cosine_);
+  return lean < 0 && 1 - std::cos(lean) > deep_share;
+}
+
+// Both feet on the ground, no spin: whether both are pressed, or which one alone.
+bool SettledRoll::two_feet_rest(int ahead, int back, int& loaded) const {
+  const double s_ahead = lever(ahead).behind, s_back = lever(back).behind;
+  const double mu_ahead = contact_of(ahead).friction, mu_back = contact_of(back).friction;
+  double on_back = -(sine_ * height_ + cosine_ * s_ahead) / (s_back - s_ahead);
+  double on_ahead = cosine_ - on_back;
+  const double slow = motion_->wheel().rest_speed;
+  const bool held = std::abs(velocity_.along) <= slow && mu_ahead * on_ahead + mu_back * on_back >= sine_;
+  if (!held) {
+    // Both slide: friction follows the pressure on each.
+    const double way = velocity_.along < -slow ? -1 : 1;
+    const double turn_back = s_back + way * mu_back * height_, turn_ahead = s_ahead + way * mu_ahead * height_;
+    on_back = -cosine_ * turn_ahead / (turn_back - turn_ahead);
+    on_ahead = cosine_ - on_back;
+  }
+  loaded = on_back > 0 ? back : ahead;
+  return on_back > 0 && on_ahead > 0;
+}
+
+// A foot that sticks at this angle with this energy per unit mass keeps to the cone until the next leg touches or the
+// wheel turns back.
+bool SettledRoll::stands_on(int leg, double angle, double energy) const {
+  const StandingFoot& foot = motion_->foot(leg);
+  const SettledWheel& wheel = motion_->wheel();
+  const Footing on{&wheel, wheel.length(leg), sine_, cosine_, contact_of(leg).friction, 0};
+  constexpr int parts = 12;
+  for (int i = 0; i <= parts; ++i) {
+    const double at = angle + (foot.next_angle() - angle) * i / parts;
+    const double square = foot.spin_squared(at, energy);
+    if (square < 0) return true;
+    const FootForces f = foot_forces(on, at, std::sqrt(square));
+    if (std::abs(f.tangential) > on.friction * f.normal + 1e-9) return false;
+  }
+  return true;
+}
+
+void SettledRoll::note_stand(int leg, double angle, double spin) {
+  const StandingFoot& foot = motion_->foot(leg);
+  const double radius = motion_->wheel().tip_radius;
+  landing_.omega_eq_squared = landing_.carried_squared =
+      foot.spin_squared(foot.landing_angle(), foot.energy(angle, spin));
+  landing_.displacement = tip_along(leg) - touch_along_ - radius * (angle - foot.landing_angle());
+  landing_.duration = time_ - touch_time_;
+}
+
+void SettledRoll::note_moving_touch() {
+  const StandingFoot& foot = motion_->foot(leg_);
+  const SettledWheel& wheel = motion_->wheel();
+  const double about_new =
+      wheel.gyration_sq() * velocity_.spin + height_ * velocity_.along - lever(leg_ + 1).behind * velocity_.out;
+  const double stood = foot.next_angle(), lands = motion_->foot(leg_ + 1).landing_angle();
+  const double height = wheel.length(leg_) * std::cos(stood) + wheel.tip_radius;
+  const double spin = about_new / (wheel.gyration_sq() + height * height +
+                                   wheel.length(leg_) * std::sin(stood) * wheel.length(leg_ + 1) * std::sin(lands));
+  landing_.carried_squared = foot.landing_squared(spin > 0 ? spin * spin : 0);
+  landing_.omega_eq_squared = foot.landing_squared(velocity_.spin * std::abs(velocity_.spin));
+  landing_.slips_late = landing_.end == LandingEnd::settled;
+  if (landing_.slips_late) return;
+  landing_.end = LandingEnd::unsettled;
+  landing_.duration = time_ - touch_time_;
+  landing_.displacement = tip_along(leg_ + 1) - touch_along_ - foot.pace();
+}
+
+Landing SettledRoll::land() {
+  const Event event = run(true);
+  if (event == Event::rests) landing_.end = LandingEnd::rest;
+  return landing_;
+}
+
+Step SettledRoll::step() {
+  const double began = time_;
+  const Event event = run(false);
+  Step step;
+  step.duration = time_ - began;
+  if (event == Event::rests) landing_.end = LandingEnd::rest;
+  if (event == Event::next_touch) {
+    step.touched = true;
+    step.omega_minus = velocity_.spin;
+    step.between_feet = tip_along(leg_ + 1) - touch_along_;
+  }
+  step.landing = landing_;
+  if (step.touched) {
+    // The next leg is the one that lands now.
+    angle_ -= motion_->wheel().leg_angle();
+    ++leg_;
+  }
+  return step;
+}
+
+SettledRoll::Event SettledRoll::run(bool until_settled) {
+  landing_ = {};
+  touch_along_ = tip_along(leg_);
+  touch_time_ = time_;
+  events_ = 0;
+  stood_ = -1;
+  Event event = Event::strikes;
+  while (++events_ < motion_->wheel().max_events) {
+    if (event == Event::strikes)
+      event = resolve();
+    else if (event == Event::carries)
+      event = carry(until_settled);
+    else if (event == Event::flies)
+      event = fly();
+    else
+      return event;
+  }
+  landing_.end = LandingEnd::given_up;
+  landing_.duration = time_ - touch_time_;
+  return Event::given_up;
+}
+
+// Impacts at one moment: the foot that strikes, the other one on the ground if that is driven into it, and so on.
+SettledRoll::Event SettledRoll::resolve() {
+  const double slow = motion_->wheel().rest_speed;
+  for (;;) {
+    if (++events_ >= motion_->wheel().max_events) return Event::given_up;
+    const ContactLever at = lever(foot_);
+    const Contact& contact = contact_of(foot_);
+    PlaneVelocity after = strike(at, contact, velocity_);
+    if (at.lift(after) < slow) after = strike(at, {0, contact.friction}, velocity_);
+    velocity_ = after;
+    ++landing_.strikes;
+    if (landing_.strikes == 1) landing_.omega_plus = velocity_.spin;
+    if (!has_other_ || lever(other_).lift(velocity_) >= -slow) break;
+    std::swap(foot_, other_);
+  }
+  if (spent()) return Event::rests;
+  // A foot that is slower than rest_speed stays down; what it still moves out of the plane is taken off.
+  const auto down = [&](int leg) { return lever(leg).lift(velocity_) < slow; };
+  const auto settle = [&](int leg) {
+    const ContactLever at = lever(leg);
+    const double push = -at.lift(velocity_) / (1 + at.behind * at.behind / at.gyration_sq);
+    velocity_.out += push;
+    velocity_.spin += push * at.behind / at.gyration_sq;
+  };
+  const bool first = down(foot_), second = has_other_ && down(other_);
+  if (first && second) {
+    velocity_.out = velocity_.spin = 0;
+    int loaded = foot_;
+    if (two_feet_rest(std::max(foot_, other_), std::min(foot_, other_), loaded) || time_ == stood_) return Event::rests;
+    stood_ = time_;
+    foot_ = loaded;
+    return Event::carries;
+  }
+  if (!first && !second) return Event::flies;
+  if (second) std::swap(foot_, other_);
+  settle(foot_);
+  return Event::carries;
+}
+
+// One foot on the ground, until it lifts, jams, settles, rests, or another one touches.
+SettledRoll::Event SettledRoll::carry(bool until_settled) {
+  const SettledWheel& wheel = motion_->wheel();
+  const StandingFoot& foot = motion_->foot(foot_);
+  const double jams = 1e-6 * wheel.gyration_sq(), top = apex(foot_);
+  Footing on{&wheel, wheel.length(foot_), sine_, cosine_, contact_of(foot_).friction, 0};
+  FootState state{angle_of(foot_), velocity_.spin, lever(foot_).slip(velocity_), tip_along(foot_)};
+  constexpr double no_slip = 1e-13;  // [m/s]: rounding of a foot that sticks
+  if (std::abs(state.slip) < no_slip) state.slip = 0;
+  has_other_ = false;
+  const auto write_back = [&] {
+    angle_ = state.angle + (foot_ - leg_) * wheel.leg_angle();
+    const double ahead = on.length * std::sin(state.angle);
+    height_ = on.length * std::cos(state.angle) + wheel.tip_radius;
+    along_ = state.along + ahead;
+    velocity_ = {state.slip + state.spin * height_, -state.spin * ahead, state.spin};
+  };
+  const auto strikes = [&](int leg) {
+    has_other_ = leg != foot_;
+    other_ = foot_;
+    foot_ = leg;
+    return Event::strikes;
+  };
+  // A foot without slip: whether it lifts; else `way` says whether it sticks or which way it is driven.
+  const auto lifts = [&] {
+    on.way = 0;
+    const FootForces f = foot_forces(on, state.angle, state.spin);
+    if (f.normal <= 0) return true;
+    if (std::abs(f.tangential) <= on.friction * f.normal) return false;
+    on.way = f.tangential > 0 ? -1 : 1;
+    return foot_forces(on, state.angle, state.spin).stiffness <= jams;
+  };
+  bool stands = false;  // the landed foot, noted when it began to
+  write_back();
+  if (state.slip == 0) {
+    if (lifts()) return Event::flies;
+  } else {
+    on.way = state.slip > 0 ? 1 : -1;
+    const FootForces f = foot_forces(on, state.angle, state.spin);
+    const bool pressed = cosine_ - on.length * std::cos(state.angle) * state.spin * state.spin > 0;
+    if (f.stiffness <= jams) return pressed ? strikes(foot_) : Event::flies;
+    if (f.normal <= 0) return Event::flies;
+  }
+  for (;;) {
+    if (++events_ >= wheel.max_events) return Event::given_up;
+    if (on.way == 0) {
+      if (state.spin <= 0 && state.angle <= top) return Event::rests;
+      if (foot_ == leg_ && !stands) {
+        stands = true;
+        note_stand(foot_, state.angle, state.spin);
+        landing_.end = LandingEnd::settled;
+        const double energy = foot.energy(state.angle, state.spin);
+        if (until_settled && !wheel.drags() && stands_on(foot_, state.angle, energy))
+          return state.angle < top && energy <= foot.potential(top) ? Event::rests : Event::settled;
+      }
+    } else {
+      stands = false;
+      if (spent()) return Event::rests;
+    }
+    // One piece of the motion; what ends it is a value that falls below 0.
+    const FootMotion motion = on.from(state);
+    double when = std::min(motion.horizon, 0.3 / std::max(1.0, std::abs(state.spin)));
+    if (when < 1e-9) return strikes(foot_);  // the pressure grows without bounds: slip jams
+    enum { turns, backward, forward, stops, lifts_off, jammed, next_leg, leg_before, none } event = none;
+    const auto look = [&](auto kind, const TimeSeries& value, double sign, double least) {
+      TimeSeries above = value;
+      for (double& term : above.term) term *= sign;
+      above.term[0] -= least;
+      const double at = above.falls_below_zero(when);
+      if (at <= when) when = at, event = kind;
+    };
+    look(next_leg, motion.angle, -1, -foot.next_angle());
+    look(leg_before, motion.angle, 1, foot.landing_angle());
+    if (on.way == 0) {
+      if (state.spin > 0)
+        look(turns, motion.spin, 1, 0);
+      else
+        look(turns, motion.angle, 1, top);
+      for (const int way : {1, -1}) {
+        TimeSeries room;
+        for (std::size_t k = 0; k < room.term.size(); ++k)
+          room.term[k] = on.friction * motion.normal.term[k] + way * motion.tangential.term[k];
+        look(way == 1 ? forward : backward, room, 1, 0);
+      }
+    } else {
+      look(stops, motion.slip, on.way, 0);
+      look(lifts_off, motion.normal, 1, 0);
+      look(jammed, motion.stiffness, 1, jams);
+    }
+    state = motion.at(when);
+    time_ += when;
+    if (event == turns && state.angle <= top) state.spin = std::min(state.spin, 0.0);
+    if (event == stops || event == forward || event == backward) state.slip = 0;
+    write_back();
+    switch (event) {
+      case none:
+      case turns:
+        break;
+      case forward:
+        on.way = 1;
+        break;
+      case backward:
+        on.way = -1;
+        break;
+      case stops:
+        if (when == 0)
+          on.way = 0;  // at the cone's edge, and back inside
+        else if (lifts())
+          return Event::flies;
+        break;
+      case lifts_off:
+        return Event::flies;
+      case jammed:
+        return strikes(foot_);
+      case next_leg:
+        if (foot_ != leg_) return strikes(foot_ + 1);
+        if (on.way != 0) note_moving_touch();
+        strikes(leg_ + 1);
+        return Event::next_touch;
+      case leg_before:
+        return strikes(foot_ - 1);
+    }
+  }
+}
+
+// No foot on the ground: a parabola at constant spin (drag: constant acceleration over a millisecond), until a tip
+// touches.
+SettledRoll::Event SettledRoll::fly() {
+  const SettledWheel& wheel = motion_->wheel();
+  const double turn = wheel.leg_angle();
+  constexpr double never = std::numeric_limits<double>::infinity();
+  const int reach = wheel.legs() < 5 ? 1 : 2;
+  bool leaves = true;  // the feet that lift are at 0 exactly
+  for (;;) {
+    if (++events_ >= wheel.max_events) return Event::given_up;
+    const double spin = velocity_.spin;
+    double slowing = 0, first = never;
+    if (wheel.drags()) {
+      first = 1e-3;
+      slowing = -wheel.drag(spin - wheel.drag(spin) / wheel.gyration_sq() * first / 2) / wheel.gyration_sq();
+    }
+    int touches = 0;
+    bool found = false;
+    // Earliest touch of a leg before `first`.
+    const auto look = [&](int leg, bool lifts) {
+      const double length = wheel.length(leg), angle = angle_of(leg);
+      const double sine = std::sin(angle), cosine = std::cos(angle);
+      const double gap0 = lifts ? 0 : std::max(0.0, height_ - length * cosine - wheel.tip_radius);
+      // The tip can fall no faster than at `fall` for a while; advancing by the time that takes never misses a touch.
+      double t = 0;
+      while (t < first) {
+        const double by = t * (spin + slowing * t / 2);
+        const auto [half_sine, half_cosine] = sine_cosine(by / 2);
+        const double gap = gap0 + t * (velocity_.out - cosine_ * t / 2) +
+                           2 * length * (sine * half_cosine + cosine * half_sine) * half_sine;
+        const double turned = sine + 2 * half_sine * (cosine * half_cosine - sine * half_sine);
+        const double speed = velocity_.out - cosine_ * t + (spin + slowing * t) * length * turned;
+        if (gap <= 0 && speed < 0) break;
+        if (lifts && t == 0 && speed < wheel.rest_speed) {
+          t = lift_off;
+          continue;
+        }
+        if (lifts && gap <= 0 && t == lift_off) break;
+        const double lean = std::abs(angle + by) + steady_turn;
+        const double fall = std::max(
+            0.05 * cosine_, cosine_ - length * spin * spin * (1 - lean * lean / 2) + length * std::abs(slowing));
+        const double above = std::max(gap, 0.0), rate = std::sqrt(speed * speed + 2 * fall * above);
+        const double safe = speed > 0 ? (speed + rate) / fall : 2 * above / (rate - speed);
+        if (speed < 0 && safe <= 1e-15 * t) break;
+        t += std::min(safe, steady_turn / std::max(1e-3, std::abs(spin)));
+      }
+      if (t < first) first = t, touches = leg, found = true;
+    };
+    if (leaves) {
+      look(foot_, true);
+      if (has_other_) look(other_, true);
+    }
+    const int lowest = leg_ + static_cast<int>(std::lround(angle_ / turn));
+    for (int leg = lowest - reach; leg <= lowest + reach; ++leg)
+      if (!(leaves && (leg == foot_ || (has_other_ && leg == other_)))) look(leg, false);
+    const double by = first * (spin + slowing * first / 2);
+    along_ += first * (velocity_.along + sine_ * first / 2);
+    height_ += first * (velocity_.out - cosine_ * first / 2);
+    angle_ += by;
+    time_ += first;
+    velocity_ = {velocity_.along + sine_ * first, velocity_.out - cosine_ * first, spin + slowing * first};
+    leaves = false;
+    if (!found) continue;
+    foot_ = touches;
+    has_other_ = false;
+    if (touches <= leg_) return Event::strikes;
+    note_moving_touch();
+    return Event::next_touch;
+  }
+}
+
+}  // namespace metastable::dynamics

@@ -1,0 +1,130 @@
+#pragma once
+// The law `settled`: landings, steps and trials of a planar rigid wheel, followed event by event.
+
+#include <functional>
+#include <vector>
+
+#include "dynamics/settled/foot_strike.h"
+#include "dynamics/settled/settled_wheel.h"
+#include "dynamics/wheel/contact_noise.h"
+
+namespace metastable::dynamics {
+
+enum class LandingEnd {
+  settled,    ///< the landed foot stands and will until the next leg touches
+  rest,       ///< turned back on a standing foot, or stands on two
+  unsettled,  ///< the next leg touches while the landed foot hops or slides: an assumption of the chain is broken
+  given_up    ///< more events than allowed (two feet that chatter at high eta)
+};
+
+/// What one landing does.
+struct Landing {
+  LandingEnd end = LandingEnd::given_up;
+  /// omega^2 that a standing foot would have at the landing angle to reach the same spin at the next touch
+  /// [rad^2/s^2]; below the barrier's at rest, 0 where the wheel rests on two feet or was given up.
+  double omega_eq_squared = 0;
+  /// The same to bring the same angular momentum about the next foot: what the next landing depends on. Differs from
+  /// omega_eq_squared only if the foot moves at the next touch: unsettled, or settled and sliding or lifting once more
+  /// (`slips_late`: backward, at low mu). The next landing from a standing foot with this then is that from the
+  /// moving one to 2e-5 rad/s (median; omega_eq_squared: 1e-3).
+  double carried_squared = 0;
+  bool slips_late = false;
+  double displacement =
+      0;                  ///< of the foot from where it touched to where it stands, down the plane, without rolling [m]
+  double omega_plus = 0;  ///< spin after the first impact [rad/s]
+  double duration = 0;    ///< from touch to where the landing ended [s]
+  int strikes = 0;        ///< impacts, the first one included
+};
+
+/// A landing and the way to the next touch.
+struct Step {
+  Landing landing;
+  bool touched = false;     ///< the next leg touches; else rest, or given up as `landing.end` has it
+  double omega_minus = 0;   ///< spin at the next touch [rad/s]
+  double between_feet = 0;  ///< from touch to touch, down the plane [m]
+  double duration = 0;      ///< from touch to touch, or to rest [s]
+};
+
+/// A wheel with everything that does not change from landing to landing. Const members may be called from any thread.
+class SettledMotion {
+ public:
+  /// @throws std::invalid_argument as SettledWheel::validate()
+  explicit SettledMotion(SettledWheel wheel);
+
+  const SettledWheel& wheel() const { return wheel_; }
+  /// @param leg any whole number, counted around the wheel
+  const StandingFoot& foot(int leg) const;
+
+  /// One landing from a foot that stands, until the landed foot has settled. 10 to 60 us at the default rest_speed.
+  /// @param leg that lands; @param omega_minus [rad/s], > 0
+  /// @param landed, old contact of the landing foot and of those behind it: eta in [0, 1), mu >= 0
+  /// @throws std::invalid_argument for a speed or contact out of range, naming it
+  Landing land(int leg, double omega_minus, const Contact& landed, const Contact& old) const;
+  Landing land(int leg, double omega_minus, const Contact& contact) const {
+    return land(leg, omega_minus, contact, contact);
+  }
+  /// The same and on to the next touch, the stance integrated in time.
+  Step step(int leg, double omega_minus, const Contact& landed, const Contact& old) const;
+  Step step(int leg, double omega_minus, const Contact& contact) const {
+    return step(leg, omega_minus, contact, contact);
+  }
+
+ private:
+  SettledWheel wheel_;
+  std::vector<StandingFoot> foot_;
+};
+
+/// A wheel rolled step by step with its complete state carried on: direct simulation of the law. Starts from a touch of
+/// a wheel that turns about a standing foot.
+class SettledRoll {
+ public:
+  /// @param motion must outlive the roll; others as in SettledMotion::land
+  SettledRoll(const SettledMotion& motion, int leg, double omega_minus, const Contact& landed, const Contact& old);
+
+  /// From the touch of leg() to the next one, which then is leg(): its contact has to be set before the next call.
+  Step step();
+  /// The landing alone, until its foot has settled. Ends the roll unless it is `settled`.
+  Landing land();
+
+  int leg() const { return leg_; }                ///< that touches, counted on without end
+  double position() const;                        ///< of its tip, down the plane from the first touch [m]
+  double spin() const { return velocity_.spin; }  ///< [rad/s]
+  double time() const { return time_; }           ///< since the start [s]
+  double energy() const;                          ///< kinetic and of gravity, from the first touch [J]
+  void set_contact(const Contact& contact);       ///< of the foothold that leg() touches
+  void set_slope(double slope);                   ///< [rad] from here on, about leg()'s foot
+
+ private:
+  enum class Event { strikes, carries, flies, next_touch, settled, rests, given_up };
+  Event run(bool until_settled);
+  Event resolve();
+  Event carry(bool until_settled);
+  Event fly();
+  const Contact& contact_of(int leg) const;
+  double angle_of(int leg) const;
+  ContactLever lever(int leg) const;
+  bool spent() const;
+  bool two_feet_rest(int ahead, int back, int& loaded) const;
+  double apex(int leg) const;
+  bool stands_on(int leg, double angle, double energy) const;
+  void note_stand(int leg, double angle, double spin);
+  void note_moving_touch();
+  double tip_along(int leg) const;
+
+  const SettledMotion* motion_;
+  int leg_;
+  std::vector<Contact> contact_;  // of the last foothold of every leg
+  double sine_, cosine_;          // of the slope, times gravity
+  // The hub, the angle of leg_ past the normal, the time.
+  double along_ = 0, height_ = 0, angle_ = 0, time_ = 0;
+  PlaneVelocity velocity_;
+  // What the last event left: the foot that strikes or carries, another one on the ground.
+  int foot_ = 0, other_ = 0;
+  bool has_other_ = false;
+  int events_ = 0;
+  double touch_along_ = 0, touch_time_ = 0;
+  double stood_ = -1;  // when the wheel stood on two feet
+  Landing landing_;
+};
+
+}  // namespace metastable::dynamics

@@ -1,0 +1,73 @@
+#pragma once
+// The wheel of the law `settled`: a planar rigid body on a plane, its feet, and what bounds its landings.
+
+#include <string>
+#include <vector>
+
+#include "dynamics/wheel/wheel.h"
+
+namespace metastable::dynamics {
+
+/// A planar rigid wheel on a plane of constant slope, SI units. The tips of the legs are discs of radius r about the
+/// legs' ends (at l_i from the hub), so a standing foot rolls on its disc.
+struct SettledWheel {
+  std::vector<double> leg_length = paper_leg_lengths();  ///< l_i [m], in the order they land
+  double mass = 1.39;                                    ///< M [kg], > 0
+  double radius_of_gyration = 0.05;                      ///< r_g [m] about the hub, > 0: J = M r_g^2
+  double tip_radius = 0;                                 ///< r [m], in [0, shortest leg / 20]
+  double gravity = 9.81;                                 ///< g [m/s^2], > 0
+  double slope = 0;                                      ///< gamma [rad], in (0, pi / legs)
+  /// Torque against the spin: constant [N m], by omega [N m s], by omega |omega| [N m s^2]; all >= 0.
+  double constant_drag = 0, linear_drag = 0, quadratic_drag = 0;
+
+  double rest_speed = 1e-5;  ///< v_tol [m/s], > 0: a foot stays down once its bounce is slower
+  double tolerance = 1e-12;  ///< of one integration step [rad, rad/s, m/s, m], > 0
+  int max_events = 20000;    ///< strikes, lifts, steps of integration; a landing that needs more is given up
+
+  int legs() const { return static_cast<int>(leg_length.size()); }
+  double leg_angle() const;
+  double length(int leg) const;  ///< of any whole number, counted around the wheel [m]
+  double gyration_sq() const { return radius_of_gyration * radius_of_gyration; }
+  bool drags() const { return constant_drag > 0 || linear_drag > 0 || quadratic_drag > 0; }
+  /// Torque / M [m^2/s^2], against the spin.
+  double drag(double spin) const;
+  /// @throws std::invalid_argument naming the quantity, its value and the allowed range.
+  void validate() const;
+};
+
+/// The wheel as the other laws have it: r_g as given, else from its inertia about the mean leg, else 0.05 m as under
+/// `coulomb`. @param slope gamma [rad]; @param tip_radius r [m] @throws std::invalid_argument as validate()
+SettledWheel settled_wheel(const Wheel& wheel, double slope, double tip_radius = 0);
+
+/// A foot that stands, seen along its leg's angle a past the normal of the plane [rad]; energies per unit mass.
+class StandingFoot {
+ public:
+  /// @param leg any whole number, counted around the wheel
+  StandingFoot(const SettledWheel& wheel, int leg);
+
+  double landing_angle() const { return landing_; }  ///< a when it touches: the leg before it stands, too [rad]
+  double next_angle() const { return next_; }        ///< a when the next leg touches [rad]
+  double apex_angle() const { return apex_; }        ///< a at the top of the barrier [rad]
+  /// (J/M + distance^2 of hub and contact) [m^2].
+  double inertia(double angle) const;
+  /// Of gravity, from the foot that stood upright at the origin [m^2/s^2].
+  double potential(double angle) const;
+  double energy(double angle, double spin) const { return inertia(angle) * spin * spin / 2 + potential(angle); }
+  double spin_squared(double angle, double energy) const { return 2 * (energy - potential(angle)) / inertia(angle); }
+  /// omega-^2 at the next touch of a foot with omega_eq^2 at its landing angle, and back. No drag.
+  double next_squared(double omega_eq_squared) const;
+  double landing_squared(double next_squared) const;
+  /// Least omega_eq^2 that passes the barrier [rad^2/s^2].
+  double barrier_squared() const;
+  /// From touch to touch of two standing feet [m]: chord of the next landing plus what the tip rolls.
+  double pace() const { return pace_; }
+
+ private:
+  double length_, radius_, gravity_, gyration_sq_, sine_, cosine_;
+  double landing_, next_, apex_, pace_;
+};
+
+/// Friction from which a rolling wheel's landing on `leg` does not slip, mu_c = d h / (J/M + h^2).
+double sticking_friction(const SettledWheel& wheel, int leg);
+
+}  // namespace metastable::dynamics
