@@ -52,11 +52,6 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
 
 inline constexpr double model_error = 0.06;
 
-/// Two causes at work at once gain what they gain alone (1.07 times at most, in 72 simulated pairs); two that gain far
-/// more together bend each other into the shape of something else (1.3 to 2.4 times where a spread of restitution that
-/// depends on speed passed for two mean effects that cancel). Beyond this ratio a pair describes and does not explain.
-inline constexpr double most_together = 1.2;
-
 /// 2 Delta log likelihood of one fit over another, in stances and in everything else.
 struct PhaseGain {
   double collisions = 0, stances = 0;

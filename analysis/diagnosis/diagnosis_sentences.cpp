@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/diagnosis/cause_ranking.h"
-
 namespace metastable::analysis {
 namespace {
 

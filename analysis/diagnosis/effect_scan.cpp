@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -144,8 +146,10 @@ ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) 
   const Eigen::MatrixXd rows = rows_of_chance(scan);
   std::vector<std::vector<double>> gains(scan.effects.size());  // by effect and draw
   for (int draw = 0; draw < draws; ++draw) {
-    const Eigen::VectorXd score = rows.transpose() * normal_multipliers(seed, static_cast<std::uint64_t>(draw),
-                                                                        DrawStream::chance_of_effects, rows.rows());
+    const std::vector<double> normals = normal_multipliers(
+        seed, static_cast<std::uint64_t>(draw), DrawStream::chance_of_effects, static_cast<std::size_t>(rows.rows()));
+    const Eigen::VectorXd multipliers = Eigen::VectorXd::Map(normals.data(), rows.rows());
+    const Eigen::VectorXd score = rows.transpose() * multipliers;
     for (std::size_t e = 0; e < scan.effects.size(); ++e) {
       const ScannedEffect& effect = scan.effects[e];
       const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());

@@ -1,7 +1,7 @@
 #pragma once
 // Which effects would a fit gain from: score tests of every effect and variant at one fit.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 

@@ -1,5 +1,6 @@
 #include "analysis/diagnosis/gap_map.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -330,8 +331,10 @@ void step_down(std::vector<GapCell>& cells, const std::vector<std::size_t>& orde
   std::vector<int> exceeded(order.size());
   std::vector<double> largest_by_chance;
   for (int draw = 0; draw < draws; ++draw) {
-    const Eigen::VectorXd chance = rows.transpose() * normal_multipliers(seed, static_cast<std::uint64_t>(draw),
-                                                                         DrawStream::chance_on_map, rows.rows());
+    const std::vector<double> normals = normal_multipliers(
+        seed, static_cast<std::uint64_t>(draw), DrawStream::chance_on_map, static_cast<std::size_t>(rows.rows()));
+    const Eigen::VectorXd multipliers = Eigen::VectorXd::Map(normals.data(), rows.rows());
+    const Eigen::VectorXd chance = rows.transpose() * multipliers;
     double largest = 0;
     for (std::size_t k = order.size(); k-- > 0;) {
       largest = std::max(largest, std::abs(chance[static_cast<Eigen::Index>(order[k])]));

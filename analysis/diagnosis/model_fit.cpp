@@ -1,5 +1,6 @@
 #include "analysis/diagnosis/model_fit.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 

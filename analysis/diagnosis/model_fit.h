@@ -1,7 +1,7 @@
 #pragma once
 // Fitting a transition model: nuisances and effects by penalised maximum likelihood.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 

@@ -1,5 +1,6 @@
 #include "analysis/diagnosis/visibility.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 

@@ -36,8 +36,9 @@ std::string angles(const std::string& id, const dynamics::LaboratoryTrial& trial
     if (!(time < end)) return rows;
     // A wheel that turns back falls the way it came, onto both feet.
     const double moment = rested && time > turned ? std::max(last, 2 * turned - time) : time;
-    const double noise =
-        camera.noise_sd > 0 ? camera.noise_sd * dynamics::normal_quantile(uniform(camera.seed, index, k + 1, 201)) : 0;
+    const double noise = camera.noise_sd_rad > 0
+                             ? camera.noise_sd_rad * dynamics::normal_quantile(uniform(camera.seed, index, k + 1, 201))
+                             : 0;
     fmt::format_to(std::back_inserter(rows), "{},{},{:.6f},{:.{}f}\n", id, index + 1, time,
                    dynamics::angle_at(trial.motion, moment) + noise, camera.decimals);
   }

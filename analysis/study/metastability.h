@@ -1,5 +1,21 @@
 #pragma once
 // The metastability study of one setting: expected steps before failure and what goes with them, with their errors.
+//
+// Example:
+//   #include <metastable/analysis/study/metastability.h>
+//
+//   #include <cstdio>
+//
+//   int main() {
+//     metastable::analysis::Setting setting;  // the paper's wheel, here on its steeper ramp
+//     setting.slope_deg = 9.59;
+//     setting.initial_speed = {5.83, 0.28};  // mean, sd [rad/s]
+//     const auto study = metastable::analysis::study(setting, {.tolerance = 0.005});
+//     const auto [value, lower, upper] = study.steps.from_start;
+//     std::printf("%.2f steps before failure (95 %%: %.2f to %.2f)\n", value, lower, upper);
+//   }
+// prints
+//   @@STUDY@@
 
 #include <cstddef>
 #include <cstdint>

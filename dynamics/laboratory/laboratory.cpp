@@ -81,7 +81,7 @@ Laboratory::Laboratory(LaboratorySetup setup)
   require(setup_.max_collisions >= 1, "max_collisions", setup_.max_collisions, "[1, inf)");
   for (std::size_t i = 0; i < setup_.conditions.size(); ++i) {
     const LaboratoryCondition& condition = setup_.conditions[i];
-    const double slope = condition.slope + changes_.slope_offset_deg * degree;
+    const double slope = condition.slope_rad + changes_.slope_offset_deg * degree;
     const double steepest = steepest_slope(wheel_.legs());
     if (!(slope > 0 && slope < steepest))
       throw std::invalid_argument(fmt::format("condition {}: slope: {:.6g} deg is outside (0, {:.6g}) deg", i,
@@ -96,9 +96,9 @@ Laboratory::Laboratory(LaboratorySetup setup)
     body.leg_length = wheel_.leg_length;
     body.mass = wheel_.hub_mass;
     body.gravity = wheel_.gravity;
-    body.slope = slope;
+    body.slope_rad = slope;
     body.offset = changes_.mass_offset;
-    body.offset_angle = changes_.mass_angle;
+    body.offset_angle_rad = changes_.mass_angle_rad;
     body.constant_drag = changes_.constant_drag;
     body.linear_drag = changes_.linear_drag;
     body.quadratic_drag = changes_.quadratic_drag;
@@ -150,10 +150,10 @@ class Laboratory::Roll {
       touch = roll_on(body_, surface_, pose, inertia(pose.leg), &trial_.motion);
       for (std::size_t m = before; m < trial_.motion.size(); ++m) {
         trial_.motion[m].time += time;
-        trial_.motion[m].turn += turn;
+        trial_.motion[m].turn_rad += turn;
       }
       time += touch.time;
-      turn += touch.turn;
+      turn += touch.turn_rad;
       const bool over = touch.end == RollEnd::rest;
       if (over || touch.leg != touch.before.leg) report_after();
       if (over) return finish(Outcome::rest);
@@ -245,7 +245,7 @@ class Laboratory::Roll {
     impact.along = touch.flew ? dot(touch.tip_velocity, along) : 0;  // a standing wheel turns about the old foot
     impact.restitution = contact.restitution;
     impact.friction = contact.friction;
-    impact.slope = body_.slope - rise;
+    impact.slope = body_.slope_rad - rise;
     impact.gravity = body_.gravity;
     impact.stiffness = lab_.model_.ramp_stiffness;
     impact.contact_mass = lab_.model_.contact_mass;
@@ -265,7 +265,7 @@ class Laboratory::Roll {
   Pose next_pose(const Touch& touch, double energy) const {
     Pose pose = touch.before;
     pose.foot = tip(body_, touch.before, touch.leg);
-    if (touch.leg != touch.before.leg) pose.angle -= body_.leg_angle();
+    if (touch.leg != touch.before.leg) pose.angle_rad -= body_.leg_angle();
     pose.leg = touch.leg;
     pose.speed = energy > 0 ? std::sqrt(2 * energy / inertia_about_foot(body_, pose, inertia(pose.leg))) : 0;
     return pose;
@@ -332,12 +332,12 @@ LaboratoryTrial Laboratory::run(std::size_t index) const { return Roll(*this, in
 double angle_at(const std::vector<Moment>& motion, double time) {
   const auto after =
       std::upper_bound(motion.begin(), motion.end(), time, [](double t, const Moment& m) { return t < m.time; });
-  if (after == motion.begin()) return motion.front().turn;
+  if (after == motion.begin()) return motion.front().turn_rad;
   const Moment& a = *(after - 1);
-  if (after == motion.end()) return a.turn;
+  if (after == motion.end()) return a.turn_rad;
   const Moment& b = *after;
   const double h = b.time - a.time, s = (time - a.time) / h;
-  return a.turn * (1 + 2 * s) * (1 - s) * (1 - s) + b.turn * s * s * (3 - 2 * s) +
+  return a.turn_rad * (1 + 2 * s) * (1 - s) * (1 - s) + b.turn_rad * s * s * (3 - 2 * s) +
          h * s * (1 - s) * ((1 - s) * a.speed - s * b.speed);
 }
 

@@ -21,7 +21,7 @@ namespace metastable::dynamics {
 
 /// One ramp and launch.
 struct LaboratoryCondition {
-  double slope = 0;  ///< stated [rad]
+  double slope_rad = 0;  ///< stated
   double ramp_length = 3.66;
   double launch_mean = 0, launch_sd = 0;  ///< omega just before collision 1 [rad/s]
   int first_landing_leg = 0;

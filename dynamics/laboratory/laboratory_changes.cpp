@@ -29,7 +29,7 @@ const std::map<std::string, Change, std::less<>>& changes() {
        [](C& c, Values v) {
          c.legs.push_back({static_cast<int>(v[0]), v[1], v[2]});
        }},
-      {"hub_eccentricity", [](C& c, Values v) { c.mass_offset = v[0], c.mass_angle = v[1]; }},
+      {"hub_eccentricity", [](C& c, Values v) { c.mass_offset = v[0], c.mass_angle_rad = v[1]; }},
       {"inertia", [](C& c, Values v) { c.inertia_ratio = v[0]; }},
       {"slope_offset", [](C& c, Values v) { c.slope_offset_deg = v[0]; }},
       {"slope_profile", [](C& c, Values v) { c.sag = v[0], c.sag_from = v[1], c.sag_to = v[2]; }},

@@ -45,7 +45,7 @@ LossCurve::LossCurve(const WheelMap& map, double state, int phase) {
   if (coulomb_) {
     kept_ = 1 - model.rebound_lost;
   } else {
-    pull_ = model.mass * model.gravity * std::sin(c.slope) * c.chord * std::sqrt(state) / 2;
+    pull_ = model.mass * model.gravity * std::sin(c.slope_rad) * c.chord * std::sqrt(state) / 2;
     stretch_ = std::sqrt(model.contact_mass / model.ramp_stiffness);
   }
   end_ = friction.constant() ? std::numeric_limits<double>::infinity()

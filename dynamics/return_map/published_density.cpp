@@ -400,7 +400,7 @@ PublishedDensity::PublishedDensity(const WheelMap& map, int phase)
   inertia_ = stance.inertia;
   before_ = map.stance(phase > 0 ? phase - 1 : map.phases() - 1).inertia;
   energy_ = c.chord * c.chord / 2;
-  kappa_ = model.mass * model.gravity * std::sin(c.slope) * c.chord / 2 *
+  kappa_ = model.mass * model.gravity * std::sin(c.slope_rad) * c.chord / 2 *
            std::sqrt(model.contact_mass / model.ramp_stiffness) / energy_;
 
   const double sd = restitution_.sd();

@@ -111,7 +111,7 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
   const double loss = (before * omega * omega - after * speed * speed) / unit;
   const double loss_rate = 2 * after * speed / unit;  // -d loss / d omega+
   const double time = std::sqrt(model_.contact_mass / model_.ramp_stiffness);
-  const double pull = model_.gravity * std::sin(c.slope) / (v0 * r2);
+  const double pull = model_.gravity * std::sin(c.slope_rad) / (v0 * r2);
   const Friction friction(contact_, change);
   const bool usual = change.restitution_ratio == 1;
 

@@ -83,8 +83,8 @@ ExtendedWheel::Path ExtendedWheel::path(const StepContext& context) const {
   const Leg& leg = geometry_[index(context.leg)];
   const Triangle& ahead = geometry_[index(context.leg + 1)].triangle;
   Path p;
-  p.start = leg.triangle.beta_second + local_slope(context.position - leg.triangle.chord / 2);
-  p.end = pi - (ahead.beta_first - local_slope(context.position + ahead.chord / 2));
+  p.start = leg.triangle.beta_second_rad + local_slope(context.position - leg.triangle.chord / 2);
+  p.end = pi - (ahead.beta_first_rad - local_slope(context.position + ahead.chord / 2));
   const double weight = 2 * model_.mass * model_.gravity / leg.inertia;
   p.inertia = leg.inertia;
   p.pendulum = weight * leg.length;
@@ -163,13 +163,13 @@ Collision ExtendedWheel::collision(const StepContext& context, double omega) con
   c.contact_x = leg.triangle.contact_x;
   c.contact_y = leg.triangle.hub_height;
   if (extension_.hub_forward != 0 || extension_.hub_aside != 0) {  // the impulse acts about the centre of mass
-    const double at = leg.triangle.beta_second - leg.eccentric_phase;
+    const double at = leg.triangle.beta_second_rad - leg.eccentric_phase;
     c.contact_x -= extension_.hub_forward * std::cos(at) + extension_.hub_aside * std::sin(at);
     c.contact_y += extension_.hub_aside * std::cos(at) - extension_.hub_forward * std::sin(at);
   }
   c.chord = leg.triangle.chord;
   c.normal_speed = leg.triangle.chord * omega;
-  c.slope = local_slope(context.position - leg.triangle.chord / 2);
+  c.slope_rad = local_slope(context.position - leg.triangle.chord / 2);
   return c;
 }
 

@@ -177,7 +177,7 @@ std::string command_line(int argc, const char* const* argv) {
 int parse_and_run(int argc, const char* const* argv) {
   CLI::App app("Metastability of walking machines: the rimless wheel on a ramp", "metastable");
   app.require_subcommand(1);
-  app.set_version_flag("--version", "metastable " + version());
+  app.set_version_flag("--version", version_text());
   app.footer("Exit codes: 0 done, 2 wrong option or file, 3 a solver failed, 130 interrupted.");
   const std::vector<Command> all = commands();
   std::deque<Options> options;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/experiment/reality.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/likelihood/coast_down_transitions.h"

@@ -59,9 +59,9 @@ TEST(Metastability, AgreesWithMonteCarloTrials) {
       const double before = c.omega_minus * c.omega_minus, after = c.omega_plus * c.omega_plus;
       const int leg = c.leg, stance = (leg + 7) % 8;
       lifted += before * setting.wheel.leg_length[static_cast<std::size_t>(stance)] >
-                    9.81 * std::sin(map.triangle(leg).beta_first - map.slope()) ||
+                    9.81 * std::sin(map.triangle(leg).beta_first_rad - map.slope()) ||
                 after * setting.wheel.leg_length[static_cast<std::size_t>(leg)] >
-                    9.81 * std::sin(map.triangle(leg).beta_second + map.slope());
+                    9.81 * std::sin(map.triangle(leg).beta_second_rad + map.slope());
     }
   }
   const auto check = [](const Accumulated& total, std::vector<double> values, double slack) {
@@ -257,7 +257,7 @@ TEST(Metastability, FailuresRarerThanTheDrawsReachDeepenTheTail) {
   // Rough terrain at a spread of 0.6 deg: 1.4e31 steps, beyond tails of 1e-30.
   constexpr double degree = M_PI / 180;
   const auto rough = [&](double sd_deg) {
-    const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = sd_deg * degree});
+    const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = sd_deg * degree});
     const double start = wheel.fixed_point();
     return Problem{wheel, {[start](double) { return start; }, 0}, [](double x) { return std::sqrt(x); }, {}};
   };

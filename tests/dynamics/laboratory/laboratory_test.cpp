@@ -43,7 +43,7 @@ void compare_with_return_map(const LaboratorySetup& setup) {
   int compared = 0, rests = 0;
   for (const LaboratoryTrial& trial : run_all(setup)) {
     const LaboratoryCondition& condition = setup.conditions[trial.condition];
-    const WheelMap map(setup.wheel, condition.slope, setup.law, ContactNoise::normal(0.54, 0.045, 0.352, 0.043));
+    const WheelMap map(setup.wheel, condition.slope_rad, setup.law, ContactNoise::normal(0.54, 0.045, 0.352, 0.043));
     for (std::size_t k = 0; k < trial.collisions.size(); ++k) {
       const LaboratoryCollision& c = trial.collisions[k];
       const int phase = c.leg % map.phases();
@@ -101,7 +101,7 @@ double drag_work(const std::string& text) {
   const LaboratoryTrial trial = lab.run(0);
   const LaboratoryCollision &a = trial.collisions.at(0), &b = trial.collisions.at(1);
   const double inertia = 1.39 * 0.1519 * 0.1519, chord = 2 * 0.1519 * std::sin(22.5 * degree);
-  const double gravity = 1.39 * 9.81 * chord * std::sin(setup.conditions[0].slope);
+  const double gravity = 1.39 * 9.81 * chord * std::sin(setup.conditions[0].slope_rad);
   return gravity - inertia / 2 * (b.omega_minus * b.omega_minus - a.omega_plus * a.omega_plus);
 }
 
@@ -286,7 +286,7 @@ TEST(Laboratory, RefusesWhatItCannotBuild) {
     change(setup);
     return message_of([&] { const Laboratory lab(setup); });
   };
-  EXPECT_EQ(message([](LaboratorySetup& s) { s.conditions[1].slope = 0.5; }),
+  EXPECT_EQ(message([](LaboratorySetup& s) { s.conditions[1].slope_rad = 0.5; }),
             "condition 1: slope: 28.6479 deg is outside (0, 22.5) deg");
   EXPECT_EQ(message([](LaboratorySetup& s) { s.order.push_back(2); }), "order: condition 2 is outside [0, 2)");
   EXPECT_EQ(message([](LaboratorySetup& s) {

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -328,7 +329,12 @@ TEST_F(CommandLine, HelpAndVersion) {
   EXPECT_EQ(metastable({"--help"}).code, 0);
   const Ran version = metastable({"--version"});
   EXPECT_EQ(version.code, 0);
-  EXPECT_TRUE(version.out.starts_with("metastable 0.1.0"));
+  EXPECT_TRUE(std::regex_match(
+      version.out,
+      std::regex("metastable 0\\.2\\.0(\\+g[0-9a-f]+(-dirty)?)?\nbuilt by \\w+ \\d+[.\\d]* .*\nwith .*\n")))
+      << version.out;
+  for (const char* library : {"Boost 1.", "CLI11 ", "Eigen 3.", "KLU 1.", "OpenSSL ", "Spectra 1.", "fmt ", "toml++ "})
+    EXPECT_NE(version.out.find(library), std::string::npos) << library;
   for (const char* command : {"steps", "compare", "sweep", "simulate", "report"}) {
     const Ran help = metastable({command, "--help"});
     EXPECT_EQ(help.code, 0);
