@@ -32,34 +32,40 @@ class ContactLikelihood {
   double operator()(const ContactParameters& parameters, ContactParameters* gradient = nullptr) const;
 
   /// Transitions that some eta and mu can lead to, and how many others there are.
-  std::size_t possible() const { return terms_.size(); }
+  std::size_t possible() const { return possible_.size(); }
   std::size_t possible_rests() const { return rests_; }
   std::size_t impossible() const { return impossible_; }
 
  private:
-  struct Piece {  // of a curve: a point, and its share of length / |grad x'|; of a region: column of eta, mu from and
-                  // to
+  /// Of a curve: a point, and its share of length / |grad x'|. Of a region: a column of eta, mu from and to.
+  struct Piece {
     double restitution, friction, weight, friction_to;
     std::size_t column;
   };
-  struct Term {
+  /// One transition: the curve that leads to its landing, or the region that rests.
+  struct Observed {
     bool landing, rested;
     std::vector<Piece> pieces;
   };
-  // A probability or density, and its logarithm's derivatives.
+  /// A probability or density, and its logarithm's derivatives.
   struct Value {
     double value = 0;
     ContactParameters slope{};
   };
-  // Of the untruncated normals.
-  static Value density(const Term& term, const ContactParameters& parameters);
-  using ColumnWeight = std::array<double, 3>;  // of one eta of the grid, and its derivatives by eta's mean and sd
+  struct Surface;
+  class LevelCurve;
+  static std::vector<Piece> region_of_rest(const Surface& surface, const std::vector<double>& after, double barrier);
+  void keep_possible(std::vector<Observed> all);
+  /// The density takes normals that are not truncated.
+  static Value density(const Observed& observed, const ContactParameters& parameters);
+  /// The weight of one eta of the grid, and its derivatives by eta's mean and sd.
+  using ColumnWeight = std::array<double, 3>;
   static std::vector<ColumnWeight> column_weights(const dynamics::TruncatedNormal& restitution);
-  static Value rest(const Term& term, const std::vector<ColumnWeight>& weights,
+  static Value rest(const Observed& observed, const std::vector<ColumnWeight>& weights,
                     const dynamics::TruncatedNormal& friction, const ContactParameters& parameters,
                     const ContactParameters& truncation);
 
-  std::vector<Term> terms_;
+  std::vector<Observed> possible_;
   std::size_t rests_ = 0, impossible_ = 0;
   int threads_ = 0;
 };

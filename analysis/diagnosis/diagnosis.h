@@ -32,14 +32,14 @@ std::string verdict_name(Verdict verdict);
 /// @throws std::invalid_argument for an unknown name
 Verdict verdict_from_name(std::string_view name);
 
-/// One number with its 90 % interval.
+/// A number comes with its 90 % interval.
 struct EstimatedParameter {
   std::string name;
   double value = 0, lower = 0, upper = 0;
   bool fitted = true;  ///< false: chosen from a list (a leg, an interval), without interval
 };
 
-/// One hypothesis about the cause: an effect, or two at once.
+/// A hypothesis about the cause names an effect, or two at once.
 struct Cause {
   std::vector<std::string> effects;  ///< one or two ids
   double probability = 0;            ///< over all causes, "no_gap", "recalibration" and "none_of_these"

@@ -1,5 +1,5 @@
 #pragma once
-// A diagnosis in plain words.
+// Says a diagnosis in plain words.
 
 #include <string>
 #include <vector>

@@ -44,17 +44,17 @@ class Stance {
   }
 
   Pose pose(const State& s) const { return {start_.foot, start_.leg, s[0], s[1], s[2]}; }
-  // Height of the next leg's tip over the surface.
+  // How high the next leg's tip is over the surface.
   double clearance(const State& s) const {
     const Point at = tip(body_, pose(s), (start_.leg + 1) % body_.legs());
     return at.z - surface_.height(at.x);
   }
-  // Ground reaction normal to the surface, over the mass [m/s^2].
+  // What the ground's reaction normal to the surface is, over the mass [m/s^2].
   double reaction(const State& s) const {
     State rate{};
     (*this)(s, rate, 0);
     const Point arm = arm_at(s[0]);
-    // Acceleration of the centre of mass: turning at speed s[1] down the ramp about the foot.
+    // The centre of mass accelerates as it turns at speed s[1] down the ramp about the foot.
     const Point acceleration{rate[1] * arm.z - s[1] * s[1] * arm.x, -rate[1] * arm.x - s[1] * s[1] * arm.z};
     const double rise = surface_.rise(start_.foot.x);
     return (acceleration.z + body_.gravity * std::cos(body_.slope_rad)) * std::cos(rise) -
@@ -74,7 +74,7 @@ class Stance {
   double inertia_;
 };
 
-// From the pose at which the foot lifts: the centre of mass on its parabola, the wheel turning evenly.
+// From the pose at which the foot lifts the centre of mass follows its parabola and the wheel turns evenly.
 Touch fly(const RollingBody& body, const RampSurface& surface, const Pose& lift, double energy, const auto& note) {
   const Point c = centre_of_mass(body, lift);
   const Point arm{c.x - lift.foot.x, c.z - lift.foot.z};

@@ -1,5 +1,5 @@
 #pragma once
-// A rimless wheel in continuous time, standing on one foot or flying: the laboratory's counterpart of the stance.
+// A rimless wheel moves in continuous time, on one foot or in flight: the laboratory's counterpart of the stance.
 
 #include <optional>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// The body that rolls. SI units.
+/// What rolls; all is in SI units.
 struct RollingBody {
   std::vector<double> leg_length;  ///< [m], in the order they land
   double mass = 0;                 ///< [kg]
@@ -31,8 +31,8 @@ struct Point {
   double x = 0, z = 0;  ///< down the plane, out of it [m]
 };
 
-/// The wheel on one foot, or just off it. `angle_rad` is how far the hub has passed over the foot's leg, from the
-/// normal of the plane [rad]; it grows as the wheel rolls down, at `speed` [rad/s].
+/// How the wheel stands on one foot, or just off it. `angle_rad` is how far the hub has passed over the foot's leg, from
+/// the normal of the plane [rad]; it grows as the wheel rolls down, at `speed` [rad/s].
 struct Pose {
   Point foot;
   int leg = 0;
@@ -41,7 +41,7 @@ struct Pose {
   double fluid_speed = 0;  ///< [rad/s]
 };
 
-/// Hub, tip of a leg, centre of mass in that pose.
+/// Where hub, tip of a leg and centre of mass are in that pose.
 Point hub(const RollingBody& body, const Pose& pose);
 Point tip(const RollingBody& body, const Pose& pose, int leg);
 Point centre_of_mass(const RollingBody& body, const Pose& pose);
@@ -60,7 +60,7 @@ struct Touch {
   bool flew = false;    ///< the foot had lifted
 };
 
-/// One moment of the motion, for a camera.
+/// What a camera sees of the motion in one moment.
 struct Moment {
   double time = 0, turn_rad = 0, speed = 0;  ///< [s], [rad], [rad/s] since the start
 };
@@ -84,7 +84,7 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
 std::vector<Moment> run_up(const RollingBody& body, const RampSurface& surface, const Pose& end, double inertia,
                            double seconds);
 
-/// The pose on both feet with `leg` about to land at the point (along, surface) and its predecessor as the stance leg.
+/// Stands the wheel on both feet: `leg` is about to land at (along, surface), and its predecessor is the stance leg.
 Pose landing_pose(const RollingBody& body, const RampSurface& surface, int leg, double along, double speed);
 
 }  // namespace metastable::dynamics

@@ -50,7 +50,6 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
   }
   drag_ = extension.viscous != 0 || extension.rolling != 0 || extension.air != 0;
   profile_ = extension.sag != 0;
-  for (const double c : extension.slope_change) profile_ = profile_ || c != 0;
 }
 
 double ExtendedWheel::local_slope(double position) const {
@@ -72,10 +71,6 @@ double ExtendedWheel::local_slope(double position) const {
         break;
     }
   }
-  const double u = std::clamp(t, -1.0, 1.0);
-  const auto& c = e.slope_change;
-  change += c[0] * u + c[1] * (1.5 * u * u - 0.5) + c[2] * u * (2.5 * u * u - 1.5) +
-            c[3] * ((35 * u * u - 30) * u * u + 3) / 8;
   return slope_ + change;
 }
 

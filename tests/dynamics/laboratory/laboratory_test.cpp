@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
+#include "dynamics/return_map/trials.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {
@@ -103,6 +105,58 @@ double drag_work(const std::string& text) {
   const double inertia = 1.39 * 0.1519 * 0.1519, chord = 2 * 0.1519 * std::sin(22.5 * degree);
   const double gravity = 1.39 * 9.81 * chord * std::sin(setup.conditions[0].slope_rad);
   return gravity - inertia / 2 * (b.omega_minus * b.omega_minus - a.omega_plus * a.omega_plus);
+}
+
+// The inertia about a foot that the laboratory's motion shows: what the hub's fall gave, turned into rotation.
+double shown_inertia(const LaboratorySetup& setup, const LaboratoryTrial& trial, std::size_t k) {
+  const Wheel& wheel = setup.wheel;
+  const auto leg = static_cast<std::size_t>(trial.collisions[k].leg);
+  const double slope = setup.conditions[trial.condition].slope, own = wheel.leg_length[leg];
+  // Height of the hub over the foot it stands on when another foot touches behind (1) or ahead (-1).
+  const auto height = [&](double other, double side) {
+    const double chord = std::sqrt(own * own + other * other - 2 * own * other * std::cos(std::numbers::pi / 4));
+    const double to_ramp = std::acos((own * own + chord * chord - other * other) / (2 * own * chord));
+    return own * std::sin(to_ramp + side * slope);
+  };
+  const double fall = height(wheel.leg_length[(leg + 7) % 8], 1) - height(wheel.leg_length[(leg + 1) % 8], -1);
+  const double before = trial.collisions[k].omega_plus, after = trial.collisions[k + 1].omega_minus;
+  return 2 * wheel.hub_mass * wheel.gravity * fall / (after * after - before * before);
+}
+
+// A ring of points about the hub has the inertia of a wheel with that radius of gyration.
+double ring_inertia(double mass, double radius, double length) {
+  constexpr int points = 720;
+  double sum = 0;
+  for (int i = 0; i < points; ++i) {
+    const double phi = 2 * std::numbers::pi * i / points;
+    const double x = radius * std::cos(phi), z = length + radius * std::sin(phi);
+    sum += mass / points * (x * x + z * z);
+  }
+  return sum;
+}
+
+// Written twice, in the laboratory and for the contact laws: neither asks the other.
+TEST(Laboratory, ItsInertiaIsThatOfTheLaws) {
+  for (const Law law : {Law::published, Law::coulomb})
+    for (const bool stated : {false, true}) {
+      LaboratorySetup setup = paper_setup(law);
+      setup.wheel.radius_of_gyration = 0.06;
+      if (stated) setup.wheel.inertia = 0.04;
+      const Laboratory lab(setup);
+      int compared = 0;
+      for (std::size_t t = 0; t < 4; ++t) {
+        const LaboratoryTrial trial = lab.run(t);
+        for (std::size_t k = 0; k + 1 < trial.collisions.size(); ++k, ++compared) {
+          const double length = setup.wheel.leg_length[static_cast<std::size_t>(trial.collisions[k].leg)];
+          const double shown = shown_inertia(setup, trial, k);
+          EXPECT_NEAR(shown / stance_inertia(setup.wheel, law, length), 1, 1e-8) << law_name(law) << ' ' << length;
+          if (law == Law::coulomb && !stated) {
+            EXPECT_NEAR(shown / ring_inertia(setup.wheel.hub_mass, 0.06, length), 1, 1e-8);
+          }
+        }
+      }
+      EXPECT_GT(compared, 20) << law_name(law) << ' ' << stated;
+    }
 }
 
 TEST(Laboratory, ResistingTorquesDoTheirWork) {
