@@ -81,7 +81,7 @@ std::vector<ContactLikelihood::Piece> ContactLikelihood::region_of_rest(const Su
 // The curve of the (eta, mu) that lead from one state to its landing: where omega+^2 has the level it needs for that.
 class ContactLikelihood::LevelCurve {
  public:
-  LevelCurve(const dynamics::WheelMap& map, const MeasuredTransition& transition)
+  LevelCurve(const dynamics::WheelMap& map, const MeasuredLanding& transition)
       : map_(map),
         state_(transition.state),
         phase_(transition.phase),
@@ -161,14 +161,14 @@ class ContactLikelihood::LevelCurve {
 };
 
 ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps,
-                                     std::span<const MeasuredTransition> transitions, int threads)
+                                     std::span<const MeasuredLanding> transitions, int threads)
     : threads_(threads) {
   std::map<std::pair<std::size_t, int>, Surface> surfaces;
-  for (const MeasuredTransition& t : transitions)
+  for (const MeasuredLanding& t : transitions)
     surfaces.try_emplace({t.condition, t.phase}, maps[t.condition], t.phase);
   std::vector<Observed> all(transitions.size());
   markov::parallel_for(transitions.size(), threads, [&](std::size_t number) {
-    const MeasuredTransition& t = transitions[number];
+    const MeasuredLanding& t = transitions[number];
     const dynamics::WheelMap& map = maps[t.condition];
     const Surface& surface = surfaces.at({t.condition, t.phase});
     const std::vector<double> after = surface.after(t.state);
@@ -213,7 +213,7 @@ std::vector<ContactLikelihood::ColumnWeight> ContactLikelihood::column_weights(
   for (std::size_t j = 0; j + 1 < columns; ++j) {
     const double a = static_cast<double>(j) * h, b = static_cast<double>(j + 1) * h;
     const double at_a = restitution.density(a), at_b = restitution.density(b);
-    // Mass between the columns and its first moment about a, with their derivatives by mean and sd.
+    // This is the mass between the columns and its first moment about a, with derivatives by mean and sd.
     const double mass[3] = {restitution.between(a, b), at_a - at_b, (at_a * (a - mean) - at_b * (b - mean)) / sd};
     const double moment[3] = {(mean - a) * mass[0] - sd * sd * (at_b - at_a), mass[0] - h * at_b,
                               -h * at_b * (b - mean) / sd - sd * (at_b - at_a)};

@@ -1,17 +1,17 @@
 #pragma once
-// Likelihood of (eta, mu) distributions for many parameter values: the geometry is worked out once.
+// Evaluates the likelihood of (eta, mu) distributions for many parameters: the geometry is worked out once.
 
 #include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
 
-#include "analysis/description/transitions.h"
+#include "analysis/description/landings.h"
 #include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::analysis {
 
-/// eta ~ N(mean, sd^2) on [0, 1] and mu ~ N(mean, sd^2) on [0, inf), independent: mean and sd of eta, then of mu.
+/// Holds mean and sd of eta, then of mu: eta ~ N(mean, sd^2) on [0, 1] and mu ~ N(mean, sd^2) on [0, inf), independent.
 using ContactParameters = std::array<double, 4>;
 
 /// Which (eta, mu) lead from a state to its landing is a curve that does not depend on how eta and mu are distributed.
@@ -24,10 +24,10 @@ class ContactLikelihood {
  public:
   /// @param maps  one a condition of the transitions; their noise does not matter
   /// O(transitions x 60000), once
-  ContactLikelihood(const std::vector<dynamics::WheelMap>& maps, std::span<const MeasuredTransition> transitions,
+  ContactLikelihood(const std::vector<dynamics::WheelMap>& maps, std::span<const MeasuredLanding> transitions,
                     int threads);
 
-  /// Sum of ln density of the landings [1/(rad^2/s^2)] and ln probability of rest or survival. -infinity where one of
+  /// Sums ln density of the landings [1/(rad^2/s^2)] and ln probability of rest or survival. -infinity where one of
   /// them vanishes. Fills `gradient`, if given, with the derivatives by the parameters (NaN where it is infinite).
   double operator()(const ContactParameters& parameters, ContactParameters* gradient = nullptr) const;
 

@@ -20,6 +20,7 @@
 #include "analysis/diagnosis/missing_columns.h"
 #include "analysis/diagnosis/too_few.h"
 #include "analysis/diagnosis/visibility.h"
+#include "analysis/statistics/interval_95.h"
 #include "dynamics/wheel/effect_catalogue.h"
 
 namespace metastable::analysis {

@@ -91,15 +91,15 @@ Table said(const std::string& id, const std::string& title, const Diagnosis& d) 
   return table;
 }
 
-const char* source_name(analysis::Source source) {
+const char* source_name(analysis::VariabilitySource source) {
   switch (source) {
-    case analysis::Source::none:
+    case analysis::VariabilitySource::none:
       return "nothing";
-    case analysis::Source::launch:
+    case analysis::VariabilitySource::launch:
       return "launch speeds (H1)";
-    case analysis::Source::legs:
+    case analysis::VariabilitySource::legs:
       return "differences of the legs (H2)";
-    case analysis::Source::contact:
+    case analysis::VariabilitySource::contact:
       return "restitution and friction (H3)";
   }
   throw std::logic_error("source without a name");
@@ -209,7 +209,7 @@ class Lessons {
     Table table = answers("hypotheses", "The paper's hypotheses as effects: each source believed half as wide as it is",
                           "believed half as wide");
     const Experiment stand_in = laboratory({});
-    for (const analysis::Source source : analysis::sources)
+    for (const analysis::VariabilitySource source : analysis::variability_sources)
       add_answer(table, source_name(source),
                  diagnosed(believed_half_as_wide(stand_in, source), source_name(source), request_));
     table.notes.push_back(

@@ -22,7 +22,7 @@ void run_steps(const StepsRequest& request) {
     options.progress = study_progress(progress);
     return analysis::study(request.setting, options);
   }();
-  const RestThresholds thresholds = rest_thresholds(study);
+  const analysis::RestThresholds thresholds = analysis::rest_thresholds(study);
   StepsExtras extras;
   if (request.certify) {
     Progress progress("certificate", study_units);

@@ -60,7 +60,7 @@ std::string propagated_text(const analysis::Propagated& propagated) {
                      to_the_digit(propagated.interval.upper, half), shares);
 }
 
-std::string thresholds_text(const RestThresholds& thresholds) {
+std::string thresholds_text(const analysis::RestThresholds& thresholds) {
   std::string text = thresholds.safe_speed
                          ? fmt::format("out of reach for launches of {:.4g} rad/s and faster", *thresholds.safe_speed)
                          : std::string("within reach at every speed");
@@ -70,7 +70,7 @@ std::string thresholds_text(const RestThresholds& thresholds) {
   return text;
 }
 
-std::string study_text(const analysis::Metastability& study, const RestThresholds& thresholds) {
+std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds) {
   const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
   std::string text = setting.describe() + "\n\n";

@@ -3,13 +3,15 @@
 
 #include <string>
 
+#include "analysis/sensitivity/propagation.h"
+#include "analysis/sensitivity/sensitivity.h"
 #include "analysis/study/metastability.h"
-#include "reports/study/study_json.h"
+#include "analysis/study/rest_thresholds.h"
 
 namespace metastable::reports {
 
 /// Everything `metastable steps` prints.
-std::string study_text(const analysis::Metastability& study, const RestThresholds& thresholds);
+std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds);
 
 /// The sensitivities as a table, ranked, or why there are none.
 std::string sensitivities_text(const analysis::Sensitivities& sensitivities);
@@ -21,6 +23,6 @@ std::string propagated_text(const analysis::Propagated& propagated);
 std::string estimate_text(const analysis::Estimate& estimate);
 
 /// What the thresholds mean, one sentence.
-std::string thresholds_text(const RestThresholds& thresholds);
+std::string thresholds_text(const analysis::RestThresholds& thresholds);
 
 }  // namespace metastable::reports
