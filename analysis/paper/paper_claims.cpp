@@ -6,10 +6,15 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/statistics/number_text.h"
+
 namespace metastable::analysis {
 namespace {
 
-std::string p_words(double p) { return p < 1e-6 ? "P < 1e-6" : fmt::format("P = {:.2g}", p); }
+std::string p_words(double p) {
+  const Decimal decimal = to_decimal(p, NumberFormat::p_value, 2);
+  return (decimal.less_than ? "P " : "P = ") + plain_text(decimal);
+}
 
 // Fewer trials that get past the 12th collision say nothing of a steady state.
 constexpr std::size_t least_trials = 20;

@@ -40,10 +40,12 @@ Command steps() {
             o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
             add_standard_errors(o);
             o.add("json", "FILE|-", "", "Write the results as JSON");
+            o.add_flag("explain", "What stands behind the words of the answer");
           },
           [](const Options& o, const std::string& line) {
             StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
             request.sensitivities = o.flag("sensitivities");
+            request.explain = o.flag("explain");
             request.standard_errors = standard_errors(o, request.setting);
             run_steps(request);
           }};

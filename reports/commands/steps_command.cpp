@@ -6,6 +6,7 @@
 
 #include "analysis/study/certify.h"
 #include "reports/output/output_file.h"
+#include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/study_json.h"
 #include "reports/study/study_progress.h"
@@ -50,6 +51,8 @@ void run_steps(const StepsRequest& request) {
   if (extras.propagated)
     fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
   if (extras.sensitivities) fmt::print("\n{}", sensitivities_text(*extras.sensitivities));
+  if (study.status != analysis::Status::rest_unresolved)
+    fmt::print("\n{}", words_text(study, request.explain, terminal_width()));
 }
 
 }  // namespace metastable::reports

@@ -93,13 +93,10 @@ Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& s
     table.rows.push_back(std::move(row));
   };
   // Figures first: at 7.02 deg with sds of 0.1.
-  const auto plain = [](const Estimate& e) {
-    return fmt::format("{:.3f} ({:.3f} to {:.3f})", e.value, e.lower, e.upper);
-  };
   add("steady speed [rad/s]", [&](const VariantStudy& s) {
     const std::vector<double>& means = s.usual_spreads().profile.trial_means;
     if (means.size() < 2) return std::string("none gets there");
-    return plain(mean_interval(analysis::speed_summary(means)));
+    return format_estimate(mean_interval(analysis::speed_summary(means)));
   });
   add("trials that rest within 16 collisions", [](const VariantStudy& s) {
     return s.variant.reading == analysis::RestReading::goes_on
@@ -223,8 +220,8 @@ Table fig4_table(const Studies& studies, const analysis::PaperExperiments& exper
                    {"fast, steady", "rad/s", NumberFormat::significant, 4},
                    {"slow, steady", "rad/s", NumberFormat::significant, 4},
                    {"difference", "rad/s", NumberFormat::fixed, 3},
-                   {"P, trial means"},
-                   {"P, all collisions"},
+                   {"P, trial means", "", NumberFormat::p_value, 2},
+                   {"P, all collisions", "", NumberFormat::p_value, 2},
                    {"not told apart from collision"}};
   const auto add = [&](const std::string& source, const analysis::TrialSpeeds& fast,
                        const analysis::TrialSpeeds& slow) {
@@ -234,7 +231,7 @@ Table fig4_table(const Studies& studies, const analysis::PaperExperiments& exper
     if (c.trial_means)
       row.insert(row.end(), {Estimate{c.trial_means->welch.difference.value, c.trial_means->welch.difference.lower,
                                       c.trial_means->welch.difference.upper},
-                             p_text(c.trial_means->welch.p), p_text(c.all_collisions->pooled.p)});
+                             p_cell(c.trial_means->welch.p), p_cell(c.all_collisions->pooled.p)});
     else
       row.insert(row.end(), {"", "", ""});
     row.push_back(c.meet ? Cell(*c.meet) : Cell("never"));
@@ -256,8 +253,9 @@ Table fig6_table(const Studies& studies, const Provenance& provenance) {
     for (const analysis::LaunchRun& run : studies.front().fig6.front().runs)
       table.columns.push_back({fmt::format("steady, launch {}", run.launch), "rad/s", NumberFormat::significant, 4});
   table.columns.push_back({"sd of a collision", "rad/s", NumberFormat::fixed, 3});
-  for (const char* pair : {"P 1-2", "P 1-3", "P 2-3"}) table.columns.push_back({pair});
-  for (const char* pair : {"P 1-2 by trial", "P 1-3 by trial", "P 2-3 by trial"}) table.columns.push_back({pair});
+  for (const char* pair : {"P 1-2", "P 1-3", "P 2-3"}) table.columns.push_back({pair, "", NumberFormat::p_value, 2});
+  for (const char* pair : {"P 1-2 by trial", "P 1-3 by trial", "P 2-3 by trial"})
+    table.columns.push_back({pair, "", NumberFormat::p_value, 2});
   table.columns.push_back({"trials that rest", "", NumberFormat::fixed, 3});
   for (const VariantStudy& s : studies)
     for (const analysis::LaunchPanel& panel : s.fig6) {
@@ -269,7 +267,7 @@ Table fig6_table(const Studies& studies, const Provenance& provenance) {
         for (const analysis::LaunchPair& pair : panel.pairs) {
           const bool both = reaches_steady(panel.run(pair.first).measured_legs) &&
                             reaches_steady(panel.run(pair.second).measured_legs);
-          row.push_back(both ? p_text(pair.alike.*p) : "");
+          row.push_back(both ? p_cell(pair.alike.*p) : Cell(""));
         }
       row.emplace_back(fastest.rest_share);
       table.rows.push_back(std::move(row));
@@ -290,15 +288,15 @@ Table equal_legs_table(const Studies& studies, const Provenance& provenance) {
                    {"launch", "rad/s", NumberFormat::fixed, 2},
                    {"measured legs", "rad/s", NumberFormat::significant, 4},
                    {"equal legs", "rad/s", NumberFormat::significant, 4},
-                   {"P"},
-                   {"P by trial"}};
+                   {"P", "", NumberFormat::p_value, 2},
+                   {"P by trial", "", NumberFormat::p_value, 2}};
   for (const VariantStudy& s : studies)
     for (const analysis::LaunchPanel& panel : s.fig6)
       for (const auto& [launch, measured, equal, alike] : panel.runs) {
         const bool both = reaches_steady(measured) && reaches_steady(equal);
         table.rows.push_back({s.variant.name, panel.friction, launch, steady_cell(measured.trial_means),
-                              steady_cell(equal.trial_means), both ? p_text(alike.p) : "",
-                              both ? p_text(alike.p_by_trial) : ""});
+                              steady_cell(equal.trial_means), both ? p_cell(alike.p) : Cell(""),
+                              both ? p_cell(alike.p_by_trial) : Cell("")});
       }
   table.notes = {
       "Steady speeds (from the 13th collision on) of the runs of Fig. 6. Paper: P > 0.1 everywhere. Collisions 13 to "
@@ -317,7 +315,7 @@ Table fig7_table(const Studies& studies, const analysis::PaperExperiments& exper
                    {"sd of a collision", "rad/s", NumberFormat::fixed, 3},
                    {"trials that rest", "", NumberFormat::fixed, 3},
                    {fmt::format("{} less simulated", experiment_name(experiments)), "rad/s", NumberFormat::fixed, 3},
-                   {"P"}};
+                   {"P", "", NumberFormat::p_value, 2}};
   for (const VariantStudy& s : studies)
     for (const analysis::SpreadPanel& panel : s.fig7)
       for (const auto& [restitution_sd, profile, test] : panel.runs)
@@ -325,7 +323,7 @@ Table fig7_table(const Studies& studies, const analysis::PaperExperiments& exper
             {s.variant.name, panel.friction_sd, restitution_sd, steady_cell(profile.trial_means),
              sd_cell(profile.steady_sd()), profile.rest_share,
              test ? Cell(Estimate{test->difference.value, test->difference.lower, test->difference.upper}) : Cell(""),
-             test ? p_text(test->p) : ""});
+             test ? p_cell(test->p) : Cell("")});
   table.notes = {
       "η ~ N(0.4, sd²), μ ~ N(0.4, sd²), launch N(7.35, 0.19²) rad/s. P: pooled t-test of all collisions from the 13th "
       "on "

@@ -1,6 +1,7 @@
 #pragma once
 // A study in words and numbers for the terminal, and its words shared with tables and pages.
 
+#include <cstddef>
 #include <string>
 
 #include "analysis/sensitivity/propagation.h"
@@ -12,6 +13,10 @@ namespace metastable::reports {
 
 /// Everything `metastable steps` prints.
 std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds);
+
+/// What the words of study_text() mean: a line each, or with `more` what stands behind them as well; lines of at most
+/// `width` characters.
+std::string words_text(const analysis::Metastability& study, bool more, std::size_t width);
 
 /// The sensitivities as a table, ranked, or why there are none.
 std::string sensitivities_text(const analysis::Sensitivities& sensitivities);
