@@ -23,8 +23,8 @@ set(ROOMS
   "analysis/blind: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment analysis/likelihood"
   "analysis/motion_capture: dynamics/wheel dynamics/return_map analysis/statistics analysis/experiment"
   "analysis/paper: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/study analysis/experiment analysis/description"
-  "analysis/sensitivity: markov markov/chain markov/passage markov/rows dynamics/return_map analysis/statistics analysis/study"
-  "reports/output: analysis/statistics"
+  "analysis/sensitivity: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/return_map analysis/statistics analysis/study"
+  "reports/output: analysis/statistics analysis/experiment"
   "reports/description: dynamics/wheel analysis/statistics analysis/description analysis/paper reports/output"
   "reports/diagnosis: dynamics/wheel analysis/statistics analysis/diagnosis analysis/blind reports/output"
   "reports/study: markov/rows dynamics/wheel analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
@@ -33,6 +33,7 @@ set(ROOMS
 
 # Where less than a whole room may be seen: who (a pattern of files), which room, which of its headers.
 set(NARROW
+  "reports/output/.*:analysis/experiment:csv_field.h"
   "analysis/experiment/.*:analysis/study:setting.h"
   "analysis/experiment/.*:dynamics/laboratory:laboratory.h"
   "analysis/experiment/(angle|coast|csv|experiment|input|stand|trial).*:dynamics/laboratory:"

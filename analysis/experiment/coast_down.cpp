@@ -11,8 +11,10 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/experiment/csv_field.h"
 #include "analysis/experiment/input_error.h"
 #include "analysis/statistics/median.h"
+#include "dynamics/wheel/ranges.h"
 
 namespace metastable::analysis {
 namespace {
@@ -82,10 +84,11 @@ CounterLog parse_counter_log(const std::string& file, std::string_view text) {
         break;
       }
       const bool counter = read == 2 || read == 4;
-      if (values[read] < 0 || (counter && values[read] != std::floor(values[read]))) {
+      const bool within = dynamics::range::log.holds(values[read]);
+      if (!within || (counter && values[read] != std::floor(values[read]))) {
         defects.add(file, {number, column()},
                     fmt::format("{}: {} is {}", columns[read], values[read],
-                                values[read] < 0 ? "outside [0, inf)" : "no whole number"));
+                                within ? "no whole number" : "outside " + dynamics::range::log.text()));
         fine = false;
         break;
       }
@@ -259,8 +262,8 @@ ExperimentFiles coast_down_files(const std::vector<CoastDownRun>& runs, const Re
     for (const auto& block : run.blocks) {
       ++trial;
       for (std::size_t k = 0; k < block.size(); ++k)
-        fmt::format_to(std::back_inserter(files.collisions_csv), "{},{},{},{:.6f},{:.9g}\n", run.name, trial, k + 1,
-                       block[k].time, block[k].omega);
+        fmt::format_to(std::back_inserter(files.collisions_csv), "{},{},{},{:.6f},{:.9g}\n", csv_field(run.name), trial,
+                       k + 1, block[k].time, block[k].omega);
     }
   }
   return files;

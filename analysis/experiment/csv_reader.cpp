@@ -7,6 +7,8 @@
 #include <cmath>
 #include <ranges>
 
+#include "analysis/experiment/csv_field.h"
+
 namespace metastable::analysis {
 namespace {
 
@@ -152,14 +154,14 @@ TextPosition CsvReader::place(std::size_t offset) const {
 }
 
 std::string_view CsvReader::text(std::size_t column) const {
-  return has(column) ? fields_[*position_[column]].text : std::string_view();
+  return has(column) ? csv_text(fields_[*position_[column]].text) : std::string_view();
 }
 
 void CsvReader::refuse(std::size_t column, std::string_view what) {
   report(has(column) ? fields_[*position_[column]].offset : begin_, fmt::format("{}: {}", columns_[column].name, what));
 }
 
-bool CsvReader::read(std::size_t column, double least, std::optional<double>& value) {
+bool CsvReader::read(std::size_t column, const dynamics::Range& range, std::optional<double>& value) {
   value.reset();
   const std::string_view field = text(column);
   if (field.empty()) {
@@ -171,8 +173,8 @@ bool CsvReader::read(std::size_t column, double least, std::optional<double>& va
     refuse(column, fmt::format("{} is not a finite number", shown_text(field)));
     return false;
   }
-  if (number < least) {
-    refuse(column, fmt::format("{} is below {}", number, least));
+  if (!range.holds(number)) {
+    refuse(column, fmt::format("{} is outside {}", number, range.text()));
     return false;
   }
   value = number;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "analysis/experiment/input_error.h"
+#include "dynamics/wheel/ranges.h"
 
 namespace metastable::analysis {
 
@@ -38,10 +39,10 @@ class CsvReader {
   bool complete() const { return complete_; }
   std::size_t line() const { return line_; }  ///< where the record begins
 
-  /// Returns the field as it is; it is empty if the column is absent.
+  /// Returns the field as csv_field() was given it; it is empty if the column is absent.
   std::string_view text(std::size_t column) const;
-  /// Reads a finite number >= least; nothing if the column is absent or the field empty. False: it is none, reported.
-  bool read(std::size_t column, double least, std::optional<double>& value);
+  /// Reads a number within the range; nothing if the column is absent or the field empty. False: it is none, reported.
+  bool read(std::size_t column, const dynamics::Range& range, std::optional<double>& value);
   /// Reads a whole number in [least, most], likewise ("3.0" is one, as tools write that know floating point only).
   bool read(std::size_t column, std::int64_t least, std::int64_t most, std::optional<std::int64_t>& value);
   /// Reports a defect of this record's field ("COLUMN: what").

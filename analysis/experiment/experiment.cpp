@@ -6,7 +6,6 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
-#include <limits>
 #include <stdexcept>
 
 #include "analysis/experiment/csv_reader.h"
@@ -18,7 +17,6 @@ namespace metastable::analysis {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr double any = -std::numeric_limits<double>::infinity();
 constexpr std::int64_t most_collisions = 1'000'000'000, most_legs = 1000;
 
 std::string file_name(const ExperimentSource& source, std::string_view name) {
@@ -28,11 +26,14 @@ std::string file_name(const ExperimentSource& source, std::string_view name) {
 std::optional<std::string> read_text(const fs::path& path, Defects& defects) {
   std::error_code error;
   if (!fs::exists(path, error) && !error) return std::nullopt;
-  std::ifstream in(path, std::ios::binary);
-  const auto size = fs::is_regular_file(path, error) ? fs::file_size(path, error) : 0;
+  // Nothing but a file is opened: a pipe would have the reader wait for a writer.
+  const bool regular = !error && fs::is_regular_file(path, error) && !error;
+  const auto size = regular ? fs::file_size(path, error) : 0;
   std::string text(error ? 0 : static_cast<std::size_t>(size), '\0');
-  if (!in || error || !in.read(text.data(), static_cast<std::streamsize>(text.size())) || fs::is_directory(path))
-    defects.add(path.string(), {}, "cannot be read");
+  std::ifstream in;
+  if (regular) in.open(path, std::ios::binary);
+  if (!regular || error || !in.read(text.data(), static_cast<std::streamsize>(text.size())))
+    defects.add(path.string(), {}, regular ? "cannot be read" : "cannot be read: it is no regular file");
   return text;
 }
 
@@ -67,10 +68,12 @@ class CollisionRows {
     std::optional<double> before;
     const bool counted = csv_.read(collision, 1, most_collisions, number);
     csv_.read(leg, 0, legs_ > 0 ? legs_ - 1 : most_legs, landing);
-    csv_.read(time_s, any, c.time);
-    csv_.read(position_m, any, c.position);
-    csv_.read(omega_minus, 0, before);
-    csv_.read(omega_plus, 0, c.omega_plus);
+    csv_.read(time_s, dynamics::range::time, c.time);
+    csv_.read(position_m, dynamics::range::position, c.position);
+    const dynamics::Range& speeds =
+        experiment_.system == System::rimless_wheel ? dynamics::range::speed : dynamics::range::rotor_speed;
+    csv_.read(omega_minus, speeds, before);
+    csv_.read(omega_plus, speeds, c.omega_plus);
     if (!at) return;
     if (*at == experiment_.trials.size()) {
       MeasuredTrial& fresh = experiment_.trials.emplace_back();

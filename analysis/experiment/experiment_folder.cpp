@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "analysis/experiment/csv_field.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -77,7 +78,10 @@ std::string toml_text(const std::string& text) {
   std::string quoted = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') quoted += '\\';
-    quoted += c;
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f')
+      quoted += fmt::format("\\u{:04x}", static_cast<unsigned char>(c));
+    else
+      quoted += c;
   }
   return quoted + '"';
 }
@@ -100,7 +104,7 @@ std::string wheel_description(const Setting& setting, Spread restitution, Spread
 }
 
 std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated) {
-  std::string toml = fmt::format("\n[[condition]]\nid = \"{}\"\nslope_deg = {}\nramp_length_m = {}\n", id,
+  std::string toml = fmt::format("\n[[condition]]\nid = {}\nslope_deg = {}\nramp_length_m = {}\n", toml_text(id),
                                  setting.slope_deg, setting.ramp_length);
   if (launch_stated) toml += fmt::format("initial_speed_rad_s = {}\n", toml_spread(setting.initial_speed));
   return toml + fmt::format("first_landing_leg = {}\n", setting.first_landing_leg);
@@ -121,12 +125,13 @@ ExperimentFiles experiment_files(const std::vector<SimulatedCondition>& conditio
   std::size_t number = 0;
   for (const auto& [id, setting, trials] : conditions) {
     toml += condition_description(id, setting);
+    const std::string field = csv_field(id);
     for (const dynamics::Trial& trial : trials) {
       ++number;
       for (const dynamics::TrialCollision& c : trial.collisions)
-        files.collisions_csv += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", id, number, c.number, c.leg,
+        files.collisions_csv += fmt::format("{},{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", field, number, c.number, c.leg,
                                             c.time, c.position, c.omega_minus, c.omega_plus);
-      files.trials_csv += fmt::format("{},{},{}\n", id, number, outcome_name(trial.outcome));
+      files.trials_csv += fmt::format("{},{},{}\n", field, number, outcome_name(trial.outcome));
     }
   }
   return files;

@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <set>
 #include <stdexcept>
 #include <vector>
+
+#include "dynamics/wheel/ranges.h"
 
 // toml++ 3.3 takes some things for granted that a text can break ("[!" or "[1,}"), and asserts them. Here they are
 // exceptions, whatever the build type; that wants the library's code in this file.
@@ -32,24 +33,8 @@ constexpr void toml_must_hold(bool truth) {
 namespace metastable::analysis {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-// What a number may be.
-struct Range {
-  double low = -infinity, high = infinity;
-  bool low_open = false, high_open = false;  // an infinite end is always open
-  std::string text() const {
-    return fmt::format("{}{}, {}{}", low_open || std::isinf(low) ? '(' : '[', low, high,
-                       high_open || std::isinf(high) ? ')' : ']');
-  }
-  bool holds(double value) const {
-    return std::isfinite(value) && (low_open ? value > low : value >= low) &&
-           (high_open ? value < high : value <= high);
-  }
-};
-constexpr Range any{};
-constexpr Range positive{.low = 0, .low_open = true};
-constexpr Range not_negative{.low = 0};
+namespace range = dynamics::range;
+using dynamics::Range;
 
 // Reads one table of the file: every key that is read is remembered, finish() reports the others.
 class Keys {
@@ -107,7 +92,7 @@ class Keys {
   }
 
   // { mean = , sd = }
-  std::optional<Spread> spread(std::string_view key, bool required, const Range& mean_range) {
+  std::optional<Spread> spread(std::string_view key, bool required, const Range& either) {
     const toml::node* node = find(key, required);
     if (node == nullptr) return std::nullopt;
     if (!node->is_table()) {
@@ -115,8 +100,7 @@ class Keys {
       return std::nullopt;
     }
     Keys keys(file_, *node->as_table(), path(key), defects_);
-    const std::optional<double> mean = keys.number("mean", true, mean_range),
-                                sd = keys.number("sd", true, not_negative);
+    const std::optional<double> mean = keys.number("mean", true, either), sd = keys.number("sd", true, either);
     keys.finish();
     if (!mean || !sd) return std::nullopt;
     return Spread{*mean, *sd};
@@ -148,10 +132,11 @@ class Keys {
   std::set<std::string, std::less<>> known_;
 };
 
-void read_wheel(Keys& root, dynamics::Wheel& wheel) {
+void read_wheel(Keys& root, dynamics::Wheel& wheel, const Defects& defects) {
+  const std::size_t before = defects.count();
   std::optional<Keys> keys = root.table("wheel", true);
   if (!keys) return;
-  if (const auto mass = keys->number("hub_mass_kg", true, positive)) wheel.hub_mass = *mass;
+  if (const auto mass = keys->number("hub_mass_kg", true, range::mass)) wheel.hub_mass = *mass;
   if (const toml::node* node = keys->find("leg_lengths_m", true)) {
     const toml::array* list = node->as_array();
     if (list == nullptr || list->size() < 3 || list->size() > 1000) {
@@ -159,13 +144,20 @@ void read_wheel(Keys& root, dynamics::Wheel& wheel) {
     } else {
       std::vector<double> lengths;
       for (std::size_t i = 0; i < list->size(); ++i)
-        if (const auto length = keys->number((*list)[i], fmt::format("wheel.leg_lengths_m[{}]", i), positive))
+        if (const auto length = keys->number((*list)[i], fmt::format("wheel.leg_lengths_m[{}]", i), range::leg_length))
           lengths.push_back(*length);
       if (lengths.size() == list->size()) wheel.leg_length = std::move(lengths);
     }
   }
-  wheel.inertia = keys->number("inertia_kg_m2", false, positive);
-  wheel.radius_of_gyration = keys->number("radius_of_gyration_m", false, not_negative);
+  wheel.inertia = keys->number("inertia_kg_m2", false, range::inertia);
+  wheel.radius_of_gyration = keys->number("radius_of_gyration_m", false, range::radius_of_gyration);
+  const auto object = [&](std::string_view key, const std::string& objection) {
+    if (!objection.empty()) keys->report(*keys->find(key, true), fmt::format("wheel.{}: {}", key, objection));
+  };
+  if (defects.count() == before) {
+    object("inertia_kg_m2", dynamics::inertia_objection(wheel));
+    object("radius_of_gyration_m", dynamics::gyration_objection(wheel));
+  }
   keys->finish();
 }
 
@@ -182,22 +174,22 @@ void read_contact(Keys& root, NominalContact& contact) {
     }
   }
   const bool required = contact.law != dynamics::Law::plastic;
-  contact.restitution = keys->spread("restitution", required, {.low = 0, .high = 1}).value_or(Spread{});
-  contact.friction = keys->spread("friction", required, not_negative).value_or(Spread{});
+  contact.restitution = keys->spread("restitution", required, range::restitution).value_or(Spread{});
+  contact.friction = keys->spread("friction", required, range::friction).value_or(Spread{});
   keys->finish();
 }
 
 void read_rotor(Keys& root, Experiment& experiment) {
   if (std::optional<Keys> keys = root.table("rotor", false)) {
-    experiment.rotor_inertia = keys->number("inertia_kg_m2", false, positive);
+    experiment.rotor_inertia = keys->number("inertia_kg_m2", false, range::rotor_inertia);
     keys->finish();
   }
   std::optional<Keys> keys = root.table("loss", true);
   if (!keys) return;
-  experiment.loss.constant = keys->number("constant", true, any).value_or(0);
-  experiment.loss.linear = keys->number("linear", true, any).value_or(0);
-  experiment.loss.quadratic = keys->number("quadratic", true, any).value_or(0);
-  experiment.loss.noise_sd = keys->number("noise_sd", true, not_negative).value_or(0);
+  experiment.loss.constant = keys->number("constant", true, range::loss).value_or(0);
+  experiment.loss.linear = keys->number("linear", true, range::loss).value_or(0);
+  experiment.loss.quadratic = keys->number("quadratic", true, range::loss).value_or(0);
+  experiment.loss.noise_sd = keys->number("noise_sd", true, range::loss_noise).value_or(0);
   keys->finish();
 }
 
@@ -222,13 +214,13 @@ void read_conditions(const std::string& file, Keys& root, Experiment& experiment
       condition.id = std::move(*id);
     }
     if (wheel) {
-      const Range slopes{.low = 0, .high = 180.0 / experiment.wheel.legs(), .low_open = true, .high_open = true};
+      const Range slopes = dynamics::slope_range(experiment.wheel.legs());
       condition.slope_deg = keys.number("slope_deg", true, slopes).value_or(0);
-      condition.ramp_length = keys.number("ramp_length_m", true, positive).value_or(0);
+      condition.ramp_length = keys.number("ramp_length_m", true, range::ramp_length).value_or(0);
       condition.first_landing_leg =
           static_cast<int>(keys.whole("first_landing_leg", false, 0, experiment.wheel.legs() - 1).value_or(0));
     }
-    condition.initial_speed = keys.spread("initial_speed_rad_s", false, not_negative);
+    condition.initial_speed = keys.spread("initial_speed_rad_s", false, wheel ? range::speed : range::rotor_speed);
     keys.finish();
     experiment.conditions.push_back(std::move(condition));
   }
@@ -274,15 +266,15 @@ void parse_experiment_toml(const std::string& file, std::string_view text, Exper
       root.report(*root.find("system", true), "system: \"rimless_wheel\" or \"coast_down\" is expected");
   }
   if (experiment.system == System::rimless_wheel) {
-    read_wheel(root, experiment.wheel);
+    read_wheel(root, experiment.wheel, defects);
     read_contact(root, experiment.contact);
   } else {
     read_rotor(root, experiment);
   }
   read_conditions(file, root, experiment, defects);
   if (std::optional<Keys> keys = root.table("sensor", false)) {
-    experiment.sensor.rate = keys->number("rate_hz", false, positive);
-    experiment.sensor.noise_sd = keys->number("noise_sd_rad_s", false, not_negative);
+    experiment.sensor.rate = keys->number("rate_hz", false, range::rate);
+    experiment.sensor.noise_sd = keys->number("noise_sd_rad_s", false, range::speed);
     keys->finish();
   }
   root.finish();

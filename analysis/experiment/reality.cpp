@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/experiment/csv_field.h"
 #include "analysis/experiment/experiment_notes.h"
 #include "analysis/statistics/random.h"
 #include "markov/parallel.h"
@@ -199,7 +200,7 @@ RealityFiles reality_files(const std::vector<RealityCondition>& conditions, cons
                   name(told.columns.omega_plus, ",omega_plus_rad_s"));
   if (told.columns.outcomes) files.trials_csv = "condition,trial,outcome\n";
   for (const MeasuredTrial& trial : told.trials) {
-    const std::string& id = told.conditions[trial.condition].id;
+    const std::string id = csv_field(told.conditions[trial.condition].id);
     auto row = std::back_inserter(files.collisions_csv);
     for (const MeasuredCollision& c : trial.collisions) {
       fmt::format_to(row, "{},{},{}", id, trial.number, c.number);

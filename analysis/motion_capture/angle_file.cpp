@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 
 #include "analysis/experiment/csv_reader.h"
 #include "analysis/experiment/trial_index.h"
@@ -14,7 +13,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double any = -std::numeric_limits<double>::infinity();
 enum Column { condition, trial, time_s, angle_rad };
 constexpr CsvColumn angle_columns[] = {{"condition"}, {"trial", true}, {"time_s", true}, {"angle_rad", true}};
 constexpr CsvColumn trial_columns[] = {{"condition"}, {"trial", true}, {"outcome", true}};
@@ -62,7 +60,8 @@ std::vector<MeasuredAngle> parse_angles(const ExperimentSource& source, const Ex
   while (csv.next()) {
     const std::optional<std::size_t> at = index.row(csv, condition, trial);
     std::optional<double> time, angle;
-    const bool timed = csv.read(time_s, any, time), turned = csv.read(angle_rad, any, angle);
+    const bool timed = csv.read(time_s, dynamics::range::time, time),
+               turned = csv.read(angle_rad, dynamics::range::turned, angle);
     if (!at) continue;
     if (*at == angles.size()) {
       angles.push_back({index.entries()[*at].number, index.entries()[*at].condition, {}});

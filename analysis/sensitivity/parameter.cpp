@@ -7,6 +7,8 @@
 #include <ranges>
 #include <stdexcept>
 
+#include "dynamics/wheel/law_quantities.h"
+
 namespace metastable::analysis {
 namespace {
 
@@ -117,21 +119,24 @@ void set_parameter(Setting& setting, Parameter parameter, double value) {
 }
 
 bool matters(const Setting& setting, Parameter parameter) {
-  const bool listed = !setting.pairs.empty();
+  using dynamics::LawQuantity;
+  const auto used = [&](LawQuantity quantity) { return dynamics::uses(setting.law, quantity); };
+  const bool drawn = setting.pairs.empty();  // a list has no means and spreads
   switch (parameter) {
     case Parameter::restitution_mean:
-      return !listed && setting.law != dynamics::Law::plastic;
+      return drawn && used(LawQuantity::restitution);
     case Parameter::restitution_sd:
-      return !listed && setting.law != dynamics::Law::plastic && setting.restitution.sd > 0;
+      return drawn && used(LawQuantity::restitution) && setting.restitution.sd > 0;
     case Parameter::friction_mean:
-      return !listed && setting.law != dynamics::Law::plastic;
+      return drawn && used(LawQuantity::friction);
     case Parameter::friction_sd:
-      return !listed && setting.law != dynamics::Law::plastic && setting.friction.sd > 0;
+      return drawn && used(LawQuantity::friction) && setting.friction.sd > 0;
     case Parameter::ramp_stiffness:
+      return used(LawQuantity::ramp_stiffness);
     case Parameter::contact_mass:
-      return setting.law == dynamics::Law::published;
+      return used(LawQuantity::contact_mass);
     case Parameter::radius_of_gyration:
-      return setting.law != dynamics::Law::published;
+      return used(LawQuantity::radius_of_gyration);
     default:
       return true;
   }

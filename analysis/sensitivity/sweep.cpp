@@ -14,6 +14,12 @@
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
+namespace {
+
+constexpr std::size_t most_points = 1000000;  // an axis has 100000 at most, so that their product fits
+
+}  // namespace
+
 std::vector<double> axis_values(double first, double last, double step) {
   if (!(step > 0) || !(last >= first) || !std::isfinite(first) || !std::isfinite(last))
     throw std::invalid_argument(fmt::format("range {}:{}:{}: needs first <= last and step > 0", first, last, step));
@@ -28,7 +34,11 @@ std::vector<double> axis_values(double first, double last, double step) {
 
 std::size_t sweep_size(const std::vector<Axis>& axes) {
   std::size_t size = 1;
-  for (const Axis& axis : axes) size *= axis.values.size();
+  for (const Axis& axis : axes) {
+    size *= axis.values.size();
+    if (size > most_points)
+      throw std::invalid_argument(fmt::format("sweep: more than {} points; take coarser steps", most_points));
+  }
   return size;
 }
 

@@ -29,7 +29,7 @@ struct SweepPoint {
   std::exception_ptr failure = {};  ///< set when a solver did not converge here (study.status is then solver_failed)
 };
 
-/// Number of points of the product of the axes.
+/// Number of points of the product of the axes. @throws std::invalid_argument if they are more than 1000000
 std::size_t sweep_size(const std::vector<Axis>& axes);
 
 /// The setting of point `index` (last axis fastest) and its coordinates.

@@ -17,8 +17,8 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double quantile_levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
-constexpr std::size_t survival_values = 64;
-constexpr std::size_t violation_draws = 64;  // a state
+constexpr std::size_t least_survival = 64, most_survival = 10000;  // values of the curve
+constexpr std::size_t violation_draws = 64;                        // a state
 constexpr std::size_t slowest_draws = 16384;
 constexpr std::size_t most_forward = 100000;  // steps followed where some launches never rest
 
@@ -118,6 +118,12 @@ Accumulated accumulated(const markov::Moments& moments, const std::vector<double
   return total;
 }
 
+// To the end of the course, where that is not too far.
+std::size_t survival_steps(const Problem& problem) {
+  const auto course = static_cast<std::size_t>(problem.last_event.value_or(0)) + 1;
+  return std::clamp(course, least_survival, most_survival);
+}
+
 }  // namespace
 
 ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
@@ -162,8 +168,7 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
   };
   if (!options.brief && !sampled.duration.empty()) result.steps.seconds = reward(sampled.duration);
   if (!options.brief && !sampled.advance.empty()) result.steps.metres = reward(sampled.advance);
-  const std::size_t shown = std::max<std::size_t>(
-      survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
+  const std::size_t shown = survival_steps(problem);
   for (std::size_t n = 0; n < shown; ++n) result.steps.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.steps.reach_end = survival.at(*problem.last_event);
 
@@ -217,8 +222,7 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   // Forward from the launch: survival, visits on the course, and the share that has come to rest when no more do.
   std::vector<double> alive = launch.after, visits(space.size(), 0.0);
   result.steps.survival = {1.0};
-  const std::size_t shown = std::max<std::size_t>(
-      survival_values, problem.last_event ? static_cast<std::size_t>(*problem.last_event) + 1 : 0);
+  const std::size_t shown = survival_steps(problem);
   for (std::size_t n = 1; n < most_forward; ++n) {
     const double surviving = std::min(result.steps.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
     const bool settled =
@@ -241,8 +245,11 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
         {level, reached == result.steps.survival.end() ? infinite
                                                        : static_cast<double>(reached - result.steps.survival.begin())});
   }
+  if (problem.last_event)  // beyond what was followed nobody rests any more
+    result.steps.reach_end =
+        result.steps
+            .survival[std::min(static_cast<std::size_t>(*problem.last_event), result.steps.survival.size() - 1)];
   result.steps.survival.resize(std::min(result.steps.survival.size(), shown));
-  if (problem.last_event) result.steps.reach_end = result.steps.survival[static_cast<std::size_t>(*problem.last_event)];
   describe_violations(problem, space, stationary, visits, options, result);
 }
 

@@ -108,7 +108,7 @@ struct StepsToRest {
   Accumulated distribution;            ///< from the launch, the last step counted
   std::optional<Accumulated> seconds;  ///< from collision 1 to the last collision
   std::optional<Accumulated> metres;   ///< from the first foot to the last
-  std::vector<double> survival;     ///< P(steps > n), n = 0, 1, ...: up to 64 values, or to the course's end if longer
+  std::vector<double> survival;     ///< P(steps > n), n = 0, 1, ...: 64 values, or to the course's end (10000 at most)
   std::optional<double> reach_end;  ///< probability of surviving the last event of the course
   /// State below which a launch may come to rest, when faster ones never do.
   std::optional<double> safe_state;

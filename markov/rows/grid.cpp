@@ -34,7 +34,7 @@ Grid::Grid(std::vector<double> edges) : edges_(std::move(edges)) {
     if (!(edges_[i] < edges_[i + 1]) || !std::isfinite(edges_[i + 1] - edges_[i]))
       throw std::invalid_argument("grid: edges must be finite and strictly ascending");
   upper_.assign(edges_.begin() + 1, edges_.end());
-  upper_.back() = std::numeric_limits<double>::infinity();
+  upper_.back() = std::numeric_limits<double>::quiet_NaN();  // nothing lies beyond the last cell, not even infinity
   // Buckets narrower than the narrowest cell, unless cells differ so much that these would be too many.
   double narrowest = width(0);
   for (std::size_t i = 1; i < cells(); ++i) narrowest = std::min(narrowest, width(i));
@@ -52,7 +52,7 @@ Grid::Grid(std::vector<double> edges) : edges_(std::move(edges)) {
   }
   if (!one_edge) return;
   start_.push_back(0);  // what rests
-  edge_.push_back(std::numeric_limits<double>::infinity());
+  edge_.push_back(std::numeric_limits<double>::quiet_NaN());
   for (const std::uint32_t cell : table_) {
     start_.push_back(static_cast<std::int32_t>(cell) + 1);
     edge_.push_back(upper_[cell]);

@@ -34,12 +34,12 @@ class Grid {
 
  private:
   std::vector<double> edges_;
-  std::vector<double> upper_;         // edges above the cells, +infinity above the last
+  std::vector<double> upper_;         // edges above the cells; above the last a number that no state reaches
   std::vector<std::uint32_t> table_;  // bucket of the axis to the cell that its start lies in
   double table_scale_ = 0;
   // For tally(), where no bucket holds two edges; bucket 0 stands for rest, the others follow.
   std::vector<std::int32_t> start_;  // 1 + cell
-  std::vector<double> edge_;         // above that cell
+  std::vector<double> edge_;         // above that cell, as upper_
 };
 
 }  // namespace metastable::markov

@@ -6,7 +6,6 @@
 #include "reports/commands/blind_command.h"
 
 namespace metastable::reports {
-
 std::vector<Command> blind_commands() {
   return {{"blind", "The diagnosis tested on cases whose truth is sealed until it has answered: make, answer, open",
            [](Options& o) {
@@ -21,6 +20,7 @@ std::vector<Command> blind_commands() {
              o.add("left-out", "N", "3", "make: cases of each effect with a catalogue that lacks it");
              o.add("tool", "PROGRAM", "",
                    "answer: run 'PROGRAM diagnose CASE --json FILE ...' (default: this program)");
+             o.add_flag("partial", "open: although some cases are not answered");
              o.add_threads();
              o.add("out", "DIR", "", "open: folder of tables and page (default: report in the run's folder)");
            },
@@ -45,7 +45,7 @@ std::vector<Command> blind_commands() {
              else if (action == "answer")
                run_blind_answer(request);
              else if (action == "open")
-               run_blind_open(request);
+               run_blind_open(request, o.flag("partial") ? Unanswered::left_out : Unanswered::refused);
              else
                throw std::invalid_argument(fmt::format("ACTION: '{}' is none of 'make', 'answer', 'open'", action));
            }}};

@@ -6,14 +6,16 @@
 #include <algorithm>
 #include <cstdio>
 #include <deque>
+#include <filesystem>
+#include <new>
 #include <optional>
 #include <ranges>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "analysis/experiment/input_error.h"
-#include "markov/chain/chain.h"
 #include "reports/command_line/command.h"
 #include "reports/command_line/option_values.h"
 #include "reports/command_line/setting_options.h"
@@ -24,6 +26,7 @@
 #include "reports/commands/sweep_command.h"
 #include "reports/commands/verify_command.h"
 #include "reports/output/interrupt.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -32,9 +35,9 @@ namespace {
 Command steps() {
   return {"steps", "Expected steps before failure of one setting, with their interval",
           [](Options& o) {
-            o.add("slope", "DEG", "7.02", "Ramp slope [deg], above 0 and below half the angle between legs");
+            o.add("slope", "DEG", "7.02", "Ramp slope [deg], from 0.001 to below half the angle between legs");
             o.add("initial-speed", "MEAN,SD", "",
-                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
+                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)", dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
             o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
             o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
@@ -55,7 +58,8 @@ Command compare() {
   return {"compare", "Expected steps of two or more slopes on common random numbers",
           [](Options& o) {
             o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]; later ones are compared with the first");
-            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
+            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
+                  dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
             o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
             add_standard_errors(o);
@@ -70,55 +74,62 @@ Command compare() {
 }
 
 Command sweep() {
-  return {
-      "sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
-      [](Options& o) {
-        o.add("slope", "RANGE", "7.02", "[deg] first:last:step, a comma list or one value; likewise the other axes");
-        o.add("restitution-mean", "RANGE", "", "Mean of eta");
-        o.add("restitution-sd", "RANGE", "", "Sd of eta");
-        o.add("friction-mean", "RANGE", "", "Mean of mu");
-        o.add("friction-sd", "RANGE", "", "Sd of mu");
-        o.add("initial-speed", "MEAN,SD", "", "Of all points (default: the paper's if the one slope is 7.02 or 9.59)");
-        add_wheel(o), add_contact(o), add_course(o), add_study(o);
-        o.add("out", "FILE", "sweep.csv",
-              "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
-      },
-      [](const Options& o, const std::string& line) {
-        SweepRequest request;
-        request.setting = common_setting(o);
-        for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
-          if (o.text(name).empty()) continue;
-          analysis::Axis axis{analysis::parameter_from_name(name), range_value(name, o.text(name))};
-          if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
-            request.setting.slope_deg = axis.values.front();
-          else
-            request.axes.push_back(std::move(axis));
-        }
-        if (request.axes.empty())
-          throw std::invalid_argument(
-              "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
-              "--friction-mean or --friction-sd as first:last:step)");
-        for (const analysis::Axis& axis : request.axes)
-          if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
-            throw std::invalid_argument(
-                fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
-        const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
-        std::optional<std::string> launch;
-        if (o.given("initial-speed")) launch = o.text("initial-speed");
-        if (!launch && !one_slope) throw std::invalid_argument("--initial-speed: must be given when the slope varies");
-        request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
-        request.study = study_options(o);
-        request.out = o.text("out");
-        request.command = line;
-        run_sweep(request);
-      }};
+  return {"sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
+          [](Options& o) {
+            o.add("slope", "RANGE", "7.02",
+                  "[deg] first:last:step, a comma list or one value; likewise the other axes");
+            o.add("restitution-mean", "RANGE", "", "Mean of eta", dynamics::range::restitution);
+            o.add("restitution-sd", "RANGE", "", "Sd of eta", dynamics::range::restitution);
+            o.add("friction-mean", "RANGE", "", "Mean of mu", dynamics::range::friction);
+            o.add("friction-sd", "RANGE", "", "Sd of mu", dynamics::range::friction);
+            o.add("initial-speed", "MEAN,SD", "",
+                  "Of all points (default: the paper's if the one slope is 7.02 or 9.59)", dynamics::range::speed);
+            add_wheel(o), add_contact(o), add_course(o), add_study(o);
+            o.add("out", "FILE", "sweep.csv",
+                  "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
+          },
+          [](const Options& o, const std::string& line) {
+            SweepRequest request;
+            request.setting = common_setting(o);
+            for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
+              if (o.text(name).empty()) continue;
+              analysis::Axis axis{analysis::parameter_from_name(name), range_value(name, o.text(name), o.range(name))};
+              if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
+                request.setting.slope_deg = axis.values.front();
+              else
+                request.axes.push_back(std::move(axis));
+            }
+            if (request.axes.empty())
+              throw std::invalid_argument(
+                  "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
+                  "--friction-mean or --friction-sd as first:last:step)");
+            for (const analysis::Axis& axis : request.axes)
+              if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
+                throw std::invalid_argument(
+                    fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
+            for (const analysis::Axis& axis : request.axes)
+              if (request.setting.law == dynamics::Law::plastic && axis.parameter != analysis::Parameter::slope)
+                throw std::invalid_argument(
+                    fmt::format("--{}: has no meaning under --law plastic", analysis::parameter_name(axis.parameter)));
+            const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
+            std::optional<std::string> launch;
+            if (o.given("initial-speed")) launch = o.text("initial-speed");
+            if (!launch && !one_slope)
+              throw std::invalid_argument("--initial-speed: must be given when the slope varies");
+            request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
+            request.study = study_options(o);
+            request.out = o.text("out");
+            request.command = line;
+            run_sweep(request);
+          }};
 }
 
 Command report() {
   return {"report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
           [](Options& o) {
             o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]");
-            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)");
+            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
+                  dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
             o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
             o.add("out", "DIR", "report", "Folder for the files");
@@ -180,7 +191,9 @@ int parse_and_run(int argc, const char* const* argv) {
   CLI::App app("Metastability of walking machines: the rimless wheel on a ramp", "metastable");
   app.require_subcommand(1);
   app.set_version_flag("--version", version_text());
-  app.footer("Exit codes: 0 done, 2 wrong option or file, 3 a solver failed, 130 interrupted.");
+  app.footer(
+      "Exit codes: 0 done, 2 wrong option or file (one that cannot be written too), 3 a computation failed, 130 "
+      "interrupted, 143 terminated.");
   const std::vector<Command> all = commands();
   std::deque<Options> options;
   std::vector<CLI::App*> subcommands;
@@ -190,7 +203,8 @@ int parse_and_run(int argc, const char* const* argv) {
     options.emplace_back(*sub);
     command.declare(options.back());
     sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")
-        ->type_name("FILE");
+        ->type_name("FILE")
+        ->check([](const std::string& file) { return file.empty() ? std::string("what is given is empty") : ""; }, "");
     subcommands.push_back(sub);
   }
   if (argc < 2 || (argv[1][0] != '-' &&
@@ -213,6 +227,7 @@ int parse_and_run(int argc, const char* const* argv) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!subcommands[i]->parsed()) continue;
     if (!config_files[i].empty()) options[i].read(config_files[i]);
+    options[i].check_given();
     all[i].run(options[i], command_line(argc, argv));
   }
   return 0;
@@ -222,12 +237,14 @@ int parse_and_run(int argc, const char* const* argv) {
 
 int run(int argc, const char* const* argv) {
   const auto fail = [](const std::string& what, int code) {
-    fmt::print(stderr, "metastable: {}\n", what);
+    std::fputs(("metastable: " + what + "\n").c_str(), stderr);  // where even this cannot be written, the code is left
     return code;
   };
   try {
     catch_interrupts();
-    return parse_and_run(argc, argv);
+    const int code = parse_and_run(argc, argv);
+    flush_standard_output();
+    return code;
   } catch (const Interrupted& interrupted) {
     return fail(interrupted.what(), interrupted.exit_code());
   } catch (const analysis::InputError& error) {  // all that is wrong with an input, a line each
@@ -235,10 +252,17 @@ int run(int argc, const char* const* argv) {
     return 2;
   } catch (const std::invalid_argument& error) {
     return fail(error.what(), 2);
-  } catch (const markov::ConvergenceError& error) {
+  } catch (const std::filesystem::filesystem_error& error) {
+    return fail(error.what(), 2);
+  } catch (const std::system_error& error) {
+    if (std::ferror(stdout)) return fail(fmt::format("cannot write standard output: {}", error.code().message()), 2);
     return fail(error.what(), 3);
+  } catch (const std::bad_alloc&) {
+    return fail("there is not enough memory for this", 3);
   } catch (const std::exception& error) {
-    return fail(error.what(), 1);
+    return fail(error.what(), 3);
+  } catch (...) {
+    return fail("a failure without a name", 3);
   }
 }
 

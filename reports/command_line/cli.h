@@ -3,8 +3,8 @@
 
 namespace metastable::reports {
 
-/// Exit codes: 0 done; 2 wrong option, key, value or file (one line on standard error); 3 a solver failed; 1 anything
-/// else; 130 or 143 interrupted.
+/// Exit codes: 0 done; 2 wrong option, key, value or file, or an output that cannot be written (one line on standard
+/// error); 3 a computation failed: a solver, memory, a program that is not there; 130 or 143 interrupted.
 int run(int argc, const char* const* argv);
 
 }  // namespace metastable::reports

@@ -41,7 +41,8 @@ void add_reality(Options& o) {
         "With --reality, repeatable: an effect outside the catalogue (sloshing_fluid, planks, frame_resonance, "
         "stored_energy, speed_spread, double_plate)");
   o.add("skewness", "G", "0", "With --reality: skewness of restitution, (-2, 2)");
-  o.add("sensor-noise", "SD", "0", "With --reality: white noise of every reported speed [rad/s]");
+  o.add("sensor-noise", "SD", "0", "With --reality: white noise of every reported speed [rad/s]",
+        dynamics::range::speed);
   o.add("smoothing", "S", "0", "With --reality: reported speeds are means over this time, 0..0.1 [s]");
   o.add("drop", "NAME,...", "",
         "With --reality: columns and statements left out (leg, time_s, position_m, omega_plus_rad_s, outcome, "
@@ -91,7 +92,7 @@ Command simulate() {
           [](Options& o) {
             o.add("slope", "DEG", "7.02", "Ramp slope [deg]");
             o.add("initial-speed", "MEAN,SD", "",
-                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)");
+                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)", dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o);
             o.add_flag(
                 "stand-in",
@@ -152,7 +153,8 @@ Command coast_down() {
         o.add("blocks", "all|odd|even", "all", "Which blocks: one half to fit a nominal loss, the other to check it");
         o.add("nominal", "DIR", "", "Take the nominal loss of this experiment folder (default: fitted to the logs)");
         o.add_flag("linear", "Fit a loss proportional to omega even where it is within five standard errors of none");
-        o.add("rotor-inertia", "KGM2", "", "Of the drum [kg m^2]: turns losses into torques");
+        o.add("rotor-inertia", "KGM2", "", "Of the drum [kg m^2]: turns losses into torques",
+              dynamics::range::rotor_inertia);
         o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
       },
       [](const Options& o, const std::string& line) {
@@ -168,11 +170,7 @@ Command coast_down() {
         request.linear = o.flag("linear");
         if (request.linear && !request.nominal.empty())
           throw std::invalid_argument("--linear: nothing is fitted with --nominal");
-        if (o.given("rotor-inertia")) {
-          request.rotor_inertia = o.number("rotor-inertia");
-          if (!(*request.rotor_inertia > 0))
-            throw std::invalid_argument(fmt::format("--rotor-inertia: {} is outside (0, inf)", *request.rotor_inertia));
-        }
+        if (o.given("rotor-inertia")) request.rotor_inertia = o.number("rotor-inertia");
         request.out = o.text("out");
         if (request.out.empty()) throw std::invalid_argument("--out: a folder must be given");
         request.command = line;

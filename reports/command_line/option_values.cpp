@@ -38,6 +38,11 @@ std::vector<std::string_view> split(std::string_view text, char mark) {
   }
 }
 
+void check(std::string_view name, std::string_view which, double value, const dynamics::Range& range) {
+  if (!range.holds(value))
+    throw std::invalid_argument(fmt::format("--{}: {}{} is outside {}", name, which, value, range.text()));
+}
+
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
   while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
@@ -46,9 +51,10 @@ std::string_view trimmed(std::string_view text) {
 
 }  // namespace
 
-double number_value(std::string_view name, std::string_view text) {
+double number_value(std::string_view name, std::string_view text, const dynamics::Range& range) {
   double value = 0;
   if (!parse(trimmed(text), value)) refuse(name, text, "a number");
+  check(name, "", value, range);
   return value;
 }
 
@@ -71,23 +77,33 @@ std::vector<double> list_value(std::string_view name, std::string_view text) {
   return values;
 }
 
-analysis::Spread spread_value(std::string_view name, std::string_view text) {
+analysis::Spread spread_value(std::string_view name, std::string_view text, const dynamics::Range& range) {
   const std::vector<std::string_view> parts = split(text, ',');
   analysis::Spread spread;
   if (parts.size() > 2 || !parse(trimmed(parts[0]), spread.mean) ||
       (parts.size() == 2 && !parse(trimmed(parts[1]), spread.sd)))
     refuse(name, text, "'mean,sd' (or one number for a constant)");
   if (spread.sd < 0) throw std::invalid_argument(fmt::format("--{}: sd {} is below 0", name, spread.sd));
+  const bool coefficient = range.high <= dynamics::range::friction.high;
+  if (coefficient && spread.mean == 0 && spread.sd > 1)
+    throw std::invalid_argument(
+        fmt::format("--{0}: '{1}' is mean 0 and sd {2}; decimals take a point, so that {3}.{2} is a constant and "
+                    "{3}.{2},0.1 has sd 0.1",
+                    name, text, trimmed(parts[1]), trimmed(parts[0])));
+  check(name, "mean ", spread.mean, range);
+  check(name, "sd ", spread.sd, range);
   return spread;
 }
 
-std::vector<double> range_value(std::string_view name, std::string_view text) {
+std::vector<double> range_value(std::string_view name, std::string_view text, const dynamics::Range& range) {
   constexpr std::string_view wanted = "'first:last:step', a comma list in rising order, or one number";
   const std::vector<std::string_view> parts = split(text, ':');
   if (parts.size() == 3) {
     double first = 0, last = 0, step = 0;
     if (!parse(trimmed(parts[0]), first) || !parse(trimmed(parts[1]), last) || !parse(trimmed(parts[2]), step))
       refuse(name, text, wanted);
+    check(name, "", first, range);
+    check(name, "", last, range);
     try {
       return analysis::axis_values(first, last, step);
     } catch (const std::invalid_argument& error) {
@@ -98,6 +114,7 @@ std::vector<double> range_value(std::string_view name, std::string_view text) {
   const std::vector<double> values = list_value(name, text);
   for (std::size_t i = 1; i < values.size(); ++i)
     if (!(values[i - 1] < values[i])) refuse(name, text, wanted);
+  for (const double value : values) check(name, "", value, range);
   return values;
 }
 
@@ -107,12 +124,19 @@ std::vector<double> legs_value(std::string_view name, std::string_view text, int
   for (const std::string_view part : split(text, ',')) {
     double length = 0;
     if (!parse(trimmed(part), length)) refuse(name, text, "'paper', one length or a comma list of lengths in m");
+    check(name, "", length, dynamics::range::leg_length);
     lengths.push_back(length);
   }
   if (lengths.size() == 1) lengths.assign(static_cast<std::size_t>(count), lengths.front());
   if (lengths.size() < 3)
     throw std::invalid_argument(fmt::format("--{}: {} legs are fewer than 3", name, lengths.size()));
+  if (lengths.size() > 1000)
+    throw std::invalid_argument(fmt::format("--{}: {} legs are more than 1000", name, lengths.size()));
   return lengths;
+}
+
+bool is_one_length(std::string_view text) {
+  return trimmed(text) != "paper" && text.find(',') == std::string_view::npos;
 }
 
 std::vector<dynamics::Contact> contact_list(const std::string& file) {
@@ -131,12 +155,12 @@ std::vector<dynamics::Contact> contact_list(const std::string& file) {
     if (parts.size() != 2)
       throw std::invalid_argument(fmt::format("{}:{}: {} columns where 2 are expected", file, number, parts.size()));
     dynamics::Contact pair;
-    if (!parse(trimmed(parts[0]), pair.restitution) || pair.restitution < 0 || pair.restitution > 1)
-      throw std::invalid_argument(
-          fmt::format("{}:{}: column restitution: '{}' is not a number in [0, 1]", file, number, parts[0]));
-    if (!parse(trimmed(parts[1]), pair.friction) || pair.friction < 0)
-      throw std::invalid_argument(
-          fmt::format("{}:{}: column friction: '{}' is not a number >= 0", file, number, parts[1]));
+    if (!parse(trimmed(parts[0]), pair.restitution) || !dynamics::range::restitution.holds(pair.restitution))
+      throw std::invalid_argument(fmt::format("{}:{}: column restitution: '{}' is not a number in {}", file, number,
+                                              parts[0], dynamics::range::restitution.text()));
+    if (!parse(trimmed(parts[1]), pair.friction) || !dynamics::range::friction.holds(pair.friction))
+      throw std::invalid_argument(fmt::format("{}:{}: column friction: '{}' is not a number in {}", file, number,
+                                              parts[1], dynamics::range::friction.text()));
     pairs.push_back(pair);
   }
   if (pairs.empty()) throw std::invalid_argument(fmt::format("{}: holds no pair", file));

@@ -8,21 +8,25 @@
 
 #include "analysis/study/setting.h"
 #include "dynamics/wheel/contact_noise.h"
+#include "dynamics/wheel/ranges.h"
 
 namespace metastable::reports {
 
-/// All throw std::invalid_argument: "--NAME: 'TEXT' is not ...".
-double number_value(std::string_view name, std::string_view text);
+/// All throw std::invalid_argument: "--NAME: 'TEXT' is not ...", or "--NAME: NUMBER is outside RANGE".
+double number_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
 /// Whole number in [least, most].
 std::uint64_t whole_value(std::string_view name, std::string_view text, std::uint64_t least, std::uint64_t most);
 /// "a,b,c" as numbers, at least one.
 std::vector<double> list_value(std::string_view name, std::string_view text);
-/// "mean,sd", or "mean" alone for a constant; sd >= 0.
-analysis::Spread spread_value(std::string_view name, std::string_view text);
+/// "mean,sd", or "mean" alone for a constant; sd >= 0. "0,4" for a coefficient, which is hardly ever meant so, is
+/// refused with a word on decimal points.
+analysis::Spread spread_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
 /// "first:last:step", a list "a,b,c", or one number: ascending values.
-std::vector<double> range_value(std::string_view name, std::string_view text);
-/// "paper", one length (then `count` legs of it), or a comma list of at least three [m].
+std::vector<double> range_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
+/// "paper", one length (then `count` legs of it), or a comma list of 3 to 1000 [m].
 std::vector<double> legs_value(std::string_view name, std::string_view text, int count);
+/// Is it one length, of which a number of legs can be had?
+bool is_one_length(std::string_view text);
 /// Pairs from a CSV file with the header "restitution,friction"; errors name file, line and column.
 std::vector<dynamics::Contact> contact_list(const std::string& file);
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
 #include <stdexcept>
 
 #include "reports/command_line/config_file.h"
@@ -19,6 +21,12 @@ void Options::add(const std::string& name, const std::string& value, const std::
     option->default_str(fallback);
     fallback_[name] = fallback;
   }
+}
+
+void Options::add(const std::string& name, const std::string& value, const std::string& fallback,
+                  const std::string& help, const dynamics::Range& range) {
+  add(name, value, fallback, fmt::format("{}; in {}", help, range.text()));
+  ranges_[name] = range;
 }
 
 void Options::add_flag(const std::string& name, const std::string& help) {
@@ -61,7 +69,20 @@ bool Options::flag(const std::string& name) const {
   return value == "true";
 }
 
-double Options::number(const std::string& name) const { return number_value(name, text(name)); }
+void Options::check_given() const {
+  for (const auto& [name, texts] : texts_)
+    if (std::ranges::find(texts, "") != texts.end())
+      throw std::invalid_argument(fmt::format(
+          "{}{}: what is given is empty", std::isupper(static_cast<unsigned char>(name.front())) ? "" : "--", name));
+}
+
+const dynamics::Range& Options::range(const std::string& name) const {
+  static constexpr dynamics::Range any;
+  const auto found = ranges_.find(name);
+  return found == ranges_.end() ? any : found->second;
+}
+
+double Options::number(const std::string& name) const { return number_value(name, text(name), range(name)); }
 
 void Options::add_seed() { add("seed", "SEED", "1", "Seed of the random numbers"); }
 
@@ -79,6 +100,6 @@ std::uint64_t Options::seed() const { return whole("seed", 0, UINT64_MAX); }
 
 int Options::threads() const { return count("threads", 0, 1024); }
 
-analysis::Spread Options::spread(const std::string& name) const { return spread_value(name, text(name)); }
+analysis::Spread Options::spread(const std::string& name) const { return spread_value(name, text(name), range(name)); }
 
 }  // namespace metastable::reports

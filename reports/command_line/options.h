@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/study/setting.h"
+#include "dynamics/wheel/ranges.h"
 
 namespace CLI {
 class App;
@@ -21,6 +22,9 @@ class Options {
   explicit Options(CLI::App& command) : command_(command) {}
 
   void add(const std::string& name, const std::string& value, const std::string& fallback, const std::string& help);
+  /// Its number, its mean and sd, or each number of its list must lie in the range, which the help states.
+  void add(const std::string& name, const std::string& value, const std::string& fallback, const std::string& help,
+           const dynamics::Range& range);
   /// An option without a value; `true` or `false` in a file.
   void add_flag(const std::string& name, const std::string& help);
   /// The options of what draws random numbers (default 1) and of what runs in parallel (default 0: all cores).
@@ -32,7 +36,10 @@ class Options {
   void add_places(const std::string& name, const std::string& help);
   /// Keys of the file that the command line did not give.
   void read(const std::string& file);
+  /// Nothing that was given may be empty. @throws std::invalid_argument
+  void check_given() const;
 
+  bool has(const std::string& name) const { return texts_.contains(name); }
   bool given(const std::string& name) const { return !texts_.at(name).empty(); }
   const std::vector<std::string>& all(const std::string& name) const { return texts_.at(name); }
   /// The one value of an option: given once, or its default ("" if it has none).
@@ -45,11 +52,14 @@ class Options {
   std::uint64_t seed() const;
   int threads() const;
   analysis::Spread spread(const std::string& name) const;
+  /// The range an option was added with; any number for others.
+  const dynamics::Range& range(const std::string& name) const;
 
  private:
   CLI::App& command_;
   std::map<std::string, std::vector<std::string>> texts_;
   std::map<std::string, std::string> fallback_;
+  std::map<std::string, dynamics::Range> ranges_;
 };
 
 }  // namespace metastable::reports

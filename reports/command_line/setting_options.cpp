@@ -2,19 +2,25 @@
 
 #include <fmt/format.h>
 
-#include <numbers>
+#include <ranges>
 #include <stdexcept>
 #include <utility>
 
 #include "dynamics/wheel/contact_law.h"
+#include "dynamics/wheel/law_quantities.h"
+#include "dynamics/wheel/ranges.h"
 #include "reports/command_line/option_values.h"
 
 namespace metastable::reports {
+namespace range = dynamics::range;
 namespace {
 
 dynamics::Wheel wheel(const Options& options) {
   dynamics::Wheel wheel;
   wheel.leg_length = legs_value("legs", options.text("legs"), options.count("leg-count", 3, 1000));
+  if (options.given("leg-count") && !is_one_length(options.text("legs")))
+    throw std::invalid_argument(
+        fmt::format("--leg-count: has a meaning where --legs is one length; it is '{}'", options.text("legs")));
   wheel.hub_mass = options.number("mass");
   if (options.given("inertia")) wheel.inertia = options.number("inertia");
   if (options.given("radius-of-gyration")) wheel.radius_of_gyration = options.number("radius-of-gyration");
@@ -22,15 +28,40 @@ dynamics::Wheel wheel(const Options& options) {
   if (options.given("contact-mass")) wheel.contact_mass = options.number("contact-mass");
   wheel.gravity = options.number("gravity");
   wheel.validate();
+  for (const auto& [name, objection] : {std::pair("inertia", dynamics::inertia_objection(wheel)),
+                                        std::pair("radius-of-gyration", dynamics::gyration_objection(wheel))})
+    if (!objection.empty()) throw std::invalid_argument(fmt::format("--{}: {}", name, objection));
   return wheel;
+}
+
+// What some laws only know. --contact-list stands for eta and mu together.
+constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
+    {"restitution", dynamics::LawQuantity::restitution},
+    {"friction", dynamics::LawQuantity::friction},
+    {"correlation", dynamics::LawQuantity::friction},
+    {"contact-list", dynamics::LawQuantity::friction},
+    {"rebound-lost", dynamics::LawQuantity::rebound_lost},
+    {"radius-of-gyration", dynamics::LawQuantity::radius_of_gyration},
+    {"ramp-stiffness", dynamics::LawQuantity::ramp_stiffness},
+    {"contact-mass", dynamics::LawQuantity::contact_mass}};
+
+void check_law(const Options& options, dynamics::Law law) {
+  for (const auto& [name, quantity] : of_some_laws) {
+    if (!options.given(name) || dynamics::uses(law, quantity)) continue;
+    // A folder states the wheel's r_g under any law: the effect slip_reversal takes it.
+    if (quantity == dynamics::LawQuantity::radius_of_gyration && options.has("reality")) continue;
+    throw std::invalid_argument(
+        fmt::format("--{}: has a meaning under --law {} only", name,
+                    fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), " and ")));
+  }
 }
 
 // Before the launch is asked for: a slope that no launch can save is named as such.
 void check_slope(const analysis::Setting& setting) {
-  const double steepest = dynamics::steepest_slope(setting.wheel.legs()) * 180 / std::numbers::pi;
-  if (!(setting.slope_deg > 0 && setting.slope_deg < steepest))
-    throw std::invalid_argument(fmt::format(
-        "slope: {:.6g} deg is outside (0, {:.6g}) deg (half the angle between legs)", setting.slope_deg, steepest));
+  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
+  if (!range.holds(setting.slope_deg))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
+                                            setting.slope_deg, range.text()));
 }
 
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
@@ -43,28 +74,33 @@ analysis::Setting checked(analysis::Setting setting) {
 
 void add_wheel(Options& options) {
   options.add("legs", "paper|L|L1,L2,...", "paper",
-              "Leg lengths [m]: the paper's, one for all, or a list in landing order");
-  options.add("leg-count", "N", "8", "Number of legs when --legs is one length (3 or more)");
-  options.add("mass", "KG", "1.39", "Hub mass M [kg]");
+              "Leg lengths [m]: the paper's, one for all, or a list in landing order", range::leg_length);
+  options.add("leg-count", "N", "8", "Number of legs when --legs is one length, 3..1000");
+  options.add("mass", "KG", "1.39", "Hub mass M [kg]", range::mass);
   options.add("inertia", "KGM2", "",
-              "About the stance foot [kg m^2] (default: M (mean L)^2; under coulomb and plastic plus M r_g^2)");
-  options.add("radius-of-gyration", "M", "", "About the hub [m] (default: 0.05 under coulomb, 0 under plastic)");
-  options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m]");
-  options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (default: the hub mass)");
-  options.add("gravity", "M/S2", "9.81", "g [m/s^2]");
+              "About the stance foot [kg m^2], from M (mean L)^2 to ten times that (default: M (mean L)^2; under "
+              "coulomb and plastic plus M r_g^2)");
+  options.add("radius-of-gyration", "M", "",
+              "About the hub [m], at most three mean legs (default: 0.05 under coulomb, 0 under plastic)",
+              range::radius_of_gyration);
+  options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m] (published)", range::ramp_stiffness);
+  options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (published; default: the hub mass)",
+              range::mass);
+  options.add("gravity", "M/S2", "9.81", "g [m/s^2]", range::gravity);
 }
 
 void add_contact(Options& options) {
   options.add("law", "published|coulomb|plastic", "published", "Contact law");
   options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops, 0..1 (coulomb)");
-  options.add("restitution", "MEAN,SD", "0.4,0.1", "eta, normal truncated to [0, 1]; SD 0 or MEAN alone: constant");
-  options.add("friction", "MEAN,SD", "0.4,0.1", "mu, normal truncated to [0, inf)");
+  options.add("restitution", "MEAN,SD", "0.4,0.1", "eta, normal truncated to [0, 1]; SD 0 or MEAN alone: constant",
+              range::restitution);
+  options.add("friction", "MEAN,SD", "0.4,0.1", "mu, normal truncated to [0, inf)", range::friction);
   options.add("correlation", "RHO", "0", "Of the normal scores of eta and mu, (-1, 1)");
   options.add("contact-list", "FILE", "", "CSV 'restitution,friction': draw pairs from a list instead");
 }
 
 void add_course(Options& options) {
-  options.add("ramp-length", "M", "3.66", "Ramp length [m]");
+  options.add("ramp-length", "M", "3.66", "Ramp length [m]", range::ramp_length);
   options.add("first-leg", "I", "0", "Leg that lands at collision 1");
 }
 
@@ -89,9 +125,8 @@ analysis::Setting common_setting(const Options& options) {
   analysis::Setting setting;
   setting.wheel = wheel(options);
   setting.law = dynamics::law_from_name(options.text("law"));
+  check_law(options, setting.law);
   setting.rebound_lost = options.number("rebound-lost");
-  if (options.given("rebound-lost") && setting.law != dynamics::Law::coulomb)
-    throw std::invalid_argument("--rebound-lost: has a meaning under --law coulomb only");
   setting.restitution = options.spread("restitution");
   setting.friction = options.spread("friction");
   setting.correlation = options.number("correlation");
@@ -106,7 +141,7 @@ analysis::Setting common_setting(const Options& options) {
 }
 
 analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text) {
-  if (text) return spread_value("initial-speed", *text);
+  if (text) return spread_value("initial-speed", *text, range::speed);
   const std::optional<analysis::Spread> paper = analysis::paper_launch(slope_deg);
   if (!paper)
     throw std::invalid_argument(fmt::format(
@@ -150,6 +185,9 @@ analysis::StudyOptions study_options(const Options& options) {
     throw std::invalid_argument(
         fmt::format("--method: '{}' is neither 'sampled' nor 'integrated'", options.text("method")));
   study.method = analysis::method_from_name(options.text("method"));
+  for (const char* name : {"samples", "sequence", "draws", "tail", "replicates"})
+    if (options.given(name) && study.method != analysis::Method::sampled)
+      throw std::invalid_argument(fmt::format("--{}: has a meaning under --method sampled only", name));
   if (options.given("cells")) study.cells = options.whole("cells", 8, 4096);
   if (options.given("samples")) study.samples = options.whole("samples", 16, 1u << 24);
   study.tolerance = options.number("tolerance");

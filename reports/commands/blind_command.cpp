@@ -12,8 +12,6 @@
 #include <chrono>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -26,6 +24,7 @@
 #include "markov/parallel.h"
 #include "reports/diagnosis/blind_json.h"
 #include "reports/diagnosis/blind_tables.h"
+#include "reports/output/input_file.h"
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
 #include "reports/output/page_folder.h"
@@ -42,9 +41,8 @@ namespace {
 namespace fs = std::filesystem;
 
 std::optional<std::string> file_text(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return std::nullopt;
-  return std::string(std::istreambuf_iterator<char>(file), {});
+  if (!fs::is_regular_file(path)) return std::nullopt;
+  return read_file(path);
 }
 
 std::string name_of(int number) { return fmt::format("{:04}", number); }
@@ -62,6 +60,7 @@ struct Places {
   fs::path case_folder(int number) const { return cases / name_of(number); }
   fs::path truth(int number) const { return sealed / (name_of(number) + ".json"); }
   fs::path answer(int number) const { return answers / (name_of(number) + ".json"); }
+  fs::path errors(int number) const { return answer(number).string() + ".err"; }
 };
 
 // A folder's name tells the number of its case.
@@ -142,6 +141,14 @@ std::vector<RecordedAnswer> checked_record(const Places& places) {
   return read_record(places.record.string(), file_text(places.record).value_or(""));
 }
 
+// Last line of the errors beside an answer that the tool failed to give; a tool that was killed with this program, or
+// still runs, leaves none.
+constexpr std::string_view failed_line = "exit code ";
+
+bool tool_failed(const Places& places, int number) {
+  return file_text(places.errors(number)).value_or("").find(failed_line) != std::string::npos;
+}
+
 std::string trimmed(std::string text) {
   while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
   return text;
@@ -207,7 +214,7 @@ void run_blind_answer(const BlindRequest& request) {
     check_interrupt();
     const int number = open[i];
     const fs::path folder = places.case_folder(number), answer = places.answer(number);
-    const fs::path fresh = answer.string() + ".new", errors = answer.string() + ".err";
+    const fs::path fresh = answer.string() + ".new", errors = places.errors(number);
     std::vector<std::string> words{tool, "diagnose", folder.string(), "--json", fresh.string(), "--threads", "1"};
     if (const std::optional<std::string> catalogue = file_text(folder / "catalogue.txt")) {
       words.emplace_back("--catalogue");
@@ -224,6 +231,7 @@ void run_blind_answer(const BlindRequest& request) {
     const std::optional<std::string> text = file_text(fresh);
     if (code != 0 || !text) {
       ++failed;  // its errors stay beside where the answer would be
+      write_file(errors, fmt::format("{}{}{}\n", file_text(errors).value_or(""), failed_line, code));
     } else {
       read_answer(fresh.string(), *text);
       fs::rename(fresh, answer);
@@ -240,7 +248,7 @@ void run_blind_answer(const BlindRequest& request) {
   fmt::print("\n");
 }
 
-void run_blind_open(const BlindRequest& request) {
+void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
   const Places places(request);
   const std::vector<int> numbers = case_numbers(places);
   std::vector<analysis::BlindTruth> truths;
@@ -265,6 +273,14 @@ void run_blind_open(const BlindRequest& request) {
           fmt::format("{}: the answer to case {} was changed since it was recorded", path.string(), entry.number));
     given[entry.number] = read_answer(path.string(), *text);
   }
+  const auto reached_cases = static_cast<std::size_t>(std::ranges::count_if(
+      numbers, [&](int number) { return given.contains(number) || tool_failed(places, number); }));
+  if (reached_cases < numbers.size() && unanswered == Unanswered::refused && !fs::exists(places.marker))
+    throw std::invalid_argument(
+        fmt::format("{}: {} of {} cases are answered, and opening the truths ends the run: answer the others first "
+                    "(`blind answer`),"
+                    " or give --partial to grade these alone",
+                    request.folder, reached_cases, numbers.size()));
   // From the first opening on the record is closed.
   const std::string head = fmt::format("{},{}\n", record.size(), record.back().chain);
   if (const std::optional<std::string> marker = file_text(places.marker)) {
@@ -279,7 +295,7 @@ void run_blind_open(const BlindRequest& request) {
   std::vector<std::optional<analysis::BlindAnswer>> answers;
   for (const analysis::BlindTruth& truth : truths) {
     const bool answered = given.contains(truth.number);
-    if (!answered && !fs::exists(places.answer(truth.number).string() + ".err")) continue;
+    if (!answered && !tool_failed(places, truth.number)) continue;
     reached.push_back(truth);
     answers.push_back(answered ? std::optional(given.at(truth.number)) : std::nullopt);
   }

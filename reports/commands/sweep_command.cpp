@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <optional>
 
 #include "reports/output/figure.h"
+#include "reports/output/file_lock.h"
 #include "reports/output/input_file.h"
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
@@ -68,8 +71,16 @@ std::string row(const analysis::SweepPoint& point) {
                             analysis::status_text(study.status));
 }
 
-// Complete rows behind the head; a last line without its end was cut short and is dropped.
-std::vector<std::string> rows_behind(const std::string& text, const std::string& head) {
+// Complete rows behind the head of a file, none if there is no such file; a last line without its end was cut short and
+// is dropped, and so is a head. @throws OutputError if it is another sweep's
+std::vector<std::string> rows_of(const std::filesystem::path& file, const std::string& head, const char* otherwise) {
+  if (!std::filesystem::exists(file)) return {};
+  if (std::filesystem::is_directory(file)) throw OutputError(file, "is a folder");
+  if (!std::filesystem::is_regular_file(file))
+    throw OutputError(file, "is no regular file, from which a sweep could be taken up again");
+  const std::string text = read_file(file);
+  if (head.starts_with(text)) return {};
+  if (!text.starts_with(head)) throw OutputError(file, fmt::format("{}; choose another --out or remove it", otherwise));
   std::vector<std::string> rows;
   for (std::size_t at = head.size(); at < text.size();) {
     const std::size_t end = text.find('\n', at);
@@ -159,25 +170,30 @@ void run_sweep(const SweepRequest& request) {
   for (std::size_t i = 0; i < size; ++i)  // wrong settings are found before the first is computed
     analysis::sweep_setting(request.setting, request.axes, i).problem();
 
-  std::vector<std::string> rows;
-  if (std::filesystem::is_directory(out)) throw OutputError(out, "is a folder");
-  if (std::filesystem::exists(out)) {
-    const std::string text = read_file(out);
-    if (!text.starts_with(first_lines))
-      throw OutputError(out, "holds another sweep; choose another --out or remove it");
-    rows = rows_behind(text, first_lines);
-  } else if (std::filesystem::exists(partial)) {
-    const std::string text = read_file(partial);
-    if (!text.starts_with(first_lines))
-      throw OutputError(partial, "belongs to another sweep; choose another --out or remove it");
-    rows = rows_behind(text, first_lines);
-  }
-  const std::size_t had = rows.size();
+  std::filesystem::path picture = out;
+  picture.replace_extension(".svg");
+  if (picture == out)
+    throw OutputError(out, "the figure beside the numbers has that name; give the numbers another ending, .csv");
+  std::vector<std::string> rows = rows_of(out, first_lines, "holds another sweep");
+  std::size_t had = rows.size();
   if (had < size) {
+    const FileLock lock(partial, FileLock::Missing::create);
+    if (!lock.held()) throw OutputError(partial, "another sweep is writing it");
+    // Read again: the other one may have ended in between.
+    rows = rows_of(out, first_lines, "holds another sweep");
+    if (rows.empty()) rows = rows_of(partial, first_lines, "belongs to another sweep");
+    had = rows.size();
     std::string so_far = first_lines;
     for (const std::string& one : rows) so_far += one;
-    write_file(partial, so_far);
+    const bool kept = read_file(partial).starts_with(so_far);
+    std::filesystem::resize_file(partial, kept ? so_far.size() : 0);
     std::ofstream journal(partial, std::ios::binary | std::ios::app);
+    const auto append = [&](const std::string& text) {
+      errno = 0;
+      if (!(journal << text << std::flush))
+        throw OutputError(partial, errno != 0 ? std::strerror(errno) : "write error");
+    };
+    if (!kept) append(so_far);
     Progress progress("sweep", size);
     analysis::StudyOptions study = request.study;
     study.progress = [](double, const std::string&) { check_interrupt(); };
@@ -185,8 +201,7 @@ void run_sweep(const SweepRequest& request) {
       progress.advance(had);
       analysis::sweep(request.setting, request.axes, had, study, [&](std::size_t, const analysis::SweepPoint& point) {
         rows.push_back(row(point));
-        journal << rows.back() << std::flush;
-        if (!journal) throw OutputError(partial, "cannot be written");
+        append(rows.back());
         progress.advance();
       });
     } catch (const Interrupted& interrupted) {
@@ -197,8 +212,6 @@ void run_sweep(const SweepRequest& request) {
     std::filesystem::rename(partial, out, error);
     if (error) throw OutputError(out, error.message());
   }
-  std::filesystem::path picture = out;
-  picture.replace_extension(".svg");
   const std::optional<Figure> drawn = figure(request, rows);
   if (drawn) write_file(picture, render_svg(*drawn));
   fmt::print("{}: {} points ({} taken over); {}\n", out.string(), size, had,

@@ -27,14 +27,27 @@ constexpr std::array<std::string_view, 7> palette{"#0072B2", "#D55E00", "#009E73
 constexpr std::array<int, 7> point_types{7, 5, 9, 11, 13, 6, 4};
 constexpr std::string_view font_family = "Helvetica,Arial,sans-serif";
 
-/// A gnuplot string that nothing in it can end or expand.
+/// A gnuplot string that nothing in it can end or expand. Single quotes expand nothing but cannot begin or end with a
+/// quote of the text; double ones hold it, and all that they would expand, as octal numbers.
 std::string quote(std::string_view text) {
-  std::string quoted = "'";
+  const char mark = text.find('\'') == std::string_view::npos ? '\'' : '"';
+  std::string quoted(1, mark);
   for (const char c : text) {
-    if (c == '\'') quoted += '\'';
-    quoted += c == '\n' ? ' ' : c;
+    if (c == '\n')
+      quoted += ' ';
+    else if (mark == '"' && std::string_view("'\"\\`").find(c) != std::string_view::npos)
+      quoted += fmt::format("\\{:03o}", static_cast<unsigned>(c));
+    else
+      quoted += c;
   }
-  return quoted + "'";
+  return quoted + mark;
+}
+
+/// The text as the label of a tick, where gnuplot looks for a number format.
+std::string tick(std::string_view text) {
+  std::string doubled;
+  for (const char c : text) doubled += c == '%' ? std::string("%%") : std::string(1, c);
+  return quote(doubled);
 }
 
 std::string axis_label(const FigureAxis& axis) {
@@ -132,7 +145,7 @@ std::string plot_element(const Series& series, std::size_t index) {
 
 std::string tics(const std::vector<std::string>& names) {
   std::string list;
-  for (std::size_t i = 0; i < names.size(); ++i) list += fmt::format("{}{} {}", i == 0 ? "" : ", ", quote(names[i]), i);
+  for (std::size_t i = 0; i < names.size(); ++i) list += fmt::format("{}{} {}", i == 0 ? "" : ", ", tick(names[i]), i);
   return list;
 }
 

@@ -1,14 +1,21 @@
 #include "reports/output/output_file.h"
 
+#include <fcntl.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <iostream>
 #include <locale>
 #include <string>
 #include <system_error>
+#include <thread>
+
+#include "reports/output/interrupt.h"
 
 namespace metastable::reports {
 namespace fs = std::filesystem;
@@ -20,6 +27,34 @@ fs::path temporary_name(const fs::path& target) {
   static std::atomic<unsigned> count{0};
   return target.parent_path() /
          ("." + target.filename().string() + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".tmp");
+}
+
+// Temporaries of the same target whose writer was killed.
+void remove_left_behind(const fs::path& target) {
+  const std::string begin = "." + target.filename().string() + ".";
+  std::error_code error;
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  for (fs::directory_iterator entry(folder, error), last; !error && entry != last; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    int writer = 0, number = 0, end = 0;
+    if (!name.starts_with(begin) ||
+        std::sscanf(name.c_str() + begin.size(), "%d-%d.tmp%n", &writer, &number, &end) != 2 ||
+        begin.size() + static_cast<std::size_t>(end) != name.size() || writer <= 0)
+      continue;
+    std::error_code ignored;
+    if (::kill(writer, 0) != 0 && errno == ESRCH) fs::remove(entry->path(), ignored);
+  }
+}
+
+// A pipe is opened only once somebody reads it; until then Ctrl-C ends the program.
+void wait_for_reader(const fs::path& pipe) {
+  for (;;) {
+    const int reader = ::open(pipe.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+    if (reader >= 0) ::close(reader);
+    if (reader >= 0 || errno != ENXIO) return;
+    check_interrupt();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
 }
 
 }  // namespace
@@ -38,7 +73,12 @@ OutputFile::OutputFile(const fs::path& path) : path_(path) {
   if (error) throw OutputError(path, error.message());
   if (fs::is_directory(target_, error)) throw OutputError(path, std::strerror(EISDIR));
   const bool in_place = present && !fs::is_regular_file(target_, error);
-  if (!in_place) temporary_ = temporary_name(target_);
+  if (in_place) {
+    if (fs::is_fifo(target_, error)) wait_for_reader(target_);
+  } else {
+    remove_left_behind(target_);
+    temporary_ = temporary_name(target_);
+  }
   errno = 0;
   file_.open(in_place ? target_ : temporary_, std::ios::binary);
   if (!file_) throw OutputError(path, last_reason());

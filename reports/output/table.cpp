@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/experiment/csv_field.h"
+
 namespace metastable::reports {
 namespace {
 
@@ -391,15 +393,7 @@ std::string escape_html(std::string_view text) {
   return out;
 }
 
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos && !text.starts_with('#')) return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"') quoted += '"';
-    quoted += c;
-  }
-  return quoted + '"';
-}
+std::string csv_field(const std::string& text) { return analysis::csv_field(text); }
 
 std::string to_csv(const Table& table) {
   validate(table);

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "analysis/experiment/csv_field.h"
+
 namespace metastable::analysis {
 namespace {
 
@@ -25,7 +27,7 @@ Reading read(std::string_view text) {
     std::optional<std::int64_t> count;
     std::optional<double> speed;
     csv.read(1, 1, 99, count);
-    csv.read(2, 0, speed);
+    csv.read(2, dynamics::Range{.low = 0, .high = 1000}, speed);
   }
   reading.defects = defects.lines();
   return reading;
@@ -46,11 +48,11 @@ TEST(CsvReader, ReadsNumbers) {
   std::optional<std::int64_t> count;
   std::optional<double> speed;
   ASSERT_TRUE(csv.next());
-  EXPECT_TRUE(csv.read(1, 1, 99, count) && csv.read(2, 0, speed));
+  EXPECT_TRUE(csv.read(1, 1, 99, count) && csv.read(2, dynamics::Range{.low = 0, .high = 1000}, speed));
   EXPECT_EQ(count, 7);
   EXPECT_EQ(speed, 12.5);
   ASSERT_TRUE(csv.next());
-  EXPECT_TRUE(csv.read(1, 1, 99, count) && csv.read(2, 0, speed));
+  EXPECT_TRUE(csv.read(1, 1, 99, count) && csv.read(2, dynamics::Range{.low = 0, .high = 1000}, speed));
   EXPECT_EQ(count, 3);
   EXPECT_EQ(speed, std::nullopt);
   EXPECT_FALSE(csv.next());
@@ -79,8 +81,22 @@ TEST(CsvReader, NamesPlaceAndReasonOfEachDefect) {
       (Strings{"f.csv:2:1: count: is empty; a whole number is expected",
                "f.csv:3:1: count: 'x' is not a whole number in 1..99",
                "f.csv:4:1: count: '0' is not a whole number in 1..99", "f.csv:4:3: speed: 'nan' is not a finite number",
-               "f.csv:5:3: speed: -2 is below 0", "f.csv:6:3: speed: '1e999' is not a finite number",
+               "f.csv:5:3: speed: -2 is outside [0, 1000]", "f.csv:6:3: speed: '1e999' is not a finite number",
                "f.csv:7:3: speed: '0x1' is not a finite number"}));
+}
+
+// A spreadsheet runs a cell that begins with = + - @ or a tab; what our own files hold comes back as it was.
+TEST(CsvReader, GetsBackWhatCsvFieldWrote) {
+  for (const std::string text : {"=1+1", "+cmd", "-2+3", "@SUM(A1)", "\tx", "'=1", "''=1", "'plain", "50%", "a,b",
+                                 "say \"no\"", "two\nlines", "-3.5", "+3e4", "-", "#1", "=a,\"b\"", ""}) {
+    const std::string field = csv_field(text);
+    EXPECT_EQ(read("name,count\n" + field + ",1\n").names, Strings{text}) << field;
+    const std::string shown = field.starts_with('"') ? field.substr(1) : field;  // as a spreadsheet takes it
+    if (shown.empty() || text == "-" || text == "-3.5" || text == "+3e4") continue;
+    EXPECT_EQ(std::string("=+-@\t").find(shown.front()), std::string::npos) << field;
+  }
+  EXPECT_EQ(csv_field("-3.5"), "-3.5");
+  EXPECT_EQ(csv_field("=1"), "'=1");
 }
 
 TEST(CsvReader, GoesOnAfterADefect) {

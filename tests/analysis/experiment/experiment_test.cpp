@@ -132,9 +132,9 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
     return lines.empty() ? "" : lines.front();
   };
   EXPECT_EQ(of("hub_mass_kg = 1.39\n", ""), "experiment.toml:1:1: missing key 'wheel.hub_mass_kg'");
-  EXPECT_EQ(of("1.39", "-1"), "experiment.toml:2:15: wheel.hub_mass_kg: -1 is outside (0, inf)");
+  EXPECT_EQ(of("1.39", "-1"), "experiment.toml:2:15: wheel.hub_mass_kg: -1 is outside [1e-06, 1e+06]");
   EXPECT_EQ(of("1.39", "\"1.39\""), "experiment.toml:2:15: wheel.hub_mass_kg: a number is expected");
-  EXPECT_EQ(of("0.151", "nan"), "experiment.toml:3:24: wheel.leg_lengths_m[1]: nan is outside (0, inf)");
+  EXPECT_EQ(of("0.151", "nan"), "experiment.toml:3:24: wheel.leg_lengths_m[1]: nan is outside [0.001, 100]");
   EXPECT_EQ(of("[0.15, 0.151, 0.15, 0.15]", "[0.15]"),
             "experiment.toml:3:17: wheel.leg_lengths_m: a list of 3 to 1000 numbers [m] is expected");
   EXPECT_EQ(of("coulomb", "sticky"),
@@ -143,7 +143,7 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
   EXPECT_EQ(of("{ mean = 0.4, sd = 0.1 }", "0.4"),
             "experiment.toml:6:15: contact.restitution: { mean = ..., sd = ... } is expected");
   EXPECT_EQ(of("slope_deg = 12", "slope_deg = 45"),
-            "experiment.toml:14:13: condition[1].slope_deg: 45 is outside (0, 45)");
+            "experiment.toml:14:13: condition[1].slope_deg: 45 is outside [0.001, 45)");
   EXPECT_EQ(of("leg = 1", "leg = 4"),
             "experiment.toml:17:21: condition[1].first_landing_leg: a whole number in 0..3 is expected");
   EXPECT_EQ(of("id = \"b\"", "id = \"a\""), "experiment.toml:13:6: id: a condition 'a' was there before");
@@ -151,6 +151,27 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
             "experiment.toml:2:1: unknown key 'hub_mas' in wheel (known: hub_mass_kg, inertia_kg_m2, leg_lengths_m, "
             "radius_of_gyration_m)");
   EXPECT_EQ(of("[wheel]\n", "[wheel\n").substr(0, 20), "experiment.toml:1:7:");
+}
+
+TEST(Experiment, RefusesWhatNoWheelCanHave) {
+  const auto of = [&](const std::string& old, const std::string& fresh, const std::string& rows = "a,1,1,0,5.0\n") {
+    const Strings lines = defects(source(replaced(description, old, fresh), header + rows));
+    return lines.empty() ? "" : lines.front();
+  };
+  EXPECT_EQ(of("1.39", "1e250"), "experiment.toml:2:15: wheel.hub_mass_kg: 1e+250 is outside [1e-06, 1e+06]");
+  EXPECT_EQ(of("0.151", "1e5"), "experiment.toml:3:24: wheel.leg_lengths_m[1]: 100000 is outside [0.001, 100]");
+  // The inertia about the hub, where that about the foot is asked for.
+  EXPECT_EQ(
+      of("hub_mass_kg = 1.39\n", "inertia_kg_m2 = 0.0035\nhub_mass_kg = 1.39\n"),
+      "experiment.toml:2:17: wheel.inertia_kg_m2: 0.0035 kg m^2 is below M (mean L)^2 = 0.03138 kg m^2, the least "
+      "about the stance foot; if it is the inertia about the hub, 0.03488 kg m^2 is meant");
+  EXPECT_EQ(of("hub_mass_kg = 1.39\n", "inertia_kg_m2 = 0.0349\nhub_mass_kg = 1.39\n"), "");
+  EXPECT_EQ(of("hub_mass_kg = 1.39\n", "inertia_kg_m2 = 1e6\nhub_mass_kg = 1.39\n").substr(0, 79),
+            "experiment.toml:2:17: wheel.inertia_kg_m2: 1000000 kg m^2 is above 0.3138 kg m^2");
+  EXPECT_EQ(of("hub_mass_kg = 1.39\n", "radius_of_gyration_m = 2\nhub_mass_kg = 1.39\n"),
+            "experiment.toml:2:24: wheel.radius_of_gyration_m: 2 m is outside [0, 0.4508] m (3 mean legs)");
+  EXPECT_EQ(of("1.39", "1.39", "a,1,1,0,1e308\n"),
+            "collisions.csv:2:9: omega_minus_rad_s: 1e+308 is outside [0, 1000]");
 }
 
 TEST(Experiment, NamesWhatIsWrongWithTheRows) {
@@ -169,7 +190,7 @@ TEST(Experiment, NamesWhatIsWrongWithTheRows) {
                "experiment"}));
   EXPECT_EQ(of("a,1,1,4,-5\na,x,1,0,NaN\n"),
             (Strings{"collisions.csv:2:7: leg: '4' is not a whole number in 0..3",
-                     "collisions.csv:2:9: omega_minus_rad_s: -5 is below 0",
+                     "collisions.csv:2:9: omega_minus_rad_s: -5 is outside [0, 1000]",
                      "collisions.csv:3:3: trial: 'x' is not a whole number in 0..2147483647",
                      "collisions.csv:3:9: omega_minus_rad_s: 'NaN' is not a finite number"}));
   EXPECT_EQ(
@@ -195,7 +216,7 @@ TEST(Experiment, NamesTrialsThatAreInOneFileOnly) {
 
 TEST(Experiment, ReportsDefectsOfAllFilesAtOnce) {
   const Strings lines = defects(source(replaced(description, "1.39", "0"), header + "a,1,1,0,\n", "condition,trial\n"));
-  EXPECT_EQ(lines, (Strings{"experiment.toml:2:15: wheel.hub_mass_kg: 0 is outside (0, inf)",
+  EXPECT_EQ(lines, (Strings{"experiment.toml:2:15: wheel.hub_mass_kg: 0 is outside [1e-06, 1e+06]",
                             "collisions.csv:2:9: omega_minus_rad_s: is empty; a number is expected",
                             "trials.csv:1:1: missing column 'outcome'"}));
 }

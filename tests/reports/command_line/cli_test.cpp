@@ -16,28 +16,14 @@
 #include <vector>
 
 #include "reports/output/interrupt.h"
+#include "tests/reports/program.h"
 #include "tests/reports/support.h"
 
 namespace metastable::reports {
 namespace {
+using test::metastable;
+using test::Ran;
 using test::read;
-
-struct Ran {
-  int code = 0;
-  std::string out, err;
-};
-
-Ran metastable(std::vector<std::string> words) {
-  std::vector<const char*> argv{"metastable"};
-  for (const std::string& word : words) argv.push_back(word.c_str());
-  Ran ran;
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  ran.code = run(static_cast<int>(argv.size()), argv.data());
-  ran.out = testing::internal::GetCapturedStdout();
-  ran.err = testing::internal::GetCapturedStderr();
-  return ran;
-}
 
 class CommandLine : public test::InFolder {
  protected:
@@ -89,13 +75,13 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"stepz"}, "stepz"},
       {{"steps", "--bogus", "1"}, "--bogus"},
       {{"steps", "--slope", "abc"}, "--slope: 'abc' is not a number"},
-      {{"steps", "--slope", "25", "--initial-speed", "7,0.1"}, "slope: 25 deg is outside (0, 22.5) deg"},
+      {{"steps", "--slope", "25", "--initial-speed", "7,0.1"}, "slope: 25 deg is outside [0.001, 22.5) deg"},
       {{"steps", "--slope", "8"}, "--initial-speed: must be given at 8 deg"},
-      {{"steps", "--slope", "22.5"}, "slope: 22.5 deg is outside (0, 22.5) deg"},
+      {{"steps", "--slope", "22.5"}, "slope: 22.5 deg is outside [0.001, 22.5) deg"},
       {{"steps", "--rebound-lost", "0.5"}, "--rebound-lost: has a meaning under --law coulomb only"},
       {{"sweep", "--friction-mean", "0.2,0.3", "--contact-list", file("ok.csv", "restitution,friction\n0.4,0.3\n")},
        "--friction-mean: cannot vary with --contact-list"},
-      {{"steps", "--initial-speed=-3,0.1"}, "initial speed: mean -3 rad/s is below 0"},
+      {{"steps", "--initial-speed=-3,0.1"}, "--initial-speed: mean -3 is outside [0, 1000]"},
       {{"steps", "--restitution", "0.4,-0.1"}, "--restitution: sd -0.1 is below 0"},
       {{"steps", "--friction", "-5,0.01"}, "friction"},
       {{"steps", "--legs", "0.15,0.15"}, "--legs: 2 legs are fewer than 3"},

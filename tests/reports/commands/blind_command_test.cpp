@@ -97,7 +97,7 @@ TEST_F(BlindRun, RefusesASealedFolderThatIsNoCase) {
   const fs::path stray = fs::path(request_.folder) / "cases" / "0001 copy";
   fs::create_directories(stray);
   write(stray / "seal.txt", "");
-  for (const auto command : {run_blind_answer, run_blind_open})
+  for (const auto command : {+run_blind_answer, +[](const BlindRequest& of) { run_blind_open(of); }})
     EXPECT_EQ(message_of([&] { command(request_); }),
               stray.string() + ": holds a seal.txt, but its name is not that of a case (0001, 0002, ...)");
 }
@@ -141,15 +141,35 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("the seal of case 3 is broken"), std::string::npos);
   write(truth, sealed);
 
-  // Two of three answered when the truths are opened: the third comes too late.
+  // Two of three answered: opening the truths ends the run, so it has to be meant. The third then comes too late.
   const fs::path record = fs::path(request_.folder) / "answers" / "record.csv";
   const std::string all = read(record);
   write(record, all.substr(0, all.rfind('\n', all.size() - 2) + 1));
-  run_blind_open(request_);
+  EXPECT_EQ(message_of([&] { run_blind_open(request_); }),
+            request_.folder +
+                ": 2 of 3 cases are answered, and opening the truths ends the run: answer the others first "
+                "(`blind answer`), or give --partial to grade these alone");
+  EXPECT_FALSE(fs::exists(request_.folder + "-sealed/opened.csv"));
+  run_blind_open(request_, Unanswered::left_out);
   EXPECT_NE(message_of([&] { run_blind_answer(request_); }).find("was opened"), std::string::npos);
   write(record, all);
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("written after the truths had been opened"),
             std::string::npos);
+}
+
+// A case that the tool failed on is answered, and wrongly; one whose tool was killed with the program is not.
+TEST_F(BlindRun, CountsWhatTheToolFailedOn) {
+  run_blind_make(request_);
+  const fs::path failing = folder_ / "failing.sh", answers = fs::path(request_.folder) / "answers";
+  write(failing, "#!/bin/sh\ncase $2 in *0002) echo no >&2; exit 3;; esac\nexec " + request_.tool + " \"$@\"\n");
+  fs::permissions(failing, fs::perms::owner_all);
+  request_.tool = failing.string();
+  run_blind_answer(request_);
+  EXPECT_EQ(read(answers / "0002.json.err"), "no\nexit code 3\n");
+  write(answers / "0002.json.err", "");  // as a killed one leaves it
+  EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("2 of 3 cases are answered"), std::string::npos);
+  run_blind_answer(request_);
+  run_blind_open(request_);
 }
 
 TEST_F(BlindRun, KeepsTruthsApart) {

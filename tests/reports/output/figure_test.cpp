@@ -38,6 +38,13 @@ std::size_t count(const std::string& text, const std::string& part) {
   return n;
 }
 
+// As gnuplot writes text into SVG.
+std::string escape_text(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += c == '"' ? std::string("&quot;") : std::string(1, c);
+  return out;
+}
+
 std::string error_of(const Figure& figure) {
   try {
     gnuplot_script(figure);
@@ -55,6 +62,24 @@ TEST(Figure, SvgIsWholeAndCarriesTitleAndProvenance) {
   EXPECT_NE(svg.find("<desc>command: metastable report --a &lt;b&gt;\nseed: 3\nversion: 0.1.0\n</desc>"),
             std::string::npos);
   EXPECT_NE(svg.find("ω² [rad²/s²]"), std::string::npos);
+}
+
+// gnuplot takes the label of a tick for a number format and a quote at a text's end for its own.
+TEST(Figure, AnyTextIsALabel) {
+  for (const std::string text : {"50%", "%d %s", "'quoted'", "'", "it's", "a\\b'", "`date`'", "@HOME $x", "x\"y'"}) {
+    Figure bars{.id = "bars", .title = text, .x = {text}, .y = {text}};
+    bars.bars = BarChart{.name = {text, "b"}, .value = {1, 2}};
+    Figure map{.id = "map", .title = text, .x = {text}, .y = {text}, .heat_map = sample_map()};
+    map.heat_map->label = text;
+    map.heat_map->x_names = map.heat_map->y_names = {text, text + "2"};
+    Figure lines = sample();
+    lines.title = lines.series[0].label = lines.x.label = text;
+    lines.reference_lines = {{.vertical = true, .at = 1, .label = text}};
+    for (const Figure& figure : {bars, map, lines}) {
+      const std::string svg = render_svg(figure), shown = ">" + escape_text(text) + "<";
+      EXPECT_GE(count(svg, shown), 2u) << shown << svg;
+    }
+  }
 }
 
 TEST(Figure, TheSameFigureGivesTheSameBytes) {

@@ -1,6 +1,8 @@
 #include "reports/output/output_file.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <iterator>
@@ -48,6 +50,26 @@ TEST_F(OutputFileTest, TwoWritersOfOneTargetDoNotMix) {
   first.commit();
   EXPECT_EQ(read(target), "first");
   EXPECT_EQ(files(), 1u);
+}
+
+// A killed writer leaves its temporary, which goes when the target is written again.
+TEST_F(OutputFileTest, SweepsUpWhatAKilledWriterLeft) {
+  EXPECT_EXIT(
+      {
+        OutputFile file(folder_ / "a.csv");
+        file.stream() << "half" << std::flush;
+        ::kill(::getpid(), SIGKILL);
+      },
+      testing::KilledBySignal(SIGKILL), "");
+  EXPECT_EQ(files(), 1u);
+  write_file(folder_ / ".a.csv.notes.tmp", "not ours");
+  OutputFile another(folder_ / "a.csv");  // its writer lives
+  write_file(folder_ / "a.csv", "whole");
+  EXPECT_EQ(files(), 3u);
+  another.stream() << "other";
+  another.commit();
+  EXPECT_EQ(read(folder_ / "a.csv"), "other");
+  EXPECT_EQ(files(), 2u);
 }
 
 TEST_F(OutputFileTest, FollowsASymbolicLink) {

@@ -78,9 +78,11 @@ TEST(Table, CsvNumbersReadBackExactly) {
 }
 
 TEST(Table, CsvQuotesWhatCouldBeMisread) {
-  Table table{
-      .id = "t", .title = "two\nlines", .columns = {{"a,b"}}, .rows = {{"# no comment"}, {"line\nbreak"}, {""}}};
-  EXPECT_EQ(to_csv(table), "# two\n# lines\n\"a,b\"\n\"# no comment\"\n\"line\nbreak\"\n\n");
+  Table table{.id = "t",
+              .title = "two\nlines",
+              .columns = {{"a,b"}},
+              .rows = {{"# no comment"}, {"line\nbreak"}, {"=1+1"}, {""}}};
+  EXPECT_EQ(to_csv(table), "# two\n# lines\n\"a,b\"\n\"# no comment\"\n\"line\nbreak\"\n'=1+1\n\n");
 }
 
 TEST(Table, Markdown) {

@@ -1,0 +1,19 @@
+#include "reports/output/standard_output.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
+
+#include "reports/output/output_file.h"
+
+namespace metastable::reports {
+
+void flush_standard_output() {
+  errno = 0;
+  const bool printed = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (!printed || !std::cout.flush())
+    throw OutputError("standard output", errno != 0 ? std::strerror(errno) : "write error");
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,120 @@
+// How the program ends where it cannot do its work: with the codes it documents, and never by waiting.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "tests/reports/program.h"
+#include "tests/reports/support.h"
+
+namespace metastable::reports {
+namespace {
+using test::metastable;
+using test::Ran;
+
+class ExitCodes : public test::InFolder {
+ protected:
+  const std::vector<std::string> quick_{"--legs", "0.1519", "--cells", "32", "--samples", "256", "--replicates", "2"};
+  std::vector<std::string> quick(std::vector<std::string> words) const {
+    words.insert(words.end(), quick_.begin(), quick_.end());
+    return words;
+  }
+  std::string pipe(const std::string& name) const {
+    ::mkfifo(path(name).c_str(), 0600);
+    return path(name);
+  }
+};
+
+// In a process of its own: the stream stays broken.
+void run_into_full_device(const std::vector<std::string>& words) {
+  ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO);
+  ::_exit(test::run(words));
+}
+
+TEST_F(ExitCodes, FullDeviceIsTwoAndALine) {
+  const std::string full = "cannot write standard output: No space left on device";
+  EXPECT_EXIT(run_into_full_device({"--help"}), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device({"--version"}), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device({"steps", "--help"}), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device({"effects"}), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device({"effects", "--json", "-"}), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device(quick({"steps"})), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device(quick({"compare"})), testing::ExitedWithCode(2), full);
+  EXPECT_EXIT(run_into_full_device({"simulate", "--trials", "3", "--out", path("made")}), testing::ExitedWithCode(2),
+              full);
+  // A file likewise.
+  const Ran ran = metastable({"effects", "--json", "/dev/full"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_EQ(ran.err, "metastable: cannot write /dev/full: No space left on device\n");
+}
+
+TEST_F(ExitCodes, FullDeviceIsNoPlaceForASweep) {
+  const Ran ran = metastable(quick({"sweep", "--friction-mean", "0.3,0.4", "--out", "/dev/full"}));
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_EQ(ran.err,
+            "metastable: cannot write /dev/full: is no regular file, from which a sweep could be taken up again\n");
+}
+
+// Ctrl-C or its like a while after the program has begun to wait; without it the program would wait for ever.
+void run_and_signal(const std::vector<std::string>& words, int signal) {
+  ::alarm(20);
+  std::thread([signal] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    ::kill(::getpid(), signal);
+  }).detach();
+  ::_exit(test::run(words));
+}
+
+TEST_F(ExitCodes, PipesThatNobodyWritesToOrReadsEndAtASignal) {
+  EXPECT_EXIT(run_and_signal({"steps", "--config", pipe("a")}, SIGINT), testing::ExitedWithCode(130), "interrupted");
+  EXPECT_EXIT(run_and_signal({"steps", "--contact-list", pipe("b")}, SIGTERM), testing::ExitedWithCode(143),
+              "terminated");
+  EXPECT_EXIT(run_and_signal({"coast-down", pipe("c"), "--out", path("drum")}, SIGINT), testing::ExitedWithCode(130),
+              "interrupted");
+  EXPECT_EXIT(run_and_signal({"effects", "--json", pipe("d")}, SIGTERM), testing::ExitedWithCode(143), "terminated");
+}
+
+TEST_F(ExitCodes, PipesAreReadToTheirEnd) {
+  std::thread writer([name = pipe("config")] {
+    std::ofstream out(name);
+    out << "slope = 7.02\n" << std::flush;
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    out << "slop = 3\n";
+  });
+  const Ran ran = metastable({"steps", "--config", path("config")});
+  writer.join();
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_NE(ran.err.find("config:2: unknown key 'slop'"), std::string::npos) << ran.err;
+}
+
+TEST_F(ExitCodes, ExperimentIsMadeOfFiles) {
+  std::filesystem::create_directory(path("data"));
+  pipe("data/experiment.toml");
+  const Ran ran = metastable({"describe", path("data")});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_EQ(ran.err, "metastable: " + path("data/experiment.toml") + ": cannot be read: it is no regular file\n");
+}
+
+TEST_F(ExitCodes, DevicesAreNotRead) {
+  const Ran ran = metastable({"steps", "--config", "/dev/zero"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_EQ(ran.err, "metastable: /dev/zero: cannot be read: it is neither a file nor a pipe\n");
+}
+
+// What is no user's error has a code too, and no other than those documented.
+TEST_F(ExitCodes, MissingGnuplotIsThree) {
+  const auto without_programs = [&] {
+    ::setenv("PATH", path("empty").c_str(), 1);
+    ::_exit(test::run(quick({"sweep", "--friction-mean", "0.3,0.4", "--out", path("s.csv")})));
+  };
+  EXPECT_EXIT(without_programs(), testing::ExitedWithCode(3), "gnuplot, which draws the figures, was not found");
+}
+
+}  // namespace
+}  // namespace metastable::reports

@@ -1,0 +1,154 @@
+// What no wheel can have, and options that would do nothing: exit code 2 and one line that says why.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/reports/program.h"
+#include "tests/reports/support.h"
+
+namespace metastable::reports {
+namespace {
+using test::metastable;
+using test::Ran;
+
+struct Case {
+  std::vector<std::string> words;
+  std::string said;
+};
+
+void expect_refused(const std::vector<Case>& cases) {
+  for (const Case& one : cases) {
+    SCOPED_TRACE(fmt::format("{}", fmt::join(one.words, " ")));
+    const Ran ran = metastable(one.words);
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_EQ(ran.out, "");
+    EXPECT_EQ(ran.err, "metastable: " + one.said + "\n");
+  }
+}
+
+class Refusals : public test::InFolder {
+ protected:
+  std::string file(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return path(name);
+  }
+};
+
+TEST_F(Refusals, OfOptionsThatDoNothing) {
+  expect_refused({
+      {{"steps", "--leg-count", "12"}, "--leg-count: has a meaning where --legs is one length; it is 'paper'"},
+      {{"steps", "--leg-count", "4", "--legs", "0.15,0.15,0.15,0.15"},
+       "--leg-count: has a meaning where --legs is one length; it is '0.15,0.15,0.15,0.15'"},
+      {{"steps", "--radius-of-gyration", "0.05"},
+       "--radius-of-gyration: has a meaning under --law coulomb and plastic only"},
+      {{"steps", "--law", "coulomb", "--ramp-stiffness", "9000"},
+       "--ramp-stiffness: has a meaning under --law published only"},
+      {{"steps", "--law", "plastic", "--contact-mass", "1"},
+       "--contact-mass: has a meaning under --law published only"},
+      {{"steps", "--law", "plastic", "--friction", "0.3,0.1"},
+       "--friction: has a meaning under --law published and coulomb only"},
+      {{"steps", "--law", "plastic", "--restitution", "0.3,0.1"},
+       "--restitution: has a meaning under --law published and coulomb only"},
+      {{"sweep", "--law", "plastic", "--friction-sd", "0.1,0.2", "--out", path("s.csv")},
+       "--friction-sd: has no meaning under --law plastic"},
+      {{"steps", "--method", "integrated", "--samples", "256"}, "--samples: has a meaning under --method sampled only"},
+      {{"steps", "--json", ""}, "--json: what is given is empty"},
+      {{"effects", "--json="}, "--json: what is given is empty"},
+      {{"diagnose", ""}, "DIR: what is given is empty"},
+      {{"steps", "--config", file("a.toml", "leg-count = 12\n")},
+       "--leg-count: has a meaning where --legs is one length; it is 'paper'"},
+      {{"steps", "--config", file("b.toml", "law = \"coulomb\"\ncontact-mass = 2\n")},
+       "--contact-mass: has a meaning under --law published only"},
+  });
+  EXPECT_EQ(metastable({"steps", "--config", ""}).code, 2);
+}
+
+TEST_F(Refusals, OfWhatNoWheelCanHave) {
+  expect_refused({
+      {{"steps", "--mass", "1e250"}, "--mass: 1e+250 is outside [1e-06, 1e+06]"},
+      {{"steps", "--initial-speed", "1e200,1"}, "--initial-speed: mean 1e+200 is outside [0, 1000]"},
+      {{"steps", "--initial-speed", "5,2000"}, "--initial-speed: sd 2000 is outside [0, 1000]"},
+      {{"compare", "--initial-speed", "5,1", "--initial-speed", "1e9,1"},
+       "--initial-speed: mean 1000000000 is outside [0, 1000]"},
+      {{"steps", "--legs", "1000"}, "--legs: 1000 is outside [0.001, 100]"},
+      {{"steps", "--legs", "0.15,0.15,0"}, "--legs: 0 is outside [0.001, 100]"},
+      {{"steps", "--ramp-length", "1e9"}, "--ramp-length: 1000000000 is outside [0.001, 100000]"},
+      {{"steps", "--ramp-stiffness", "0"}, "--ramp-stiffness: 0 is outside [1, 1e+12]"},
+      {{"steps", "--gravity", "1e5"}, "--gravity: 100000 is outside [0.001, 1000]"},
+      {{"steps", "--slope", "1e-9", "--initial-speed", "5,1"},
+       "slope: 1e-09 deg is outside [0.001, 22.5) deg (below half the angle between legs)"},
+      {{"steps", "--restitution", "1.2,0.1"}, "--restitution: mean 1.2 is outside [0, 1]"},
+      {{"sweep", "--friction-mean", "0:20:1", "--out", path("s.csv")}, "--friction-mean: 20 is outside [0, 10]"},
+      {{"sweep", "--slope", "5,6", "--initial-speed", "1e5", "--out", path("s.csv")},
+       "--initial-speed: mean 100000 is outside [0, 1000]"},
+      {{"steps", "--config", file("c.toml", "mass = 1e250\n")}, "--mass: 1e+250 is outside [1e-06, 1e+06]"},
+      // Inertia about the hub, where that about the foot is asked for.
+      {{"steps", "--inertia", "0.0035"},
+       "--inertia: 0.0035 kg m^2 is below M (mean L)^2 = 0.03207 kg m^2, the least about the stance foot; if it is the "
+       "inertia about the hub, 0.03557 kg m^2 is meant"},
+      {{"steps", "--inertia", "1e6"},
+       "--inertia: 1000000 kg m^2 is above 0.3207 kg m^2, where the radius of gyration is 3 mean legs"},
+      {{"steps", "--law", "coulomb", "--radius-of-gyration", "2"},
+       "--radius-of-gyration: 2 m is outside [0, 0.4557] m (3 mean legs)"},
+  });
+}
+
+// A decimal comma makes two numbers of one.
+TEST_F(Refusals, OfADecimalCommaHintsAtThePoint) {
+  const std::string hint = "decimals take a point, so that 0.4 is a constant and 0.4,0.1 has sd 0.1";
+  expect_refused({{{"steps", "--friction", "0,4"}, "--friction: '0,4' is mean 0 and sd 4; " + hint},
+                  {{"steps", "--restitution", "0,4"}, "--restitution: '0,4' is mean 0 and sd 4; " + hint}});
+}
+
+// The help says what the messages say, from the same table.
+TEST_F(Refusals, AreAnnouncedInTheHelp) {
+  std::string help = metastable({"steps", "--help"}).out;
+  help.erase(std::unique(help.begin(), help.end(),
+                         [](char a, char b) {
+                           return std::isspace(static_cast<unsigned char>(a)) &&
+                                  std::isspace(static_cast<unsigned char>(b));
+                         }),
+             help.end());
+  std::ranges::replace(help, '\n', ' ');
+  for (const char* text :
+       {"rad/s] (default: the paper's at 7.02 and 9.59); in [0, 1000]", "landing order; in [0.001, 100]",
+        "Hub mass M [kg]; in [1e-06, 1e+06]", "Ramp length [m]; in [0.001, 100000]", "g [m/s^2]; in [0.001, 1000]",
+        "K_r [N/m] (published); in [1, 1e+12]"})
+    EXPECT_NE(help.find(text), std::string::npos) << text << "\n" << help;
+}
+
+// The ends of the ranges are answers. The curve of survival does not grow with the ramp.
+TEST_F(Refusals, DoNotReachTheEndsOfTheRanges) {
+  const std::vector<std::string> quick{"--cells", "32", "--samples", "256", "--replicates", "2", "--json"};
+  int number = 0;
+  for (std::vector<std::string> words :
+       std::vector<std::vector<std::string>>{{"--ramp-length", "100000"},
+                                             {"--ramp-length", "100000", "--law", "coulomb"},
+                                             {"--mass", "1e6", "--ramp-stiffness", "1e12"},
+                                             {"--mass", "1e-6", "--ramp-stiffness", "1"},
+                                             {"--legs", "0.001", "--initial-speed", "1000,0"},
+                                             {"--legs", "100", "--initial-speed", "0.3,0.01", "--ramp-length", "3000"},
+                                             {"--inertia", "0.32"},
+                                             {"--gravity", "0.001"},
+                                             {"--gravity", "1000", "--initial-speed", "70,1"}}) {
+    SCOPED_TRACE(fmt::format("{}", fmt::join(words, " ")));
+    words.insert(words.begin(), "steps");
+    words.insert(words.end(), quick.begin(), quick.end());
+    words.push_back(path(fmt::format("{}.json", number++)));
+    const Ran ran = metastable(words);
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    if (ran.code != 0) continue;
+    const auto json = nlohmann::json::parse(test::read(words.back()));
+    const std::vector<double> survival = json["survival"];
+    EXPECT_LE(survival.size(), 10000u);
+    EXPECT_TRUE(std::ranges::is_sorted(survival, std::greater<>()));
+  }
+}
+
+}  // namespace
+}  // namespace metastable::reports
