@@ -126,8 +126,16 @@ struct Spectrum {
 /// The metastable regime: what survivors look like once the start is forgotten.
 struct Survivors {
   std::vector<PhaseDistribution> by_phase;
-  double mean = 0, sd = 0;                  ///< of the observable over all phases (equal shares)
-  double restart_mean = 0, restart_sd = 0;  ///< stationary, with a new launch after each rest
+  double mean = 0, sd = 0;  ///< of the observable over all phases (equal shares)
+  /// Stationary, with a new launch after each rest; NaN where every launch rests at once.
+  double restart_mean = 0, restart_sd = 0;
+};
+
+/// One number of a chain, told in two ways that share little.
+struct Agreement {
+  std::string what;
+  double one = 0, other = 0;
+  double tolerance = 0;  ///< relative
 };
 
 /// What a study answers, and what it was made with.
@@ -142,7 +150,8 @@ struct Metastability {
   StepsToRest steps;
   Spectrum spectrum;
   Survivors survivors;
-  std::vector<Share> violations;  ///< of the return map's assumptions
+  std::vector<Share> violations;      ///< of the return map's assumptions
+  std::vector<Agreement> agreements;  ///< of the finest chain, checked before the study is given (consistency.h)
 };
 
 /// Pilot grid, graded cells, replicated draws, three cell sizes, refinement until the tolerance is met.
@@ -152,7 +161,8 @@ struct Metastability {
 /// interval_95: t-interval over the replicates' extrapolations and, as an independent error, a third of the difference
 /// of the last two extrapolations of all draws.
 /// Method::integrated: integrated_study().
-/// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails
+/// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails or the results
+/// contradict each other (consistency.h)
 Metastability study(const Problem& problem, const StudyOptions& options = {});
 
 /// The same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "analysis/study/certify.h"
+#include "analysis/study/consistency.h"
 #include "reports/output/output_file.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
@@ -30,6 +31,7 @@ void run_steps(const StepsRequest& request) {
     extras.certified = analysis::certify(
         request.setting,
         {.tolerance = request.study.tolerance, .threads = request.study.threads, .progress = study_progress(progress)});
+    analysis::require_consistent(study, *extras.certified);
   }
   if (request.sensitivities || !request.standard_errors.empty()) {
     Progress progress("sensitivities", study_units);
