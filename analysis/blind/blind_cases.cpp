@@ -23,9 +23,7 @@ constexpr std::array<std::pair<std::string_view, BlindKind>, 5> kinds{{{"none", 
                                                                        {"left_out", BlindKind::left_out}}};
 
 // The nuisances of every model, which recalibration removes: no candidate that could be left out or paired.
-constexpr std::string_view recalibration = "contact_distribution";
-// There or not: it cannot be made as visible as another effect beside it.
-constexpr std::string_view without_size = "slip_reversal";
+constexpr std::string_view recalibration = dynamics::contact_distribution_id;
 
 // The size whose power is `target`. Powers grow like a power of a small size, mostly its square: secant steps in
 // logarithms, inside the bracket known so far.
@@ -108,7 +106,8 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
     if (info.id == recalibration) continue;
     plan.insert(plan.end(), static_cast<std::size_t>(size.left_out_per_effect),
                 BlindPlan{BlindKind::left_out, {info.id}, 2});
-    if (info.id != without_size) paired.push_back(info.id);
+    // An effect without a size is there or not: it cannot be made as visible as another one beside it.
+    if (!info.parameters.empty()) paired.push_back(info.id);
   }
   for (int p = 0; p < size.pairs; ++p) {
     std::vector<std::string> two;
@@ -168,7 +167,7 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
     design.reality.outside = {*truth.outside};
   }
 
-  // What the modeller believes: the truth, or something near it. A shape of the noise that no one states.
+  // The modeller believes the truth, or something near it; nobody states the shape of the noise.
   FolderOptions folder;
   folder.title = fmt::format("Blind case {}", number);
   folder.dropped = design.dropped;

@@ -24,7 +24,7 @@ std::string_view blind_kind_name(BlindKind kind);
 /// @throws std::invalid_argument for an unknown name
 BlindKind blind_kind(std::string_view name);
 
-/// How many cases of each kind, none below 0.
+/// How many cases of each kind a run has, none below 0.
 struct BlindSize {
   int per_effect_and_strength = 6;  ///< each effect at 1x, 2x and 4x
   int none = 300;
@@ -33,7 +33,7 @@ struct BlindSize {
   int left_out_per_effect = 3;
 };
 
-/// The sealed truth of a case.
+/// What is true of a case, sealed until it is answered.
 struct BlindTruth {
   int number = 0;  ///< from 1
   BlindKind kind = BlindKind::none;
@@ -42,8 +42,8 @@ struct BlindTruth {
   int strength = 0;  ///< 1, 2, 4; 0 where it is not defined (none, outside)
   double power = 0;  ///< expected 2 Delta log likelihood, true contact known
   double left = 0;   ///< realised, after recalibration; 0 until complete_truth()
-  /// Of a pair, by effect: realised, after recalibration with the other effect in the model. Not sealed, for it follows
-  /// from the rest and the case; empty until complete_pair().
+  /// Of a pair, by effect, it is what was realised after recalibration with the other effect in the model. Not sealed,
+  /// for it follows from the rest and the case; empty until complete_pair().
   std::vector<double> left_by_effect = {};
   bool nominal_is_true = true;
   Spread restitution, friction;  ///< true
@@ -72,14 +72,14 @@ struct BlindPlan {
 /// @throws std::invalid_argument naming a count below 0
 std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed);
 
-/// Case `number` (from 1) of a plan. Sizes are found by a search on `power` for 16, 64, 256 (each effect of a pair for
-/// 64); an effect that cannot be made so strong within its range keeps its largest size, and truth.power tells.
-/// truth.left is not worked out: a case that is graded takes complete_truth() too.
+/// Draws case `number` (from 1) of a plan. Sizes are found by a search on `power` for 16, 64, 256 (each effect of a
+/// pair for 64); an effect that cannot be made so strong within its range keeps its largest size, and truth.power
+/// tells. truth.left is not worked out: a case that is graded takes complete_truth() too.
 BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, const Power& power);
 
-/// Sets truth.left from the case's own files; a case without catalogue effects keeps 0. A fit: about a second.
+/// Sets truth.left from the case's own files; a case without catalogue effects keeps 0. A fit takes about a second.
 void complete_truth(BlindCase& made);
-/// Sets truth.left_by_effect of a pair; nothing for other kinds. Two fits.
+/// Sets truth.left_by_effect of a pair by two fits; other kinds stay as they are.
 /// @param experiment  the case as it was written
 void complete_pair(BlindTruth& truth, const Experiment& experiment);
 

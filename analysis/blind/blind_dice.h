@@ -1,5 +1,5 @@
 #pragma once
-// The random numbers of one blind case.
+// A blind case draws its random numbers from here.
 
 #include <Random123/philox.h>
 
@@ -11,8 +11,8 @@
 
 namespace metastable::analysis {
 
-/// Random numbers in the order they are asked for: Philox4x64 at counter (number, n), key (seed). A run's cases are
-/// numbered from 1; 0 is its plan.
+/// Gives random numbers in the order they are asked for, from Philox4x64 at counter (number, n) with key (seed). A
+/// run's cases are numbered from 1; 0 is its plan.
 class BlindDice {
  public:
   BlindDice(std::uint64_t seed, std::uint64_t number) : seed_(seed), number_(number) {}
@@ -20,7 +20,7 @@ class BlindDice {
     const r123::Philox4x64::ctr_type counter{{number_, asked_++, 300, 0}};
     return r123::Philox4x64()(counter, r123::Philox4x64::key_type{{seed_, 0}})[0];
   }
-  /// In the open interval (from, to).
+  /// A number that lies in the open interval (from, to).
   double uniform(double from = 0, double to = 1) { return from + (to - from) * unit_interval(word()); }
   /// from .. to, both included.
   int whole(int from, int to) { return std::min(to, from + static_cast<int>(uniform(0, to - from + 1))); }

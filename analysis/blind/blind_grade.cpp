@@ -6,6 +6,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "analysis/blind/sized_effect.h"
+#include "analysis/statistics/interval_95.h"
+
 namespace metastable::analysis {
 namespace {
 
@@ -103,7 +106,7 @@ void count_effect(Tally& tally, const BlindTruth& truth, const Answer& answer) {
   const std::string& id = truth.effects.front().id;
   const int strength = truth.strength;
   const bool in_set = answer && contains(answer->cause_set, id);
-  const bool left = id != "contact_distribution" && truth.left >= no_power_left;
+  const bool left = id != dynamics::contact_distribution_id && truth.left >= no_power_left;
   tally.found[strength].count(answer && answer->verdict != Verdict::no_gap);
   if (left) {
     tally.found_left[strength].count(gap(answer));
@@ -235,40 +238,9 @@ std::vector<CalibrationBin> calibration(const std::vector<std::pair<double, bool
 
 }  // namespace
 
-const std::vector<std::string>& rightful_places(const std::string& effect) {
-  static const std::map<std::string, std::vector<std::string>> all{
-      {"contact_distribution", {"phase", "speed", "condition", ":spread", ":mean"}},
-      {"initial_speed", {"collision", "phase", "condition", "speed"}},
-      {"leg_lengths", {"leg"}},
-      {"leg_contact", {"leg"}},
-      {"hub_eccentricity", {"leg"}},
-      {"inertia", {"phase", "speed", "condition"}},
-      {"slope_offset", {"phase", "condition", "speed"}},
-      {"slope_profile", {"position", "collision", "time"}},
-      {"axle_drag_viscous", {"phase", "speed", "condition"}},
-      {"rolling_resistance", {"phase", "speed", "condition"}},
-      {"air_drag", {"phase", "speed", "condition"}},
-      {"speed_dependent_restitution", {"speed", "phase", "condition"}},
-      {"speed_dependent_friction", {"speed", "phase", "condition"}},
-      {"contact_memory", {":memory"}},
-      {"friction_patch", {"position", "collision", "time"}},
-      {"trial_drift", {"trial"}},
-      {"trial_spread", {"trial", ":memory"}},
-      {"contact_outliers", {":tail", ":spread", "outcome"}},
-      {"sensor_noise", {":spread", ":memory", "phase"}},
-      {"sensor_bias", {"phase", ":mean"}},
-      {"bounce", {"phase", "speed", "condition"}},
-      {"ramp_vibration", {"time", "speed", "phase", ":spread"}},
-      {"slip_reversal", {"phase", "speed", ":spread", ":tail", "condition"}},
-  };
-  static const std::vector<std::string> none;
-  const auto found = all.find(effect);
-  return found == all.end() ? none : found->second;
-}
-
 std::pair<double, double> wilson(const Proportion& proportion) {
   if (proportion.of == 0) return {0, 1};
-  constexpr double z = 1.959963984540054;
+  constexpr double z = normal_95;
   const double n = proportion.of, p = proportion.right / n;
   const double middle = (p + z * z / (2 * n)) / (1 + z * z / n);
   const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));

@@ -25,11 +25,11 @@ struct BlindAnswer {
   std::vector<std::pair<std::string, double>> causes;  ///< by falling probability
   std::vector<std::string> cause_set;
   std::vector<AnsweredParameter> parameters;  ///< of the first cause
-  struct Place {
+  struct ClaimedPlace {
     std::string facet, aspect;
     double p_adjusted = 1;
   };
-  std::vector<Place> where;
+  std::vector<ClaimedPlace> where;
   std::optional<double> closed_lower, closed_upper;  ///< share of the gap that was closed, 90 %
 };
 
@@ -37,7 +37,7 @@ struct Proportion {
   int right = 0, of = 0;
   void count(bool is_right) { right += is_right, ++of; }
 };
-/// Wilson's 95 % interval of a proportion; {0, 1} of nothing.
+/// Gives Wilson's 95 % interval of a proportion; that of nothing is {0, 1}.
 std::pair<double, double> wilson(const Proportion& proportion);
 
 /// One line of the table of measures.
@@ -69,8 +69,5 @@ struct BlindGrades {
 /// @param answers  one a truth; nothing: not answered, counted as a failure of every measure it belongs to
 /// @throws std::invalid_argument if they are not as many as the truths
 BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::optional<BlindAnswer>>& answers);
-
-/// Facets, and aspects written with a leading ':', in which an effect may rightly be found; empty for an unknown id.
-const std::vector<std::string>& rightful_places(const std::string& effect);
 
 }  // namespace metastable::analysis

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <stdexcept>
 
 #include "analysis/diagnosis/model_fit.h"
+#include "analysis/likelihood/wheel_nuisances.h"
 #include "analysis/likelihood/wheel_transitions.h"
 
 namespace metastable::analysis {
@@ -15,7 +15,7 @@ dynamics::NominalValues contact_of(const dynamics::NominalValues& stated,
                                    const std::vector<dynamics::Effect>& effects) {
   dynamics::NominalValues truth = stated;
   for (const dynamics::Effect& effect : effects)
-    if (effect.id == "contact_distribution") {
+    if (effect.id == dynamics::contact_distribution_id) {
       truth.restitution_mean = effect.values[0];
       truth.restitution_sd = effect.values[1];
       truth.friction_mean = effect.values[2];
@@ -24,75 +24,24 @@ dynamics::NominalValues contact_of(const dynamics::NominalValues& stated,
   return truth;
 }
 
-double log_likelihood(const TransitionModel& model, const std::vector<double>& nuisance,
-                      const std::vector<FittedForm>& forms) {
-  std::vector<Term> terms;
-  for (const FittedForm& form : forms) terms.push_back({&form.candidate, form.candidate.variants[0], form.values});
-  return model.evaluate(nuisance, terms).total();
-}
-
-std::vector<FittedForm> forms_of(const std::vector<dynamics::Effect>& effects, const Experiment& experiment) {
-  std::vector<FittedForm> forms;
+std::vector<EffectTerm> terms_of(const TransitionModel& model, const std::vector<dynamics::Effect>& effects) {
+  std::vector<EffectTerm> terms;
   for (const dynamics::Effect& effect : effects)
-    if (effect.id != "contact_distribution")
-      forms.push_back(fitted_form(effect, experiment.wheel.leg_length, experiment.conditions.front().ramp_length));
-  return forms;
+    if (effect.id != dynamics::contact_distribution_id) terms.push_back(fitted_term(model, effect));
+  return terms;
 }
 
 }  // namespace
 
-FittedForm fitted_form(const dynamics::Effect& effect, const std::vector<double>& stated_legs, double ramp_length) {
-  dynamics::effect_info(effect.id);
-  FittedForm form;
-  form.candidate.id = effect.id;
-  std::vector<double>& variant = form.candidate.variants.front();
-  const std::vector<double>& v = effect.values;
-  if (effect.id == "contact_distribution")
-    throw std::invalid_argument("contact_distribution: its parameters are the model's nuisances");
-  if (effect.id == "leg_lengths") {
-    for (std::size_t i = 0; i < v.size(); ++i) form.values.push_back(v[i] - stated_legs.at(i));
-  } else if (effect.id == "leg_contact") {
-    const bool friction = v[1] != 1 || v[2] == 1;  // both at once have no fitted form: friction's is taken
-    variant = {v[0], friction ? 0.0 : 1.0};
-    form.values = {friction ? v[1] : v[2]};
-  } else if (effect.id == "hub_eccentricity") {
-    form.values = {v[0] * std::cos(v[1]), v[0] * std::sin(v[1])};
-  } else if (effect.id == "slope_profile") {
-    variant = {0, v[1], v[2] > 0 ? v[2] : ramp_length};
-    form.values = {v[0]};
-  } else if (effect.id == "speed_dependent_friction") {
-    variant = {v[1]};
-    form.values = {v[0]};
-  } else if (effect.id == "friction_patch") {
-    variant = {v[0], v[1] > 0 ? v[1] : ramp_length};
-    form.values = {v[2]};
-  } else if (effect.id == "trial_spread" || effect.id == "sensor_noise") {
-    form.values = {v[0] * v[0]};
-  } else if (effect.id == "contact_outliers") {
-    variant = {v[1]};
-    form.values = {v[0]};
-  } else if (effect.id == "sensor_bias") {
-    variant = {1, 1};
-    form.values = {v[0]};
-  } else if (effect.id == "ramp_vibration") {
-    variant = {v[1]};
-    form.values = {v[0], 0};
-  } else {
-    form.values = v;
-  }
-  return form;
+EffectTerm fitted_term(const TransitionModel& model, const dynamics::Effect& effect) {
+  for (const Candidate& candidate : model.candidates())
+    if (candidate.id == effect.id) return term_of(candidate, effect.values);
+  throw std::invalid_argument(fmt::format("effect {}: the model has no candidate for it", effect.id));
 }
 
 std::vector<double> true_nuisances(const TransitionModel& model, const dynamics::NominalValues& contact) {
-  std::vector<double> values;
-  for (const Nuisance& nuisance : model.nuisances()) {
-    double value = nuisance.nominal;
-    if (nuisance.name == "restitution_mean") value = contact.restitution_mean;
-    if (nuisance.name == "log restitution_sd") value = std::log(contact.restitution_sd);
-    if (nuisance.name == "friction_mean") value = contact.friction_mean;
-    if (nuisance.name == "log friction_sd") value = std::log(contact.friction_sd);
-    values.push_back(value);
-  }
+  std::vector<double> values = nominal_values(model);
+  set_contact(values, {contact.restitution_mean, contact.restitution_sd, contact.friction_mean, contact.friction_sd});
   return values;
 }
 
@@ -110,9 +59,9 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
     const auto model = wheel_transitions(experiment);
     const Setting& stated = design.conditions.front().setting;
     const dynamics::NominalValues contact = stated_values(stated.restitution, stated.friction, stated.wheel.leg_length);
-    sum += 2 * (log_likelihood(*model, true_nuisances(*model, contact_of(contact, effects)),
-                               forms_of(effects, experiment)) -
-                log_likelihood(*model, true_nuisances(*model, contact), {}));
+    const std::vector<double> with = true_nuisances(*model, contact_of(contact, effects));
+    sum += 2 * (model->evaluate(with, terms_of(*model, effects)).total() -
+                model->evaluate(true_nuisances(*model, contact), {}).total());
   }
   return sum / replicates;
 }
@@ -121,16 +70,8 @@ double power_left(const Experiment& experiment, const dynamics::NominalValues& t
                   const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept) {
   const auto model = wheel_transitions(experiment);
   const std::vector<double> nuisance = true_nuisances(*model, contact_of(truth, effects));
-  const double with = log_likelihood(*model, nuisance, forms_of(effects, experiment));
-  std::vector<Term> terms;
-  for (const dynamics::Effect& effect : kept)
-    for (const Candidate& candidate : model->candidates())
-      if (candidate.id == effect.id) {
-        const FittedForm form =
-            fitted_form(effect, experiment.wheel.leg_length, experiment.conditions.front().ramp_length);
-        terms.push_back({&candidate, form.candidate.variants.front(), form.values});
-      }
-  return 2 * (with - fit(*model, nuisance, terms).log_likelihood);
+  const double with = model->evaluate(nuisance, terms_of(*model, effects)).total();
+  return 2 * (with - fit(*model, nuisance, terms_of(*model, kept)).log_likelihood);
 }
 
 }  // namespace metastable::analysis

@@ -17,17 +17,12 @@ struct PowerDesign {
   std::vector<std::string> dropped;
 };
 
-/// A catalogue effect as the diagnosis' model takes it: a candidate of one variant, and its values.
-struct FittedForm {
-  Candidate candidate;
-  std::vector<double> values;
-};
-/// @param stated_legs  lengths [m], for leg_lengths
-/// @param ramp_length  [m], for stretches that end with the ramp
-/// @throws std::invalid_argument for contact_distribution, which is no candidate but the nuisances
-FittedForm fitted_form(const dynamics::Effect& effect, const std::vector<double>& stated_legs, double ramp_length);
+/// A catalogue effect as a wheel's model takes it.
+/// @throws std::invalid_argument for an effect that is no candidate of the model, as contact_distribution (its
+/// nuisances)
+EffectTerm fitted_term(const TransitionModel& model, const dynamics::Effect& effect);
 
-/// The nuisances of a model at a true contact distribution (others at their nominal values).
+/// Sets the nuisances of a wheel's model to a true contact distribution; the others stay at their nominal values.
 std::vector<double> true_nuisances(const TransitionModel& model, const dynamics::NominalValues& contact);
 
 /// Mean over `replicates` laboratory experiments with the effects of 2 log(likelihood with them / without), true

@@ -19,8 +19,8 @@ struct Draw {
   double sign;
 };
 
-template <class Named>  // size -> Values
-SizedEffect sized(const Draw& d, double start, double largest, Named values, std::set<std::string> needs = {}) {
+template <class ValuesOf>  // size -> Values
+SizedEffect sized(const Draw& d, double start, double largest, ValuesOf values, std::set<std::string> needs = {}) {
   return {[id = d.id, truth = d.truth, values](double s) { return dynamics::effect_from_values(id, values(s), truth); },
           start, largest, std::move(needs)};
 }
@@ -128,37 +128,51 @@ SizedEffect ramp_vibration(const Draw& d) {
                {"time_s"});
 }
 
-const std::map<std::string, SizedEffect (*)(const Draw&)>& all() {
+// How an effect is drawn, and where it may rightly be found.
+struct Entry {
+  SizedEffect (*draw)(const Draw&);
+  std::vector<std::string> places;
+};
+
+const std::map<std::string, Entry>& all() {
   using D = Draw;
-  static const std::map<std::string, SizedEffect (*)(const Draw&)> makers{
-      {"contact_distribution", contact_distribution},
-      {"initial_speed", initial_speed},
-      {"leg_lengths", leg_lengths},
-      {"leg_contact", leg_contact},
-      {"hub_eccentricity", hub_eccentricity},
-      {"inertia", [](const D& d) { return ratio(d, "ratio", 0.01, 0.4); }},
-      {"slope_offset", [](const D& d) { return either_sign(d, "offset_deg", 0.05, 1.5); }},
-      {"slope_profile", slope_profile},
-      {"axle_drag_viscous", [](const D& d) { return plain(d, "n_m_s", 1e-3, 0.03); }},
-      {"rolling_resistance", [](const D& d) { return plain(d, "torque_n_m", 4e-3, 0.1); }},
-      {"air_drag", [](const D& d) { return plain(d, "n_m_s2", 2e-4, 6e-3); }},
-      {"speed_dependent_restitution", [](const D& d) { return either_sign(d, "exponent", 0.05, 1.5); }},
-      {"speed_dependent_friction", speed_dependent_friction},
-      {"contact_memory", [](const D& d) { return plain(d, "correlation", 0.1, 0.95); }},
-      {"friction_patch", friction_patch},
-      {"trial_drift", [](const D& d) { return either_sign(d, "relative_change", 0.03, 0.8); }},
-      {"trial_spread", [](const D& d) { return plain(d, "friction_sd", 0.015, 0.12); }},
-      {"contact_outliers", contact_outliers},
+  static const std::map<std::string, Entry> entries{
+      {"contact_distribution", {contact_distribution, {"phase", "speed", "condition", ":spread", ":mean"}}},
+      {"initial_speed", {initial_speed, {"collision", "phase", "condition", "speed"}}},
+      {"leg_lengths", {leg_lengths, {"leg"}}},
+      {"leg_contact", {leg_contact, {"leg"}}},
+      {"hub_eccentricity", {hub_eccentricity, {"leg"}}},
+      {"inertia", {[](const D& d) { return ratio(d, "ratio", 0.01, 0.4); }, {"phase", "speed", "condition"}}},
+      {"slope_offset",
+       {[](const D& d) { return either_sign(d, "offset_deg", 0.05, 1.5); }, {"phase", "condition", "speed"}}},
+      {"slope_profile", {slope_profile, {"position", "collision", "time"}}},
+      {"axle_drag_viscous",
+       {[](const D& d) { return plain(d, "n_m_s", 1e-3, 0.03); }, {"phase", "speed", "condition"}}},
+      {"rolling_resistance",
+       {[](const D& d) { return plain(d, "torque_n_m", 4e-3, 0.1); }, {"phase", "speed", "condition"}}},
+      {"air_drag", {[](const D& d) { return plain(d, "n_m_s2", 2e-4, 6e-3); }, {"phase", "speed", "condition"}}},
+      {"speed_dependent_restitution",
+       {[](const D& d) { return either_sign(d, "exponent", 0.05, 1.5); }, {"speed", "phase", "condition"}}},
+      {"speed_dependent_friction", {speed_dependent_friction, {"speed", "phase", "condition"}}},
+      {"contact_memory", {[](const D& d) { return plain(d, "correlation", 0.1, 0.95); }, {":memory"}}},
+      {"friction_patch", {friction_patch, {"position", "collision", "time"}}},
+      {"trial_drift", {[](const D& d) { return either_sign(d, "relative_change", 0.03, 0.8); }, {"trial"}}},
+      {"trial_spread", {[](const D& d) { return plain(d, "friction_sd", 0.015, 0.12); }, {"trial", ":memory"}}},
+      {"contact_outliers", {contact_outliers, {":tail", ":spread", "outcome"}}},
       {"sensor_noise",
-       [](const D& d) {
-         return plain(d, "sd_rad_s", 0.03, 0.5, {"noise", "omega_plus_rad_s"});
-       }},
-      {"sensor_bias", [](const D& d) { return either_sign(d, "bias_rad_s", 0.005, 0.3, {"omega_plus_rad_s"}); }},
-      {"bounce", [](const D& d) { return plain(d, "rebound_lost", 0.02, 1); }},
-      {"ramp_vibration", ramp_vibration},
-      {"slip_reversal", [](const D& d) { return sized(d, 1, 1, [](double) { return Values{}; }); }},
+       {[](const D& d) {
+          return plain(d, "sd_rad_s", 0.03, 0.5, {"noise", "omega_plus_rad_s"});
+        },
+        {":spread", ":memory", "phase"}}},
+      {"sensor_bias",
+       {[](const D& d) { return either_sign(d, "bias_rad_s", 0.005, 0.3, {"omega_plus_rad_s"}); }, {"phase", ":mean"}}},
+      {"bounce", {[](const D& d) { return plain(d, "rebound_lost", 0.02, 1); }, {"phase", "speed", "condition"}}},
+      {"ramp_vibration", {ramp_vibration, {"time", "speed", "phase", ":spread"}}},
+      {"slip_reversal",
+       {[](const D& d) { return sized(d, 1, 1, [](double) { return Values{}; }); },
+        {"phase", "speed", ":spread", ":tail", "condition"}}},
   };
-  return makers;
+  return entries;
 }
 
 }  // namespace
@@ -166,7 +180,13 @@ const std::map<std::string, SizedEffect (*)(const Draw&)>& all() {
 SizedEffect sized_effect(const std::string& id, const dynamics::NominalValues& truth, BlindDice& dice) {
   const auto found = all().find(id);
   if (found == all().end()) throw std::logic_error("sized_effect: " + id + " is not among those it can draw");
-  return found->second({id, truth, dice, dice.sign()});
+  return found->second.draw({id, truth, dice, dice.sign()});
+}
+
+const std::vector<std::string>& rightful_places(const std::string& id) {
+  static const std::vector<std::string> none;
+  const auto found = all().find(id);
+  return found == all().end() ? none : found->second.places;
 }
 
 }  // namespace metastable::analysis

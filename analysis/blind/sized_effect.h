@@ -1,9 +1,10 @@
 #pragma once
-// The effects of blind cases as functions of one size each.
+// The effects of blind cases as functions of one size each, and where they may be found. Each has one entry.
 
 #include <functional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "analysis/blind/blind_dice.h"
 #include "dynamics/wheel/effect_catalogue.h"
@@ -22,5 +23,8 @@ struct SizedEffect {
 /// @param truth  contact and legs to which the effect is added
 /// @throws std::logic_error naming an id for which nothing says how it is drawn
 SizedEffect sized_effect(const std::string& id, const dynamics::NominalValues& truth, BlindDice& dice);
+
+/// Facets, and aspects written with a leading ':', in which an effect may rightly be found; empty for an unknown id.
+const std::vector<std::string>& rightful_places(const std::string& id);
 
 }  // namespace metastable::analysis

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "analysis/description/transitions.h"
+#include "analysis/description/landings.h"
 #include "analysis/statistics/minimize.h"
 #include "analysis/statistics/profile_interval.h"
 #include "dynamics/return_map/landing_density.h"
@@ -33,8 +33,8 @@ std::vector<dynamics::WheelMap> maps_of(const Experiment& experiment, dynamics::
 
 constexpr ContactParameters wide = {0.4, 0.2, 0.4, 0.2};  // of maps whose noise does not matter
 
-std::vector<MeasuredTransition> collect(const Experiment& experiment, const std::vector<std::size_t>& conditions,
-                                        const ContactFitOptions& options, const std::vector<dynamics::WheelMap>& maps) {
+std::vector<MeasuredLanding> collect(const Experiment& experiment, const std::vector<std::size_t>& conditions,
+                                     const ContactFitOptions& options, const std::vector<dynamics::WheelMap>& maps) {
   if (experiment.system != System::rimless_wheel)
     throw std::invalid_argument("contact fit: a coast-down has neither restitution nor friction");
   for (const std::size_t condition : conditions)
@@ -43,16 +43,16 @@ std::vector<MeasuredTransition> collect(const Experiment& experiment, const std:
           fmt::format("contact fit: condition {} of {}", condition, experiment.conditions.size()));
   if (options.transition == Transition::collision && experiment.columns.omega_plus == Presence::none)
     throw std::invalid_argument("contact fit: collisions.csv has no omega_plus_rad_s to fit collisions to");
-  std::vector<MeasuredTransition> all = options.transition == Transition::step
-                                            ? step_transitions(experiment, conditions, maps)
-                                            : collision_transitions(experiment, conditions, maps);
-  std::erase_if(all, [](const MeasuredTransition& t) { return !(t.state > 0); });
+  std::vector<MeasuredLanding> all = options.transition == Transition::step
+                                         ? step_landings(experiment, conditions, maps)
+                                         : collision_landings(experiment, conditions, maps);
+  std::erase_if(all, [](const MeasuredLanding& t) { return !(t.state > 0); });
   if (all.empty()) throw std::invalid_argument("contact fit: no transition to fit");
   return all;
 }
 
-// The variables behind the parameters. An sd is sqrt(least_sd^2 + s^2): where the data show no spread, s = 0 is a
-// minimum like any other.
+// Turns parameters into the variables behind them. An sd is sqrt(least_sd^2 + s^2): where the data show no spread, s =
+// 0 is a minimum like any other.
 using Point = std::vector<double>;
 Point to_point(const ContactParameters& p) {
   const auto s = [](double sd) { return std::sqrt(std::max(sd * sd - least_sd * least_sd, 0.0)); };
@@ -61,7 +61,7 @@ Point to_point(const ContactParameters& p) {
 double to_sd(double s) { return std::hypot(least_sd, s); }
 ContactParameters to_parameters(const Point& x) { return {x[0], to_sd(x[1]), x[2], to_sd(x[3])}; }
 
-// Ranges of the variables. Means of mu end where the likelihood's grid is too coarse for a small spread.
+// Variables stay in these ranges. Means of mu end where the likelihood's grid is too coarse for a small spread.
 constexpr ContactParameters lowest = {-0.5, 0, -0.5, 0}, highest = {1.5, 1, 0.85, 1};
 
 // Minus the log-likelihood and its gradient; infinite beyond the ranges (an sd's variable may change its sign).
@@ -79,7 +79,7 @@ double cost(const ContactLikelihood& likelihood, const Point& x, Point& gradient
   return -value;
 }
 
-// Second derivatives, by central differences of the gradient.
+// Returns second derivatives, by central differences of the gradient.
 Eigen::MatrixXd curvature(const SmoothFunction& function, const Minimum& minimum) {
   const std::size_t n = minimum.at.size();
   constexpr double step = 2e-4;
@@ -137,7 +137,8 @@ bool same(const Point& a, const Point& b, double within) {
   return true;
 }
 
-// Where descents from a grid of starts and from the nominal contact end on every few-th transition, the best first.
+// Says where descents from a grid of starts and from the nominal contact end on every few-th transition, the best
+// first.
 std::vector<Point> best_starts(const SmoothFunction& function, const Experiment& experiment, dynamics::Law law) {
   constexpr std::size_t most = 4;
   constexpr double near = 4;  // of the best; the others' intervals would not count
@@ -215,8 +216,8 @@ struct Maximum {
   bool settled = false;  ///< no profile finds a higher likelihood
 };
 
-// The best of the modes and its profiles. A profile that finds a higher likelihood on its way starts the search anew
-// from there.
+// Picks the best of the modes and its profiles. A profile that finds a higher likelihood on its way starts the search
+// anew from there.
 Maximum best_of(const SmoothFunction& function, std::vector<Mode> modes, bool intervals) {
   Maximum result;
   for (int restart = 0; restart < 8 && !result.settled; ++restart) {
@@ -246,8 +247,8 @@ Maximum best_of(const SmoothFunction& function, std::vector<Mode> modes, bool in
   return result;
 }
 
-// Standard errors, directions and correlations from the curvature. A spread that the data do not show is at its least
-// value; the others then have their standard errors given that. Returns the names of such spreads.
+// Finds standard errors, directions and correlations from the curvature. A spread that the data do not show is at its
+// least value; the others then have their standard errors given that. Returns the names of such spreads.
 std::string describe_errors(ContactFit& fit, const Mode& mode) {
   std::vector<std::size_t> free;
   std::vector<std::string_view> bound;
@@ -290,10 +291,10 @@ void describe_intervals(ContactFit& fit, const Maximum& best, bool intervals) {
 double contact_log_likelihood(const Experiment& experiment, const std::vector<std::size_t>& conditions,
                               const ContactFitOptions& options, const ContactParameters& parameters) {
   const std::vector<dynamics::WheelMap> maps = maps_of(experiment, options.law, parameters);
-  const std::vector<MeasuredTransition> transitions = collect(experiment, conditions, options, maps);
+  const std::vector<MeasuredLanding> transitions = collect(experiment, conditions, options, maps);
   std::vector<double> terms(transitions.size());
   markov::parallel_for(transitions.size(), options.threads, [&](std::size_t i) {
-    const MeasuredTransition& t = transitions[i];
+    const MeasuredLanding& t = transitions[i];
     const dynamics::WheelMap& map = maps[t.condition];
     if (t.landing) {
       terms[i] = std::log(dynamics::LandingDensity(map, t.state, t.phase)(*t.landing));
@@ -329,7 +330,7 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
     return fit;
   }
   const std::vector<dynamics::WheelMap> maps = maps_of(experiment, options.law, wide);
-  const std::vector<MeasuredTransition> all = collect(experiment, conditions, options, maps);
+  const std::vector<MeasuredLanding> all = collect(experiment, conditions, options, maps);
   const ContactLikelihood likelihood(maps, all, options.threads);
   fit.transitions = likelihood.possible();
   fit.rests = likelihood.possible_rests();
@@ -346,7 +347,7 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
       return cost(of, x, gradient);
     };
   };
-  std::vector<MeasuredTransition> thinned;
+  std::vector<MeasuredLanding> thinned;
   for (std::size_t i = 0; i < all.size(); i += std::max<std::size_t>(1, all.size() / thinned_size))
     thinned.push_back(all[i]);
   const ContactLikelihood of_thinned(maps, thinned, options.threads);

@@ -27,14 +27,23 @@ std::vector<double> friction_nodes(const dynamics::WheelMap& map, int phase) {
   return nodes;
 }
 
+double restitution_at(std::size_t column) { return static_cast<double>(column) / (columns - 1); }
+
+// A node of the grid with omega+^2 there.
+struct Corner {
+  double restitution, friction, value;
+};
+
+}  // namespace
+
 // omega+^2 = scale x - drag sqrt(x) of one phase on the grid, column by column.
-struct Surface {
+struct ContactLikelihood::Surface {
   std::vector<double> friction;
   std::vector<dynamics::StepCoefficients> node;
+
   Surface(const dynamics::WheelMap& map, int phase) : friction(friction_nodes(map, phase)) {
     for (std::size_t j = 0; j < columns; ++j)
-      for (const double mu : friction)
-        node.push_back(map.coefficients(phase, {static_cast<double>(j) / (columns - 1), mu}));
+      for (const double mu : friction) node.push_back(map.coefficients(phase, {restitution_at(j), mu}));
   }
   std::vector<double> after(double state) const {
     const double omega = std::sqrt(state);
@@ -44,114 +53,148 @@ struct Surface {
   }
 };
 
-struct Corner {
-  double restitution, friction, value;
-};
+// Intervals of mu that rest, for each eta.
+std::vector<ContactLikelihood::Piece> ContactLikelihood::region_of_rest(const Surface& surface,
+                                                                        const std::vector<double>& after,
+                                                                        double barrier) {
+  const std::vector<double>& mu = surface.friction;
+  const std::size_t rows = mu.size();
+  std::vector<Piece> pieces;
+  for (std::size_t j = 0; j < columns; ++j) {
+    const double* column = after.data() + j * rows;
+    for (std::size_t i = 0; i + 1 < rows; ++i) {
+      const double a = column[i] - barrier, b = column[i + 1] - barrier;
+      if (a >= 0 && b >= 0) continue;
+      double from = mu[i], to = mu[i + 1];
+      if (a >= 0) from = std::isinf(b) ? to : from + (to - from) * a / (a - b);
+      if (b >= 0) to = std::isinf(a) ? from : from + (to - from) * a / (a - b);
+      if (!pieces.empty() && pieces.back().column == j && pieces.back().friction_to == from)
+        pieces.back().friction_to = to;
+      else
+        pieces.push_back({restitution_at(j), from, 0, to, j});
+    }
+    if (column[rows - 1] < barrier && !pieces.empty()) pieces.back().friction_to = infinity;
+  }
+  return pieces;
+}
 
-}  // namespace
+// The curve of the (eta, mu) that lead from one state to its landing: where omega+^2 has the level it needs for that.
+class ContactLikelihood::LevelCurve {
+ public:
+  LevelCurve(const dynamics::WheelMap& map, const MeasuredLanding& transition)
+      : map_(map),
+        state_(transition.state),
+        phase_(transition.phase),
+        level_(*transition.landing - map.stance(transition.phase).gain) {}
 
-ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps,
-                                     std::span<const MeasuredTransition> transitions, int threads)
-    : threads_(threads) {
-  std::map<std::pair<std::size_t, int>, Surface> surfaces;
-  for (const MeasuredTransition& t : transitions)
-    surfaces.try_emplace({t.condition, t.phase}, maps[t.condition], t.phase);
-
-  std::vector<Term> terms(transitions.size());
-  markov::parallel_for(transitions.size(), threads, [&](std::size_t number) {
-    const MeasuredTransition& t = transitions[number];
-    const dynamics::WheelMap& map = maps[t.condition];
-    const dynamics::Stance& stance = map.stance(t.phase);
-    const Surface& surface = surfaces.at({t.condition, t.phase});
-    const std::vector<double> after = surface.after(t.state);
+  std::vector<Piece> pieces(const Surface& surface, const std::vector<double>& after) {
     const std::vector<double>& mu = surface.friction;
     const std::size_t rows = mu.size();
-    Term& term = terms[number];
-    term.landing = t.landing.has_value();
-    term.rested = t.rested;
-    const auto eta = [](std::size_t j) { return static_cast<double>(j) / (columns - 1); };
-    if (!term.landing) {
-      // Intervals of mu that rest, for each eta.
-      for (std::size_t j = 0; j < columns; ++j) {
-        const double* column = after.data() + j * rows;
-        for (std::size_t i = 0; i + 1 < rows; ++i) {
-          const double a = column[i] - stance.barrier, b = column[i + 1] - stance.barrier;
-          if (a >= 0 && b >= 0) continue;
-          double from = mu[i], to = mu[i + 1];
-          if (a >= 0) from = std::isinf(b) ? to : from + (to - from) * a / (a - b);
-          if (b >= 0) to = std::isinf(a) ? from : from + (to - from) * a / (a - b);
-          if (!term.pieces.empty() && term.pieces.back().column == j && term.pieces.back().friction_to == from)
-            term.pieces.back().friction_to = to;
-          else
-            term.pieces.push_back({eta(j), from, 0, to, j});
-        }
-        if (column[rows - 1] < stance.barrier && !term.pieces.empty()) term.pieces.back().friction_to = infinity;
-      }
-      return;
-    }
-    const double level = *t.landing - stance.gain;
-    const auto cross = [&](const Corner& a, const Corner& b) {
-      const double share = (level - a.value) / (b.value - a.value);
-      return std::pair{a.restitution + share * (b.restitution - a.restitution),
-                       a.friction + share * (b.friction - a.friction)};
-    };
-    const auto triangle = [&](const Corner& a, const Corner& b, const Corner& c) {
-      const bool above_a = a.value > level, above_b = b.value > level, above_c = c.value > level;
-      if (above_a == above_b && above_b == above_c) return;
-      const Corner& lone = above_b == above_c ? a : above_a == above_c ? b : c;
-      const Corner& one = above_b == above_c ? b : a;
-      const Corner& two = above_b == above_c || above_a == above_c ? c : b;
-      const auto [x1, y1] = cross(lone, one);
-      const auto [x2, y2] = cross(lone, two);
-      const double dx1 = b.restitution - a.restitution, dy1 = b.friction - a.friction, dv1 = b.value - a.value;
-      const double dx2 = c.restitution - a.restitution, dy2 = c.friction - a.friction, dv2 = c.value - a.value;
-      double gradient = std::hypot(dv1 * dy2 - dv2 * dy1, dx1 * dv2 - dx2 * dv1) / std::abs(dx1 * dy2 - dx2 * dy1);
-      double shift_x = 0, shift_y = 0;
-      // That is the gradient of the plane through the corners; the surface's own takes its place unless it changes
-      // within the triangle, as it does about its extremes.
-      constexpr double h = 1e-5;
-      const double x = std::clamp((x1 + x2) / 2, h, 1 - h), y = std::max((y1 + y2) / 2, h);
-      const auto value = [&](double dx, double dy) { return map.after_collision(t.state, t.phase, {x + dx, y + dy}); };
-      const double gx = (value(h, 0) - value(-h, 0)) / (2 * h), gy = (value(0, h) - value(0, -h)) / (2 * h);
-      const double own = std::hypot(gx, gy);
-      if (own > gradient / 1.5 && own < gradient * 1.5) {
-        const double miss = (level - value(0, 0)) / (own * own);
-        shift_x = miss * gx;
-        shift_y = miss * gy;
-        gradient = own;
-      }
-      const double weight = std::hypot(x2 - x1, y2 - y1) / gradient / 2;
-      for (const double at : {0.5 - gauss, 0.5 + gauss})
-        term.pieces.push_back({x1 + at * (x2 - x1) + shift_x, y1 + at * (y2 - y1) + shift_y, weight, 0, 0});
-    };
     for (std::size_t j = 0; j + 1 < columns; ++j)
       for (std::size_t i = 0; i + 1 < rows; ++i) {
         const double* p = after.data() + j * rows + i;
         const double* q = p + rows;
-        const bool above = p[0] > level;
-        if (above == (p[1] > level) && above == (q[0] > level) && above == (q[1] > level)) continue;
+        const bool above = p[0] > level_;
+        if (above == (p[1] > level_) && above == (q[0] > level_) && above == (q[1] > level_)) continue;
         if (!(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(q[0]) && std::isfinite(q[1]))) continue;
-        const Corner a{eta(j), mu[i], p[0]}, b{eta(j), mu[i + 1], p[1]}, c{eta(j + 1), mu[i], q[0]},
-            d{eta(j + 1), mu[i + 1], q[1]};
-        triangle(a, b, c);
-        triangle(b, c, d);
+        const Corner a{restitution_at(j), mu[i], p[0]}, b{restitution_at(j), mu[i + 1], p[1]},
+            c{restitution_at(j + 1), mu[i], q[0]}, d{restitution_at(j + 1), mu[i + 1], q[1]};
+        pass_through(a, b, c);
+        pass_through(b, c, d);
       }
+    return std::move(pieces_);
+  }
+
+ private:
+  // Where the level lies between two corners.
+  std::pair<double, double> cross(const Corner& a, const Corner& b) const {
+    const double share = (level_ - a.value) / (b.value - a.value);
+    return {a.restitution + share * (b.restitution - a.restitution), a.friction + share * (b.friction - a.friction)};
+  }
+
+  double after(double restitution, double friction) const {
+    return map_.after_collision(state_, phase_, {restitution, friction});
+  }
+
+  // How far the curve lies from the triangle's chord, and |grad omega+^2| there.
+  struct Bend {
+    double gradient, shift_x = 0, shift_y = 0;
+  };
+
+  // The gradient of the plane through the corners; the surface's own takes its place unless it changes within the
+  // triangle, as it does about its extremes.
+  Bend bend(const Corner& a, const Corner& b, const Corner& c, double middle_x, double middle_y) const {
+    const double dx1 = b.restitution - a.restitution, dy1 = b.friction - a.friction, dv1 = b.value - a.value;
+    const double dx2 = c.restitution - a.restitution, dy2 = c.friction - a.friction, dv2 = c.value - a.value;
+    Bend bend{std::hypot(dv1 * dy2 - dv2 * dy1, dx1 * dv2 - dx2 * dv1) / std::abs(dx1 * dy2 - dx2 * dy1)};
+    constexpr double h = 1e-5;
+    const double x = std::clamp(middle_x, h, 1 - h), y = std::max(middle_y, h);
+    const double gx = (after(x + h, y) - after(x - h, y)) / (2 * h), gy = (after(x, y + h) - after(x, y - h)) / (2 * h);
+    const double own = std::hypot(gx, gy);
+    if (own > bend.gradient / 1.5 && own < bend.gradient * 1.5) {
+      const double miss = (level_ - after(x, y)) / (own * own);
+      bend = {own, miss * gx, miss * gy};
+    }
+    return bend;
+  }
+
+  // The curve's piece in one triangle, by two points of Gauss's rule.
+  void pass_through(const Corner& a, const Corner& b, const Corner& c) {
+    const bool above_a = a.value > level_, above_b = b.value > level_, above_c = c.value > level_;
+    if (above_a == above_b && above_b == above_c) return;
+    const Corner& lone = above_b == above_c ? a : above_a == above_c ? b : c;
+    const Corner& one = above_b == above_c ? b : a;
+    const Corner& two = above_b == above_c || above_a == above_c ? c : b;
+    const auto [x1, y1] = cross(lone, one);
+    const auto [x2, y2] = cross(lone, two);
+    const auto [gradient, shift_x, shift_y] = bend(a, b, c, (x1 + x2) / 2, (y1 + y2) / 2);
+    const double weight = std::hypot(x2 - x1, y2 - y1) / gradient / 2;
+    for (const double at : {0.5 - gauss, 0.5 + gauss})
+      pieces_.push_back({x1 + at * (x2 - x1) + shift_x, y1 + at * (y2 - y1) + shift_y, weight, 0, 0});
+  }
+
+  const dynamics::WheelMap& map_;
+  double state_;
+  int phase_;
+  double level_;  // of omega+^2
+  std::vector<Piece> pieces_;
+};
+
+ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps,
+                                     std::span<const MeasuredLanding> transitions, int threads)
+    : threads_(threads) {
+  std::map<std::pair<std::size_t, int>, Surface> surfaces;
+  for (const MeasuredLanding& t : transitions)
+    surfaces.try_emplace({t.condition, t.phase}, maps[t.condition], t.phase);
+  std::vector<Observed> all(transitions.size());
+  markov::parallel_for(transitions.size(), threads, [&](std::size_t number) {
+    const MeasuredLanding& t = transitions[number];
+    const dynamics::WheelMap& map = maps[t.condition];
+    const Surface& surface = surfaces.at({t.condition, t.phase});
+    const std::vector<double> after = surface.after(t.state);
+    all[number] = {t.landing.has_value(), t.rested,
+                   t.landing ? LevelCurve(map, t).pieces(surface, after)
+                             : region_of_rest(surface, after, map.stance(t.phase).barrier)};
   });
-  for (Term& term : terms) {
+  keep_possible(std::move(all));
+}
+
+void ContactLikelihood::keep_possible(std::vector<Observed> all) {
+  for (Observed& observed : all) {
     // A survivor whose region of rest is empty is certain, not impossible.
-    if (term.pieces.empty() && (term.landing || term.rested)) {
+    if (observed.pieces.empty() && (observed.landing || observed.rested)) {
       ++impossible_;
       continue;
     }
-    rests_ += term.rested;
-    terms_.push_back(std::move(term));
+    rests_ += observed.rested;
+    possible_.push_back(std::move(observed));
   }
 }
 
-ContactLikelihood::Value ContactLikelihood::density(const Term& term, const ContactParameters& p) {
+ContactLikelihood::Value ContactLikelihood::density(const Observed& observed, const ContactParameters& p) {
   double sum = 0, u1 = 0, u2 = 0, v1 = 0, v2 = 0;  // moments along the curve
   const double a = 1 / p[1], b = 1 / p[3];
-  for (const Piece& piece : term.pieces) {
+  for (const Piece& piece : observed.pieces) {
     const double u = (piece.restitution - p[0]) * a, v = (piece.friction - p[2]) * b;
     const double share = piece.weight * std::exp(-0.5 * (u * u + v * v));
     sum += share;
@@ -170,7 +213,7 @@ std::vector<ContactLikelihood::ColumnWeight> ContactLikelihood::column_weights(
   for (std::size_t j = 0; j + 1 < columns; ++j) {
     const double a = static_cast<double>(j) * h, b = static_cast<double>(j + 1) * h;
     const double at_a = restitution.density(a), at_b = restitution.density(b);
-    // Mass between the columns and its first moment about a, with their derivatives by mean and sd.
+    // This is the mass between the columns and its first moment about a, with derivatives by mean and sd.
     const double mass[3] = {restitution.between(a, b), at_a - at_b, (at_a * (a - mean) - at_b * (b - mean)) / sd};
     const double moment[3] = {(mean - a) * mass[0] - sd * sd * (at_b - at_a), mass[0] - h * at_b,
                               -h * at_b * (b - mean) / sd - sd * (at_b - at_a)};
@@ -183,11 +226,11 @@ std::vector<ContactLikelihood::ColumnWeight> ContactLikelihood::column_weights(
   return weights;
 }
 
-ContactLikelihood::Value ContactLikelihood::rest(const Term& term, const std::vector<ColumnWeight>& weights,
+ContactLikelihood::Value ContactLikelihood::rest(const Observed& observed, const std::vector<ColumnWeight>& weights,
                                                  const dynamics::TruncatedNormal& friction, const ContactParameters& p,
                                                  const ContactParameters& truncation) {
   Value rest;
-  for (const Piece& piece : term.pieces) {
+  for (const Piece& piece : observed.pieces) {
     const ColumnWeight& weight = weights[piece.column];
     if (!(weight[0] > 0)) continue;
     const double within = friction.between(piece.friction, piece.friction_to);
@@ -225,19 +268,19 @@ double ContactLikelihood::operator()(const ContactParameters& p, ContactParamete
     ContactParameters slope{};
   };
   constexpr std::size_t block = 256;  // sums in an order that does not depend on the threads
-  std::vector<Sum> sums((terms_.size() + block - 1) / block);
+  std::vector<Sum> sums((possible_.size() + block - 1) / block);
   markov::parallel_for(sums.size(), threads_, [&](std::size_t s) {
-    for (std::size_t i = s * block; i < std::min(terms_.size(), (s + 1) * block); ++i) {
-      const Term& term = terms_[i];
-      if (term.landing) {
-        const Value landing = density(term, p);
+    for (std::size_t i = s * block; i < std::min(possible_.size(), (s + 1) * block); ++i) {
+      const Observed& observed = possible_[i];
+      if (observed.landing) {
+        const Value landing = density(observed, p);
         sums[s].value += std::log(landing.value / inside);
         for (std::size_t k = 0; k < 4; ++k) sums[s].slope[k] += landing.slope[k] - truncation[k];
-      } else if (term.rested || !term.pieces.empty()) {
-        const Value stays = rest(term, weights, friction, p, truncation);
-        sums[s].value += term.rested ? std::log(stays.value) : std::log1p(-stays.value);
-        if (stays.value == 0 && !term.rested) continue;
-        const double share = term.rested ? 1 : -stays.value / (1 - stays.value);
+      } else if (observed.rested || !observed.pieces.empty()) {
+        const Value stays = rest(observed, weights, friction, p, truncation);
+        sums[s].value += observed.rested ? std::log(stays.value) : std::log1p(-stays.value);
+        if (stays.value == 0 && !observed.rested) continue;
+        const double share = observed.rested ? 1 : -stays.value / (1 - stays.value);
         for (std::size_t k = 0; k < 4; ++k) sums[s].slope[k] += share * stays.slope[k];
       }
     }

@@ -1,17 +1,17 @@
 #pragma once
-// Likelihood of (eta, mu) distributions for many parameter values: the geometry is worked out once.
+// Evaluates the likelihood of (eta, mu) distributions for many parameters: the geometry is worked out once.
 
 #include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
 
-#include "analysis/description/transitions.h"
+#include "analysis/description/landings.h"
 #include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::analysis {
 
-/// eta ~ N(mean, sd^2) on [0, 1] and mu ~ N(mean, sd^2) on [0, inf), independent: mean and sd of eta, then of mu.
+/// Holds mean and sd of eta, then of mu: eta ~ N(mean, sd^2) on [0, 1] and mu ~ N(mean, sd^2) on [0, inf), independent.
 using ContactParameters = std::array<double, 4>;
 
 /// Which (eta, mu) lead from a state to its landing is a curve that does not depend on how eta and mu are distributed.
@@ -24,42 +24,48 @@ class ContactLikelihood {
  public:
   /// @param maps  one a condition of the transitions; their noise does not matter
   /// O(transitions x 60000), once
-  ContactLikelihood(const std::vector<dynamics::WheelMap>& maps, std::span<const MeasuredTransition> transitions,
+  ContactLikelihood(const std::vector<dynamics::WheelMap>& maps, std::span<const MeasuredLanding> transitions,
                     int threads);
 
-  /// Sum of ln density of the landings [1/(rad^2/s^2)] and ln probability of rest or survival. -infinity where one of
+  /// Sums ln density of the landings [1/(rad^2/s^2)] and ln probability of rest or survival. -infinity where one of
   /// them vanishes. Fills `gradient`, if given, with the derivatives by the parameters (NaN where it is infinite).
   double operator()(const ContactParameters& parameters, ContactParameters* gradient = nullptr) const;
 
   /// Transitions that some eta and mu can lead to, and how many others there are.
-  std::size_t possible() const { return terms_.size(); }
+  std::size_t possible() const { return possible_.size(); }
   std::size_t possible_rests() const { return rests_; }
   std::size_t impossible() const { return impossible_; }
 
  private:
-  struct Piece {  // of a curve: a point, and its share of length / |grad x'|; of a region: column of eta, mu from and
-                  // to
+  /// Of a curve: a point, and its share of length / |grad x'|. Of a region: a column of eta, mu from and to.
+  struct Piece {
     double restitution, friction, weight, friction_to;
     std::size_t column;
   };
-  struct Term {
+  /// One transition: the curve that leads to its landing, or the region that rests.
+  struct Observed {
     bool landing, rested;
     std::vector<Piece> pieces;
   };
-  // A probability or density, and its logarithm's derivatives.
+  /// A probability or density, and its logarithm's derivatives.
   struct Value {
     double value = 0;
     ContactParameters slope{};
   };
-  // Of the untruncated normals.
-  static Value density(const Term& term, const ContactParameters& parameters);
-  using ColumnWeight = std::array<double, 3>;  // of one eta of the grid, and its derivatives by eta's mean and sd
+  struct Surface;
+  class LevelCurve;
+  static std::vector<Piece> region_of_rest(const Surface& surface, const std::vector<double>& after, double barrier);
+  void keep_possible(std::vector<Observed> all);
+  /// The density takes normals that are not truncated.
+  static Value density(const Observed& observed, const ContactParameters& parameters);
+  /// The weight of one eta of the grid, and its derivatives by eta's mean and sd.
+  using ColumnWeight = std::array<double, 3>;
   static std::vector<ColumnWeight> column_weights(const dynamics::TruncatedNormal& restitution);
-  static Value rest(const Term& term, const std::vector<ColumnWeight>& weights,
+  static Value rest(const Observed& observed, const std::vector<ColumnWeight>& weights,
                     const dynamics::TruncatedNormal& friction, const ContactParameters& parameters,
                     const ContactParameters& truncation);
 
-  std::vector<Term> terms_;
+  std::vector<Observed> possible_;
   std::size_t rests_ = 0, impossible_ = 0;
   int threads_ = 0;
 };

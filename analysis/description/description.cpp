@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "analysis/description/transitions.h"
+#include "analysis/description/landings.h"
 
 namespace metastable::analysis {
 namespace {
@@ -33,8 +33,8 @@ ConditionDescription describe_condition(const Experiment& experiment, std::size_
   c.trials = c.speeds.size();
   for (const std::vector<double>& trial : c.speeds) c.collisions += trial.size();
   c.profile = speed_profile(c.speeds);
-  c.steady = summarize(steady_trial_means(c.speeds));
-  c.steady_collisions = summarize(steady_speeds(c.speeds));
+  c.steady = speed_summary(steady_trial_means(c.speeds));
+  c.steady_collisions = speed_summary(steady_speeds(c.speeds));
   c.legs = speed_per_leg(experiment, index, experiment.legs() + 1);
   c.line = return_map_line(c.speeds, 1);
   c.survival = survival(experiment, index, seed);

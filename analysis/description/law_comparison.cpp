@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "analysis/description/transitions.h"
+#include "analysis/description/landings.h"
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/statistics/interval_95.h"
 #include "analysis/statistics/two_sample_tests.h"
@@ -13,8 +13,8 @@ namespace {
 void summarize_speeds(LawRow& row, const TrialSpeeds& speeds, const std::vector<double>& measured) {
   row.trials = speeds.size();
   const std::vector<double> means = steady_trial_means(speeds);
-  row.steady = summarize(means);
-  row.collision_sd = summarize(steady_speeds(speeds)).sd;
+  row.steady = speed_summary(means);
+  row.collision_sd = speed_summary(steady_speeds(speeds)).sd;
   if (means.size() >= 2 && measured.size() >= 2) row.p_speed = welch_t_test(means, measured).p;
 }
 

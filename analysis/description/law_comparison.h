@@ -1,5 +1,5 @@
 #pragma once
-// An experiment beside what the contact laws predict for it.
+// Puts an experiment beside what the contact laws predict for it.
 
 #include <cstdint>
 #include <functional>
@@ -11,11 +11,11 @@
 #include "analysis/description/contact_fit.h"
 #include "analysis/description/speed_profile.h"
 #include "analysis/experiment/experiment.h"
-#include "analysis/study/metastability.h"
+#include "analysis/statistics/estimate.h"
 
 namespace metastable::analysis {
 
-/// One condition, measured or predicted.
+/// Holds one condition, measured or predicted.
 struct LawRow {
   std::string condition;
   std::string source;             ///< "measured", "coulomb, as given", "published, fitted", ...
@@ -33,9 +33,10 @@ struct LawComparison {
   std::vector<std::pair<dynamics::Law, ContactFit>> fits;
 };
 
-/// Every condition against every law, with (eta, mu) as given and as fitted to all conditions (steps from omega_minus
-/// to the next). Simulated trials start as the measured ones (stated launch, else mean and sd at collision 1) and are
-/// followed to the ramp's end or to the last collision that a trial of the condition reached, whichever comes first.
+/// Holds every condition against every law, with (eta, mu) as given and as fitted to all conditions (steps from
+/// omega_minus to the next). Simulated trials start as the measured ones (stated launch, else mean and sd at collision
+/// 1) and are followed to the ramp's end or to the last collision that a trial of the condition reached, whichever
+/// comes first.
 /// @param trials  simulated trials a row, >= 2
 LawComparison compare_laws(const Experiment& experiment, const std::vector<dynamics::Law>& laws, int trials,
                            std::uint64_t seed, int threads, const std::function<void()>& progress = {});

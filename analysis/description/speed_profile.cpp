@@ -29,7 +29,7 @@ TrialSpeeds speeds(const std::vector<dynamics::Trial>& trials) {
   return all;
 }
 
-SpeedSummary summarize(std::span<const double> values) {
+SpeedSummary speed_summary(std::span<const double> values) {
   SpeedSummary s;
   s.count = values.size();
   const auto n = static_cast<double>(s.count);
@@ -53,7 +53,8 @@ std::vector<SpeedSummary> speed_profile(const TrialSpeeds& trials) {
   std::size_t longest = 0;
   for (const std::vector<double>& trial : trials) longest = std::max(longest, trial.size());
   std::vector<SpeedSummary> profile;
-  for (std::size_t k = 1; k <= longest; ++k) profile.push_back(summarize(at_collision(trials, static_cast<int>(k))));
+  for (std::size_t k = 1; k <= longest; ++k)
+    profile.push_back(speed_summary(at_collision(trials, static_cast<int>(k))));
   return profile;
 }
 
@@ -68,7 +69,7 @@ std::vector<double> steady_trial_means(const TrialSpeeds& trials, int from) {
   std::vector<double> means;
   for (const std::vector<double>& trial : trials) {
     const auto skip = static_cast<std::size_t>(from) - 1;
-    if (trial.size() > skip) means.push_back(summarize(std::span(trial).subspan(skip)).mean);
+    if (trial.size() > skip) means.push_back(speed_summary(std::span(trial).subspan(skip)).mean);
   }
   return means;
 }
@@ -84,10 +85,10 @@ std::optional<std::vector<SpeedSummary>> speed_per_leg(const Experiment& experim
       of_leg[static_cast<std::size_t>(*c.leg)].push_back(c.omega_minus);
     }
     for (std::size_t leg = 0; leg < means.size(); ++leg)
-      if (!of_leg[leg].empty()) means[leg].push_back(summarize(of_leg[leg]).mean);
+      if (!of_leg[leg].empty()) means[leg].push_back(speed_summary(of_leg[leg]).mean);
   }
   std::vector<SpeedSummary> summaries;
-  for (const std::vector<double>& one : means) summaries.push_back(summarize(one));
+  for (const std::vector<double>& one : means) summaries.push_back(speed_summary(one));
   return summaries;
 }
 

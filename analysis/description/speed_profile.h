@@ -14,7 +14,7 @@ namespace metastable::analysis {
 /// Speeds just before collisions 1, 2, ... [rad/s], one list a trial.
 using TrialSpeeds = std::vector<std::vector<double>>;
 
-/// Of the trials of one condition. @throws std::invalid_argument for an index out of range
+/// Takes the trials of one condition. @throws std::invalid_argument for an index out of range
 TrialSpeeds speeds(const Experiment& experiment, std::size_t condition);
 TrialSpeeds speeds(const std::vector<dynamics::Trial>& trials);
 
@@ -27,14 +27,15 @@ struct SpeedSummary {
   double sd = 0;              ///< between the values [rad/s]; 0 for fewer than two
   double standard_error = 0;  ///< of the mean, sd / sqrt(count)
 };
-SpeedSummary summarize(std::span<const double> values);
+SpeedSummary speed_summary(std::span<const double> values);
 
-/// Speeds at collision `number` (from 1) of the trials that got there.
+/// Returns the speeds at collision `number` (from 1) of the trials that got there.
 std::vector<double> at_collision(const TrialSpeeds& trials, int number);
 /// Entry k is collision k + 1, up to the longest trial.
 std::vector<SpeedSummary> speed_profile(const TrialSpeeds& trials);
 
-/// Speeds from collision `from` on: all of them, and the mean of each trial that got there (one a trial: independent).
+/// Return the speeds from collision `from` on: all of them, and the mean of each trial that got there (one a trial:
+/// independent).
 std::vector<double> steady_speeds(const TrialSpeeds& trials, int from = steady_collision);
 std::vector<double> steady_trial_means(const TrialSpeeds& trials, int from = steady_collision);
 
@@ -42,7 +43,7 @@ std::vector<double> steady_trial_means(const TrialSpeeds& trials, int from = ste
 /// is leg i; nothing if the legs of some collision are not known.
 std::optional<std::vector<SpeedSummary>> speed_per_leg(const Experiment& experiment, std::size_t condition, int from);
 
-/// Straight line through the pairs (omega_k, omega_k+1) from collision `from` on.
+/// Fits a straight line to the pairs (omega_k, omega_k+1) from collision `from` on.
 struct ReturnMapLine {
   std::size_t pairs = 0;
   double slope = 0, slope_error = 0;  ///< standard error, allowing for dependence within trials (sandwich)

@@ -65,8 +65,8 @@ double log_evidence(const ScannedEffect& scanned, double gain) {
          0.5 * parameters * std::log1p(g);
 }
 
-Term term_at(const ScannedEffect& scanned, std::size_t variant) {
-  Term term{scanned.candidate, scanned.candidate->variants[variant], {}};
+EffectTerm term_at(const ScannedEffect& scanned, std::size_t variant) {
+  EffectTerm term{scanned.candidate, scanned.candidate->variants[variant], {}};
   for (std::size_t p = 0; p < scanned.candidate->parameters.size(); ++p) {
     const FreeParameter& parameter = scanned.candidate->parameters[p];
     // Far from the neutral value the scores say little.
@@ -77,7 +77,7 @@ Term term_at(const ScannedEffect& scanned, std::size_t variant) {
   return term;
 }
 
-// Variants worth a full fit.
+// These variants are worth a full fit.
 std::vector<std::size_t> leading_variants(const ScannedEffect& scanned) {
   std::vector<std::size_t> order(scanned.gain.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -99,7 +99,7 @@ void refine_variant(const TransitionModel& model, Fit& best) {
     for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
       if (spacing[entry] == 0) continue;
       for (const double sign : {1.0, -1.0}) {
-        std::vector<Term> terms = best.terms;
+        std::vector<EffectTerm> terms = best.terms;
         terms.back().variant[entry] += sign * share * spacing[entry];
         Fit tried =
             fit(model, best.nuisance, terms, {.count = {}, .refit_nuisances = true, .most_iterations = refining_steps});
@@ -112,12 +112,12 @@ void refine_variant(const TransitionModel& model, Fit& best) {
     }
 }
 
-// The best fit of `base` with one more effect.
+// Finds the best fit of `base` with one more effect.
 RankedCause fit_cause(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned) {
   RankedCause cause;
   bool first = true;
   for (const std::size_t variant : leading_variants(scanned)) {
-    std::vector<Term> terms = base.terms;
+    std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(scanned, variant));
     Fit tried = best_fit(model, base.nuisance, terms);
     if (tried.penalised < base.penalised) {  // a bad start: from nothing instead
@@ -136,7 +136,8 @@ RankedCause fit_cause(const TransitionModel& model, const Fit& base, const Scann
   return cause;
 }
 
-// What a second effect gained beyond the model error of the first. `exact`: the part of the first that has none.
+// A second effect counts for what it gained beyond the model error of the first. `exact`: the part of the first that
+// has none.
 double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact) {
   const PhaseGain before = phase_gain(model, first, exact), now = phase_gain(model, pair, first);
   const double tolerated = model_error * model_error;
@@ -226,7 +227,7 @@ class Ranker {
   double top_ = 0;  // evidence of the best of them
 };
 
-// Chance of such a gain by one effect alone.
+// How likely one effect alone gains as much by chance.
 double Ranker::p_value(const Candidate* candidate, double gain) const {
   if (candidate->parameters.empty()) return 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, gain)));
   return chance_.p_value(candidate, gain);
@@ -244,7 +245,7 @@ void Ranker::fit_law(RankedCause& cause) const {
   if (!cause.fit.converged && cause.fit.penalised - recalibrated_.penalised > law_hopeless)
     cause.fit = from(cause.fit.nuisance, more_law_steps);
   cause.gain = gain(cause.fit);
-  // Far below and hardly rising any more: decided against.
+  // What is far below and hardly rises any more is decided against.
   if (!cause.fit.converged && cause.gain > law_refuted) cause.not_decided = cause.fit.reason;
   cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
   cause.evidence = 0.5 * cause.gain;
@@ -267,7 +268,7 @@ void Ranker::fit_singles() {
     heartbeat();
     const Candidate* candidate = candidates_[i];
     RankedCause& cause = singles_[i];
-    cause.terms = {Term{candidate, candidate->variants[0], {}}};
+    cause.terms = {EffectTerm{candidate, candidate->variants[0], {}}};
     if (!candidate->undecidable.empty()) {
       cause.not_decided = candidate->undecidable;
       cause.evidence = -std::numeric_limits<double>::infinity();
@@ -306,7 +307,7 @@ void Ranker::fit_overlooked() {
     }
 }
 
-// The strongest fitted effects, by falling evidence. `to_refine`: of those with variants between the listed ones.
+// Lists the strongest fitted effects by falling evidence. `to_refine`: of those with variants between the listed ones.
 std::vector<std::size_t> Ranker::leaders(bool to_refine) const {
   std::vector<std::size_t> all;
   for (std::size_t i = 0; i < singles_.size(); ++i)
@@ -409,11 +410,11 @@ void Ranker::scan_asked_pairs() {
   }
 }
 
-// What the two effects of a pair gain each by itself, summed.
+// Sums what the two effects of a pair gain each by itself.
 double Ranker::gain_alone(const RankedCause& pair) const {
   double alone = 0;
   for (const RankedCause& cause : singles_)
-    for (const Term& term : pair.terms)
+    for (const EffectTerm& term : pair.terms)
       if (cause.terms[0].candidate == term.candidate) alone += std::max(0.0, cause.gain);
   return alone;
 }
@@ -455,9 +456,9 @@ PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit&
   return gain;
 }
 
-const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<Term>& terms,
+const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<EffectTerm>& terms,
                       const Fit& recalibrated) {
-  for (const Term& term : terms)
+  for (const EffectTerm& term : terms)
     for (const RankedCause& cause : singles)
       if (term.candidate->exact && cause.terms[0].candidate == term.candidate && !cause.fit.nuisance.empty())
         return cause.fit;

@@ -1,5 +1,5 @@
 #pragma once
-// Which effect: every candidate fitted, weighed and compared with chance; pairs where they earn it.
+// Which effect it is: every candidate is fitted, weighed and compared with chance; pairs where they earn it.
 
 #include <functional>
 #include <string>
@@ -10,9 +10,9 @@
 
 namespace metastable::analysis {
 
-/// One hypothesis: one effect or two.
+/// A hypothesis supposes one effect or two.
 struct RankedCause {
-  std::vector<Term> terms;
+  std::vector<EffectTerm> terms;
   Fit fit;
   double gain = 0;  ///< 2 Delta penalised log likelihood over the recalibrated model
   /// Of the gain by chance: of a single effect by the variants listed, before one between them was sought; of a pair
@@ -52,11 +52,6 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
 
 inline constexpr double model_error = 0.06;
 
-/// Two causes at work at once gain what they gain alone (1.07 times at most, in 72 simulated pairs); two that gain far
-/// more together bend each other into the shape of something else (1.3 to 2.4 times where a spread of restitution that
-/// depends on speed passed for two mean effects that cancel). Beyond this ratio a pair describes and does not explain.
-inline constexpr double most_together = 1.2;
-
 /// 2 Delta log likelihood of one fit over another, in stances and in everything else.
 struct PhaseGain {
   double collisions = 0, stances = 0;
@@ -65,6 +60,7 @@ PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit&
 
 /// What `terms` gained beyond this fit may be off by an error of form: the fit of those of them that are exact, or
 /// `recalibrated`. @param singles  fitted causes
-const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<Term>& terms, const Fit& recalibrated);
+const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<EffectTerm>& terms,
+                      const Fit& recalibrated);
 
 }  // namespace metastable::analysis

@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
@@ -12,18 +13,20 @@
 #include <utility>
 
 #include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/collision_profile.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/diagnosis/gap_map.h"
 #include "analysis/diagnosis/gap_shrinkage.h"
 #include "analysis/diagnosis/missing_columns.h"
 #include "analysis/diagnosis/too_few.h"
 #include "analysis/diagnosis/visibility.h"
+#include "analysis/statistics/interval_95.h"
 #include "dynamics/wheel/effect_catalogue.h"
 
 namespace metastable::analysis {
 namespace {
 
-// The test for a gap.
+// These levels decide whether there is a gap.
 constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes
 constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide one another; hardly ever used up
 constexpr double recalibration_level = 0.02;
@@ -47,13 +50,9 @@ constexpr double rival_evidence = 4;    //   those no further behind the best. S
 // A recalibration that did not settle is mentioned beyond this rise that its slope still promises.
 constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likelihood; of the largest gain found
 
-constexpr double score_90 = 1.6448536269514722, score_95 = 1.96;  // half-widths of two-sided intervals
+constexpr double score_90 = 1.6448536269514722;  // half-width of a two-sided interval
 
-constexpr int longest_profile = 40;          // collisions
-constexpr std::uint64_t profile_rounds = 4;  // simulated experiments that its means are taken over
-constexpr double least_profile_trials = 3;
-
-// P of as large a quadratic form of the nuisances' scores by chance: the prior shrinks each direction of the
+// How likely a quadratic form of the nuisances' scores is as large by chance: the prior shrinks each direction of the
 // information.
 double recalibration_p_value(const TransitionModel& model, const Fit& as_given, double gain) {
   const Eigen::Index size = as_given.information.rows();
@@ -83,7 +82,7 @@ double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit
   for (const RankedCause& pair : ranking.pairs) {
     if (!pair.fit.converged) continue;
     double parameters = 0, looks = pairs;  // variants among them
-    for (const Term& term : pair.terms) {
+    for (const EffectTerm& term : pair.terms) {
       parameters += static_cast<double>(term.values.size());
       looks *= static_cast<double>(term.candidate->variants.size());
     }
@@ -94,11 +93,12 @@ double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit
   return least;
 }
 
-std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixXd& covariance, Eigen::Index first) {
+std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::MatrixXd& covariance,
+                                          Eigen::Index first) {
   const std::vector<double>& variant = term.variant;
-  const std::vector<Named> here = term.candidate->report(variant, term.values);
+  const std::vector<NamedValue> here = term.candidate->report(variant, term.values);
   std::vector<EstimatedParameter> all;
-  for (const Named& one : here) all.push_back({one.first, one.second, one.second, one.second, false});
+  for (const NamedValue& one : here) all.push_back({one.first, one.second, one.second, one.second, false});
   const auto count = term.values.size();
   if (count == 1) {  // reported numbers are monotone in the one value: its ends are theirs
     const FreeParameter& p = term.candidate->parameters[0];
@@ -113,7 +113,7 @@ std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixX
     }
     return all;
   }
-  // By the slopes of the reported numbers.
+  // The slopes of the reported numbers carry the covariance over.
   for (std::size_t k = 0; k < all.size(); ++k) {
     Eigen::VectorXd slope(static_cast<Eigen::Index>(count));
     for (std::size_t p = 0; p < count; ++p) {
@@ -133,7 +133,7 @@ std::vector<EstimatedParameter> estimates(const Term& term, const Eigen::MatrixX
 
 Cause describe(const TransitionModel& model, const RankedCause& ranked) {
   Cause cause;
-  for (const Term& term : ranked.terms) cause.effects.push_back(term.candidate->id);
+  for (const EffectTerm& term : ranked.terms) cause.effects.push_back(term.candidate->id);
   cause.gain = ranked.gain;
   cause.p_value = ranked.p_value;
   cause.evidence = ranked.evidence;
@@ -146,14 +146,14 @@ Cause describe(const TransitionModel& model, const RankedCause& ranked) {
   steadied.diagonal().array() += 1e-12;
   const Eigen::MatrixXd covariance = steadied.ldlt().solve(Eigen::MatrixXd::Identity(steadied.rows(), steadied.cols()));
   auto first = static_cast<Eigen::Index>(model.nuisances().size());
-  for (const Term& term : ranked.terms) {
+  for (const EffectTerm& term : ranked.terms) {
     cause.parameters.push_back(estimates(term, covariance, first));
     first += static_cast<Eigen::Index>(term.values.size());
   }
   return cause;
 }
 
-// A number moved by one nuisance alone: between its values at that one's ends, inside its bounds.
+// A number that one nuisance alone moves lies between its values at that one's ends, inside its bounds.
 void keep_positive(const TransitionModel& model, const Fit& fit, const Eigen::MatrixXd& covariance,
                    const Eigen::VectorXd& slope, std::size_t number, EstimatedParameter& estimate) {
   if ((slope.array() != 0).count() != 1) return;
@@ -170,12 +170,12 @@ void keep_positive(const TransitionModel& model, const Fit& fit, const Eigen::Ma
   std::tie(estimate.lower, estimate.upper) = std::minmax({at(here - half), at(here + half)});
 }
 
-// By the slopes of the reported numbers, unless those take a positive one below zero.
+// Intervals follow the slopes of the reported numbers, unless those take a positive one below zero.
 std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit) {
   const Eigen::MatrixXd covariance =
       fit.information.ldlt().solve(Eigen::MatrixXd::Identity(fit.information.rows(), fit.information.cols()));
   std::vector<EstimatedParameter> all;
-  const std::vector<Named> here = model.report_nuisances(fit.nuisance);
+  const std::vector<NamedValue> here = model.report_nuisances(fit.nuisance);
   for (std::size_t k = 0; k < here.size(); ++k) {
     Eigen::VectorXd slope(covariance.rows());
     for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
@@ -210,60 +210,6 @@ StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std:
   steps.recalibrated = model.expected_steps(recalibrated.nuisance, {}, seed);
   steps.with_effect = model.expected_steps(chosen.nuisance, chosen.terms, seed);
   return steps;
-}
-
-// Mean speed before each collision, by condition.
-std::vector<ProfilePoint> profiles(const TransitionModel& model, const std::vector<double>& nominal, const Fit& chosen,
-                                   std::uint64_t seed) {
-  struct Sum {
-    double count = 0, sum = 0, squares = 0;
-  };
-  const auto gather = [&](const TransitionModel& m, std::vector<std::vector<Sum>>& sums) {
-    const Event* previous = nullptr;
-    for (const Event& e : m.events()) {
-      const bool before = e.kind == EventKind::collision || e.kind == EventKind::step || e.kind == EventKind::rest ||
-                          e.kind == EventKind::survival;
-      if (!before || e.number > longest_profile) continue;
-      if (previous && previous->trial == e.trial && previous->number == e.number) continue;
-      previous = &e;
-      auto& of = sums[e.condition];
-      if (of.size() < static_cast<std::size_t>(e.number)) of.resize(static_cast<std::size_t>(e.number));
-      Sum& s = of[static_cast<std::size_t>(e.number) - 1];
-      s.count += 1;
-      s.sum += e.speed;
-      s.squares += e.speed * e.speed;
-    }
-  };
-  std::vector<std::vector<Sum>> measured(model.conditions()), given(model.conditions()), with(model.conditions());
-  gather(model, measured);
-  for (std::uint64_t round = 0; round < profile_rounds; ++round) {
-    gather(*model.simulate(nominal, {}, seed + round), given);
-    gather(*model.simulate(chosen.nuisance, chosen.terms, seed + round), with);
-  }
-  std::vector<ProfilePoint> points;
-  for (std::size_t c = 0; c < measured.size(); ++c)
-    for (std::size_t k = 0; k < measured[c].size(); ++k) {
-      const Sum& m = measured[c][k];
-      if (m.count < least_profile_trials) continue;
-      const auto mean = [](const Sum& s) { return s.count > 0 ? s.sum / s.count : 0.0; };
-      const auto sd = [&](const Sum& s) {
-        return s.count > 1 ? std::sqrt(std::max(0.0, s.squares / s.count - mean(s) * mean(s)) * s.count / (s.count - 1))
-                           : 0;
-      };
-      ProfilePoint p;
-      p.condition = c;
-      p.collision = static_cast<int>(k) + 1;
-      p.trials = static_cast<std::size_t>(m.count);
-      p.measured = mean(m);
-      p.measured_error = sd(m) / std::sqrt(m.count);
-      if (k < given[c].size()) p.baseline = mean(given[c][k]);
-      if (k < with[c].size()) {
-        p.with_effect = mean(with[c][k]);
-        p.band = score_95 * sd(with[c][k]) / std::sqrt(m.count);
-      }
-      points.push_back(p);
-    }
-  return points;
 }
 
 // The one or two effects that an entry of the catalogue names. Throws for unknown ones.
@@ -325,7 +271,7 @@ Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
   return given;
 }
 
-// The tests for a gap, together.
+// Puts the tests for a gap together.
 void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated) {
   d.gap.p_effects = std::max(least_p_value, ranking.p_value);
   d.gap.p_where = std::max(least_p_value, d.gap.recalibrated.p_value);
@@ -373,14 +319,14 @@ std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& 
   return ordered;
 }
 
-// The best hypothesis, and what speaks against it.
+// Holds the best hypothesis and what speaks against it.
 struct Chosen {
   const Fit* fit = nullptr;  // the recalibrated model where no hypothesis is worth having
   double none = 0;           // odds that it is none of the catalogue
   double bent = 1;           // share of its gain that an error of form may bend
 };
 
-// What the best hypothesis leaves on the map: judged beyond its own model error.
+// What the best hypothesis leaves on the map is judged beyond its own model error.
 Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking, const RankedCause& best,
               const Fit& recalibrated, const DiagnosisOptions& options) {
   Chosen chosen{&best.fit};
@@ -442,7 +388,7 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const std
 void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) {
   if (!gap) {
     d.verdict = d.gap.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
-    if (d.verdict == Verdict::recalibrate) d.causes.set = {"contact_distribution"};
+    if (d.verdict == Verdict::recalibrate) d.causes.set = {std::string(dynamics::contact_distribution_id)};
     return;
   }
   if (none >= 1) {
@@ -558,7 +504,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   d.shrinkage.steps = steps_before_failure(model, nominal, recalibrated, *chosen.fit, options.seed);
   if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
     d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
-  d.shrinkage.profile = profiles(model, nominal, *chosen.fit, options.seed);
+  d.shrinkage.profile = collision_profile(model, nominal, *chosen.fit, options.seed);
   progress(0.93, "what could not be seen");
   d.limits.missing = missing_columns(model, recalibrated, candidates, options.threads, options.seed);
   d.limits.not_possible = too_few(model, d, options);

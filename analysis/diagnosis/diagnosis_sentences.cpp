@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/statistics/number_text.h"
 
 namespace metastable::analysis {
 namespace {
@@ -79,14 +80,20 @@ void say_where(std::vector<std::string>& s, const Diagnosis& d) {
   }
 }
 
+Estimate closed_percent(const Shrinkage& s) { return {100 * *s.closed, 100 * *s.closed_lower, 100 * *s.closed_upper}; }
+
 void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
-  if (!d.shrinkage.measures.empty() && d.shrinkage.measures[0].closed && d.verdict != Verdict::no_gap) {
-    const Shrinkage& log_score = d.shrinkage.measures[0];
+  if (d.shrinkage.measures.empty() || !d.shrinkage.measures[0].closed || d.verdict == Verdict::no_gap) return;
+  const Shrinkage& log_score = d.shrinkage.measures[0];
+  const std::string change =
+      fmt::format("from {:.2g} to {:.2g} nats a collision", log_score.baseline, log_score.with_effect);
+  if (closed_is_known(log_score)) {
+    const DecimalEstimate percent = to_decimal(closed_percent(log_score), NumberFormat::general, 3);
+    s.push_back(fmt::format("Held out, {} % of the gap closes (90 %: {} to {} %), {}.", plain_text(percent.value),
+                            plain_text(percent.lower), plain_text(percent.upper), change));
+  } else {
     s.push_back(
-        fmt::format("Held out, {:.0f} % of the gap closes (90 %: {:.0f} to {:.0f} %), from {:.2g} to {:.2g} nats a "
-                    "collision.",
-                    100 * *log_score.closed, 100 * *log_score.closed_lower, 100 * *log_score.closed_upper,
-                    log_score.baseline, log_score.with_effect));
+        fmt::format("Held out, the gap goes {}; the share that closes is {}.", change, closed_unknown(log_score)));
   }
 }
 
@@ -107,6 +114,47 @@ void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
 }
 
 }  // namespace
+
+bool closed_is_known(const Shrinkage& s) {
+  return s.closed && s.closed_lower && s.closed_upper && *s.closed_upper - *s.closed_lower <= 1;
+}
+
+std::string closed_unknown(const Shrinkage& s) {
+  if (!s.closed || !s.closed_lower || !s.closed_upper) return "not known: the gap as given may be none";
+  const DecimalEstimate percent = to_decimal(closed_percent(s), NumberFormat::general, 3);
+  return fmt::format("not known: 90 % interval {} to {} %, wider than the gap", plain_text(percent.lower),
+                     plain_text(percent.upper));
+}
+
+std::string next_step(const Diagnosis& d) {
+  switch (d.verdict) {
+    case Verdict::no_gap:
+      return "Use the model as it is. An effect below its smallest size under “What these data could have seen” would "
+             "have gone unnoticed; more trials lower these sizes.";
+    case Verdict::recalibrate:
+      return "Put the recalibrated parameters into experiment.toml and diagnose trials that were not used here: if "
+             "these ask for other ones again, something drifts.";
+    case Verdict::explained:
+      if (d.causes.set.size() == 1)
+        return fmt::format(
+            "Give the model {} with the parameters under “Which effect”, or take it out of the machine; "
+            "new trials should then leave no gap.",
+            d.causes.set.front());
+      if (!d.limits.next.empty())
+        return fmt::format(
+            "Tell the causes apart before changing the model: {} would do it best (“The next "
+            "experiment”).",
+            d.limits.next.front().change);
+      return "Tell the causes apart before changing the model: with more trials, or with a column under “What missing "
+             "columns hide”.";
+    case Verdict::unexplained:
+      return "Check the measurement first where the gap shows most (units, leg numbers, sensor noise). If it holds, "
+             "see "
+             "what the cells that stay beyond chance have in common (--out DIR draws the map): no effect of the "
+             "catalogue does that.";
+  }
+  return "";
+}
 
 std::vector<std::string> sentences(const Diagnosis& d) {
   std::vector<std::string> all;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -16,7 +18,7 @@ namespace {
 constexpr double largest_step = 0.1;  // of a difference, in standard errors
 constexpr double far_out = 0.03;      // share of the draws beyond which a tail follows its law instead of their count
 
-// Gain of the score `u` with information `info`; one parameter at its lower bound gains only upwards.
+// What the score `u` gains with information `info`; one parameter at its lower bound gains only upwards.
 double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,
                      Eigen::VectorXd* start) {
   if (u.size() == 1) {
@@ -43,7 +45,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   struct Work {
     std::size_t effect, variant;
     Eigen::Index first;
-    std::vector<Term> terms;
+    std::vector<EffectTerm> terms;
   };
   std::vector<Work> work;
   Eigen::Index columns = 0;
@@ -52,7 +54,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
     ScannedEffect effect;
     effect.candidate = candidate;
     for (std::size_t v = 0; v < candidate->variants.size(); ++v) {
-      Term term{candidate, candidate->variants[v], {}};
+      EffectTerm term{candidate, candidate->variants[v], {}};
       for (const FreeParameter& p : candidate->parameters) term.values.push_back(p.neutral);
       effect.first.push_back(columns);
       Work one{scan.effects.size(), v, columns, fit.terms};
@@ -72,7 +74,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
       const auto column = one.first + static_cast<Eigen::Index>(p);
       double step = one.terms.back().candidate->parameters[p].step;
       for (int attempt = 0; attempt < 2; ++attempt) {
-        std::vector<Term> moved = one.terms;
+        std::vector<EffectTerm> moved = one.terms;
         moved.back().values[p] += step;
         const Evaluation there = model.evaluate(fit.nuisance, moved);
         for (Eigen::Index k = 0; k < events; ++k) {
@@ -144,8 +146,10 @@ ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) 
   const Eigen::MatrixXd rows = rows_of_chance(scan);
   std::vector<std::vector<double>> gains(scan.effects.size());  // by effect and draw
   for (int draw = 0; draw < draws; ++draw) {
-    const Eigen::VectorXd score = rows.transpose() * normal_multipliers(seed, static_cast<std::uint64_t>(draw),
-                                                                        DrawStream::chance_of_effects, rows.rows());
+    const std::vector<double> normals = normal_multipliers(
+        seed, static_cast<std::uint64_t>(draw), DrawStream::chance_of_effects, static_cast<std::size_t>(rows.rows()));
+    const Eigen::VectorXd multipliers = Eigen::VectorXd::Map(normals.data(), rows.rows());
+    const Eigen::VectorXd score = rows.transpose() * multipliers;
     for (std::size_t e = 0; e < scan.effects.size(); ++e) {
       const ScannedEffect& effect = scan.effects[e];
       const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());

@@ -1,7 +1,7 @@
 #pragma once
 // Which effects would a fit gain from: score tests of every effect and variant at one fit.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// Score statistics of one candidate at a fit.
+/// What the scores at a fit say of one candidate.
 struct ScannedEffect {
   const Candidate* candidate = nullptr;
   std::vector<double> gain;            ///< by variant: 2 Delta log likelihood that the scores promise
@@ -18,7 +18,7 @@ struct ScannedEffect {
   std::size_t best = 0;                ///< variant
 };
 
-/// Efficient scores (nuisances projected out) of all candidates at a fit.
+/// Holds the efficient scores (nuisances projected out) of all candidates at a fit.
 struct EffectScan {
   std::vector<ScannedEffect> effects;
   Eigen::MatrixXd by_trial;     ///< [trials x columns] efficient scores, summed over a trial's events

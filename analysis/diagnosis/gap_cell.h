@@ -1,5 +1,5 @@
 #pragma once
-// A map of a gap, as plain data: cells along the facets of an experiment.
+// A map of a gap is plain data: cells along the facets of an experiment.
 
 #include <cstddef>
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace metastable::analysis {
 
-/// One cell of the map.
+/// A cell of the map says how far one aspect is off in one place.
 struct GapCell {
   std::string facet;           ///< speed, leg, position, collision, trial, time, phase, condition, outcome
   std::string aspect;          ///< mean, spread, tail, memory

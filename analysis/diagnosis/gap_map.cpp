@@ -1,5 +1,6 @@
 #include "analysis/diagnosis/gap_map.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -56,7 +57,7 @@ struct Column {
   std::vector<double> weights;                        // of a cell that is a contrast; empty: 1
 };
 
-// The cells of a map and their columns, in the same order.
+// Holds the cells of a map and their columns, in the same order.
 struct Columns {
   std::vector<GapCell> cells;
   std::vector<Column> columns;
@@ -274,13 +275,13 @@ double left_of_shift(const Column& column, const Fit& fit) {
   return 1 - follows.dot(fit.information.ldlt().solve(follows)) / column.variance;
 }
 
-// Statistics, sizes and p-values of the cells by themselves.
+// Gives the cells their own statistics, sizes and p-values.
 void standardise(std::vector<GapCell>& cells, const std::vector<Column>& columns, const Efficient& efficient,
                  const Units& units, const Fit& fit) {
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const Column& column = columns[k];
     const auto c = static_cast<Eigen::Index>(k);
-    // Event-wise variance: independent without a gap, and many more of them than trials.
+    // The variance is summed by event: without a gap events are independent, and there are many more than trials.
     const double sum = efficient.sums[c], whole = efficient.whole_norm[c];
     // The model's own variance, less the share that the fitted parameters take off: where nothing rare happened (no
     // rest, no far score) the events themselves show almost none.
@@ -330,8 +331,10 @@ void step_down(std::vector<GapCell>& cells, const std::vector<std::size_t>& orde
   std::vector<int> exceeded(order.size());
   std::vector<double> largest_by_chance;
   for (int draw = 0; draw < draws; ++draw) {
-    const Eigen::VectorXd chance = rows.transpose() * normal_multipliers(seed, static_cast<std::uint64_t>(draw),
-                                                                         DrawStream::chance_on_map, rows.rows());
+    const std::vector<double> normals = normal_multipliers(
+        seed, static_cast<std::uint64_t>(draw), DrawStream::chance_on_map, static_cast<std::size_t>(rows.rows()));
+    const Eigen::VectorXd multipliers = Eigen::VectorXd::Map(normals.data(), rows.rows());
+    const Eigen::VectorXd chance = rows.transpose() * multipliers;
     double largest = 0;
     for (std::size_t k = order.size(); k-- > 0;) {
       largest = std::max(largest, std::abs(chance[static_cast<Eigen::Index>(order[k])]));

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -116,7 +117,7 @@ Fit best_rival(const TransitionModel& model, const std::vector<const Fit*>& riva
     heartbeat();
     Fit tried = fit(model, rival->nuisance, rival->terms, options);
     std::size_t parameters = 0;
-    for (const Term& term : rival->terms) parameters += term.values.size();
+    for (const EffectTerm& term : rival->terms) parameters += term.values.size();
     const double score = tried.penalised - parameter_price * static_cast<double>(parameters);
     if (score > best) {
       best = score;
@@ -126,7 +127,7 @@ Fit best_rival(const TransitionModel& model, const std::vector<const Fit*>& riva
   return chosen;
 }
 
-// The flexible model: shifts of the scores in every cell, ridge-fitted to the trials counted.
+// The flexible model shifts the scores in every cell by a ridge fit to the trials counted.
 struct Flexible {
   Eigen::VectorXd bounded;    // [events] scores of the chosen model
   Eigen::VectorXd predicted;  // [events] their shifts

@@ -6,9 +6,10 @@
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
-#include "analysis/diagnosis/model_fit.h"
 
 namespace metastable::analysis {
+
+struct Fit;
 
 /// Cross-validated by trial: in every fold nuisances and each of `rivals` are refitted to the other trials, the rival
 /// with the best penalised likelihood there is used on the held-out ones (an empty list of terms: none). Measures:

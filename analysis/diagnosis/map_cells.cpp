@@ -72,7 +72,7 @@ class Cutter {
     cells_.push_back({"phase", !two_phases_ ? "step" : stance ? "stance" : "collision", members, stance});
     for (std::size_t c = first; c < cells_.size(); ++c) cells_[c].stance = stance;
   }
-  // Collisions 1, 2, 3 to 4, ..., 13 to 16, from 17.
+  // Groups are collisions 1, 2, 3 to 4, ..., 13 to 16, and those from 17.
   static std::optional<std::pair<int, std::string>> collisions(int number) {
     static constexpr std::array ends{1, 2, 4, 8, 12, 16};
     int from = 1;
@@ -121,7 +121,7 @@ class Cutter {
     });
   }
 
-  // From -1 at the first trial to 1 at the last one.
+  // Weights run from -1 at the first trial to 1 at the last one.
   void trend(const std::vector<std::size_t>& members, const std::string& where) {
     MapCell cell{"trial", "trend over the trials" + where, members, false};
     const double last = static_cast<double>(model_.trials() - 1);
@@ -129,7 +129,7 @@ class Cutter {
       cell.weights.push_back(2 * static_cast<double>(model_.events()[i].trial) / last - 1);
     cells_.push_back(std::move(cell));
   }
-  // Cosine and sine of the time since the previous collision: as many frequencies as its spread tells apart.
+  // Takes cosine and sine of the time since the previous collision at as many frequencies as its spread tells apart.
   void swings(const std::vector<std::size_t>& members, const std::string& where) {
     std::vector<double> times;
     MapCell cell{.facet = "time", .swing = true};

@@ -12,7 +12,7 @@ namespace metastable::analysis {
 /// Transitions that a cell of the map holds at least.
 inline constexpr int least_cell_events = 20;
 
-/// Members of one cell. With weights it is a contrast of means: a trend, a swing.
+/// Says which events one cell holds. With weights it is a contrast of means: a trend, a swing.
 struct MapCell {
   std::string facet = {}, at = {};       ///< as GapCell's
   std::vector<std::size_t> events = {};  ///< indices
@@ -20,10 +20,6 @@ struct MapCell {
   std::vector<double> weights = {};      ///< by event; empty: 1
   bool swing = false;                    ///< cosine or sine of the time since the previous collision
 };
-
-inline bool is_stance(EventKind kind) { return kind == EventKind::stance; }
-/// A collision, with its stance or alone, or what came of one: rest, survival.
-inline bool is_contact(EventKind kind) { return kind != EventKind::stance && kind != EventKind::launch; }
 
 /// The model's events cut by speed, leg, position, collision, trial, time and condition, each phase by itself; trends
 /// over the trials; and swings where time_tells(). Phases, and cells of a facet, with too few events have none.

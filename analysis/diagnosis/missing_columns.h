@@ -5,9 +5,10 @@
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
-#include "analysis/diagnosis/model_fit.h"
 
 namespace metastable::analysis {
+
+struct Fit;
 
 /// Effects that a missing column hides or makes much harder to see, and those that look alike for lack of it. Both
 /// designs with data drawn from the recalibrated model, so that a gap does not blur the comparison.

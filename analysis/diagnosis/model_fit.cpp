@@ -1,5 +1,6 @@
 #include "analysis/diagnosis/model_fit.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -12,17 +13,17 @@ constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is t
 constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
 
-// All parameters of a hypothesis as one vector.
+// Holds all parameters of a hypothesis in one vector.
 class Point {
  public:
-  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<Term> terms, bool with_nuisances)
+  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<EffectTerm> terms, bool with_nuisances)
       : model_(model), nuisance_(std::move(nuisance)), terms_(std::move(terms)) {
     if (with_nuisances)
       for (std::size_t i = 0; i < nuisance_.size(); ++i) {
         const Nuisance& n = model.nuisances()[i];
         slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n.nominal, n.prior_sd});
       }
-    for (Term& term : terms_)
+    for (EffectTerm& term : terms_)
       for (std::size_t i = 0; i < term.values.size(); ++i) {
         const FreeParameter& p = term.candidate->parameters[i];
         slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, 0, 0});
@@ -37,7 +38,7 @@ class Point {
   };
   std::vector<Slot>& slots() { return slots_; }
   const std::vector<double>& nuisance() const { return nuisance_; }
-  const std::vector<Term>& terms() const { return terms_; }
+  const std::vector<EffectTerm>& terms() const { return terms_; }
   Evaluation evaluate() const { return model_.evaluate(nuisance_, terms_); }
   double log_prior() const {
     double sum = 0;
@@ -49,7 +50,7 @@ class Point {
  private:
   const TransitionModel& model_;
   std::vector<double> nuisance_;
-  std::vector<Term> terms_;
+  std::vector<EffectTerm> terms_;
   std::vector<Slot> slots_;
 };
 
@@ -179,13 +180,13 @@ Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, 
 }
 
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
-                        const std::vector<Term>& terms, const Evaluation& here, bool with_nuisances) {
+                        const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances) {
   Point point(model, nuisance, terms, with_nuisances);
   std::vector<double> steps(point.slots().size());
   return differences(point, here, steps);
 }
 
-Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options) {
   Point point(model, nuisance, terms, options.refit_nuisances);
   auto& slots = point.slots();
@@ -207,7 +208,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       result.converged = true;
       break;
     }
-    // All parameters together; where that fails, the effects' and the nuisances' by themselves.
+    // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves.
     const double before = best;
     double promised = 0;
     bool better = false;
@@ -229,7 +230,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       break;
     }
     if (!better) {
-      // At the optimum, up to what the differences resolve.
+      // This is the optimum, up to what the differences resolve.
       result.converged = promised < unresolved + unresolved_share * (best - start);
       if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
       break;
@@ -248,12 +249,12 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   return result;
 }
 
-Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
              const FitOptions& options) {
   Fit best = fit(model, nuisance, terms, options);
-  const std::vector<Start> starts = model.starts(terms);
-  for (const Start& start : starts) {
-    std::vector<Term> moved = terms;
+  const std::vector<FitStart> starts = model.starts(terms);
+  for (const FitStart& start : starts) {
+    std::vector<EffectTerm> moved = terms;
     for (std::size_t i = 0; i < moved.size(); ++i) moved[i].values = start.values[i];
     Fit tried = fit(model, start.nuisance, moved, options);
     if (tried.penalised > best.penalised || !std::isfinite(best.penalised)) best = std::move(tried);

@@ -1,7 +1,7 @@
 #pragma once
-// Fitting a transition model: nuisances and effects by penalised maximum likelihood.
+// Fits nuisances and effects of a transition model by penalised maximum likelihood.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -15,10 +15,10 @@ struct Derivatives {
   Eigen::MatrixXd change;  ///< [events x parameters] of the normal score
 };
 
-/// A fitted hypothesis.
+/// What a fit has found of a hypothesis.
 struct Fit {
   std::vector<double> nuisance;
-  std::vector<Term> terms;
+  std::vector<EffectTerm> terms;
   double log_likelihood = 0;    ///< of the events counted, without the prior
   double penalised = 0;         ///< with the nuisances' prior
   Evaluation evaluation;        ///< of all events, counted or not
@@ -39,16 +39,16 @@ struct FitOptions {
 /// dz/d(speed), log density = log phi(z) + log J, and the information is the sum of z' z'^T + (log J)' (log J)'^T,
 /// which no outlying observation inflates. Starts from the given values; parameters stay inside their bounds. A
 /// likelihood that is not finite there: not converged, with that reason.
-Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options = {});
 
 /// The better of the fits from the given values and from the starts that the model offers (TransitionModel::starts).
-Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<Term>& terms,
+Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
              const FitOptions& options = {});
 
-/// Derivatives at a point with respect to the free parameters of `terms` only.
+/// Takes the derivatives at a point with respect to the free parameters of `terms` only.
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
-                        const std::vector<Term>& terms, const Evaluation& here, bool with_nuisances);
+                        const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances);
 
 /// The information of columns: sum over counted events of change change^T + (slope + z change)(...)^T.
 /// @param weights  by event, 1 or 0

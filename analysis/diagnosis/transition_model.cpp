@@ -1,16 +1,23 @@
 #include "analysis/diagnosis/transition_model.h"
 
 #include <numeric>
+#include <utility>
 
 namespace metastable::analysis {
 
 double Evaluation::total() const { return std::accumulate(log_density.begin(), log_density.end(), 0.0); }
 
-std::vector<Start> TransitionModel::starts(std::span<const Term>) const { return {}; }
+EffectTerm term_of(const Candidate& candidate, const std::vector<double>& catalogue_values) {
+  FittedForm form = candidate.form_of ? candidate.form_of(catalogue_values)
+                                      : FittedForm{candidate.variants.front(), catalogue_values};
+  return {&candidate, std::move(form.variant), std::move(form.values)};
+}
 
-std::string TransitionModel::size_in_words(std::span<const Term>) const { return {}; }
+std::vector<FitStart> TransitionModel::starts(std::span<const EffectTerm>) const { return {}; }
 
-std::vector<double> TransitionModel::rest_chances(std::span<const double>, std::span<const Term>) const {
+std::string TransitionModel::size_in_words(std::span<const EffectTerm>) const { return {}; }
+
+std::vector<double> TransitionModel::rest_chances(std::span<const double>, std::span<const EffectTerm>) const {
   return std::vector<double>(events().size(), 0);
 }
 

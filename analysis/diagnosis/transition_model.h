@@ -23,6 +23,10 @@ enum class EventKind {
   survival    ///< not coming to rest after the last measured speed
 };
 
+inline bool is_stance(EventKind kind) { return kind == EventKind::stance; }
+/// A collision, with its stance or alone, or what came of one: rest, survival.
+inline bool is_contact(EventKind kind) { return kind != EventKind::stance && kind != EventKind::launch; }
+
 /// One observed transition and where in the experiment it stands. The list of a data set does not depend on parameters.
 struct Event {
   EventKind kind = EventKind::step;
@@ -62,8 +66,13 @@ struct FreeParameter {
   double try_at = 0;   ///< a size worth starting from where the neutral value says nothing; 0: start at neutral
 };
 
-/// One reported number of an effect.
-using Named = std::pair<std::string, double>;
+/// A number as it is reported: by its name.
+using NamedValue = std::pair<std::string, double>;
+
+/// What stands for an effect of one size in a fit.
+struct FittedForm {
+  std::vector<double> variant, values;
+};
 
 /// An effect as it is fitted: some parameters are free, the others run over a list of variants (a leg, an interval).
 struct Candidate {
@@ -73,22 +82,28 @@ struct Candidate {
   /// By entry of a variant: how far apart the list's values lie, where those between are possible too; 0: they are not.
   std::vector<double> refine = {};
   /// The fitted values under the names of the catalogue.
-  std::function<std::vector<Named>(const std::vector<double>& variant, const std::vector<double>& values)> report;
+  std::function<std::vector<NamedValue>(const std::vector<double>& variant, const std::vector<double>& values)> report;
+  /// The inverse gives the form of the effect with these values of the catalogue, in the order of its parameters. Where
+  /// it is empty the catalogue's values are the fitted ones.
+  std::function<FittedForm(const std::vector<double>& catalogue_values)> form_of = {};
   /// Why these data cannot tell it; empty if they can.
   std::string undecidable;
   /// Reality has no other form of it than this one: none of its gain is forgiven as an error of form.
   bool exact = false;
 };
 
-/// A candidate with values.
-struct Term {
+/// A hypothesis adds candidates with values.
+struct EffectTerm {
   const Candidate* candidate = nullptr;
   std::vector<double> variant;
   std::vector<double> values;
 };
 
+/// Makes the candidate the effect with these values of the catalogue.
+EffectTerm term_of(const Candidate& candidate, const std::vector<double>& catalogue_values);
+
 /// Where a fit may start.
-struct Start {
+struct FitStart {
   std::vector<double> nuisance;
   std::vector<std::vector<double>> values;  ///< by term
 };
@@ -105,47 +120,50 @@ class TransitionModel {
   /// from the event's own speed alone.
   virtual bool time_tells() const = 0;
   virtual std::string condition_name(std::size_t condition) const = 0;
-  /// Of Event::position.
+  /// In which Event::position is measured.
   virtual std::string position_unit() const { return "m"; }
   /// What a recalibration refits, in words that "remove" can follow.
   virtual std::string recalibrated() const { return "contact parameters"; }
   virtual const std::vector<Nuisance>& nuisances() const = 0;
   virtual const std::vector<Candidate>& candidates() const = 0;
-  /// Densities with these nuisances and effects. Values outside a model's reach give a very small density, never a NaN.
-  virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const = 0;
+  /// Gives the densities with these nuisances and effects. Values outside a model's reach give a very small density,
+  /// never a NaN.
+  virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const = 0;
   /// Whether a recalibration refits the noise of every step, so that it takes up part of a large gap.
   virtual bool refits_noise() const { return false; }
-  /// Starts that the data themselves suggest for a fit of these terms, tried beside the usual one. By default none.
-  virtual std::vector<Start> starts(std::span<const Term> terms) const;
-  /// How large effects are beside what the nominal model states, a sentence. By default none.
-  virtual std::string size_in_words(std::span<const Term> terms) const;
+  /// Starts that the data themselves suggest for a fit of these terms, tried beside the usual one. The default offers
+  /// none.
+  virtual std::vector<FitStart> starts(std::span<const EffectTerm> terms) const;
+  /// How large effects are beside what the nominal model states, a sentence. The default says nothing.
+  virtual std::string size_in_words(std::span<const EffectTerm> terms) const;
   /// [events] Probability of coming to rest after each event's collision, given what was measured before it; 0 for
-  /// events of no collision. By default 0 throughout.
-  virtual std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const Term> terms) const;
-  /// The same design (trials, columns, conditions) with outcomes drawn from the model. Same seed, same data.
-  virtual std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
+  /// events of no collision. The default is 0 throughout.
+  virtual std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
+  /// The same design (trials, columns, conditions) with outcomes drawn from the model. The same seed gives the same
+  /// data.
+  virtual std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                                     std::uint64_t seed) const = 0;
   /// Changed experiments in words, each with data drawn from the model without effects: another slope or launch speed,
   /// more columns, more trials.
   virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
       std::span<const double> nuisance, std::uint64_t seed) const = 0;
   /// The same design with each column that was not measured, by the column's name, with data drawn from the model.
-  /// By default none.
+  /// The default has none.
   virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(
       std::span<const double> nuisance, std::uint64_t seed) const;
   /// Observed collisions at risk, and how many of them led to rest. Zero where outcomes are unknown.
   virtual std::pair<double, double> rests() const = 0;
   /// Expected steps before failure under the model, from its hazard along simulated trials as long as the measured
   /// ones; infinity where it never rests.
-  virtual double expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
+  virtual double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                 std::uint64_t seed) const = 0;
   /// What is not known or was assumed, a sentence each.
   virtual const std::vector<std::string>& notes() const = 0;
-  /// The reported contact (or loss) parameters of a recalibration.
-  virtual std::vector<Named> report_nuisances(std::span<const double> nuisance) const = 0;
+  /// What a recalibration is reported by: contact or loss parameters.
+  virtual std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const = 0;
 };
 
-/// The nuisances as the experiment states them.
+/// Gives the nuisances as the experiment states them.
 inline std::vector<double> nominal_values(const TransitionModel& model) {
   std::vector<double> values;
   for (const Nuisance& n : model.nuisances()) values.push_back(n.nominal);

@@ -1,5 +1,6 @@
 #include "analysis/diagnosis/visibility.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -81,7 +82,7 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
 }
 
 std::vector<NextExperiment> next_experiments(const TransitionModel& model, const Fit& cause,
-                                             const std::vector<Term>& rival, int threads, std::uint64_t seed) {
+                                             const std::vector<EffectTerm>& rival, int threads, std::uint64_t seed) {
   std::vector<NextExperiment> all;
   if (cause.terms.size() != 1 || rival.size() != 1 || cause.terms[0].values.empty() || rival[0].values.empty())
     return all;

@@ -16,6 +16,6 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
 /// Changes of the experiment (TransitionModel::alternatives) by what they would tell between the fitted cause and its
 /// rival, best first: the gain of the fitted size that the rival and the nuisances cannot take up.
 std::vector<NextExperiment> next_experiments(const TransitionModel& model, const Fit& cause,
-                                             const std::vector<Term>& rival, int threads, std::uint64_t seed);
+                                             const std::vector<EffectTerm>& rival, int threads, std::uint64_t seed);
 
 }  // namespace metastable::analysis

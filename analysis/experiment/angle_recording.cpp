@@ -43,13 +43,17 @@ struct Piece {
 
 // The stance before collision 1, from its end backwards.
 Piece before_first(const Stance& stance, double omega) {
-  Piece piece{
-      .begin = -lead, .end = 0, .angle = 0, .from = 0, .state = {stance.end_angle, omega}, .pendulum = stance.pendulum};
+  Piece piece{.begin = -lead,
+              .end = 0,
+              .angle = 0,
+              .from = 0,
+              .state = {stance.end_angle_rad, omega},
+              .pendulum = stance.pendulum};
   constexpr double step = 1e-4;
   StanceState now = piece.state;
   for (double time = 0; time > -lead; time -= step) {
     now = dynamics::stance_motion(stance.pendulum, now, -step);
-    if (now.speed <= 0 || now.angle < stance.start_angle) {
+    if (now.speed <= 0 || now.angle < stance.start_angle_rad) {
       piece.begin = time;
       break;
     }
@@ -62,8 +66,8 @@ Piece before_first(const Stance& stance, double omega) {
 void CameraOptions::validate() const {
   if (!(rate >= 10 && rate <= 100000))
     throw std::invalid_argument(fmt::format("angle rate: {} Hz is outside [10, 100000]", rate));
-  if (!(noise_sd >= 0) || !std::isfinite(noise_sd))
-    throw std::invalid_argument(fmt::format("angle noise: {} rad is outside [0, inf)", noise_sd));
+  if (!(noise_sd_rad >= 0) || !std::isfinite(noise_sd_rad))
+    throw std::invalid_argument(fmt::format("angle noise: {} rad is outside [0, inf)", noise_sd_rad));
   if (decimals < 1 || decimals > 15)
     throw std::invalid_argument(fmt::format("angle decimals: {} is outside 1..15", decimals));
 }
@@ -88,7 +92,7 @@ AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial
                 .end = 0,
                 .angle = angle,
                 .from = c.time,
-                .state = {stance.start_angle, c.omega_plus},
+                .state = {stance.start_angle_rad, c.omega_plus},
                 .pendulum = stance.pendulum};
     if (i + 1 < trial.collisions.size()) {
       piece.end = trial.collisions[i + 1].time;
@@ -99,9 +103,9 @@ AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial
         now = dynamics::stance_motion(piece.pendulum, now, 1e-4);
       piece.end = c.time + 2 * up;
     } else {
-      piece.end = c.time + dynamics::stance_passage(piece.pendulum, piece.state, stance.end_angle).first;
+      piece.end = c.time + dynamics::stance_passage(piece.pendulum, piece.state, stance.end_angle_rad).first;
     }
-    angle += stance.end_angle - stance.start_angle;
+    angle += stance.end_angle_rad - stance.start_angle_rad;
     pieces.push_back(piece);
   }
   const bool rested = trial.outcome == dynamics::Outcome::rest;
@@ -113,12 +117,13 @@ AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial
     const double time = begin + (static_cast<double>(k) + offset) / options.rate;
     if (!(time < end)) return recording;
     while (p + 1 < pieces.size() && time >= pieces[p].end) ++p;
-    const double noise =
-        options.noise_sd > 0 ? options.noise_sd * dynamics::normal_quantile(uniform(options.seed, index, k + 1)) : 0;
+    const double noise = options.noise_sd_rad > 0
+                             ? options.noise_sd_rad * dynamics::normal_quantile(uniform(options.seed, index, k + 1))
+                             : 0;
     // Held before the release; on both feet after the fall back.
     const double moment = rested && time >= pieces[p].end ? pieces[p].begin : std::max(time, pieces.front().begin);
     recording.time.push_back(time);
-    recording.angle.push_back(pieces[p].at(moment) + noise);
+    recording.angle_rad.push_back(pieces[p].at(moment) + noise);
   }
 }
 
@@ -134,7 +139,7 @@ std::string angle_csv(const std::vector<SimulatedCondition>& conditions, const C
       const AngleRecording recording = record_angle(map, condition.trials[t], options, before + t);
       for (std::size_t k = 0; k < recording.time.size(); ++k)
         fmt::format_to(std::back_inserter(rows[t]), "{},{},{:.6f},{:.{}f}\n", id, before + t + 1, recording.time[k],
-                       recording.angle[k], options.decimals);
+                       recording.angle_rad[k], options.decimals);
     });
     for (const std::string& part : rows) text += part;
     before += rows.size();

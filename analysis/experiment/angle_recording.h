@@ -11,15 +11,15 @@
 
 namespace metastable::analysis {
 
-/// The unwrapped angle of the wheel [rad], rising as it rolls down, at rising times [s].
+/// The unwrapped angle of the wheel, rising as it rolls down, at rising times [s].
 struct AngleRecording {
-  std::vector<double> time, angle;
+  std::vector<double> time, angle_rad;
 };
 
 struct CameraOptions {
-  double rate = 120;         ///< frames per second [Hz], [10, 100000]
-  double noise_sd = 0.0002;  ///< white noise of the angle [rad], >= 0
-  int decimals = 9;          ///< of the angle in angle.csv, 1..15
+  double rate = 120;             ///< frames per second [Hz], [10, 100000]
+  double noise_sd_rad = 0.0002;  ///< white noise of the angle, >= 0
+  int decimals = 9;              ///< of the angle in angle.csv, 1..15
   std::uint64_t seed = 1;
   int threads = 0;  ///< the same bits on any number
   /// @throws std::invalid_argument naming the option and its range

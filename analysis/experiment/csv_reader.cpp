@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
-// The whole text as a finite number.
+// Reads the whole text as a finite number.
 bool parse(std::string_view text, double& value) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -110,7 +110,8 @@ bool CsvReader::record() {
   }
 }
 
-// From the opening quote to behind the closing one. False: it is never closed; reported, and nothing is left to read.
+// Goes from the opening quote to behind the closing one. False: it is never closed; reported, and nothing is left to
+// read.
 bool CsvReader::quoted_field(Field& field) {
   const std::size_t open = at_;
   bool doubled = false;
@@ -145,7 +146,7 @@ void CsvReader::skip_line() {
   ++next_line_;
 }
 
-Place CsvReader::place(std::size_t offset) const {
+TextPosition CsvReader::place(std::size_t offset) const {
   const std::string_view before = text_.substr(begin_, offset - begin_);
   const std::size_t last = before.rfind('\n');
   return {line_ + static_cast<std::size_t>(std::ranges::count(before, '\n')),

@@ -1,9 +1,8 @@
 #pragma once
-// CSV files with a header (RFC 4180), read strictly: whatever is not understood is a defect with its line and column.
+// Reads CSV files with a header (RFC 4180) strictly: whatever is not understood is a defect with its line and column.
 
 #include <cstdint>
 #include <deque>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -40,11 +39,11 @@ class CsvReader {
   bool complete() const { return complete_; }
   std::size_t line() const { return line_; }  ///< where the record begins
 
-  /// The field as csv_field() was given it; empty if the column is absent.
+  /// Returns the field as csv_field() was given it; it is empty if the column is absent.
   std::string_view text(std::size_t column) const;
-  /// A number within the range; nothing if the column is absent or the field empty. False: it is none, reported.
+  /// Reads a number within the range; nothing if the column is absent or the field empty. False: it is none, reported.
   bool read(std::size_t column, const dynamics::Range& range, std::optional<double>& value);
-  /// A whole number in [least, most], likewise ("3.0" is one, as tools write that know floating point only).
+  /// Reads a whole number in [least, most], likewise ("3.0" is one, as tools write that know floating point only).
   bool read(std::size_t column, std::int64_t least, std::int64_t most, std::optional<std::int64_t>& value);
   /// Reports a defect of this record's field ("COLUMN: what").
   void refuse(std::size_t column, std::string_view what);
@@ -58,7 +57,7 @@ class CsvReader {
   bool record();  // false: nothing left. fields_ empty: defective, reported
   bool quoted_field(Field& field);
   void skip_line();
-  Place place(std::size_t offset) const;
+  TextPosition place(std::size_t offset) const;
   void report(std::size_t offset, std::string_view what) { defects_.add(file_, place(offset), what); }
 
   std::string file_;

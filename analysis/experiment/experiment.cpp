@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "analysis/experiment/csv_reader.h"
+#include "analysis/experiment/experiment_notes.h"
 #include "analysis/experiment/experiment_toml.h"
 #include "analysis/experiment/trial_index.h"
 
@@ -44,7 +45,7 @@ constexpr CsvColumn collision_columns[] = {
 // Reads collisions.csv row by row into the trials of an experiment.
 class CollisionRows {
  public:
-  // legs: 0 if not known
+  // @param legs  0 if not known
   CollisionRows(Experiment& experiment, TrialIndex& index, CsvReader& csv, int legs)
       : experiment_(experiment), index_(index), csv_(csv), legs_(legs) {}
 
@@ -118,7 +119,7 @@ class CollisionRows {
   std::size_t filled_[std::size(collision_columns)] = {};
 };
 
-// trials.csv. Trials of the experiment stand in the order of collisions.entries().
+// Reads trials.csv. Trials of the experiment stand in the order of collisions.entries().
 void read_outcomes(Experiment& experiment, TrialIndex& index, const TrialIndex& collisions, CsvReader& csv) {
   while (csv.next()) {
     const std::optional<std::size_t> at = index.row(csv, 0, 1);
@@ -136,36 +137,6 @@ void read_outcomes(Experiment& experiment, TrialIndex& index, const TrialIndex& 
       csv.refuse(0, fmt::format("trial {} is of condition {} in collisions.csv", entry.number,
                                 shown_text(experiment.conditions[rolled->condition].id)));
     experiment.trials[static_cast<std::size_t>(rolled - collisions.entries().data())].outcome = outcome;
-  }
-}
-
-// What is not wrong but should be seen.
-void add_notes(Experiment& experiment) {
-  const auto missing = [&](Presence presence, std::string_view column) {
-    if (presence == Presence::none) experiment.notes.push_back(fmt::format("{} is not given.", column));
-    if (presence == Presence::some)
-      experiment.notes.push_back(fmt::format("{} is given for some collisions only.", column));
-  };
-  if (experiment.system == System::rimless_wheel) missing(experiment.columns.leg, "leg");
-  missing(experiment.columns.time, "time_s");
-  if (experiment.system == System::rimless_wheel) missing(experiment.columns.position, "position_m");
-  missing(experiment.columns.omega_plus, "omega_plus_rad_s");
-  if (!experiment.columns.outcomes)
-    experiment.notes.push_back("There is no trials.csv: how the trials ended is not known.");
-  for (std::size_t c = 0; c < experiment.conditions.size(); ++c) {
-    const Condition& condition = experiment.conditions[c];
-    std::size_t trials = 0, others = 0;
-    for (const MeasuredTrial& roll : experiment.trials) {
-      if (roll.condition != c) continue;
-      ++trials;
-      others += roll.collisions.front().leg.value_or(condition.first_landing_leg) != condition.first_landing_leg;
-    }
-    if (trials == 0) experiment.notes.push_back(fmt::format("Condition '{}' has no trial.", condition.id));
-    if (others > 0)
-      experiment.notes.push_back(
-          fmt::format("Condition '{}': {} of {} trials do not begin with first_landing_leg = {}; the "
-                      "column leg counts.",
-                      condition.id, others, trials, condition.first_landing_leg));
   }
 }
 
@@ -266,7 +237,7 @@ Experiment parse_experiment(const ExperimentSource& source) {
   }
   defects.check();
   std::ranges::sort(experiment.trials, {}, &MeasuredTrial::number);
-  add_notes(experiment);
+  experiment.notes = notes_on(experiment);
   return experiment;
 }
 

@@ -36,7 +36,7 @@ namespace {
 namespace range = dynamics::range;
 using dynamics::Range;
 
-// One table of the file: every key that is read is remembered, finish() reports the others.
+// Reads one table of the file: every key that is read is remembered, finish() reports the others.
 class Keys {
  public:
   Keys(const std::string& file, const toml::table& table, std::string name, Defects& defects)
@@ -121,7 +121,7 @@ class Keys {
   }
 
  private:
-  static Place place(const toml::source_region& source) {
+  static TextPosition place(const toml::source_region& source) {
     return {std::max<std::size_t>(source.begin.line, 1), std::max<std::size_t>(source.begin.column, 1)};
   }
 
@@ -226,7 +226,7 @@ void read_conditions(const std::string& file, Keys& root, Experiment& experiment
   }
 }
 
-// The table, or nothing and a defect.
+// Returns the table, or nothing and reports a defect.
 std::optional<toml::table> parse(const std::string& file, std::string_view text, Defects& defects) {
   try {
     return toml::parse(text);

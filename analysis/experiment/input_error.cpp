@@ -7,7 +7,7 @@ namespace metastable::analysis {
 InputError::InputError(std::vector<std::string> lines)
     : std::invalid_argument(fmt::format("{}", fmt::join(lines, "\n"))), lines_(std::move(lines)) {}
 
-void Defects::add(std::string_view file, Place place, std::string_view what) {
+void Defects::add(std::string_view file, TextPosition place, std::string_view what) {
   if (++count_ > most_shown) return;
   if (place.line == 0)
     lines_.push_back(fmt::format("{}: {}", file, what));

@@ -20,8 +20,8 @@ class InputError : public std::invalid_argument {
   std::vector<std::string> lines_;
 };
 
-/// A place in a text file. Both count from 1; 0: not known or the file as a whole.
-struct Place {
+/// Names a place in a text file. Both count from 1; 0 is not known or the file as a whole.
+struct TextPosition {
   std::size_t line = 0;
   std::size_t column = 0;  ///< in bytes
 };
@@ -31,10 +31,10 @@ class Defects {
  public:
   static constexpr std::size_t most_shown = 20;
 
-  void add(std::string_view file, Place place, std::string_view what);
+  void add(std::string_view file, TextPosition place, std::string_view what);
   std::size_t count() const { return count_; }
   bool empty() const { return count_ == 0; }
-  /// The first `most_shown` in the order they were added; what was left out is counted in a last line.
+  /// Returns the first `most_shown` in the order they were added; what was left out is counted in a last line.
   std::vector<std::string> lines() const;
   /// @throws InputError if there is any
   void check() const;
@@ -44,7 +44,7 @@ class Defects {
   std::size_t count_ = 0;
 };
 
-/// Text from a file for a message: in single quotes, at most 40 bytes, everything but printable ASCII as \xNN.
+/// Shows text from a file in a message: in single quotes, at most 40 bytes, everything but printable ASCII as \xNN.
 std::string shown_text(std::string_view text);
 
 }  // namespace metastable::analysis

@@ -4,12 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <charconv>
 #include <iterator>
 #include <numbers>
 #include <stdexcept>
 
 #include "analysis/experiment/csv_field.h"
+#include "analysis/experiment/experiment_notes.h"
 #include "analysis/statistics/random.h"
 #include "markov/parallel.h"
 
@@ -18,7 +19,28 @@ namespace {
 
 constexpr double tail = 0.3;  // [s] recorded of a wheel that has come to rest
 
-// Uniform in (0, 1) from Philox4x64 at counter (index, number, stream), key (seed): apart from the laboratory's draws.
+// Returns the number that a reader finds where the files hold this one.
+double as_written(double value) {
+  const std::string text = fmt::format("{:.6f}", value);
+  double read = 0;
+  std::from_chars(text.data(), text.data() + text.size(), read);
+  return read;
+}
+
+// Returns what experiment.toml says of a wheel.
+dynamics::Wheel stated_wheel(const Setting& setting) {
+  dynamics::Wheel wheel;
+  wheel.hub_mass = setting.wheel.hub_mass;
+  wheel.leg_length = setting.wheel.leg_length;
+  wheel.inertia = setting.wheel.inertia;
+  wheel.radius_of_gyration = setting.law == dynamics::Law::published
+                                 ? setting.wheel.radius_of_gyration
+                                 : dynamics::contact_model(setting.wheel, setting.law).radius_of_gyration;
+  return wheel;
+}
+
+// Draws a uniform in (0, 1) from Philox4x64 at counter (index, number, stream), key (seed), apart from the
+// laboratory's.
 double uniform(std::uint64_t seed, std::uint64_t index, std::uint64_t number, std::uint64_t stream) {
   const r123::Philox4x64::ctr_type counter{{index, number, stream, 0}};
   const auto bits = r123::Philox4x64()(counter, r123::Philox4x64::key_type{{seed, 0}});
@@ -37,8 +59,9 @@ std::string angles(const std::string& id, const dynamics::LaboratoryTrial& trial
     if (!(time < end)) return rows;
     // A wheel that turns back falls the way it came, onto both feet.
     const double moment = rested && time > turned ? std::max(last, 2 * turned - time) : time;
-    const double noise =
-        camera.noise_sd > 0 ? camera.noise_sd * dynamics::normal_quantile(uniform(camera.seed, index, k + 1, 201)) : 0;
+    const double noise = camera.noise_sd_rad > 0
+                             ? camera.noise_sd_rad * dynamics::normal_quantile(uniform(camera.seed, index, k + 1, 201))
+                             : 0;
     fmt::format_to(std::back_inserter(rows), "{},{},{:.6f},{:.{}f}\n", id, index + 1, time,
                    dynamics::angle_at(trial.motion, moment) + noise, camera.decimals);
   }
@@ -104,8 +127,8 @@ const std::vector<std::string>& droppable() {
   return names;
 }
 
-RealityFiles reality_files(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
-                           const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
+Experiment experiment_of(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
+                         const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
   if (conditions.empty()) throw std::invalid_argument("laboratory: no condition");
   for (const std::string& name : options.dropped)
     if (std::find(droppable().begin(), droppable().end(), name) == droppable().end()) {
@@ -117,40 +140,82 @@ RealityFiles reality_files(const std::vector<RealityCondition>& conditions, cons
     return std::find(options.dropped.begin(), options.dropped.end(), name) == options.dropped.end();
   };
   const Setting& first = conditions.front().setting;
+  Experiment experiment;
+  experiment.title = options.title;
+  experiment.wheel = stated_wheel(first);
+  experiment.contact = {first.law, options.restitution.value_or(first.restitution),
+                        options.friction.value_or(first.friction)};
+  for (const auto& [id, setting, count] : conditions) {
+    Condition& condition = experiment.conditions.emplace_back();
+    condition.id = id;
+    condition.slope_deg = setting.slope_deg;
+    condition.ramp_length = setting.ramp_length;
+    if (told("initial_speed_rad_s")) condition.initial_speed = setting.initial_speed;
+    condition.first_landing_leg = setting.first_landing_leg;
+  }
+  if (options.camera) experiment.sensor.rate = options.camera->rate;
+  if (told("noise")) experiment.sensor.noise_sd = setup.sensor_noise;
+
+  const auto presence = [&](std::string_view name) { return told(name) ? Presence::all : Presence::none; };
+  experiment.columns = {presence("leg"), presence("time_s"), presence("position_m"), presence("omega_plus_rad_s"),
+                        told("outcome")};
+  const auto given = [](Presence column, auto value) {
+    return column == Presence::all ? std::optional(value) : std::nullopt;
+  };
+  for (const dynamics::LaboratoryTrial& trial : trials) {
+    MeasuredTrial& measured = experiment.trials.emplace_back();
+    measured.number = static_cast<int>(experiment.trials.size());
+    measured.condition = trial.condition;
+    for (const dynamics::LaboratoryCollision& c : trial.collisions)
+      measured.collisions.push_back(
+          {static_cast<int>(measured.collisions.size()) + 1, given(experiment.columns.leg, c.leg),
+           given(experiment.columns.time, as_written(c.time)),
+           given(experiment.columns.position, as_written(c.position)), as_written(c.reported_minus),
+           given(experiment.columns.omega_plus, as_written(c.reported_plus))});
+    if (experiment.columns.outcomes) measured.outcome = trial.outcome;
+  }
+  experiment.notes = notes_on(experiment);
+  return experiment;
+}
+
+RealityFiles reality_files(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
+                           const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
+  const Experiment told = experiment_of(conditions, setup, trials, options);
   RealityFiles result;
   ExperimentFiles& files = result.files;
-  files.experiment_toml = wheel_description(first, options.restitution.value_or(first.restitution),
-                                            options.friction.value_or(first.friction), options.title, options.comment);
-  for (const RealityCondition& condition : conditions)
-    files.experiment_toml += condition_description(condition.id, condition.setting, told("initial_speed_rad_s"));
+  files.experiment_toml = wheel_description(conditions.front().setting, told.contact.restitution, told.contact.friction,
+                                            told.title, options.comment);
+  for (std::size_t c = 0; c < conditions.size(); ++c)
+    files.experiment_toml +=
+        condition_description(conditions[c].id, conditions[c].setting, told.conditions[c].initial_speed.has_value());
   std::string sensor;
-  if (options.camera) sensor += fmt::format("rate_hz = {}\n", options.camera->rate);
-  if (told("noise")) sensor += fmt::format("noise_sd_rad_s = {}\n", setup.sensor_noise);
+  if (told.sensor.rate) sensor += fmt::format("rate_hz = {}\n", *told.sensor.rate);
+  if (told.sensor.noise_sd) sensor += fmt::format("noise_sd_rad_s = {}\n", *told.sensor.noise_sd);
   if (!sensor.empty()) files.experiment_toml += "\n[sensor]\n" + sensor;
 
-  const bool leg = told("leg"), time = told("time_s"), position = told("position_m"), after = told("omega_plus_rad_s");
+  const auto name = [](Presence column, const char* text) { return column == Presence::all ? text : ""; };
   files.collisions_csv =
-      fmt::format("condition,trial,collision{}{}{},omega_minus_rad_s{}\n", leg ? ",leg" : "", time ? ",time_s" : "",
-                  position ? ",position_m" : "", after ? ",omega_plus_rad_s" : "");
-  if (told("outcome")) files.trials_csv = "condition,trial,outcome\n";
-  std::vector<std::string> recordings(trials.size());
-  for (std::size_t t = 0; t < trials.size(); ++t) {
-    const std::string id = csv_field(conditions[trials[t].condition].id);
+      fmt::format("condition,trial,collision{}{}{},omega_minus_rad_s{}\n", name(told.columns.leg, ",leg"),
+                  name(told.columns.time, ",time_s"), name(told.columns.position, ",position_m"),
+                  name(told.columns.omega_plus, ",omega_plus_rad_s"));
+  if (told.columns.outcomes) files.trials_csv = "condition,trial,outcome\n";
+  for (const MeasuredTrial& trial : told.trials) {
+    const std::string id = csv_field(told.conditions[trial.condition].id);
     auto row = std::back_inserter(files.collisions_csv);
-    for (std::size_t k = 0; k < trials[t].collisions.size(); ++k) {
-      const dynamics::LaboratoryCollision& c = trials[t].collisions[k];
-      fmt::format_to(row, "{},{},{}", id, t + 1, k + 1);
-      if (leg) fmt::format_to(row, ",{}", c.leg);
-      if (time) fmt::format_to(row, ",{:.6f}", c.time);
-      if (position) fmt::format_to(row, ",{:.6f}", c.position);
-      fmt::format_to(row, ",{:.6f}", c.reported_minus);
-      if (after) fmt::format_to(row, ",{:.6f}", c.reported_plus);
+    for (const MeasuredCollision& c : trial.collisions) {
+      fmt::format_to(row, "{},{},{}", id, trial.number, c.number);
+      if (c.leg) fmt::format_to(row, ",{}", *c.leg);
+      if (c.time) fmt::format_to(row, ",{:.6f}", *c.time);
+      if (c.position) fmt::format_to(row, ",{:.6f}", *c.position);
+      fmt::format_to(row, ",{:.6f}", c.omega_minus);
+      if (c.omega_plus) fmt::format_to(row, ",{:.6f}", *c.omega_plus);
       files.collisions_csv += '\n';
     }
-    if (told("outcome")) files.trials_csv += fmt::format("{},{},{}\n", id, t + 1, outcome_name(trials[t].outcome));
+    if (trial.outcome) files.trials_csv += fmt::format("{},{},{}\n", id, trial.number, outcome_name(*trial.outcome));
   }
   if (options.camera) {
     options.camera->validate();
+    std::vector<std::string> recordings(trials.size());
     markov::parallel_for(trials.size(), options.camera->threads, [&](std::size_t t) {
       recordings[t] = angles(conditions[trials[t].condition].id, trials[t], t, *options.camera);
     });

@@ -1,5 +1,5 @@
 #pragma once
-// Experiments run in the virtual laboratory, and their folders.
+// Runs experiments in the virtual laboratory, and writes their folders.
 
 #include <cstdint>
 #include <optional>
@@ -14,18 +14,18 @@
 
 namespace metastable::analysis {
 
-/// Contact and legs [m] as the catalogue of effects takes them.
+/// Returns contact and legs [m] as the catalogue of effects takes them.
 dynamics::NominalValues stated_values(const Spread& restitution, const Spread& friction,
                                       const std::vector<double>& leg_lengths);
 
-/// One condition as the modeller states it.
+/// Describes one condition as the modeller states it.
 struct RealityCondition {
   std::string id;
   Setting setting;  ///< the nominal model
   int trials = 50;  ///< 1 .. 100000
 };
 
-/// How reality departs from the nominal model.
+/// Says how reality departs from the nominal model.
 struct RealityOptions {
   std::vector<dynamics::Effect> effects = {};
   std::vector<dynamics::OutsideEffect> outside = {};
@@ -39,25 +39,30 @@ struct RealityOptions {
   int threads = 0;
 };
 
-/// The laboratory of these conditions. Wheel and contact are those of the first.
+/// Sets up the laboratory of these conditions. Wheel and contact are those of the first.
 /// @throws std::invalid_argument where there is no condition, and naming a setting the laboratory cannot take
 /// (correlation, list of pairs) or an option out of range
 dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& conditions,
                                            const RealityOptions& options);
-/// All trials, in the order they were run. The same bits on any number of threads.
+/// Returns all trials in the order they were run. They have the same bits on any number of threads.
 std::vector<dynamics::LaboratoryTrial> run_laboratory(const dynamics::LaboratorySetup& setup, int threads);
 
-/// What a folder tells of an experiment.
+/// Says what a folder tells of an experiment.
 struct FolderOptions {
   std::string title = {};
   std::vector<std::string> comment = {};  ///< first lines of experiment.toml, each behind "# "
-  /// Columns and statements left out: leg, time_s, position_m, omega_plus_rad_s, outcome, initial_speed_rad_s, noise.
+  /// Leaves these out: leg, time_s, position_m, omega_plus_rad_s, outcome, initial_speed_rad_s, noise.
   std::vector<std::string> dropped = {};
   std::optional<Spread> restitution = {}, friction = {};  ///< stated; default: those of the first condition's setting
   std::optional<CameraOptions> camera = {};               ///< angle.csv too
 };
-/// Names that FolderOptions::dropped may hold.
+/// Lists the names that FolderOptions::dropped may hold.
 const std::vector<std::string>& droppable();
+
+/// Returns the trials as an experiment without a folder in between: what reading reality_files() back gives, with
+/// digits that the files carry. @throws std::invalid_argument as reality_files()
+Experiment experiment_of(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
+                         const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options);
 
 struct RealityFiles {
   ExperimentFiles files;

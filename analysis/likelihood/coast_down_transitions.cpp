@@ -6,9 +6,12 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/statistics/random.h"
 #include "dynamics/wheel/effect_catalogue.h"
@@ -34,19 +37,23 @@ constexpr std::size_t stretch = 10;                   // revolutions whose mean 
 constexpr double small_loss = 0.1;                    // of the nominal loss: less is called small
 constexpr double slowest_share = 0.2;                 // of the speed seen: the filter's is never below
 
-enum Place {
-  noise_at,
-  jitter_s_at,
-  jitter_rad_at,
-  glitch_at,
-  wander_sd_at,
-  wander_length_at,
-  constant_at,
-  linear_at,
-  quadratic_at,
-  ring_at,
-  ring_speed_at,
-  ring_width_at
+// Where each nuisance stands in the list.
+struct DrumSlot {
+  enum : std::size_t {
+    log_noise_sd,
+    log_tick_jitter_s,
+    log_tick_jitter_rad,
+    logit_glitch_share,
+    log_wander_sd,
+    log_wander_revolutions,
+    constant,
+    linear,
+    quadratic,
+    resonance,
+    log_resonance_rad_s,
+    log_resonance_width,
+    count
+  };
 };
 
 struct Losses {
@@ -70,6 +77,13 @@ struct Losses {
   }
 };
 
+// An effect as it is fitted, and what its value does to the losses.
+struct DrumEffect {
+  Candidate candidate;
+  std::function<void(Losses&, double)> apply;
+  std::optional<int> power = {};  // of the speed with which a torque grows
+};
+
 // How late a tick makes a revolution's omega^2 too small.
 double slope_of_lateness(double omega) { return omega * omega * omega / pi; }
 
@@ -86,16 +100,16 @@ class CoastDownTransitions : public TransitionModel {
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   const std::vector<std::string>& notes() const override { return notes_; }
-  Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const override;
-  std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
+  Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
+  std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override;
   std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
                                                                                      std::uint64_t seed) const override;
   std::pair<double, double> rests() const override { return {0, 0}; }
-  double expected_steps(std::span<const double>, std::span<const Term>, std::uint64_t) const override {
+  double expected_steps(std::span<const double>, std::span<const EffectTerm>, std::uint64_t) const override {
     return std::numeric_limits<double>::infinity();  // a drum does not fail by a step
   }
-  std::vector<Named> report_nuisances(std::span<const double> nuisance) const override {
+  std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const override {
     const Losses l = losses(nuisance, {});
     return {{"constant", l.constant},
             {"linear", l.linear},
@@ -105,7 +119,7 @@ class CoastDownTransitions : public TransitionModel {
             {"tick_jitter_rad", l.jitter_rad},
             {"glitch_share", l.glitches},
             {"wander_sd", l.wander_sd},
-            {"wander_revolutions", std::exp(nuisance[wander_length_at])},
+            {"wander_revolutions", std::exp(nuisance[DrumSlot::log_wander_revolutions])},
             {"resonance", l.ring},
             {"resonance_rad_s", l.ring_speed},
             {"resonance_width", l.ring_width}};
@@ -113,13 +127,14 @@ class CoastDownTransitions : public TransitionModel {
   std::string position_unit() const override { return "rad"; }
   std::string recalibrated() const override { return "losses within what differs from run to run, and noise,"; }
   bool refits_noise() const override { return true; }
-  std::vector<Start> starts(std::span<const Term> terms) const override;
-  std::string size_in_words(std::span<const Term> terms) const override;
+  std::vector<FitStart> starts(std::span<const EffectTerm> terms) const override;
+  std::string size_in_words(std::span<const EffectTerm> terms) const override;
 
  private:
-  Losses losses(std::span<const double> nuisance, std::span<const Term> terms) const;
+  Losses losses(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
   void set_up_nuisances();
-  void set_up_candidates();
+  void set_up_effects();
+  const DrumEffect& effect_of(const EffectTerm& term) const;
   void list_events();
 
   RevolutionLoss stated_;
@@ -132,6 +147,7 @@ class CoastDownTransitions : public TransitionModel {
   bool fresh_runs_ = false;  // a later trial starts faster than an earlier one
   std::vector<Event> events_;
   std::vector<Nuisance> nuisances_;
+  std::vector<DrumEffect> effects_;
   std::vector<Candidate> candidates_;
   std::vector<std::string> notes_;
 };
@@ -154,7 +170,7 @@ CoastDownTransitions::CoastDownTransitions(const Experiment& experiment) : state
   if (events_.empty())
     throw std::invalid_argument("collisions.csv: no trial has two revolutions: there is no transition");
   set_up_nuisances();
-  set_up_candidates();
+  set_up_effects();
 }
 
 // Counters jitter and garble revolutions, and the loss of a run wanders a little and differs from the next one's (air,
@@ -165,27 +181,33 @@ void CoastDownTransitions::set_up_nuisances() {
   const double w = typical_speed_;
   typical_loss_ = std::max(1e-6, stated_.constant + stated_.linear * w + stated_.quadratic * w * w);
   const double noise = std::clamp(stated_.noise_sd, 1e-6, 0.5 * typical_loss_);
-  nuisances_ = {{"log noise_sd", std::log(noise), 2, 1e-3, -14, std::log(largest_noise * typical_loss_)},
-                {"log tick_jitter_s", std::log(3e-6), 4, 1e-2, std::log(1e-9), std::log(1e-3)},
-                {"log tick_jitter_rad", std::log(3e-6), 4, 1e-2, std::log(1e-9), std::log(0.01)},
-                {"logit glitch_share", -5, 2, 1e-2, -12, -4},
-                {"log wander_sd", std::log(0.1 * noise), 4, 1e-2, -20, std::log(largest_wander * typical_loss_)},
-                {"log wander_revolutions", std::log(20), 1, 1e-2, std::log(2), std::log(500)}};
-  const double most = largest_run_to_run * typical_loss_, sd = run_to_run * typical_loss_;
-  double scale = 1;
-  for (const char* name : {"constant", "linear", "quadratic"}) {
-    nuisances_.push_back({name, 0, sd / scale, 1e-2 * sd / scale, -most / scale, most / scale});
-    scale *= w;
-  }
   double slowest = w, fastest = w;
   for (const Event& e : events_) {
     slowest = std::min(slowest, std::max(1e-3, e.speed));
     fastest = std::max(fastest, e.speed);
   }
-  nuisances_.push_back(
+  using Slot = DrumSlot;
+  nuisances_.resize(Slot::count);
+  const auto set = [this](std::size_t slot, Nuisance nuisance) { nuisances_[slot] = std::move(nuisance); };
+  set(Slot::log_noise_sd, {"log noise_sd", std::log(noise), 2, 1e-3, -14, std::log(largest_noise * typical_loss_)});
+  set(Slot::log_tick_jitter_s, {"log tick_jitter_s", std::log(3e-6), 4, 1e-2, std::log(1e-9), std::log(1e-3)});
+  set(Slot::log_tick_jitter_rad, {"log tick_jitter_rad", std::log(3e-6), 4, 1e-2, std::log(1e-9), std::log(0.01)});
+  set(Slot::logit_glitch_share, {"logit glitch_share", -5, 2, 1e-2, -12, -4});
+  set(Slot::log_wander_sd,
+      {"log wander_sd", std::log(0.1 * noise), 4, 1e-2, -20, std::log(largest_wander * typical_loss_)});
+  set(Slot::log_wander_revolutions, {"log wander_revolutions", std::log(20), 1, 1e-2, std::log(2), std::log(500)});
+  // The terms of the loss differ from run to run by shares of the mean nominal loss.
+  const auto term = [&](const char* name, double scale) {
+    const double most = largest_run_to_run * typical_loss_, sd = run_to_run * typical_loss_;
+    return Nuisance{name, 0, sd / scale, 1e-2 * sd / scale, -most / scale, most / scale};
+  };
+  set(Slot::constant, term("constant", 1));
+  set(Slot::linear, term("linear", w));
+  set(Slot::quadratic, term("quadratic", w * w));
+  set(Slot::resonance,
       {"resonance", 0, usual_ring * typical_loss_, 1e-3 * typical_loss_, 0, largest_ring * typical_loss_});
-  nuisances_.push_back({"log resonance_rad_s", std::log(w), 0.5, 1e-3, std::log(slowest), std::log(fastest)});
-  nuisances_.push_back({"log resonance_width", std::log(0.1), 0.5, 1e-2, std::log(0.03), std::log(0.3)});
+  set(Slot::log_resonance_rad_s, {"log resonance_rad_s", std::log(w), 0.5, 1e-3, std::log(slowest), std::log(fastest)});
+  set(Slot::log_resonance_width, {"log resonance_width", std::log(0.1), 0.5, 1e-2, std::log(0.03), std::log(0.3)});
 }
 
 void CoastDownTransitions::list_events() {
@@ -204,69 +226,72 @@ void CoastDownTransitions::list_events() {
   }
 }
 
-void CoastDownTransitions::set_up_candidates() {
-  const auto add = [this](std::string id, std::string name, FreeParameter p, double power = 1) {
-    Candidate c;
-    c.id = std::move(id);
-    c.parameters = {p};
-    c.report = [name = std::move(name), power](const Values&, const Values& v) {
-      return std::vector<Named>{{name, power == 1 ? v[0] : std::pow(std::max(0.0, v[0]), power)}};
+// Torques take loss by a power of the speed; below zero: less loss than the nominal model ascribes. The other effects
+// keep the catalogue's ranges.
+void CoastDownTransitions::set_up_effects() {
+  const double per_torque = 4 * pi / inertia_;  // work 2 pi T, kinetic energy I omega^2 / 2
+  const auto parameter = [](const char* id) { return dynamics::effect_info(id).parameters.front(); };
+  const auto add = [&](const char* id, FreeParameter free, std::function<void(Losses&, double)> apply) {
+    DrumEffect effect;
+    effect.candidate.id = id;
+    effect.candidate.parameters = {free};
+    effect.candidate.report = [name = parameter(id).name](const Values&, const Values& v) {
+      return std::vector<NamedValue>{{name, v[0]}};
     };
-    candidates_.push_back(std::move(c));
+    effect.apply = std::move(apply);
+    effects_.push_back(std::move(effect));
   };
-  // The catalogue's ranges. A torque below zero: less loss than the nominal model ascribes.
-  const auto range = [](const char* id, std::size_t which = 0) {
-    const dynamics::EffectParameter& p = dynamics::effect_info(id).parameters.at(which);
-    return std::pair{p.lower, p.upper};
+  const auto torque = [&](const char* id, int power, double step, double Losses::*loss) {
+    const double most = parameter(id).upper;
+    add(id, {0, -most, most, step * inertia_}, [loss, per_torque](Losses& l, double v) { l.*loss += per_torque * v; });
+    effects_.back().power = power;
   };
-  const auto torque = [&](const char* id, const char* name, double step) {
-    const double most = range(id).second;
-    add(id, name, {0, -most, most, step * inertia_});
+  const auto in_range = [&](const char* id, double Losses::*field, double step, double try_at = 0) {
+    const dynamics::EffectParameter p = parameter(id);
+    add(id, {0, p.lower, p.upper, step, try_at}, [field](Losses& l, double v) { l.*field = v; });
   };
-  torque("axle_drag_viscous", "n_m_s", 1e-5);
-  torque("rolling_resistance", "torque_n_m", 1e-4);
-  torque("air_drag", "n_m_s2", 1e-7);
-  const auto [least_kept, most_kept] = range("contact_memory");
-  add("contact_memory", "correlation", {0, least_kept, most_kept, 1e-3});
-  const auto [least_drift, most_drift] = range("trial_drift");
-  add("trial_drift", "relative_change", {0, least_drift, most_drift, 1e-3});
-  add("contact_outliers", "share", {0, 0, range("contact_outliers").second, 1e-4, 0.01});
-  add("sensor_noise", "sd_rad_s", {0, 0, std::pow(range("sensor_noise").second, 2), 1e-9, 1e-7}, 0.5);
-  const auto [least_bias, most_bias] = range("sensor_bias");
-  add("sensor_bias", "bias_rad_s", {0, least_bias, most_bias, 1e-4});
-  for (Candidate& c : candidates_)
-    if (c.id == "trial_drift" && !fresh_runs_)
-      c.undecidable = "the trials are blocks of one run: a drift cannot be told from a loss that varies with the speed";
+  torque("axle_drag_viscous", 1, 1e-5, &Losses::linear);
+  torque("rolling_resistance", 0, 1e-4, &Losses::constant);
+  torque("air_drag", 2, 1e-7, &Losses::quadratic);
+  in_range("contact_memory", &Losses::memory, 1e-3);
+  in_range("trial_drift", &Losses::drift, 1e-3);
+  if (!fresh_runs_)
+    effects_.back().candidate.undecidable =
+        "the trials are blocks of one run: a drift cannot be told from a loss that varies with the speed";
+  in_range("contact_outliers", &Losses::outliers, 1e-4, 0.01);
+  // Fitted as a variance: there the likelihood has a slope at nothing.
+  add("sensor_noise", {0, 0, std::pow(parameter("sensor_noise").upper, 2), 1e-9, 1e-7},
+      [](Losses& l, double v) { l.sensor = std::hypot(l.sensor, std::sqrt(std::max(0.0, v))); });
+  effects_.back().candidate.report = [name = parameter("sensor_noise").name](const Values&, const Values& v) {
+    return std::vector<NamedValue>{{name, std::sqrt(std::max(0.0, v[0]))}};
+  };
+  in_range("sensor_bias", &Losses::bias, 1e-4);
+  for (const DrumEffect& effect : effects_) candidates_.push_back(effect.candidate);
 }
 
-Losses CoastDownTransitions::losses(std::span<const double> nuisance, std::span<const Term> terms) const {
+const DrumEffect& CoastDownTransitions::effect_of(const EffectTerm& term) const {
+  const auto found = std::find_if(effects_.begin(), effects_.end(),
+                                  [&](const DrumEffect& effect) { return effect.candidate.id == term.candidate->id; });
+  if (found == effects_.end()) throw std::logic_error("coast_down_transitions: no effect " + term.candidate->id);
+  return *found;
+}
+
+Losses CoastDownTransitions::losses(std::span<const double> nuisance, std::span<const EffectTerm> terms) const {
   Losses l{.constant = stated_.constant, .linear = stated_.linear, .quadratic = stated_.quadratic};
-  l.constant += nuisance[constant_at];
-  l.linear += nuisance[linear_at];
-  l.quadratic += nuisance[quadratic_at];
-  l.ring = nuisance[ring_at];
-  l.ring_speed = std::exp(nuisance[ring_speed_at]);
-  l.ring_width = std::exp(nuisance[ring_width_at]);
-  l.noise = std::exp(nuisance[noise_at]);
+  l.constant += nuisance[DrumSlot::constant];
+  l.linear += nuisance[DrumSlot::linear];
+  l.quadratic += nuisance[DrumSlot::quadratic];
+  l.ring = nuisance[DrumSlot::resonance];
+  l.ring_speed = std::exp(nuisance[DrumSlot::log_resonance_rad_s]);
+  l.ring_width = std::exp(nuisance[DrumSlot::log_resonance_width]);
+  l.noise = std::exp(nuisance[DrumSlot::log_noise_sd]);
   l.sensor = sensor_;
-  l.jitter_s = std::exp(nuisance[jitter_s_at]);
-  l.jitter_rad = std::exp(nuisance[jitter_rad_at]);
-  l.glitches = 1 / (1 + std::exp(-nuisance[glitch_at]));
-  l.wander_sd = std::exp(nuisance[wander_sd_at]);
-  l.wander_kept = std::exp(-1 / std::exp(nuisance[wander_length_at]));
-  const double per_torque = 4 * pi / inertia_;  // work 2 pi T, kinetic energy I omega^2 / 2
-  for (const Term& term : terms) {
-    const std::string& id = term.candidate->id;
-    const double v = term.values[0];
-    if (id == "axle_drag_viscous") l.linear += per_torque * v;
-    if (id == "rolling_resistance") l.constant += per_torque * v;
-    if (id == "air_drag") l.quadratic += per_torque * v;
-    if (id == "contact_memory") l.memory = v;
-    if (id == "trial_drift") l.drift = v;
-    if (id == "contact_outliers") l.outliers = v;
-    if (id == "sensor_noise") l.sensor = std::hypot(l.sensor, std::sqrt(std::max(0.0, v)));
-    if (id == "sensor_bias") l.bias = v;
-  }
+  l.jitter_s = std::exp(nuisance[DrumSlot::log_tick_jitter_s]);
+  l.jitter_rad = std::exp(nuisance[DrumSlot::log_tick_jitter_rad]);
+  l.glitches = 1 / (1 + std::exp(-nuisance[DrumSlot::logit_glitch_share]));
+  l.wander_sd = std::exp(nuisance[DrumSlot::log_wander_sd]);
+  l.wander_kept = std::exp(-1 / std::exp(nuisance[DrumSlot::log_wander_revolutions]));
+  for (const EffectTerm& term : terms) effect_of(term).apply(l, term.values[0]);
   return l;
 }
 
@@ -275,8 +300,9 @@ struct Seen {
   double log_density, score, unit;
 };
 
-// Kalman filter of one trial. State: omega^2, by how much the loss has wandered, and the jitter of the tick that began
-// the last period and of the one that ended it; a tick too late makes one period long and the next one short.
+// A Kalman filter follows one trial. Its state is omega^2, by how much the loss has wandered, and the jitter of the
+// tick that began the last period and of the one that ended it; a tick too late makes one period long and the next one
+// short.
 class LossFilter {
  public:
   // `constant`: the trial's own.
@@ -364,7 +390,7 @@ Seen LossFilter::see(double omega) {
   return seen;
 }
 
-Evaluation CoastDownTransitions::evaluate(std::span<const double> nuisance, std::span<const Term> terms) const {
+Evaluation CoastDownTransitions::evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const {
   const Losses l = losses(nuisance, terms);
   const auto true_speed = [&](double reported) { return std::max(1e-3, reported - l.bias); };
   Evaluation result;
@@ -385,16 +411,15 @@ Evaluation CoastDownTransitions::evaluate(std::span<const double> nuisance, std:
 
 // The mean loss of short stretches beyond the nominal one, by least squares on the terms: close to what they are in the
 // end, where the slopes of the likelihood without them point anywhere.
-std::vector<Start> CoastDownTransitions::starts(std::span<const Term> terms) const {
+std::vector<FitStart> CoastDownTransitions::starts(std::span<const EffectTerm> terms) const {
   const double per_torque = 4 * pi / inertia_;
   std::vector<std::size_t> fitted;
   std::vector<int> power;
   for (std::size_t i = 0; i < terms.size(); ++i) {
-    const std::string& id = terms[i].candidate->id;
-    const int p = id == "rolling_resistance" ? 0 : id == "axle_drag_viscous" ? 1 : id == "air_drag" ? 2 : -1;
-    if (p < 0) continue;
+    const std::optional<int> p = effect_of(terms[i]).power;
+    if (!p) continue;
     fitted.push_back(i);
-    power.push_back(p);
+    power.push_back(*p);
   }
   std::vector<double> beyond, omega;  // by stretch
   for (const auto& speeds : speeds_) {
@@ -418,44 +443,44 @@ std::vector<Start> CoastDownTransitions::starts(std::span<const Term> terms) con
     sizes = columns.colPivHouseholderQr().solve(y);
     left -= columns * sizes;
   }
-  Start start{nominal_values(*this), {}};
-  for (const Term& term : terms) start.values.push_back(term.values);
+  FitStart start{nominal_values(*this), {}};
+  for (const EffectTerm& term : terms) start.values.push_back(term.values);
   for (std::size_t c = 0; c < fitted.size(); ++c) {
     const FreeParameter& p = terms[fitted[c]].candidate->parameters[0];
     start.values[fitted[c]][0] = std::clamp(sizes[static_cast<Eigen::Index>(c)] / per_torque, p.lower, p.upper);
   }
   const double scatter = std::sqrt(left.squaredNorm() / static_cast<double>(rows));
-  const auto set = [&](Place place, double value) {
-    const Nuisance& n = nuisances_[place];
-    start.nuisance[place] = std::clamp(std::log(std::max(1e-9, value)), n.lower, n.upper);
+  const auto set = [&](std::size_t slot, double value) {
+    const Nuisance& n = nuisances_[slot];
+    start.nuisance[slot] = std::clamp(std::log(std::max(1e-9, value)), n.lower, n.upper);
   };
-  std::vector<Start> all;
-  // The scatter as a wandering loss, short or long, and as noise.
-  set(wander_sd_at, scatter);
+  std::vector<FitStart> all;
+  // The scatter may be a wandering loss, short or long, or noise.
+  set(DrumSlot::log_wander_sd, scatter);
   for (const double revolutions : {5.0, 50.0}) {
-    set(wander_length_at, revolutions);
+    set(DrumSlot::log_wander_revolutions, revolutions);
     all.push_back(start);
   }
-  // The same with the stretch that lost most as a resonance.
+  // Or the stretch that lost most is where the rig rings.
   Eigen::Index most = 0;
   const double ring = left.maxCoeff(&most);
-  start.nuisance[ring_at] = std::clamp(ring, 0.0, nuisances_[ring_at].upper);
-  set(ring_speed_at, w[most]);
-  set(wander_sd_at, 0.3 * scatter);
+  start.nuisance[DrumSlot::resonance] = std::clamp(ring, 0.0, nuisances_[DrumSlot::resonance].upper);
+  set(DrumSlot::log_resonance_rad_s, w[most]);
+  set(DrumSlot::log_wander_sd, 0.3 * scatter);
   all.push_back(start);
-  set(wander_length_at, 5);
-  set(noise_at, scatter);
+  set(DrumSlot::log_wander_revolutions, 5);
+  set(DrumSlot::log_noise_sd, scatter);
   all.push_back(start);
   start.nuisance = nominal_values(*this);
-  set(noise_at, 3 * scatter);
+  set(DrumSlot::log_noise_sd, 3 * scatter);
   all.push_back(start);
   return all;
 }
 
-std::string CoastDownTransitions::size_in_words(std::span<const Term> terms) const {
+std::string CoastDownTransitions::size_in_words(std::span<const EffectTerm> terms) const {
   const std::vector<double> nominal = nominal_values(*this);
-  // Mean loss over the measured revolutions that the terms add to the nominal one.
-  const auto mean_loss = [&](std::span<const Term> some) {
+  // What the terms add to the nominal loss, as a mean over the measured revolutions, is their size.
+  const auto mean_loss = [&](std::span<const EffectTerm> some) {
     const Losses l = losses(nominal, some);
     double sum = 0;
     for (const Event& e : events_) sum += l.constant + l.linear * e.speed + l.quadratic * e.speed * e.speed;
@@ -464,7 +489,7 @@ std::string CoastDownTransitions::size_in_words(std::span<const Term> terms) con
   const double stated = mean_loss({}), all = mean_loss(terms) - stated;
   if (!(stated > 0) || all == 0) return {};
   std::vector<std::string> parts;
-  for (const Term& term : terms)
+  for (const EffectTerm& term : terms)
     if (const double one = mean_loss({&term, 1}) - stated; one != 0)
       parts.push_back(fmt::format("{} {:+.0f} %", term.candidate->id, 100 * one / stated));
   return fmt::format("Of the loss that the nominal model states over these speeds that is {}{}.",
@@ -472,7 +497,8 @@ std::string CoastDownTransitions::size_in_words(std::span<const Term> terms) con
 }
 
 std::unique_ptr<TransitionModel> CoastDownTransitions::simulate(std::span<const double> nuisance,
-                                                                std::span<const Term> terms, std::uint64_t seed) const {
+                                                                std::span<const EffectTerm> terms,
+                                                                std::uint64_t seed) const {
   const Losses l = losses(nuisance, terms);
   auto copy = std::make_unique<CoastDownTransitions>(*this);
   for (std::size_t t = 0; t < speeds_.size(); ++t) {

@@ -1,5 +1,20 @@
 #pragma once
 // From an experiment to its diagnosis in one call.
+//
+// Example:
+//   #include <metastable/analysis/likelihood/diagnose.h>
+//
+//   #include <cstdio>
+//
+//   int main(int, char** arguments) {
+//     // A folder with experiment.toml, collisions.csv and trials.csv; of the catalogue only what is suspected.
+//     const auto diagnosis = metastable::analysis::diagnose(
+//         arguments[1], {.catalogue = {"leg_contact", "slope_offset"}, .draws = 200});
+//     std::printf("%s\n", verdict_name(diagnosis.verdict).c_str());
+//     for (const auto& cause : diagnosis.causes.ranked) std::printf("%s: %.2f\n", cause.name().c_str(), cause.probability);
+//   }
+// prints
+//   @@DIAGNOSE@@
 
 #include <filesystem>
 

@@ -111,7 +111,7 @@ SpeedFilter::Out SpeedFilter::rest(const ExtendedWheel& wheel, const StepContext
   return out;
 }
 
-// P of less than a score given the previous collision's.
+// The chance of a lower score is that given the previous collision's.
 double SpeedFilter::conditional(double below) const {
   if (extension_.memory == 0 || !previous_) return std::clamp(below, 1e-300, 1.0);
   const double rho = extension_.memory;

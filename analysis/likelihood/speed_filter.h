@@ -1,5 +1,5 @@
 #pragma once
-// The speed of one trial, followed through its noisy measurements.
+// A filter follows the speed of one trial through its noisy measurements.
 
 #include <optional>
 
@@ -15,9 +15,9 @@ inline constexpr double least_log_density = -60;
 /// Normal score of a probability, held inside +-8.
 double score_of_probability(double below);
 
-/// The wheel's speed given all measurements so far: N(mean, variance) just before each collision, just after it where
-/// that is measured. Gaussian: exact while the sensor noise is small beside the spread of a collision. One object a
-/// trial.
+/// Holds the wheel's speed given all measurements so far as N(mean, variance): just before each collision, just after
+/// it where that is measured. This is exact while the sensor noise is small beside the spread of a collision. Each
+/// trial needs a filter of its own.
 class SpeedFilter {
  public:
   /// What one measurement says: its log density, its normal score, and the speed that a unit of score is [rad/s].
@@ -30,19 +30,19 @@ class SpeedFilter {
   /// @param slack  sd of the least speed that a next collision can have, where the legs are not known [rad/s]
   SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0);
 
-  /// The first speed, against the stated launch.
+  /// The first speed is seen: it is held against the stated launch.
   Out launch(const Condition& condition, double reported);
-  /// The first speed (or one after a gap), with nothing to hold it against.
+  /// The first speed is seen (or one after a gap), and nothing can be held against it.
   void start(double reported);
   /// omega+ is seen: the collision.
   Out collision(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
-  /// Then the next omega-: the stance.
+  /// Then the next omega- is seen: the stance.
   Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
   /// Only the next omega- is seen: collision and stance together.
   Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
-  /// An omega+ below `bound` (or none, of a foot that jams) after the last measured speed, or not that.
+  /// After the last measured speed omega+ was below `bound` (or there was none, the foot jammed), or it was not.
   Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound, bool rested);
-  /// The chance of an omega+ below `bound` after the last measured speed.
+  /// How likely omega+ is to be below `bound` after the last measured speed.
   double chance_below(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound) const;
 
  private:

@@ -1,8 +1,11 @@
 #include "analysis/likelihood/wheel_candidates.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace metastable::analysis {
 namespace {
@@ -12,27 +15,36 @@ using Values = std::vector<double>;
 
 constexpr double degree = std::numbers::pi / 180;
 
-// One free parameter that goes into one field and is reported under one name.
+// The plain effect has one free parameter, which goes into one field and is reported under one name.
 WheelCandidate simple(std::string id, std::string name, double Extension::*field, FreeParameter parameter,
                       double unit = 1) {
   WheelCandidate c;
   c.candidate.id = std::move(id);
   c.candidate.parameters = {parameter};
   c.candidate.report = [name = std::move(name)](const Values&, const Values& v) {
-    return std::vector<Named>{{name, v[0]}};
+    return std::vector<NamedValue>{{name, v[0]}};
   };
   c.apply = [field, unit](Extension& e, const Values&, const Values& v) { e.*field = v[0] * unit; };
   return c;
 }
 
-// A standard deviation, fitted as its square: there the likelihood has a slope at nothing.
+// A standard deviation is fitted as its square: there the likelihood has a slope at nothing.
 WheelCandidate spread(std::string id, std::string name, double Extension::*field, double largest, double try_at) {
   WheelCandidate c =
       simple(std::move(id), "", field, {0, 0, largest * largest, 1e-3 * try_at * try_at, try_at * try_at});
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] * v[0]}}; };
   c.candidate.report = [name = std::move(name)](const Values&, const Values& v) {
-    return std::vector<Named>{{name, std::sqrt(std::max(0.0, v[0]))}};
+    return std::vector<NamedValue>{{name, std::sqrt(std::max(0.0, v[0]))}};
   };
   c.apply = [field](Extension& e, const Values&, const Values& v) { e.*field = std::sqrt(std::max(0.0, v[0])); };
+  return c;
+}
+
+// An effect between trials, launches or collisions needs some of them, whatever its size.
+WheelCandidate needing(std::size_t least, std::size_t here, const char* of_what, WheelCandidate c) {
+  if (c.candidate.undecidable.empty() && here < least)
+    c.candidate.undecidable =
+        fmt::format("it needs {} {}, and there {} {}", least, of_what, here == 1 ? "is" : "are", here);
   return c;
 }
 
@@ -41,7 +53,7 @@ WheelCandidate initial_speed(const WheelDesign& design) {
   c.candidate.id = "initial_speed";
   c.candidate.parameters = {{0, -3, 3, 1e-3}, {0, -1, 1, 1e-3}};
   c.candidate.report = [](const Values&, const Values& v) {
-    return std::vector<Named>{{"mean_rad_s", v[0]}, {"sd_rad_s", v[1]}};
+    return std::vector<NamedValue>{{"mean_rad_s", v[0]}, {"sd_rad_s", v[1]}};
   };
   c.apply = [](Extension& e, const Values&, const Values& v) {
     e.launch_shift = v[0];
@@ -56,16 +68,21 @@ WheelCandidate leg_lengths(const WheelDesign& design) {
   c.candidate.id = "leg_lengths";
   c.candidate.parameters.assign(design.leg_lengths.size(), {0, -0.02, 0.02, 1e-6});
   c.candidate.report = [stated = design.leg_lengths](const Values&, const Values& v) {
-    std::vector<Named> named;
+    std::vector<NamedValue> named;
     for (std::size_t i = 0; i < v.size(); ++i) named.emplace_back("leg_lengths_m", stated[i] + v[i]);
     return named;
+  };
+  c.candidate.form_of = [stated = design.leg_lengths](const Values& v) {
+    FittedForm form;
+    for (std::size_t i = 0; i < v.size(); ++i) form.values.push_back(v[i] - stated.at(i));
+    return form;
   };
   c.apply = [](Extension& e, const Values&, const Values& v) { e.leg_change = v; };
   if (!design.legs_known) c.candidate.undecidable = "which leg landed is not known";
   return c;
 }
 
-// Variants: {leg, 0: its friction or 1: its restitution}.
+// A variant is {leg, what}: 0 is the leg's friction, 1 its restitution.
 WheelCandidate leg_contact(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "leg_contact";
@@ -75,8 +92,12 @@ WheelCandidate leg_contact(const WheelDesign& design) {
     for (int leg = 0; leg < design.legs; ++leg) c.candidate.variants.push_back({static_cast<double>(leg), what});
   c.candidate.report = [](const Values& variant, const Values& v) {
     const bool friction = variant[1] == 0;
-    return std::vector<Named>{
+    return std::vector<NamedValue>{
         {"leg", variant[0]}, {"friction_ratio", friction ? v[0] : 1}, {"restitution_ratio", friction ? 1 : v[0]}};
+  };
+  c.candidate.form_of = [](const Values& v) {
+    const bool friction = v[1] != 1 || v[2] == 1;  // both at once have no fitted form: friction's is taken
+    return FittedForm{{v[0], friction ? 0.0 : 1.0}, {friction ? v[1] : v[2]}};
   };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.leg = static_cast<int>(variant[0]);
@@ -91,8 +112,9 @@ WheelCandidate hub_eccentricity(const WheelDesign& design) {
   c.candidate.id = "hub_eccentricity";
   c.candidate.parameters = {{0, -0.05, 0.05, 1e-6}, {0, -0.05, 0.05, 1e-6}};
   c.candidate.report = [](const Values&, const Values& v) {
-    return std::vector<Named>{{"offset_m", std::hypot(v[0], v[1])}, {"phase_rad", std::atan2(v[1], v[0])}};
+    return std::vector<NamedValue>{{"offset_m", std::hypot(v[0], v[1])}, {"phase_rad", std::atan2(v[1], v[0])}};
   };
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] * std::cos(v[1]), v[0] * std::sin(v[1])}}; };
   c.apply = [](Extension& e, const Values&, const Values& v) {
     e.hub_forward = v[0];
     e.hub_aside = v[1];
@@ -101,7 +123,7 @@ WheelCandidate hub_eccentricity(const WheelDesign& design) {
   return c;
 }
 
-// Variants: {shape, from, to}; parabola, half sine, bend in the middle.
+// A variant is {shape, from, to}; the shape is a parabola, half a sine or a bend in the middle.
 WheelCandidate slope_profile(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "slope_profile";
@@ -116,7 +138,10 @@ WheelCandidate slope_profile(const WheelDesign& design) {
     c.candidate.variants.push_back({2, 0, 2 * share * design.furthest});
   c.candidate.refine = {0, 0, 0.25 * design.furthest};
   c.candidate.report = [](const Values& variant, const Values& v) {
-    return std::vector<Named>{{"sag_m", v[0]}, {"from_m", variant[1]}, {"to_m", variant[2]}};
+    return std::vector<NamedValue>{{"sag_m", v[0]}, {"from_m", variant[1]}, {"to_m", variant[2]}};
+  };
+  c.candidate.form_of = [end = design.ramp_length](const Values& v) {
+    return FittedForm{{0, v[1], v[2] > 0 ? v[2] : end}, {v[0]}};
   };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.sag_shape = static_cast<Extension::Shape>(static_cast<int>(variant[0]));
@@ -134,8 +159,9 @@ WheelCandidate speed_dependent_friction() {
   c.candidate.variants = {{1.0}, {2.0}, {4.0}, {8.0}};
   c.candidate.refine = {0.8};
   c.candidate.report = [](const Values& variant, const Values& v) {
-    return std::vector<Named>{{"amplitude", v[0]}, {"speed_rad_s", variant[0]}};
+    return std::vector<NamedValue>{{"amplitude", v[0]}, {"speed_rad_s", variant[0]}};
   };
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0]}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.stribeck_speed = variant[0];
     e.stribeck = v[0];
@@ -143,7 +169,7 @@ WheelCandidate speed_dependent_friction() {
   return c;
 }
 
-// Variants: intervals between twelfths of the stretch that was rolled over.
+// Variants are the intervals between twelfths of the stretch that was rolled over.
 WheelCandidate friction_patch(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "friction_patch";
@@ -156,7 +182,11 @@ WheelCandidate friction_patch(const WheelDesign& design) {
       c.candidate.variants.push_back({from * part - 0.03, to * part - 0.03});
   c.candidate.refine = {part, part};
   c.candidate.report = [](const Values& variant, const Values& v) {
-    return std::vector<Named>{{"from_m", std::max(0.0, variant[0])}, {"to_m", variant[1]}, {"friction_ratio", v[0]}};
+    return std::vector<NamedValue>{
+        {"from_m", std::max(0.0, variant[0])}, {"to_m", variant[1]}, {"friction_ratio", v[0]}};
+  };
+  c.candidate.form_of = [end = design.ramp_length](const Values& v) {
+    return FittedForm{{v[0], v[1] > 0 ? v[1] : end}, {v[2]}};
   };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.patch_from = variant[0];
@@ -173,8 +203,9 @@ WheelCandidate contact_outliers() {
   c.candidate.variants = {{1.4}, {1.8}, {2.5}};
   c.candidate.refine = {0.3};
   c.candidate.report = [](const Values& variant, const Values& v) {
-    return std::vector<Named>{{"share", v[0]}, {"friction_ratio", variant[0]}};
+    return std::vector<NamedValue>{{"share", v[0]}, {"friction_ratio", variant[0]}};
   };
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0]}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.outlier_friction = variant[0];
     e.outlier_share = v[0];
@@ -182,7 +213,7 @@ WheelCandidate contact_outliers() {
   return c;
 }
 
-// Variants: the bias before a collision and after it stand as {1, 1}, {1, 0}, {1, -1}.
+// A variant says how the biases before and after a collision stand: {1, 1}, {1, 0}, {1, -1}.
 WheelCandidate sensor_bias(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "sensor_bias";
@@ -190,8 +221,9 @@ WheelCandidate sensor_bias(const WheelDesign& design) {
   c.candidate.variants = {{1, 1}};
   if (design.speeds_after) c.candidate.variants = {{1, 1}, {1, 0}, {1, -1}};
   c.candidate.report = [](const Values& variant, const Values& v) {
-    return std::vector<Named>{{"bias_rad_s", v[0]}, {"share_after_collision", variant[1]}};
+    return std::vector<NamedValue>{{"bias_rad_s", v[0]}, {"share_after_collision", variant[1]}};
   };
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{1, 1}, {v[0]}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.bias_before = v[0] * variant[0];
     e.bias_after = v[0] * variant[1];
@@ -207,9 +239,10 @@ WheelCandidate ramp_vibration() {
   for (double f = 2; f <= 60; f *= 1.06) c.candidate.variants.push_back({f});
   c.candidate.refine = {0.6};
   c.candidate.report = [](const Values& variant, const Values& v) {
-    return std::vector<Named>{
+    return std::vector<NamedValue>{
         {"amplitude", std::hypot(v[0], v[1])}, {"frequency_hz", variant[0]}, {"phase_rad", std::atan2(-v[1], v[0])}};
   };
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0], 0}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
     e.ring_frequency = variant[0];
     e.ring_cosine = v[0];
@@ -218,10 +251,18 @@ WheelCandidate ramp_vibration() {
   return c;
 }
 
+WheelCandidate sensor_noise(const WheelDesign& design) {
+  WheelCandidate c = spread("sensor_noise", "sd_rad_s", &Extension::noise_sd, 1, 0.01);
+  c.candidate.exact = true;
+  if (!design.noise_stated)
+    c.candidate.undecidable = "no sensor noise is stated: it was assumed or taken from the data";
+  return c;
+}
+
 WheelCandidate slip_reversal(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "slip_reversal";
-  c.candidate.report = [](const Values&, const Values&) { return std::vector<Named>{}; };
+  c.candidate.report = [](const Values&, const Values&) { return std::vector<NamedValue>{}; };
   c.apply = [](Extension& e, const Values&, const Values&) { e.law = dynamics::Law::coulomb; };
   if (design.law != dynamics::Law::published) c.candidate.undecidable = "the nominal law is not `published`";
   return c;
@@ -230,37 +271,36 @@ WheelCandidate slip_reversal(const WheelDesign& design) {
 }  // namespace
 
 std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
-  std::vector<WheelCandidate> all{
-      initial_speed(design),
+  constexpr const char* after_another = "collisions with one before them in their trial";
+  constexpr const char* away = "collisions away from the start";
+  // A mean and a spread, or a trend, and as many again to judge them by.
+  return {
+      needing(5, design.launches, "launches where a launch speed is stated", initial_speed(design)),
       leg_lengths(design),
       leg_contact(design),
       hub_eccentricity(design),
       simple("inertia", "ratio", &Extension::inertia_ratio, {1, 0.5, 2, 1e-4}),
       simple("slope_offset", "offset_deg", &Extension::slope_offset, {0, -3, 3, 1e-3}, degree),
-      slope_profile(design),
+      needing(2, design.away, away, slope_profile(design)),
       simple("axle_drag_viscous", "n_m_s", &Extension::viscous, {0, -0.1, 0.1, 1e-6}),
       simple("rolling_resistance", "torque_n_m", &Extension::rolling, {0, -0.3, 0.3, 1e-5}),
       simple("air_drag", "n_m_s2", &Extension::air, {0, -0.02, 0.02, 1e-7}),
       simple("speed_dependent_restitution", "exponent", &Extension::restitution_exponent, {0, -2, 2, 1e-3}),
       speed_dependent_friction(),
-      simple("contact_memory", "correlation", &Extension::memory, {0, -0.95, 0.95, 1e-3}),
-      friction_patch(design),
-      simple("trial_drift", "relative_change", &Extension::drift, {0, -0.9, 5, 1e-3}),
-      spread("trial_spread", "friction_sd", &Extension::trial_friction_sd, 0.3, 0.01),
+      needing(2, design.successive, after_another,
+              simple("contact_memory", "correlation", &Extension::memory, {0, -0.95, 0.95, 1e-3})),
+      needing(2, design.away, away, friction_patch(design)),
+      needing(3, design.trials, "trials",
+              simple("trial_drift", "relative_change", &Extension::drift, {0, -0.9, 5, 1e-3})),
+      needing(5, design.trials, "trials",
+              spread("trial_spread", "friction_sd", &Extension::trial_friction_sd, 0.3, 0.01)),
       contact_outliers(),
-      spread("sensor_noise", "sd_rad_s", &Extension::noise_sd, 1, 0.01),
+      sensor_noise(design),
       sensor_bias(design),
       simple("bounce", "rebound_lost", &Extension::rebound_lost, {0, 0, 1, 1e-3, 0.05}),
-      ramp_vibration(),
+      needing(2, design.successive, after_another, ramp_vibration()),
       slip_reversal(design),
   };
-  for (WheelCandidate& c : all)
-    if (c.candidate.id == "sensor_noise") {
-      c.candidate.exact = true;
-      if (!design.noise_stated)
-        c.candidate.undecidable = "no sensor noise is stated: it was assumed or taken from the data";
-    }
-  return all;
 }
 
 }  // namespace metastable::analysis

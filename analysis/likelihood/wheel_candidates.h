@@ -1,6 +1,8 @@
 #pragma once
-// The catalogue's effects on the wheel, as they are fitted. One entry an effect.
+// The catalogue's effects on the wheel, as they are fitted. Each has one entry: what is free in it, what its values do
+// to the wheel, what they are called in the catalogue and which of them the catalogue's values are, and what it needs.
 
+#include <cstddef>
 #include <functional>
 #include <vector>
 
@@ -14,6 +16,10 @@ struct WheelDesign {
   int legs = 8;
   bool legs_known = true, speeds_after = true;
   bool launches_stated = true, noise_stated = true;
+  std::size_t trials = 0;
+  std::size_t launches = 0;         ///< for which a launch speed is stated
+  std::size_t successive = 0;       ///< collisions with one before them in their trial
+  std::size_t away = 0;             ///< collisions away from the start of the ramp
   std::vector<double> leg_lengths;  ///< stated [m]
   double furthest = 1.8;            ///< landing foot [m]
   double ramp_length = 3.66;        ///< [m]

@@ -12,11 +12,11 @@ namespace metastable::analysis {
 /// Noise of speeds after collisions where these are imagined and none is stated [rad/s].
 inline constexpr double imagined_noise = 0.005;
 
-/// The experiment with the legs that land in their turn from each condition's first one. A rimless wheel only.
+/// The experiment with the legs that land in their turn from each condition's first one; it must be of a rimless wheel.
 Experiment with_legs_from_the_first(Experiment experiment);
 
 /// The experiment with each column that is missing filled in, by the column's name: legs in their turn from the
-/// condition's first, speeds after collisions as values to be drawn anew. A rimless wheel only.
+/// condition's first, speeds after collisions as values to be drawn anew. It must be of a rimless wheel.
 std::vector<std::pair<std::string, Experiment>> completed_experiments(const Experiment& experiment);
 
 }  // namespace metastable::analysis

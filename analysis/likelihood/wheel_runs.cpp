@@ -22,7 +22,7 @@ constexpr double rounding = 1e-5;          // residuals below are those of print
 
 std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
 
-// Legs that were not noted: the stances tell them where omega_plus is there, because the legs' lengths differ.
+// Where legs were not noted the stances tell them if omega_plus is there, because the legs' lengths differ.
 void find_legs(WheelRuns& measured, bool column) {
   if (column || measured.wheel.equal_legs()) {
     measured.legs_known = column;
@@ -96,7 +96,7 @@ void complete_contexts(WheelRuns& measured) {
   }
 }
 
-// What the stances miss the model's next speed by [rad/s].
+// By how much each stance misses the model's next speed [rad/s].
 std::vector<double> stance_residuals(const WheelRuns& measured) {
   std::vector<double> residual;
   const std::vector<ExtendedWheel> wheels = stated_wheels(measured);

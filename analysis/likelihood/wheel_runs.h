@@ -19,7 +19,7 @@ struct RunCollision {
   std::optional<double> after;  ///< reported omega+ [rad/s]
 };
 
-/// One trial.
+/// One trial is a run of collisions.
 struct WheelRun {
   std::size_t condition = 0;  ///< index
   std::vector<RunCollision> collisions;
@@ -57,8 +57,8 @@ double jam_bound(const WheelRuns& measured);
 /// The last collision's omega+ becomes 0 where it is below jam_bound and the wheel is not known to have gone on.
 void mark_jam(const WheelRuns& measured, WheelRun& run);
 
-/// Their transitions: per trial launch (where one is stated), then collision and stance, or step, and rest or survival
-/// where the outcome is known.
+/// Their transitions, the one list that likelihoods go by: per trial launch (where one is stated), then collision and
+/// stance, or step, and rest or survival where the outcome is known. Stances that are exact are left out.
 std::vector<Event> wheel_events(const WheelRuns& measured);
 
 }  // namespace metastable::analysis

@@ -6,12 +6,14 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 
 #include "analysis/likelihood/wheel_candidates.h"
 #include "analysis/likelihood/wheel_columns.h"
 #include "analysis/likelihood/wheel_hypothesis.h"
 #include "analysis/likelihood/wheel_likelihood.h"
+#include "analysis/likelihood/wheel_nuisances.h"
 #include "analysis/likelihood/wheel_runs.h"
 #include "analysis/likelihood/wheel_simulation.h"
 
@@ -50,23 +52,22 @@ class WheelTransitions : public TransitionModel {
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   const std::vector<std::string>& notes() const override { return measured_.notes; }
-  Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const override;
-  std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const Term> terms) const override;
-  std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
+  Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
+  std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
+  std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override;
   std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
                                                                                      std::uint64_t seed) const override;
   std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(std::span<const double> nuisance,
                                                                                   std::uint64_t seed) const override;
   std::pair<double, double> rests() const override;
-  double expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
+  double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                         std::uint64_t seed) const override;
-  std::vector<Named> report_nuisances(std::span<const double> nuisance) const override;
+  std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const override;
 
  private:
-  WheelHypothesis hypothesis(std::span<const double> nuisance, std::span<const Term> terms) const;
+  WheelHypothesis hypothesis(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
   void set_up_parameters();
-  void name_what_is_too_few();
 
   Experiment experiment_;  // as it was read
   WheelRuns measured_;
@@ -84,22 +85,13 @@ WheelTransitions::WheelTransitions(const Experiment& experiment)
     throw std::invalid_argument(
         "collisions.csv: no trial has two collisions or omega_plus_rad_s: there is no transition");
   set_up_parameters();
-  name_what_is_too_few();
 }
 
 void WheelTransitions::set_up_parameters() {
-  const NominalContact& c = experiment_.contact;
-  // Spreads are fitted by their logarithms.
-  nuisances_ = {
-      {"restitution_mean", c.restitution.mean, 0.08, 1e-4, 0.02, 0.98},
-      {"log restitution_sd", std::log(std::max(0.01, c.restitution.sd)), 0.4, 1e-3, std::log(0.005), std::log(0.4)},
-      {"friction_mean", c.friction.mean, 0.08, 1e-4, 0.02, 1.5},
-      {"log friction_sd", std::log(std::max(0.01, c.friction.sd)), 0.4, 1e-3, std::log(0.005), std::log(0.5)},
-      {"skew", 0, 0.06, 1e-3, -0.5, 0.5},
-      {"tails", 0, 0.06, 1e-3, -0.4, 0.4}};
   // Where nobody stated the noise, the stances say it only together with the effects that act in them.
-  if (!measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances)
-    nuisances_.push_back({"log noise_sd", std::log(measured_.noise), 0.5, 1e-3, std::log(1e-4), 0});
+  const bool refits_noise = !measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances;
+  nuisances_ =
+      wheel_nuisances(experiment_.contact, refits_noise ? std::optional<double>(measured_.noise) : std::nullopt);
   WheelDesign design;
   design.legs = measured_.wheel.legs();
   design.legs_known = measured_.legs_known;
@@ -112,58 +104,40 @@ void WheelTransitions::set_up_parameters() {
   design.furthest = 0.1;
   for (const WheelRun& run : measured_.runs)
     design.furthest = std::max(design.furthest, run.collisions.back().context.position);
+  design.trials = measured_.runs.size();
+  for (const Event& e : events_) {
+    design.launches += e.kind == EventKind::launch;
+    const bool contact = e.kind == EventKind::collision || e.kind == EventKind::step;
+    design.successive += contact && e.number > 1;
+    design.away += contact && e.position > 0;
+  }
   design.ramp_length = 0;
   for (const Condition& one : measured_.conditions) design.ramp_length = std::max(design.ramp_length, one.ramp_length);
   effects_ = wheel_candidates(design);
   for (const WheelCandidate& effect : effects_) candidates_.push_back(effect.candidate);
 }
 
-// Effects between trials, launches or collisions need some of them, whatever their size.
-void WheelTransitions::name_what_is_too_few() {
-  std::size_t launches = 0, successive = 0, away = 0;
-  for (const Event& e : events_) {
-    launches += e.kind == EventKind::launch;
-    const bool contact = e.kind == EventKind::collision || e.kind == EventKind::step;
-    successive += contact && e.number > 1;
-    away += contact && e.position > 0;
-  }
-  const auto needs = [this](const char* effect, std::size_t least, std::size_t here, const char* of_what) {
-    for (Candidate& c : candidates_)
-      if (c.id == effect && c.undecidable.empty() && here < least)
-        c.undecidable = fmt::format("it needs {} {}, and there {} {}", least, of_what, here == 1 ? "is" : "are", here);
-  };
-  // A mean and a spread, or a trend, and as many again to judge them by.
-  needs("initial_speed", 5, launches, "launches where a launch speed is stated");
-  needs("trial_spread", 5, measured_.runs.size(), "trials");
-  needs("trial_drift", 3, measured_.runs.size(), "trials");
-  needs("contact_memory", 2, successive, "collisions with one before them in their trial");
-  needs("ramp_vibration", 2, successive, "collisions with one before them in their trial");
-  needs("slope_profile", 2, away, "collisions away from the start");
-  needs("friction_patch", 2, away, "collisions away from the start");
-}
-
-WheelHypothesis WheelTransitions::hypothesis(std::span<const double> nuisance, std::span<const Term> terms) const {
-  WheelHypothesis h{.contact = {nuisance[0], std::exp(nuisance[1]), nuisance[2], std::exp(nuisance[3])},
-                    .tilt = ScoreTilt(nuisance[4], nuisance[5]),
-                    .extension = {}};
-  if (nuisance.size() > 6) h.noise = std::exp(nuisance[6]);
-  for (const Term& term : terms)
+WheelHypothesis WheelTransitions::hypothesis(std::span<const double> nuisance,
+                                             std::span<const EffectTerm> terms) const {
+  WheelHypothesis h = hypothesis_at(nuisance);
+  for (const EffectTerm& term : terms)
     for (const WheelCandidate& effect : effects_)
       if (effect.candidate.id == term.candidate->id) effect.apply(h.extension, term.variant, term.values);
   return h;
 }
 
-Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::span<const Term> terms) const {
+Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const {
   return wheel_likelihood(measured_, events_, hypothesis(nuisance, terms));
 }
 
 std::vector<double> WheelTransitions::rest_chances(std::span<const double> nuisance,
-                                                   std::span<const Term> terms) const {
+                                                   std::span<const EffectTerm> terms) const {
   return wheel_rest_chances(measured_, events_, hypothesis(nuisance, terms));
 }
 
 std::unique_ptr<TransitionModel> WheelTransitions::simulate(std::span<const double> nuisance,
-                                                            std::span<const Term> terms, std::uint64_t seed) const {
+                                                            std::span<const EffectTerm> terms,
+                                                            std::uint64_t seed) const {
   auto copy = std::make_unique<WheelTransitions>(*this);
   copy->measured_.runs = simulated_runs(measured_, hypothesis(nuisance, terms), seed);
   copy->events_ = wheel_events(copy->measured_);
@@ -228,16 +202,17 @@ std::pair<double, double> WheelTransitions::rests() const {
   return {at_risk, rested};
 }
 
-double WheelTransitions::expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
+double WheelTransitions::expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                         std::uint64_t seed) const {
   return simulated_steps(measured_, hypothesis(nuisance, terms), seed);
 }
 
-std::vector<Named> WheelTransitions::report_nuisances(std::span<const double> nuisance) const {
-  return {{"restitution_mean", nuisance[0]},
-          {"restitution_sd", std::exp(nuisance[1])},
-          {"friction_mean", nuisance[2]},
-          {"friction_sd", std::exp(nuisance[3])}};
+std::vector<NamedValue> WheelTransitions::report_nuisances(std::span<const double> nuisance) const {
+  const dynamics::ContactSpread contact = hypothesis_at(nuisance).contact;
+  return {{"restitution_mean", contact.restitution_mean},
+          {"restitution_sd", contact.restitution_sd},
+          {"friction_mean", contact.friction_mean},
+          {"friction_sd", contact.friction_sd}};
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 #pragma once
-// The rimless wheel's measured trials as transitions.
+// The rimless wheel's measured trials become transitions.
 
 #include <memory>
 
@@ -8,11 +8,11 @@
 
 namespace metastable::analysis {
 
-/// One-step densities of the wheel's trials under the nominal law with its (eta, mu), effects of the catalogue in
-/// between. With omega_plus, collision and stance are separate events; sensor noise is carried along by a Gaussian
-/// filter on the speed (exact while the noise is small beside the spread of a collision). Recalibration refits the
-/// contact's means and sds and a smooth change of shape (ScoreTilt). What was not measured is completed as wheel_runs()
-/// says.
+/// The model gives one-step densities of the wheel's trials under the nominal law with its (eta, mu) and the
+/// catalogue's effects. With omega_plus, collision and stance are separate events; sensor noise is carried along by a
+/// Gaussian filter on the speed (exact while the noise is small beside the spread of a collision). Recalibration refits
+/// the contact's means and sds and a smooth change of shape (ScoreTilt). What was not measured is completed as
+/// wheel_runs() says.
 /// @throws std::invalid_argument for a coast-down, for `plastic`, and for an experiment without a transition
 std::unique_ptr<TransitionModel> wheel_transitions(const Experiment& experiment);
 

@@ -69,7 +69,7 @@ std::vector<MeasuredAngle> parse_angles(const ExperimentSource& source, const Ex
     }
     if (!timed || !turned) continue;
     angles[*at].recording.time.push_back(*time);
-    angles[*at].recording.angle.push_back(*angle);
+    angles[*at].recording.angle_rad.push_back(*angle);
     lines[*at].push_back(csv.line());
   }
   if (defects.empty()) {

@@ -54,8 +54,8 @@ class Search {
       throw std::invalid_argument(
           fmt::format("the rate of {:.6g} Hz is outside {}..{} Hz", rate, slowest_rate, fastest_rate));
     const SavitzkyGolay smooth(smoothing_window(options, rate), 3, 0), slope(smooth.window(), 3, 1);
-    angle_ = smooth.apply(recording.angle, 1 / rate);
-    speed_ = slope.apply(recording.angle, 1 / rate);
+    angle_ = smooth.apply(recording.angle_rad, 1 / rate);
+    speed_ = slope.apply(recording.angle_rad, 1 / rate);
   }
 
   FoundTrial run() {
@@ -99,11 +99,11 @@ class Search {
     c.number = static_cast<int>(n) + 1;
     c.peak_time = recording_.time[peak.at];
     c.peak = speed_[peak.at];
-    c.peak_angle = angle_[peak.at];
+    c.peak_angle_rad = angle_[peak.at];
     // The apex lies within one leg angle of the collision: behind the last one the recording may go on with others.
     std::size_t behind = last ? all.size() : chosen[n + 1];
     if (last)
-      while (behind > chosen[n] + 1 && angle_[all[behind - 1].at] > c.peak_angle + 0.5 * map_.wheel().leg_angle())
+      while (behind > chosen[n] + 1 && angle_[all[behind - 1].at] > c.peak_angle_rad + 0.5 * map_.wheel().leg_angle())
         --behind;
     c.bounces = static_cast<int>(behind - chosen[n]) - 1;
     const std::size_t end = behind < all.size() ? all[behind].at : speed_.size();
@@ -131,12 +131,12 @@ class Search {
     const auto first = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), from) - time.begin());
     const auto end = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), to) - time.begin());
     const StanceFit guess{.time = at,
-                          .angle = (recording_.angle[fall] + recording_.angle[fall + 1]) / 2,
+                          .angle_rad = (recording_.angle_rad[fall] + recording_.angle_rad[fall + 1]) / 2,
                           .omega_minus = speed_[peak.at],
                           .omega_plus = speed_[std::min(peak.trough, fall + (fall - peak.at) + 1)],
-                          .residual_sd = 0};
+                          .residual_sd_rad = 0};
     return fit_collision(std::span(time).subspan(first, end - first),
-                         std::span(recording_.angle).subspan(first, end - first), stance(n), stance(n + 1), guess);
+                         std::span(recording_.angle_rad).subspan(first, end - first), stance(n), stance(n + 1), guess);
   }
 
   const AngleRecording& recording_;

@@ -21,10 +21,10 @@ struct FinderOptions {
 };
 
 struct FoundCollision {
-  int number = 0;         ///< from 1
-  double peak_time = 0;   ///< of the largest smoothed speed [s]
-  double peak = 0;        ///< that speed [rad/s]: the paper's omega_minus
-  double peak_angle = 0;  ///< of the wheel then [rad]
+  int number = 0;             ///< from 1
+  double peak_time = 0;       ///< of the largest smoothed speed [s]
+  double peak = 0;            ///< that speed [rad/s]: the paper's omega_minus
+  double peak_angle_rad = 0;  ///< of the wheel then
   /// The stance motion fitted to the samples before and after the drop, extrapolated to the collision. Nothing: too few
   /// samples, or the fit did not settle.
   std::optional<StanceFit> fit;

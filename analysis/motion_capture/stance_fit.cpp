@@ -24,18 +24,18 @@ class Residuals {
     // Outwards from the collision, each sample from its neighbour, so that every stretch is integrated once.
     const auto first_after =
         static_cast<std::size_t>(std::upper_bound(time_.begin(), time_.end(), p(0)) - time_.begin());
-    dynamics::StanceState state{before_.end_angle, p(2)};
+    dynamics::StanceState state{before_.end_angle_rad, p(2)};
     double now = p(0);
     for (std::size_t i = first_after; i-- > 0; now = time_[i]) {
       state = dynamics::stance_motion(before_.pendulum, state, time_[i] - now);
-      residual(static_cast<Eigen::Index>(i)) = p(1) + state.angle - before_.end_angle - angle_[i];
+      residual(static_cast<Eigen::Index>(i)) = p(1) + state.angle - before_.end_angle_rad - angle_[i];
     }
-    state = {after_.start_angle, p(3)};
+    state = {after_.start_angle_rad, p(3)};
     now = p(0);
     for (std::size_t i = first_after; i < time_.size(); now = time_[i], ++i) {
       state = dynamics::stance_motion(after_.pendulum, state, time_[i] - now);
-      if (state.angle < after_.start_angle) state = {after_.start_angle, 0};  // fallen back onto both feet
-      residual(static_cast<Eigen::Index>(i)) = p(1) + state.angle - after_.start_angle - angle_[i];
+      if (state.angle < after_.start_angle_rad) state = {after_.start_angle_rad, 0};  // fallen back onto both feet
+      residual(static_cast<Eigen::Index>(i)) = p(1) + state.angle - after_.start_angle_rad - angle_[i];
     }
     return residual;
   }
@@ -49,7 +49,7 @@ class Residuals {
 std::optional<std::pair<StanceFit, double>> descend(const Residuals& residuals, StanceFit guess, double earliest,
                                                     double latest) {
   constexpr std::array<double, 4> increment{1e-6, 1e-6, 1e-5, 1e-5};
-  Parameters p(guess.time, guess.angle, guess.omega_minus, guess.omega_plus);
+  Parameters p(guess.time, guess.angle_rad, guess.omega_minus, guess.omega_plus);
   Eigen::VectorXd r = residuals(p);
   double damping = 1e-3;
   for (int step = 0; step < 50; ++step) {

@@ -10,11 +10,11 @@
 namespace metastable::analysis {
 
 struct StanceFit {
-  double time = 0;         ///< of the collision [s]
-  double angle = 0;        ///< of the wheel then [rad]
-  double omega_minus = 0;  ///< [rad/s]
-  double omega_plus = 0;   ///< [rad/s]
-  double residual_sd = 0;  ///< of the samples [rad]
+  double time = 0;             ///< of the collision [s]
+  double angle_rad = 0;        ///< of the wheel then
+  double omega_minus = 0;      ///< [rad/s]
+  double omega_plus = 0;       ///< [rad/s]
+  double residual_sd_rad = 0;  ///< of the samples
 };
 
 /// Least squares of time, angle, omega_minus and omega_plus: before the collision the stance motion of `before`

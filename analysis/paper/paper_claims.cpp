@@ -6,19 +6,27 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/statistics/number_text.h"
+
 namespace metastable::analysis {
 namespace {
 
-std::string p_words(double p) { return p < 1e-6 ? "P < 1e-6" : fmt::format("P = {:.2g}", p); }
+std::string p_words(double p) {
+  const Decimal decimal = to_decimal(p, NumberFormat::p_value, 2);
+  return (decimal.less_than ? "P " : "P = ") + plain_text(decimal);
+}
 
 // Fewer trials that get past the 12th collision say nothing of a steady state.
 constexpr std::size_t least_trials = 20;
 bool lasts(const StudiedProfile& profile) { return profile.trial_means.size() >= least_trials; }
-bool all_last(const std::array<StudiedProfile, 3>& row) { return std::all_of(row.begin(), row.end(), lasts); }
+bool all_last(const LaunchPanel& panel) {
+  return std::ranges::all_of(panel.runs, [](const LaunchRun& run) { return lasts(run.measured_legs); });
+}
+bool all_last(const MeanPanel& panel) {
+  return std::ranges::all_of(panel.runs, [](const MeanRun& run) { return lasts(run.profile); });
+}
 
-constexpr std::array<std::array<std::size_t, 2>, 3> launch_pairs{{{0, 1}, {0, 2}, {1, 2}}};  // of fig6_p
-
-// The smallest P, and of how many: times that it is the level of the family (Bonferroni).
+// Keeps the smallest P, and of how many: times that it is the level of the family (Bonferroni).
 struct Family {
   double p = 1;
   int count = 0;
@@ -30,10 +38,11 @@ Finding nothing_left() {
   return {ClaimVerdict::not_applicable, "hardly a trial gets past the 12th collision where it counts"};
 }
 
-// Range of `of` over the restitution means at one friction of Fig. 9.
-double range(const std::array<StudiedProfile, 3>& row, double (StudiedProfile::*of)() const) {
-  const double a = (row[0].*of)(), b = (row[1].*of)(), c = (row[2].*of)();
-  return std::max({a, b, c}) - std::min({a, b, c});
+// Returns the range of `of` over the restitution means of one panel.
+double range(const MeanPanel& panel, double (StudiedProfile::*of)() const) {
+  std::vector<double> values;
+  for (const MeanRun& run : panel.runs) values.push_back((run.profile.*of)());
+  return *std::ranges::max_element(values) - *std::ranges::min_element(values);
 }
 
 Finding convergence(const ConditionComparison& c) {
@@ -65,9 +74,12 @@ Finding error_bars(const std::vector<SpeedSummary>& fast, const std::vector<Spee
 
 Finding low_friction(const VariantStudy& s) {
   Family family;
-  for (std::size_t j = 0; j < 2; ++j)
-    for (std::size_t i = 0; i < 3; ++i)
-      if (lasts(s.fig6[j][launch_pairs[i][0]]) && lasts(s.fig6[j][launch_pairs[i][1]])) family.add(s.fig6_p[j][i]);
+  for (const LaunchPanel& panel : s.fig6) {
+    if (panel.friction >= 0.5) continue;
+    for (const LaunchPair& pair : panel.pairs)
+      if (lasts(panel.run(pair.first).measured_legs) && lasts(panel.run(pair.second).measured_legs))
+        family.add(pair.alike.p);
+  }
   if (family.count == 0) return nothing_left();
   const bool alike = family.level() > 0.05;
   return {family.p > 0.9 ? ClaimVerdict::reproduced
@@ -78,39 +90,48 @@ Finding low_friction(const VariantStudy& s) {
 }
 
 Finding high_friction(const VariantStudy& s) {
-  if (!all_last(s.fig6[3])) return nothing_left();
-  const double low_fast = s.fig6_p[3][1], middle_fast = s.fig6_p[3][2];
-  return {low_fast < 0.001 && middle_fast < 0.001 ? ClaimVerdict::reproduced
-          : low_fast < 0.05 || middle_fast < 0.05 ? ClaimVerdict::partly
-                                                  : ClaimVerdict::not_reproduced,
-          fmt::format("μ = 0.55: k = 3 against 1 {}, against 2 {}; one value a trial {}, {}", p_words(low_fast),
-                      p_words(middle_fast), p_words(s.fig6_p_trials[3][1]), p_words(s.fig6_p_trials[3][2]))};
+  const LaunchPanel& panel = s.fig6.back();
+  if (!all_last(panel)) return nothing_left();
+  const SteadyTest slow_fast = panel.pair(1, 3).alike, middle_fast = panel.pair(2, 3).alike;
+  return {slow_fast.p < 0.001 && middle_fast.p < 0.001 ? ClaimVerdict::reproduced
+          : slow_fast.p < 0.05 || middle_fast.p < 0.05 ? ClaimVerdict::partly
+                                                       : ClaimVerdict::not_reproduced,
+          fmt::format("μ = 0.55: k = 3 against 1 {}, against 2 {}; one value a trial {}, {}", p_words(slow_fast.p),
+                      p_words(middle_fast.p), p_words(slow_fast.p_by_trial), p_words(middle_fast.p_by_trial))};
 }
 
 Finding variability_grows(const VariantStudy& s) {
-  if (!std::all_of(s.fig6.begin(), s.fig6.end(), all_last)) return nothing_left();
-  double slow = 0, fast = 0;
-  for (std::size_t k = 0; k < 3; ++k) slow += s.fig6[0][k].steady_sd() / 3, fast += s.fig6[3][k].steady_sd() / 3;
-  double k1 = 0, k3 = 0;
-  for (std::size_t j = 0; j < 4; ++j) k1 += s.fig6[j][0].steady_sd() / 4, k3 += s.fig6[j][2].steady_sd() / 4;
-  const bool friction = fast > 1.05 * slow, launch = k3 > 1.05 * k1;
+  if (!std::ranges::all_of(s.fig6, [](const LaunchPanel& panel) { return all_last(panel); })) return nothing_left();
+  const auto over_launches = [](const LaunchPanel& panel) {
+    double mean = 0;
+    for (const LaunchRun& run : panel.runs) mean += run.measured_legs.steady_sd() / 3;
+    return mean;
+  };
+  const auto over_frictions = [&](int k) {
+    double mean = 0;
+    for (const LaunchPanel& panel : s.fig6) mean += panel.run(k).measured_legs.steady_sd() / 4;
+    return mean;
+  };
+  const double low = over_launches(s.fig6.front()), high = over_launches(s.fig6.back());
+  const double slow = over_frictions(1), fast = over_frictions(3);
+  const bool friction = high > 1.05 * low, launch = fast > 1.05 * slow;
   return {friction && launch   ? ClaimVerdict::reproduced
           : friction || launch ? ClaimVerdict::partly
                                : ClaimVerdict::not_reproduced,
-          fmt::format("sd {:.3f} to {:.3f} rad/s from μ = 0.40 to 0.55; {:.3f} to {:.3f} from k = 1 to 3", slow, fast,
-                      k1, k3)};
+          fmt::format("sd {:.3f} to {:.3f} rad/s from μ = 0.40 to 0.55; {:.3f} to {:.3f} from k = 1 to 3", low, high,
+                      slow, fast)};
 }
 
 Finding leg_lengths(const VariantStudy& s) {
   Family pooled, by_trial;
   double most = 0;
-  for (std::size_t j = 0; j < 4; ++j)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const StudiedProfile &measured = s.fig6[j][k], &equal = s.equal_legs[j][k];
-      if (!lasts(measured) || !lasts(equal)) continue;
-      pooled.add(s.legs_p[j][k]);
-      by_trial.add(s.legs_p_trials[j][k]);
-      most = std::max(most, std::abs(summarize(measured.trial_means).mean - summarize(equal.trial_means).mean));
+  for (const LaunchPanel& panel : s.fig6)
+    for (const LaunchRun& run : panel.runs) {
+      if (!lasts(run.measured_legs) || !lasts(run.equal_legs)) continue;
+      pooled.add(run.legs_alike.p);
+      by_trial.add(run.legs_alike.p_by_trial);
+      most = std::max(most, std::abs(speed_summary(run.measured_legs.trial_means).mean -
+                                     speed_summary(run.equal_legs.trial_means).mean));
     }
   if (pooled.count == 0) return nothing_left();
   const bool chance = by_trial.level() > 0.05;
@@ -122,15 +143,16 @@ Finding leg_lengths(const VariantStudy& s) {
                       pooled.p <= 0.1 && chance ? " (no more than chance among so many)" : "", most)};
 }
 
-// Main effects of rows and columns on |t|, as ranges of their means.
+// Compares the main effects of both sds on |t|, as ranges of its means.
 Finding spread_of_friction(const VariantStudy& s) {
   std::array<double, 4> friction{};
   std::array<double, 3> restitution{};
-  for (std::size_t j = 0; j < 4; ++j)
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (!s.fig7_test[j][k] || !lasts(s.fig7[j][k])) return nothing_left();
-      friction[j] += std::abs(s.fig7_test[j][k]->t) / 3;
-      restitution[k] += std::abs(s.fig7_test[j][k]->t) / 4;
+  for (std::size_t j = 0; j < friction.size(); ++j)
+    for (std::size_t k = 0; k < restitution.size(); ++k) {
+      const SpreadRun& run = s.fig7[j].runs[k];
+      if (!run.against_experiment || !lasts(run.profile)) return nothing_left();
+      friction[j] += std::abs(run.against_experiment->t) / 3;
+      restitution[k] += std::abs(run.against_experiment->t) / 4;
     }
   const auto spread = [](const auto& values) {
     return *std::max_element(values.begin(), values.end()) - *std::min_element(values.begin(), values.end());
@@ -144,7 +166,7 @@ Finding spread_of_friction(const VariantStudy& s) {
 }
 
 Finding tangential_loss(const VariantStudy& s) {
-  const MeanSpread &a = s.fig8[0].tangential_net, &b = s.fig8[3].tangential_net;
+  const MeanSpread &a = s.fig8.front().losses.tangential_net, &b = s.fig8.back().losses.tangential_net;
   const bool rises = b.mean > a.mean && b.sd > a.sd;
   const auto near = [](double ours, double paper) { return ours > paper / 1.5 && ours < paper * 1.5; };
   const bool close = near(a.mean, 0.05) && near(a.sd, 0.03) && near(b.mean, 0.11) && near(b.sd, 0.19);
@@ -155,9 +177,9 @@ Finding tangential_loss(const VariantStudy& s) {
 }
 
 Finding normal_loss(const VariantStudy& s) {
-  const MeanSpread &a = s.fig8[0].normal, &b = s.fig8[3].normal;
+  const MeanSpread &a = s.fig8.front().losses.normal, &b = s.fig8.back().losses.normal;
   bool steady = true;
-  for (const EnergyLosses& losses : s.fig8) steady = steady && std::abs(losses.normal.mean / 0.17 - 1) < 0.25;
+  for (const LossRun& run : s.fig8) steady = steady && std::abs(run.losses.normal.mean / 0.17 - 1) < 0.25;
   const bool rises = b.sd > a.sd;
   return {rises && steady ? ClaimVerdict::reproduced
           : rises         ? ClaimVerdict::partly
@@ -166,20 +188,20 @@ Finding normal_loss(const VariantStudy& s) {
 }
 
 Finding transient_influence(const VariantStudy& s) {
-  const double transient = range(s.fig9[0], &StudiedProfile::transient_sd);
-  const double steady = range(s.fig9[0], &StudiedProfile::steady_sd);
-  if (!all_last(s.fig9[0])) return nothing_left();
+  const double transient = range(s.fig9.front(), &StudiedProfile::transient_sd);
+  const double steady = range(s.fig9.front(), &StudiedProfile::steady_sd);
+  if (!all_last(s.fig9.front())) return nothing_left();
   return {transient > steady ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("μ mean 0.2: sd differs by {:.3f} rad/s at collisions 2-6, by {:.3f} beyond the 12th", transient,
                       steady)};
 }
 
 std::pair<double, double> steady_ranges(const VariantStudy& s) {
-  return {range(s.fig9[0], &StudiedProfile::steady_sd), range(s.fig9[3], &StudiedProfile::steady_sd)};
+  return {range(s.fig9.front(), &StudiedProfile::steady_sd), range(s.fig9.back(), &StudiedProfile::steady_sd)};
 }
 
 Finding influence_grows(const VariantStudy& s) {
-  if (!all_last(s.fig9[0]) || !all_last(s.fig9[3])) return nothing_left();
+  if (!all_last(s.fig9.front()) || !all_last(s.fig9.back())) return nothing_left();
   const auto [low, high] = steady_ranges(s);
   return {high > low ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("steady sd differs by {:.3f} rad/s over η at μ mean 0.2, by {:.3f} at 0.5", low, high)};
@@ -188,11 +210,12 @@ Finding influence_grows(const VariantStudy& s) {
 Finding restitution_raises(const VariantStudy& s) {
   int rises = 0, rows = 0;
   double low = 0, high = 0;
-  for (const auto& row : s.fig9) {
-    if (!lasts(row[0]) || !lasts(row[2])) continue;
+  for (const MeanPanel& panel : s.fig9) {
+    const StudiedProfile &least = panel.low_restitution(), &most = panel.high_restitution();
+    if (!lasts(least) || !lasts(most)) continue;
     ++rows;
-    rises += row[2].steady_sd() > row[0].steady_sd();
-    low += row[0].steady_sd(), high += row[2].steady_sd();
+    rises += most.steady_sd() > least.steady_sd();
+    low += least.steady_sd(), high += most.steady_sd();
   }
   if (rows == 0) return nothing_left();
   return {rises == rows ? ClaimVerdict::reproduced
@@ -203,7 +226,7 @@ Finding restitution_raises(const VariantStudy& s) {
 }
 
 Finding influence_shrinks(const VariantStudy& s) {
-  if (!all_last(s.fig9[0]) || !all_last(s.fig9[3])) return nothing_left();
+  if (!all_last(s.fig9.front()) || !all_last(s.fig9.back())) return nothing_left();
   const auto [low, high] = steady_ranges(s);
   return {high < low ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("steady sd differs by {:.3f} rad/s over η at μ mean 0.2, by {:.3f} at 0.5", low, high)};
@@ -211,30 +234,30 @@ Finding influence_shrinks(const VariantStudy& s) {
 
 Finding failures(const VariantStudy& s) {
   if (s.variant.reading == RestReading::goes_on) return {ClaimVerdict::not_applicable, "no trial can rest"};
-  const double share = s.fig7[1][1].rest_share;  // both sds 0.1
+  const double share = s.usual_spreads().profile.rest_share;
   return {share > 0.02 && share < 0.9 ? ClaimVerdict::reproduced : ClaimVerdict::not_reproduced,
           fmt::format("{:.1f} % of the trials rest within 16 collisions at 7.02 deg (sds of 0.1)", 100 * share)};
 }
 
-// The largest total index of a source over the frictions, and where.
+// Holds the largest total index of a source over the frictions, and where it is.
 struct Influence {
   double steady = 0, steps = 0;
   bool steps_vary = false;
   double friction = 0;
 };
-Influence largest(const VariantStudy& s, std::initializer_list<std::size_t> sources) {
+Influence largest(const VariantStudy& s, const std::vector<VarianceSource>& sources) {
   Influence share;
-  for (std::size_t f = 0; f < s.variance.size(); ++f) {
-    const auto sum = [&](const SobolResult& result) {
+  for (const VarianceRun& run : s.variance) {
+    const auto largest_total = [&](const SobolResult& result) {
       double total = 0;
-      for (const std::size_t source : sources)
-        if (!result.group.empty()) total = std::max(total, result.group[source].total.value);
+      for (const VarianceSource source : sources)
+        if (!result.group.empty()) total = std::max(total, index_of(result, source).total.value);
       return total;
     };
-    const double steady = sum(s.variance[f].steady_speed);
-    if (steady > share.steady) share.steady = steady, share.friction = variance_friction[f];
-    share.steps = std::max(share.steps, sum(s.variance[f].steps));
-    share.steps_vary = share.steps_vary || !s.variance[f].steps.group.empty();
+    const double steady = largest_total(run.shares.steady_speed);
+    if (steady > share.steady) share.steady = steady, share.friction = run.friction;
+    share.steps = std::max(share.steps, largest_total(run.shares.steps));
+    share.steps_vary = share.steps_vary || !run.shares.steps.group.empty();
   }
   return share;
 }
@@ -245,7 +268,7 @@ std::string share_words(const Influence& share) {
                      share.steps_vary ? fmt::format("{:.3f}", share.steps) : "do not vary");
 }
 
-// At 7.02 deg; without a verdict where outcomes were not noted.
+// Judges the trials at 7.02 deg; there is no verdict where outcomes were not noted.
 Finding failures_seen(const PaperExperiments& experiments) {
   if (!experiments.rest_share_702) return {};
   const double share = *experiments.rest_share_702;
@@ -253,7 +276,7 @@ Finding failures_seen(const PaperExperiments& experiments) {
           fmt::format("{:.1f} % of the trials rest", 100 * share)};
 }
 
-// One claim of the paper, and how trials are held against it.
+// Pairs a claim of the paper with the way trials are held against it.
 struct Check {
   const char *where, *claim, *paper, *reading;
   Finding (*simulated)(const VariantStudy&);
@@ -263,11 +286,11 @@ struct Check {
 const Check checks[] = {
     {"Fig. 4", "fast and slow start at 9.59 deg meet beyond the 12th collision", "P > 0.07",
      "Welch's test of trial means from collision 13 on, P > 0.05; no collision from the 13th on told apart",
-     [](const VariantStudy& s) { return convergence(s.fig4_comparison); },
+     [](const VariantStudy& s) { return convergence(s.fig4.comparison); },
      [](const PaperExperiments& e) { return convergence(compare_conditions(e.fast_959, e.slow_959)); }},
     {"Fig. 4", "error bars shrink along the profiles, yet do not vanish", "figure only",
      "mean standard error at collisions 13 to 16 below that at the first, for both starts",
-     [](const VariantStudy& s) { return error_bars(s.fig4[0].profile, s.fig4[1].profile); },
+     [](const VariantStudy& s) { return error_bars(s.fig4.fast.profile, s.fig4.slow.profile); },
      [](const PaperExperiments& e) { return error_bars(speed_profile(e.fast_959), speed_profile(e.slow_959)); }},
     {"Fig. 6", "μ < 0.5: launch speed leaves no trace in the steady state", "P > 0.9, all pairs",
      "pooled t-test of all collisions from the 13th on at μ = 0.40 and 0.45; “partly”: none significant at 0.05 over "
@@ -335,20 +358,25 @@ std::vector<Claim> paper_claims(const std::vector<VariantStudy>& studies, const 
 
 std::vector<Hypothesis> paper_hypotheses(const std::vector<VariantStudy>& studies) {
   constexpr double matters = 0.1;
-  std::vector<Hypothesis> all{{"H1", "variability depends on the launch speed's distribution", {}},
-                              {"H2", "variability depends on the uneven leg lengths", {}},
-                              {"H3", "variability depends on the distributions of restitution and friction", {}}};
-  for (const VariantStudy& s : studies) {
-    const auto judge = [&](const Influence& share) {
-      const bool steady = share.steady > matters, steps = share.steps_vary && share.steps > matters;
-      return Finding{steady  ? ClaimVerdict::reproduced
-                     : steps ? ClaimVerdict::partly
-                             : ClaimVerdict::not_reproduced,
-                     share_words(share)};
-    };
-    all[0].findings.push_back(judge(largest(s, {0})));
-    all[1].findings.push_back(judge(largest(s, {1})));
-    all[2].findings.push_back(judge(largest(s, {2, 3})));
+  const auto judge = [](const Influence& share) {
+    const bool steady = share.steady > matters, steps = share.steps_vary && share.steps > matters;
+    return Finding{steady  ? ClaimVerdict::reproduced
+                   : steps ? ClaimVerdict::partly
+                           : ClaimVerdict::not_reproduced,
+                   share_words(share)};
+  };
+  const struct {
+    const char *name, *text;
+    std::vector<VarianceSource> sources;
+  } stated[] = {{"H1", "variability depends on the launch speed's distribution", {VarianceSource::launch_speed}},
+                {"H2", "variability depends on the uneven leg lengths", {VarianceSource::leg_lengths}},
+                {"H3",
+                 "variability depends on the distributions of restitution and friction",
+                 {VarianceSource::restitution, VarianceSource::friction}}};
+  std::vector<Hypothesis> all;
+  for (const auto& [name, text, sources] : stated) {
+    Hypothesis& hypothesis = all.emplace_back(Hypothesis{name, text, {}});
+    for (const VariantStudy& s : studies) hypothesis.findings.push_back(judge(largest(s, sources)));
   }
   return all;
 }

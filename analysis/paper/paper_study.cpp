@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
@@ -16,6 +17,15 @@ namespace {
 constexpr int collisions = 16;       // of a trial, Sec. III
 constexpr double leg_sd = 0.000687;  // [m], Sec. IV-A
 constexpr Spread launch_702{7.35, 0.19};
+constexpr std::array fig6_friction{0.40, 0.45, 0.50, 0.55};
+constexpr std::array fig6_launch{3.35, 5.35, 7.35};
+constexpr std::array fig7_restitution_sd{0.05, 0.10, 0.15};
+constexpr std::array fig7_friction_sd{0.05, 0.10, 0.15, 0.20};
+constexpr std::array fig8_sd{0.05, 2 * 0.05, 3 * 0.05, 4 * 0.05};
+constexpr std::array fig9_friction{0.2, 0.3, 0.4, 0.5};
+constexpr std::array fig9_restitution{0.3, 0.5, 0.7};
+constexpr std::array variance_friction{0.3, 0.4, 0.5, 0.55};
+constexpr double usual_mean = 0.4, usual_sd = 0.1;  // of eta and mu, Sec. III
 
 double mean_sd(const std::vector<SpeedSummary>& profile, std::size_t first, std::size_t last) {
   double sum = 0, count = 0;
@@ -29,7 +39,11 @@ double p_of(TTest (*test)(std::span<const double>, std::span<const double>), con
   return a.size() < 2 || b.size() < 2 ? 1 : test(a, b).p;
 }
 
-// Profiles of one variant; every profile has random numbers of its own, so that tests between them hold.
+SteadyTest steady_test(const StudiedProfile& a, const StudiedProfile& b) {
+  return {p_of(pooled_t_test, a.steady, b.steady), p_of(welch_t_test, a.trial_means, b.trial_means)};
+}
+
+// Simulates the profiles of one variant; every profile has random numbers of its own, so that tests between them hold.
 class Simulator {
  public:
   Simulator(const Variant& variant, const PaperStudyOptions& options) : variant_(variant), options_(options) {}
@@ -68,6 +82,71 @@ class Simulator {
   std::uint64_t number_ = 0;
 };
 
+Fig4 study_fig4(Simulator& simulator) {
+  Setting steep;
+  steep.slope_deg = 9.59;
+  steep.initial_speed = {5.83, 0.28};
+  Fig4 fig;
+  fig.fast = simulator.profile(steep, "fast start");
+  steep.initial_speed = {4.51, 0.36};
+  fig.slow = simulator.profile(steep, "slow start");
+  fig.comparison = compare_conditions(fig.fast.speeds, fig.slow.speeds);
+  return fig;
+}
+
+LaunchPanel study_fig6(Simulator& simulator, double friction) {
+  LaunchPanel panel;
+  panel.friction = friction;
+  for (std::size_t k = 0; k < panel.runs.size(); ++k) {
+    LaunchRun& run = panel.runs[k];
+    Setting setting;
+    setting.restitution = {0.4, 0.2};
+    setting.friction = {friction, 0};
+    run.launch = fig6_launch[k];
+    setting.initial_speed = {run.launch, 0.198};
+    run.measured_legs = simulator.profile(setting, fmt::format("launch {} rad/s", run.launch));
+    setting.wheel.leg_length.assign(setting.wheel.leg_length.size(), Setting{}.wheel.mean_leg_length());
+    run.equal_legs = simulator.profile(setting, "equal legs");
+    run.legs_alike = steady_test(run.measured_legs, run.equal_legs);
+  }
+  auto pair = panel.pairs.begin();
+  for (const auto& [first, second] : {std::pair(1, 2), std::pair(1, 3), std::pair(2, 3)})
+    *pair++ = {first, second, steady_test(panel.run(first).measured_legs, panel.run(second).measured_legs)};
+  return panel;
+}
+
+// @param measured  steady speeds of the experiment
+SpreadPanel study_fig7(Simulator& simulator, double friction_sd, const std::vector<double>& measured) {
+  SpreadPanel panel;
+  panel.friction_sd = friction_sd;
+  for (std::size_t k = 0; k < panel.runs.size(); ++k) {
+    SpreadRun& run = panel.runs[k];
+    run.restitution_sd = fig7_restitution_sd[k];
+    Setting setting;
+    setting.restitution = {usual_mean, run.restitution_sd};
+    setting.friction = {usual_mean, friction_sd};
+    setting.initial_speed = launch_702;
+    run.profile = simulator.profile(setting, fmt::format("η sd {}", run.restitution_sd));
+    if (measured.size() >= 2 && run.profile.steady.size() >= 2)
+      run.against_experiment = pooled_t_test(measured, run.profile.steady);
+  }
+  return panel;
+}
+
+MeanPanel study_fig9(Simulator& simulator, double friction) {
+  MeanPanel panel;
+  panel.friction = friction;
+  for (std::size_t m = 0; m < panel.runs.size(); ++m) {
+    MeanRun& run = panel.runs[m];
+    run.restitution = fig9_restitution[m];
+    Setting setting;
+    setting.restitution = {run.restitution, 0.15};
+    setting.friction = {friction, 0.15};
+    run.profile = simulator.profile(setting, fmt::format("η mean {}", run.restitution));
+  }
+  return panel;
+}
+
 }  // namespace
 
 std::vector<Variant> paper_variants() {
@@ -78,6 +157,21 @@ std::vector<Variant> paper_variants() {
 
 double StudiedProfile::transient_sd() const { return mean_sd(profile, 2, 6); }
 double StudiedProfile::steady_sd() const { return mean_sd(profile, steady_collision, collisions); }
+
+const LaunchPair& LaunchPanel::pair(int first, int second) const {
+  for (const LaunchPair& one : pairs)
+    if (one.first == first && one.second == second) return one;
+  throw std::out_of_range(fmt::format("launches: {} and {} are no pair of Fig. 6", first, second));
+}
+
+const SpreadRun& VariantStudy::usual_spreads() const {
+  const auto panel = std::ranges::find(fig7, usual_sd, &SpreadPanel::friction_sd);
+  return *std::ranges::find(panel->runs, usual_sd, &SpreadRun::restitution_sd);
+}
+const LossRun& VariantStudy::usual_losses() const { return *std::ranges::find(fig8, usual_sd, &LossRun::sd); }
+const VarianceRun& VariantStudy::usual_variance() const {
+  return *std::ranges::find(variance, usual_mean, &VarianceRun::friction);
+}
 
 PaperExperiments paper_experiments(const Experiment& experiment) {
   if (experiment.system != System::rimless_wheel)
@@ -90,7 +184,7 @@ PaperExperiments paper_experiments(const Experiment& experiment) {
   for (std::size_t i = 0; i < experiment.conditions.size(); ++i) {
     const std::vector<double> first = at_collision(speeds(experiment, i), 1);
     if (first.size() < 2) continue;
-    if (std::abs(experiment.conditions[i].slope_deg - 9.59) < 0.5) steep.emplace_back(summarize(first).mean, i);
+    if (std::abs(experiment.conditions[i].slope_deg - 9.59) < 0.5) steep.emplace_back(speed_summary(first).mean, i);
     if (std::abs(experiment.conditions[i].slope_deg - 7.02) < 0.5 && !flat) flat = i;
   }
   std::sort(steep.begin(), steep.end());
@@ -113,18 +207,21 @@ PaperExperiments paper_experiments(const Experiment& experiment) {
 
 PaperExperiments simulated_experiments(std::uint64_t seed, int threads) {
   const std::vector<SimulatedCondition> conditions = stand_in(stand_in_setting(), seed, threads);
-  const auto& flat = conditions[2].trials;
+  const auto of = [&](std::string_view id) -> const std::vector<dynamics::Trial>& {
+    return std::ranges::find(conditions, id, &SimulatedCondition::id)->trials;
+  };
+  const std::vector<dynamics::Trial>& flat = of("fast-7.02");
   const auto rests =
       std::count_if(flat.begin(), flat.end(), [](const auto& t) { return t.outcome == dynamics::Outcome::rest; });
   return {true,
           "simulated stand-in",
-          speeds(conditions[0].trials),
-          speeds(conditions[1].trials),
+          speeds(of("fast-9.59")),
+          speeds(of("slow-9.59")),
           speeds(flat),
           static_cast<double>(rests) / static_cast<double>(flat.size())};
 }
 
-std::size_t paper_study_units() { return 2 + 4 * 12 + 4 + variance_friction.size(); }
+std::size_t paper_study_units() { return 2 + 4 * 12 + fig8_sd.size() + variance_friction.size(); }
 
 VariantStudy study_variant(const Variant& variant, const PaperExperiments& experiments,
                            const PaperStudyOptions& options) {
@@ -132,69 +229,28 @@ VariantStudy study_variant(const Variant& variant, const PaperExperiments& exper
   VariantStudy study;
   study.variant = variant;
   Simulator simulator(variant, options);
-  Setting paper;  // 7.02 deg, the paper's legs and launch, eta and mu ~ N(0.4, 0.1^2)
-
-  Setting steep = paper;
-  steep.slope_deg = 9.59;
-  steep.initial_speed = {5.83, 0.28};
-  study.fig4[0] = simulator.profile(steep, "fast start");
-  steep.initial_speed = {4.51, 0.36};
-  study.fig4[1] = simulator.profile(steep, "slow start");
-  study.fig4_comparison = compare_conditions(study.fig4[0].speeds, study.fig4[1].speeds);
-
-  for (std::size_t j = 0; j < 4; ++j) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      Setting setting = paper;
-      setting.restitution = {0.4, 0.2};
-      setting.friction = {fig6_friction[j], 0};
-      setting.initial_speed = {fig6_launch[k], 0.198};
-      study.fig6[j][k] = simulator.profile(setting, fmt::format("launch {} rad/s", fig6_launch[k]));
-      std::fill(setting.wheel.leg_length.begin(), setting.wheel.leg_length.end(), paper.wheel.mean_leg_length());
-      study.equal_legs[j][k] = simulator.profile(setting, "equal legs");
-      study.legs_p[j][k] = p_of(pooled_t_test, study.fig6[j][k].steady, study.equal_legs[j][k].steady);
-      study.legs_p_trials[j][k] = p_of(welch_t_test, study.fig6[j][k].trial_means, study.equal_legs[j][k].trial_means);
-    }
-    constexpr std::array<std::array<std::size_t, 2>, 3> pairs{{{0, 1}, {0, 2}, {1, 2}}};
-    for (std::size_t i = 0; i < 3; ++i) {
-      const StudiedProfile &a = study.fig6[j][pairs[i][0]], &b = study.fig6[j][pairs[i][1]];
-      study.fig6_p[j][i] = p_of(pooled_t_test, a.steady, b.steady);
-      study.fig6_p_trials[j][i] = p_of(welch_t_test, a.trial_means, b.trial_means);
-    }
-  }
+  study.fig4 = study_fig4(simulator);
+  for (std::size_t j = 0; j < study.fig6.size(); ++j) study.fig6[j] = study_fig6(simulator, fig6_friction[j]);
   const std::vector<double> measured = steady_speeds(experiments.fast_702);
-  for (std::size_t j = 0; j < 4; ++j)
-    for (std::size_t k = 0; k < 3; ++k) {
-      Setting setting = paper;
-      setting.restitution = {0.4, fig7_restitution_sd[k]};
-      setting.friction = {0.4, fig7_friction_sd[j]};
-      setting.initial_speed = launch_702;
-      study.fig7[j][k] = simulator.profile(setting, fmt::format("η sd {}", fig7_restitution_sd[k]));
-      if (measured.size() >= 2 && study.fig7[j][k].steady.size() >= 2)
-        study.fig7_test[j][k] = pooled_t_test(measured, study.fig7[j][k].steady);
-    }
-  for (std::size_t k = 0; k < 4; ++k) {
-    Setting setting = paper;
+  for (std::size_t j = 0; j < study.fig7.size(); ++j)
+    study.fig7[j] = study_fig7(simulator, fig7_friction_sd[j], measured);
+  for (std::size_t k = 0; k < study.fig8.size(); ++k) {
+    Setting setting;
     setting.law = variant.law;
-    setting.restitution.sd = setting.friction.sd = 0.05 * static_cast<double>(k + 1);
-    study.fig8[k] = energy_losses(setting, {.trials = options.trials,
-                                            .collisions = collisions,
-                                            .rest_rule = variant.reading == RestReading::rests,
-                                            .seed = options.seed,
-                                            .threads = options.threads});
+    setting.restitution.sd = setting.friction.sd = study.fig8[k].sd = fig8_sd[k];
+    study.fig8[k].losses = energy_losses(setting, {.trials = options.trials,
+                                                   .collisions = collisions,
+                                                   .rest_rule = variant.reading == RestReading::rests,
+                                                   .seed = options.seed,
+                                                   .threads = options.threads});
     simulator.done();
   }
-  for (std::size_t n = 0; n < 4; ++n)
-    for (std::size_t m = 0; m < 3; ++m) {
-      Setting setting = paper;
-      setting.restitution = {fig9_restitution[m], 0.15};
-      setting.friction = {fig9_friction[n], 0.15};
-      study.fig9[n][m] = simulator.profile(setting, fmt::format("η mean {}", fig9_restitution[m]));
-    }
-  for (std::size_t f = 0; f < variance_friction.size(); ++f) {
-    Setting setting = paper;
+  for (std::size_t n = 0; n < study.fig9.size(); ++n) study.fig9[n] = study_fig9(simulator, fig9_friction[n]);
+  for (std::size_t f = 0; f < study.variance.size(); ++f) {
+    Setting setting;
     setting.law = variant.law;
-    setting.friction.mean = variance_friction[f];
-    study.variance[f] = variance_of_trials(
+    setting.friction.mean = study.variance[f].friction = variance_friction[f];
+    study.variance[f].shares = variance_of_trials(
         setting, leg_sd, {.samples = options.samples, .seed = options.seed, .threads = options.threads});
     simulator.done();
   }

@@ -1,5 +1,5 @@
 #pragma once
-// The simulated results of the paper, figure by figure, under one contact law and one reading of its rest rule.
+// Simulates the paper's results, figure by figure, under one contact law and one reading of its rest rule.
 
 #include <array>
 #include <cstdint>
@@ -28,7 +28,7 @@ struct Variant {
 /// `coulomb` once: at these slopes nothing rests under it.
 std::vector<Variant> paper_variants();
 
-/// One simulated velocity profile.
+/// Holds one simulated velocity profile.
 struct StudiedProfile {
   Setting setting;
   std::string label;
@@ -41,14 +41,15 @@ struct StudiedProfile {
   double steady_sd() const;         ///< mean sd at collisions 13 to 16 [rad/s]; of the survivors
 };
 
-/// The three experiments: measured, or their stand-in.
+/// Holds the three experiments, measured or their stand-in.
 struct PaperExperiments {
   bool stand_in = true;
   std::string title;
   TrialSpeeds fast_959, slow_959, fast_702;
   std::optional<double> rest_share_702;
 };
-/// Conditions of `experiment` by slope: one near 7.02 deg, two near 9.59 deg (the faster launch is the fast one).
+/// Picks the conditions of `experiment` by slope: one near 7.02 deg, two near 9.59 deg (the faster launch is the fast
+/// one).
 /// @throws std::invalid_argument naming what is missing
 PaperExperiments paper_experiments(const Experiment& experiment);
 /// @param seed of the simulation (stand_in.h)
@@ -64,32 +65,92 @@ struct PaperStudyOptions {
 /// Calls of `progress` by one study_variant().
 std::size_t paper_study_units();
 
-constexpr std::array<double, 4> fig6_friction = {0.40, 0.45, 0.50, 0.55};
-constexpr std::array<double, 3> fig6_launch = {3.35, 5.35, 7.35};
-constexpr std::array<double, 3> fig7_restitution_sd = {0.05, 0.10, 0.15};
-constexpr std::array<double, 4> fig7_friction_sd = {0.05, 0.10, 0.15, 0.20};
-constexpr std::array<double, 4> fig9_friction = {0.2, 0.3, 0.4, 0.5};
-constexpr std::array<double, 3> fig9_restitution = {0.3, 0.5, 0.7};
-constexpr std::array<double, 4> variance_friction = {0.3, 0.4, 0.5, 0.55};
-
-struct VariantStudy {
-  Variant variant;
-  std::array<StudiedProfile, 2> fig4;  ///< fast, slow
-  ConditionComparison fig4_comparison;
-  std::array<std::array<StudiedProfile, 3>, 4> fig6;        ///< [friction][launch]
-  std::array<std::array<double, 3>, 4> fig6_p{};            ///< launches 1-2, 1-3, 2-3: pooled t, all collisions
-  std::array<std::array<double, 3>, 4> fig6_p_trials{};     ///< the same, Welch, one value a trial
-  std::array<std::array<StudiedProfile, 3>, 4> equal_legs;  ///< fig6 with all legs at their mean
-  std::array<std::array<double, 3>, 4> legs_p{};            ///< fig6 against equal_legs, pooled t
-  std::array<std::array<double, 3>, 4> legs_p_trials{};
-  std::array<std::array<StudiedProfile, 3>, 4> fig7;             ///< [friction sd][restitution sd]
-  std::array<std::array<std::optional<TTest>, 3>, 4> fig7_test;  ///< against the experiment at 7.02 deg
-  std::array<EnergyLosses, 4> fig8;
-  std::array<std::array<StudiedProfile, 3>, 4> fig9;  ///< [friction][restitution]
-  std::array<VarianceSources, 4> variance;            ///< over variance_friction
+/// Says whether steady speeds of two profiles are alike. P is 1 where one of them has fewer than two values (all trials
+/// rested).
+struct SteadyTest {
+  double p = 1;           ///< pooled t, all collisions, as the paper seems to do
+  double p_by_trial = 1;  ///< Welch, one value a trial
 };
 
-/// P is NaN-free: 1 where a sample has fewer than two values (all trials rested).
+/// Fig. 4 shows two starts at 9.59 deg.
+struct Fig4 {
+  StudiedProfile fast, slow;
+  ConditionComparison comparison;
+};
+
+/// Holds a launch at one friction (Fig. 6), and the same with all legs at their mean (Sec. IV-A).
+struct LaunchRun {
+  double launch = 0;  ///< mean [rad/s]
+  StudiedProfile measured_legs, equal_legs;
+  SteadyTest legs_alike;
+};
+/// Compares two launches of Fig. 6 by the paper's k = 1, 2, 3.
+struct LaunchPair {
+  int first = 1, second = 2;
+  SteadyTest alike;
+};
+/// Holds one panel of Fig. 6.
+struct LaunchPanel {
+  double friction = 0;
+  std::array<LaunchRun, 3> runs;    ///< slowest launch first
+  std::array<LaunchPair, 3> pairs;  ///< 1-2, 1-3, 2-3
+  const LaunchRun& run(int k) const { return runs.at(static_cast<std::size_t>(k - 1)); }
+  /// @throws std::out_of_range unless 1 <= first < second <= 3
+  const LaunchPair& pair(int first, int second) const;
+};
+
+/// Fig. 7 varies the sds of eta and mu.
+struct SpreadRun {
+  double restitution_sd = 0;
+  StudiedProfile profile;
+  std::optional<TTest> against_experiment;  ///< at 7.02 deg; nothing where too few trials get past the 12th collision
+};
+struct SpreadPanel {
+  double friction_sd = 0;
+  std::array<SpreadRun, 3> runs;  ///< narrowest first
+};
+
+/// Fig. 8 varies one sd for eta and mu.
+struct LossRun {
+  double sd = 0;
+  EnergyLosses losses;
+};
+
+/// Fig. 9 varies the means of eta and mu, both with sd 0.15.
+struct MeanRun {
+  double restitution = 0;
+  StudiedProfile profile;
+};
+struct MeanPanel {
+  double friction = 0;
+  std::array<MeanRun, 3> runs;  ///< least restitution first
+  const StudiedProfile& low_restitution() const { return runs.front().profile; }
+  const StudiedProfile& high_restitution() const { return runs.back().profile; }
+};
+
+/// Holds shares of the variance at one mean of mu (Sec. IV).
+struct VarianceRun {
+  double friction = 0;
+  VarianceSources shares;
+};
+
+/// Panels and runs rise with the quantity they are named after.
+struct VariantStudy {
+  Variant variant;
+  Fig4 fig4;
+  std::array<LaunchPanel, 4> fig6;
+  std::array<SpreadPanel, 4> fig7;
+  std::array<LossRun, 4> fig8;
+  std::array<MeanPanel, 4> fig9;
+  std::array<VarianceRun, 4> variance;
+
+  // These have the paper's contact, eta, mu ~ N(0.4, 0.1^2), at 7.02 deg.
+  const SpreadRun& usual_spreads() const;     ///< of fig7
+  const LossRun& usual_losses() const;        ///< of fig8
+  const VarianceRun& usual_variance() const;  ///< of variance
+};
+
+/// @throws std::invalid_argument for options out of range
 VariantStudy study_variant(const Variant& variant, const PaperExperiments& experiments,
                            const PaperStudyOptions& options);
 

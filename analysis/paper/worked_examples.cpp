@@ -5,6 +5,8 @@
 #include "analysis/experiment/reality.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/paper/uncharged_sticking.h"
+#include "analysis/study/metastability.h"
+#include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::analysis {
 
@@ -20,8 +22,7 @@ Experiment laboratory_stand_in(const std::vector<dynamics::Effect>& effects, std
   options.threads = threads;
   const dynamics::LaboratorySetup setup = laboratory_setup(conditions, options);
   const auto run = run_laboratory(setup, threads);
-  const RealityFiles made = reality_files(conditions, setup, run, {.title = "laboratory"});
-  return parse_experiment(source_of(made.files, "laboratory"));
+  return experiment_of(conditions, setup, run, {.title = "laboratory"});
 }
 
 std::vector<ChargeOnSticking> charge_on_sticking(std::uint64_t seed, int threads) {
@@ -49,23 +50,23 @@ std::vector<ChargeOnSticking> charge_on_sticking(std::uint64_t seed, int threads
   return ramps;
 }
 
-Experiment believed_half_as_wide(Experiment e, Source source) {
+Experiment believed_half_as_wide(Experiment e, VariabilitySource source) {
   switch (source) {
-    case Source::none:
+    case VariabilitySource::none:
       break;
-    case Source::launch:
+    case VariabilitySource::launch:
       for (Condition& condition : e.conditions) {
         if (!condition.initial_speed)
           throw std::invalid_argument("condition '" + condition.id + "': its launch is not stated");
         condition.initial_speed->sd /= 2;
       }
       break;
-    case Source::legs: {
+    case VariabilitySource::legs: {
       const double mean = e.wheel.mean_leg_length();
       for (double& length : e.wheel.leg_length) length = mean + (length - mean) / 2;
       break;
     }
-    case Source::contact:
+    case VariabilitySource::contact:
       e.contact.restitution.sd /= 2;
       e.contact.friction.sd /= 2;
       break;

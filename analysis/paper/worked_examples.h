@@ -1,12 +1,12 @@
 #pragma once
-// What the worked examples of the diagnosis (`metastable lessons`) compute and diagnose.
+// Provides what the worked examples of the diagnosis (`metastable lessons`) compute and diagnose.
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
 #include "analysis/experiment/experiment.h"
-#include "analysis/study/metastability.h"
+#include "analysis/statistics/estimate.h"
 #include "dynamics/wheel/effect_catalogue.h"
 
 namespace metastable::analysis {
@@ -18,30 +18,32 @@ namespace metastable::analysis {
 Experiment laboratory_stand_in(const std::vector<dynamics::Effect>& effects, std::uint64_t seed, int threads,
                                int trials = 0);
 
-/// Expected steps of the paper's wheel with equal legs of 0.1519 m, launched as in the paper, on one ramp.
+/// Holds expected steps of the paper's wheel with equal legs of 0.1519 m, launched as in the paper, on one ramp.
 struct ChargeOnSticking {
   double slope_deg = 0;
   double critical_friction = 0;            ///< mu_c = x y/(L^2 + y^2): a foot with more sticks
   double share_above = 0;                  ///< of mu ~ N(0.4, 0.1^2) above it
   Estimate published, uncharged, coulomb;  ///< under the law, without its charge (analysis/paper/uncharged_sticking.h)
 };
-/// On the paper's two ramps, intervals of 5 %. @throws as study()
+/// Studies the paper's two ramps, with intervals of 5 %. @throws as study()
 std::vector<ChargeOnSticking> charge_on_sticking(std::uint64_t seed, int threads);
 
-/// The sources of variability that the paper's hypotheses H1, H2 and H3 are about, and none of them.
-enum class Source { none, launch, legs, contact };
-inline constexpr std::array sources{Source::none, Source::launch, Source::legs, Source::contact};
-/// An experiment whose nominal model believes one source half as wide as it states: the sds of the launches, the legs'
-/// distances from their mean, or the sds of eta and mu. @throws std::invalid_argument for launches that are not stated
-Experiment believed_half_as_wide(Experiment experiment, Source source);
+/// Names what the paper's hypotheses H1, H2 and H3 are about, and none of these.
+enum class VariabilitySource { none, launch, legs, contact };
+inline constexpr std::array variability_sources{VariabilitySource::none, VariabilitySource::launch,
+                                                VariabilitySource::legs, VariabilitySource::contact};
+/// Returns the experiment with one source half as wide in its nominal model as it states: the sds of the launches, the
+/// legs' distances from their mean, or the sds of eta and mu. @throws std::invalid_argument for launches that are not
+/// stated
+Experiment believed_half_as_wide(Experiment experiment, VariabilitySource source);
 
-/// One experiment under another nominal law.
+/// Holds one experiment under another nominal law.
 struct UnderLaw {
   dynamics::Law law = dynamics::Law::published;
   bool whole_steps = false;  ///< omega_plus is left out, so that steps count and not collisions
   Experiment experiment;
 };
-/// Under `published` and `coulomb`, each with omega_plus and, where it was measured, without.
+/// Puts it under `published` and `coulomb`, each with omega_plus and, where it was measured, without.
 std::vector<UnderLaw> under_both_laws(const Experiment& experiment);
 
 }  // namespace metastable::analysis

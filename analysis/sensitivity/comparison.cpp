@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "analysis/statistics/number_text.h"
 #include "analysis/statistics/t_interval.h"
 
 namespace metastable::analysis {
@@ -64,10 +65,12 @@ Contrast contrast(const Comparison& comparison, std::size_t against, std::size_t
       std::hypot(sampling(difference), a.steps.discretization_error * a.steps.from_start.value +
                                            b.steps.discretization_error * b.steps.from_start.value);
   result.difference = Estimate{apart, apart - apart_half, apart + apart_half};
-  result.sentence = fmt::format(
-      "{} takes {:.4g} times the steps of {} (95 % interval {:.4g} to {:.4g}), {:.4g} more ({:.4g} to {:.4g})", name_b,
-      ratio, name_a, result.ratio->lower, result.ratio->upper, apart, result.difference->lower,
-      result.difference->upper);
+  const DecimalEstimate times = to_decimal(*result.ratio, NumberFormat::significant, 4),
+                        more = to_decimal(*result.difference, NumberFormat::significant, 4);
+  result.sentence =
+      fmt::format("{} takes {} times the steps of {} (95 % interval {} to {}), {} more ({} to {})", name_b,
+                  plain_text(times.value), name_a, plain_text(times.lower), plain_text(times.upper),
+                  plain_text(more.value), plain_text(more.lower), plain_text(more.upper));
   return result;
 }
 

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "markov/chain/chain.h"
@@ -52,6 +54,18 @@ Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::s
   return setting;
 }
 
+std::string sweep_description(const Setting& base, const std::vector<Axis>& axes) {
+  // A number that varies is none: it is described as "nan".
+  constexpr std::string_view none = "nan", slope = "nan deg";
+  Setting setting = base;
+  for (const Axis& axis : axes) set_parameter(setting, axis.parameter, std::numeric_limits<double>::quiet_NaN());
+  std::string text = setting.describe();
+  if (text.starts_with(slope)) text.replace(0, slope.size(), "slope varies");
+  for (std::size_t at = text.find(none); at != std::string::npos; at = text.find(none, at))
+    text.replace(at, none.size(), "varies");
+  return text;
+}
+
 void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
            const std::function<void(std::size_t, const SweepPoint&)>& done) {
   const std::size_t size = sweep_size(axes);
@@ -59,7 +73,7 @@ void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin
   StudyOptions single = options;
   single.threads = 1;
   single.brief = true;
-  single.progress = nullptr;
+  if (options.progress) single.progress = [&](double, const std::string& what) { options.progress(0, what); };
   std::mutex mutex;
   std::map<std::size_t, SweepPoint> waiting;  // finished before an earlier point
   std::size_t next = begin;

@@ -18,13 +18,12 @@ r123::Philox4x64::ctr_type words(const r123::Philox4x64::ctr_type& counter, std:
 
 }  // namespace
 
-Eigen::VectorXd normal_multipliers(std::uint64_t seed, std::uint64_t draw, DrawStream stream, Eigen::Index count) {
-  Eigen::VectorXd multipliers(count);
-  for (Eigen::Index t = 0; t < count; t += 4) {
-    const auto bits =
-        words({{draw, static_cast<std::uint64_t>(t), static_cast<std::uint64_t>(stream), 0}}, seed, multiplier_key);
-    for (Eigen::Index i = 0; i < 4 && t + i < count; ++i)
-      multipliers[t + i] = dynamics::normal_quantile(unit_interval(bits[static_cast<std::size_t>(i)]));
+std::vector<double> normal_multipliers(std::uint64_t seed, std::uint64_t draw, DrawStream stream, std::size_t count) {
+  std::vector<double> multipliers(count);
+  for (std::size_t t = 0; t < count; t += 4) {
+    const auto bits = words({{draw, t, static_cast<std::uint64_t>(stream), 0}}, seed, multiplier_key);
+    for (std::size_t i = 0; i < 4 && t + i < count; ++i)
+      multipliers[t + i] = dynamics::normal_quantile(unit_interval(bits[i]));
   }
   return multipliers;
 }

@@ -1,8 +1,9 @@
 #pragma once
 // Random numbers of the diagnosis, by counter: the same bits on any number of threads.
 
-#include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace metastable::analysis {
 
@@ -17,8 +18,8 @@ enum class DrawStream : std::uint64_t {
   folds = 4               ///< the order in which trials go to folds
 };
 
-/// Standard normals by which a bootstrap multiplies scores: those of draw number `draw`. @param count  >= 0
-Eigen::VectorXd normal_multipliers(std::uint64_t seed, std::uint64_t draw, DrawStream stream, Eigen::Index count);
+/// Standard normals by which a bootstrap multiplies scores: those of draw number `draw`.
+std::vector<double> normal_multipliers(std::uint64_t seed, std::uint64_t draw, DrawStream stream, std::size_t count);
 
 /// Weight of a held-out trial in a bootstrap by exponential weights (mean 1): that of draw number `draw`.
 double exponential_weight(std::uint64_t seed, std::uint64_t draw, std::uint64_t trial);

@@ -20,10 +20,12 @@ namespace {
 using dynamics::Interval;
 using markov::LandingSource;
 
-constexpr double beyond_top = 1.3;  // how far above the top edge the drift looks, relative
-constexpr double top_noise = 4;     // the top edge: where noise of so many sds leads no higher
-constexpr double launch_noise = 8;  // and launches of so many sds lie below
-constexpr int pieces = 16;          // of a cell, for the mean over the launch
+constexpr double beyond_top = 1.3;     // how far above the top edge the drift looks, relative
+constexpr double top_noise = 4;        // the top edge: where noise of so many sds leads no higher
+constexpr double launch_noise = 8;     // and launches of so many sds lie below
+constexpr double least_range = 2;      // states the nodes cover, over the lowest
+constexpr double least_launch = 0.01;  // of the lowest state: launches below it are not told apart
+constexpr int pieces = 16;             // of a cell, for the mean over the launch
 
 LandingSource::Range range(const Interval& i) { return {i.lower, i.upper}; }
 Interval interval(const LandingSource::Range& r) { return {r.lower, r.upper}; }
@@ -53,11 +55,11 @@ class Wheel final : public LandingSource {
   std::vector<dynamics::LandingBounds> bounds_;
 };
 
-// A state from which even fortunate noise leads no higher, above all launches.
-double top_state(const dynamics::WheelMap& map, const dynamics::TruncatedNormal& launch) {
+// A state from which even fortunate noise leads no higher, above all launches and well above `lowest`.
+double top_state(const dynamics::WheelMap& map, const dynamics::TruncatedNormal& launch, double lowest) {
   const dynamics::TruncatedNormal &eta = map.noise().restitution(), &mu = map.noise().friction();
   const double fastest = launch.mean() + launch_noise * launch.sd() + 0.1;
-  double top = fastest * fastest;
+  double top = std::max(fastest * fastest, least_range * lowest);
   const double most = 4 * top;
   const double share = top_noise / std::numbers::sqrt2;
   for (const auto& [by_eta, by_mu] :
@@ -68,6 +70,13 @@ double top_state(const dynamics::WheelMap& map, const dynamics::TruncatedNormal&
         top = std::max(top, 1.02 * (map.after_collision(top, p, fortunate) + map.stance(p).gain));
   }
   return std::min(top, most);
+}
+
+// Where nodes have to begin for launches too slow to come from a step: less is as good as rest at the first one.
+double lowest_of_launch(const dynamics::TruncatedNormal& launch, double lowest) {
+  if (launch.mean() * launch.mean() >= lowest) return lowest;
+  const double slow = std::max(0.0, launch.mean() - launch_noise * launch.sd() - 0.1);
+  return std::max(slow * slow, least_launch * lowest);
 }
 
 // Spacing in proportion to the state, as the noise of the landing is.
@@ -183,9 +192,11 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
   CertifiedSteps result;
   result.upper = std::numeric_limits<double>::infinity();
   try {
-    const double top = top_state(map, launch), beyond = beyond_top * top;
     std::vector<double> lowest;
     for (int p = 0; p < map.phases(); ++p) lowest.push_back(map.state_interval(p).first * (1 - 0x1p-44));
+    const double top = top_state(map, launch, *std::max_element(lowest.begin(), lowest.end()));
+    const double beyond = beyond_top * top;
+    lowest[phase] = lowest_of_launch(launch, lowest[phase]);
     const std::vector<Size> ladder = sizes(map.phases(), options.largest_cells);
     for (std::size_t s = 0; s < ladder.size(); ++s) {
       if (options.progress)

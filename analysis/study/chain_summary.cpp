@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 #include <string>
+#include <utility>
 
 #include "markov/chain/eigenpairs.h"
 #include "markov/chain/sparse_solver.h"
@@ -20,7 +21,10 @@ constexpr double quantile_levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
 constexpr std::size_t least_survival = 64, most_survival = 10000;  // values of the curve
 constexpr std::size_t violation_draws = 64;                        // a state
 constexpr std::size_t slowest_draws = 16384;
-constexpr std::size_t most_forward = 100000;  // steps followed where some launches never rest
+constexpr std::size_t most_forward = 100000;  // steps followed where some states never rest
+constexpr double same_chain = 1e-6;           // agreement wanted of two ways to solve it
+constexpr double rarest_launch = 1e-15;       // that counts: beyond 8 sds
+constexpr double rarest_rest = 1e-9;          // worth a word where the others never rest
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -31,10 +35,10 @@ struct MeanSd {
 };
 
 // Of the observable, states weighted by `mass` (any total).
-MeanSd observe(const Problem& problem, const markov::StateSpace& space, const std::vector<double>& mass) {
+MeanSd observe(const Problem& problem, std::span<const double> states, std::span<const double> mass) {
   double total = 0, first = 0, second = 0;
-  for (std::size_t i = 0; i < space.size(); ++i) {
-    const double value = problem.observable(space.grid(space.phase(i)).midpoint(space.cell(i)));
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const double value = problem.observable(states[i]);
     total += mass[i];
     first += mass[i] * value;
     second += mass[i] * value * value;
@@ -43,24 +47,20 @@ MeanSd observe(const Problem& problem, const markov::StateSpace& space, const st
   return {first, std::sqrt(std::max(0.0, second / total - first * first))};
 }
 
-void describe_survivors(const Problem& problem, const markov::StateSpace& space, const std::vector<double>& nu,
-                        Metastability& result) {
+void describe_survivors(const Problem& problem, const markov::StateSpace& space, std::span<const double> states,
+                        const std::vector<double>& nu, Metastability& result) {
   for (int p = 0; p < space.phases(); ++p) {
     const auto edges = space.grid(p).edges();
+    const auto mass = std::span(nu).subspan(space.index(p, 0), space.cells());
+    const double total = std::accumulate(mass.begin(), mass.end(), 0.0);
     PhaseDistribution phase{{edges.begin(), edges.end()}, {}, 0, 0};
-    std::vector<double> only(space.size(), 0.0);
-    double total = 0;
-    for (std::size_t c = 0; c < space.cells(); ++c) total += nu[space.index(p, c)];
-    for (std::size_t c = 0; c < space.cells(); ++c) {
-      only[space.index(p, c)] = nu[space.index(p, c)] / total;
-      phase.mass.push_back(only[space.index(p, c)]);
-    }
-    const MeanSd observed = observe(problem, space, only);
+    for (const double share : mass) phase.mass.push_back(share / total);
+    const MeanSd observed = observe(problem, states.subspan(space.index(p, 0), space.cells()), phase.mass);
     phase.mean = observed.mean;
     phase.sd = observed.sd;
     result.survivors.by_phase.push_back(std::move(phase));
   }
-  const MeanSd all = observe(problem, space, nu);
+  const MeanSd all = observe(problem, states, nu);
   result.survivors.mean = all.mean;
   result.survivors.sd = all.sd;
 }
@@ -112,6 +112,17 @@ void describe_violations(const Problem& problem, const markov::StateSpace& space
   }
 }
 
+// Of the quasi-stationary distribution, class by class.
+double log_survival_of_a_revolution(const markov::ChainSolver& solver, const markov::QuasiStationary& quasi) {
+  double log_survival = 0;
+  for (const std::vector<std::uint32_t>& of_class : solver.period().classes) {
+    double rest = 0;
+    for (const std::uint32_t i : of_class) rest += quasi.distribution[i] * solver.chain().kill(i);
+    log_survival += std::log1p(-rest);
+  }
+  return log_survival;
+}
+
 Accumulated accumulated(const markov::Moments& moments, const std::vector<double>& quantiles) {
   Accumulated total{moments.mean, moments.sd, {}};
   for (std::size_t i = 0; i < quantiles.size(); ++i) total.quantiles.push_back({quantile_levels[i], quantiles[i]});
@@ -126,13 +137,24 @@ std::size_t survival_steps(const Problem& problem) {
 
 }  // namespace
 
-ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
-                       const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws) {
-  const markov::ChainSolver solver(sampled.chain);
-  const std::vector<double> mean = markov::mean_first_passage(solver);
+SolvedChain::SolvedChain(const markov::SampledChain& sampled)
+    : solver(sampled.chain),
+      mean(markov::mean_first_passage(solver)),
+      quasi(markov::quasi_stationary(solver)),
+      from_start(1 + dot(sampled.launch.after, mean)) {}
+
+std::vector<double> midpoints(const markov::StateSpace& space) {
+  std::vector<double> states;
+  for (std::size_t i = 0; i < space.size(); ++i) states.push_back(space.grid(space.phase(i)).midpoint(space.cell(i)));
+  return states;
+}
+
+ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space, const SolvedChain& solved,
+                       const std::vector<markov::DrawOptions>& draws) {
+  const std::vector<double>& mean = solved.mean;
   ChainSteps steps;
-  steps.from_start = 1 + dot(sampled.launch.after, mean);
-  steps.from_quasi_stationary = 1 / markov::quasi_stationary(solver).failure_rate;
+  steps.from_start = solved.from_start;
+  steps.from_quasi_stationary = 1 / solved.quasi.failure_rate;
   int worst_phase = 0;
   for (int p = 1; p < space.phases(); ++p)
     if (mean[space.index(p, 0)] < mean[space.index(worst_phase, 0)]) worst_phase = p;
@@ -148,26 +170,31 @@ ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace
   return steps;
 }
 
-void summarize(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
-               const StudyOptions& options, Metastability& result) {
-  const markov::ChainSolver solver(sampled.chain);
-  const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
+void summarize(const Problem& problem, const markov::StateSpace& space, std::span<const double> states,
+               const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options,
+               Metastability& result) {
+  const markov::ChainSolver& solver = solved.solver;
+  const markov::QuasiStationary& quasi = solved.quasi;
   const markov::Launch& launch = sampled.launch;
   result.phases = space.phases();
   result.spectrum.period = solver.period().period;
 
-  const std::vector<double> mean = markov::mean_first_passage(solver);
-  const std::vector<double> second = markov::second_moment(solver, mean);
+  const std::vector<double> second = markov::second_moment(solver, solved.mean);
   const markov::Survival survival(solver, quasi, launch);
   std::vector<double> quantiles;
   for (const double level : quantile_levels) quantiles.push_back(survival.quantile(level));
-  result.steps.distribution = accumulated(markov::steps_from_launch(launch, mean, second), quantiles);
+  result.steps.distribution = accumulated(markov::steps_from_launch(launch, solved.mean, second), quantiles);
   const auto reward = [&](const std::vector<double>& pay) {
     return accumulated(markov::reward_from_launch(solver, launch, pay),
                        markov::reward_quantiles(solver, quasi, launch, pay, quantile_levels));
   };
   if (!options.brief && !sampled.duration.empty()) result.steps.seconds = reward(sampled.duration);
   if (!options.brief && !sampled.advance.empty()) result.steps.metres = reward(sampled.advance);
+  result.agreements.push_back(
+      {"expected steps, solved and summed over survival", result.steps.distribution.mean, survival.mean(), same_chain});
+  if (quasi.revolution_failure_rate < 1)
+    result.agreements.push_back({"failure rate, and that of its survivors", -std::log1p(-quasi.revolution_failure_rate),
+                                 -log_survival_of_a_revolution(solver, quasi), same_chain});
   const std::size_t shown = survival_steps(problem);
   for (std::size_t n = 0; n < shown; ++n) result.steps.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.steps.reach_end = survival.at(*problem.last_event);
@@ -179,11 +206,13 @@ void summarize(const Problem& problem, const markov::StateSpace& space, const ma
     result.spectrum.total_variation_steps =
         markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   }
-  describe_survivors(problem, space, quasi.distribution, result);
-  if (dot(launch.after, launch.after) > 0) {  // otherwise no launch survives its first collision
-    const MeanSd restarted = observe(problem, space, markov::stationary_with_restart(solver, launch.after));
+  describe_survivors(problem, space, states, quasi.distribution, result);
+  if (dot(launch.after, launch.after) > 0) {
+    const MeanSd restarted = observe(problem, states, markov::stationary_with_restart(solver, launch.after));
     result.survivors.restart_mean = restarted.mean;
     result.survivors.restart_sd = restarted.sd;
+  } else {  // no launch survives its first collision
+    result.survivors.restart_mean = result.survivors.restart_sd = std::numeric_limits<double>::quiet_NaN();
   }
   if (!options.brief)
     describe_violations(problem, space, quasi.distribution, solver.solve_left(launch.after), options, result);
@@ -200,12 +229,19 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
                        const StudyOptions& options, Metastability& result) {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   const markov::Launch& launch = sampled.launch;
+  const markov::Reachability reach = markov::classify(sampled.chain);
+  const std::vector<std::uint8_t> met = markov::reachable_from(sampled.chain, launch.after);
+  std::vector<std::uint32_t> mortal;  // states from which rest can be reached
+  std::vector<double> rolling(space.size(), 0.0), met_rolling(space.size(), 0.0);
+  for (std::size_t i = 0; i < space.size(); ++i) {
+    if (reach.can_rest[i]) mortal.push_back(static_cast<std::uint32_t>(i));
+    rolling[i] = reach.can_rest[i] ? 0 : 1;
+    met_rolling[i] = rolling[i] * met[i];
+  }
+  const bool ever = dot(met_rolling, met_rolling) > 0;
   result.phases = space.phases();
-  result.steps.from_start = result.steps.from_quasi_stationary = {infinite, infinite, infinite};
-  result.steps.worst_start = {infinite, infinite, infinite};
-  result.steps.distribution = {infinite, infinite, {}};
 
-  const std::vector<double> stationary = markov::stationary(sampled.chain, launch.after);
+  const std::vector<double> stationary = markov::stationary(sampled.chain, ever ? met_rolling : rolling);
   std::vector<std::uint32_t> recurrent;
   for (std::size_t i = 0; i < stationary.size(); ++i)
     if (stationary[i] > 0) recurrent.push_back(static_cast<std::uint32_t>(i));
@@ -215,29 +251,51 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   result.spectrum.moduli = moduli_per_step(problem, markov::revolution_chain(closed, period), period.period,
                                            options.eigenvalues, 0.0, result.message);
   result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
-  describe_survivors(problem, space, stationary, result);
-  result.survivors.restart_mean = result.survivors.mean;
-  result.survivors.restart_sd = result.survivors.sd;
+  describe_survivors(problem, space, midpoints(space), stationary, result);
+  result.survivors.restart_mean = ever ? result.survivors.mean : std::numeric_limits<double>::quiet_NaN();
+  result.survivors.restart_sd = ever ? result.survivors.sd : std::numeric_limits<double>::quiet_NaN();
 
-  // Forward from the launch: survival, visits on the course, and the share that has come to rest when no more do.
+  // Until rest or for ever: the share of the launches that never rest, and the steps of the others.
+  double never = dot(launch.after, rolling), steps = 1;
+  if (!mortal.empty()) {
+    const markov::ChainSolver until(sampled.chain.restricted_to(mortal));
+    std::vector<double> entering, after;
+    const std::vector<double> leads = markov::apply(sampled.chain, rolling);
+    for (const std::uint32_t i : mortal) {
+      entering.push_back(leads[i]);
+      after.push_back(launch.after[i]);
+    }
+    const std::vector<double> visits = until.solve_left(after);
+    never += dot(visits, entering);
+    steps += std::accumulate(visits.begin(), visits.end(), 0.0);
+  }
+  const bool finite = never < rarest_launch;
+  result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, infinite, infinite};
+  result.steps.from_start = finite ? Estimate{steps, steps, steps} : result.steps.from_quasi_stationary;
+
+  // Forward from the launch: survival, and visits on the course.
   std::vector<double> alive = launch.after, visits(space.size(), 0.0);
   result.steps.survival = {1.0};
   const std::size_t shown = survival_steps(problem);
   for (std::size_t n = 1; n < most_forward; ++n) {
     const double surviving = std::min(result.steps.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
-    const bool settled =
-        n > 2 * static_cast<std::size_t>(result.spectrum.period) &&
-        surviving > result.steps.survival[n - static_cast<std::size_t>(result.spectrum.period)] * (1 - 1e-12);
-    if (n >= shown && settled) break;
+    if (n >= shown && surviving <= never * (1 + 1e-12)) break;
     result.steps.survival.push_back(surviving);
     if (n < shown)
       for (std::size_t i = 0; i < visits.size(); ++i) visits[i] += alive[i];
     alive = markov::apply_left(sampled.chain, alive);
   }
-  const double ever_rests = 1 - result.steps.survival.back();
-  if (ever_rests > 1e-9)
-    result.message = fmt::format("infinite: rest is unreachable for {:.4g} % of the launches, the others rest",
-                                 100 * result.steps.survival.back());
+  double square = infinite;
+  if (finite) {
+    square = 0;
+    for (std::size_t n = 0; n < result.steps.survival.size(); ++n)
+      square += (2 * static_cast<double>(n) + 1) * result.steps.survival[n];
+  }
+  result.steps.distribution = {
+      result.steps.from_start.value, finite ? std::sqrt(std::max(0.0, square - steps * steps)) : infinite, {}};
+  if (!finite && 1 - never > rarest_rest)
+    result.message =
+        fmt::format("infinite: rest is unreachable for {:.4g} % of the launches, the others rest", 100 * never);
   for (const double level : quantile_levels) {
     const auto reached = std::find_if(result.steps.survival.begin(), result.steps.survival.end(),
                                       [&](double surviving) { return surviving <= 1 - level; });

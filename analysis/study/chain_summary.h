@@ -1,14 +1,27 @@
 #pragma once
-// What one sampled chain says: the numbers of a study that need no replicates.
+// What one chain says: the numbers of a study that need no replicates.
 
+#include <span>
 #include <vector>
 
 #include "analysis/study/metastability.h"
 #include "analysis/study/problem.h"
 #include "markov/chain/solver.h"
+#include "markov/passage/quasi_stationary.h"
 #include "markov/rows/discretization.h"
 
 namespace metastable::analysis {
+
+/// A chain whose every state reaches rest, solved once for all that is read off it.
+struct SolvedChain {
+  /// @throws std::domain_error, markov::ConvergenceError as markov::ChainSolver, markov::quasi_stationary
+  explicit SolvedChain(const markov::SampledChain& sampled);
+
+  markov::ChainSolver solver;
+  std::vector<double> mean;  ///< expected steps from every state
+  markov::QuasiStationary quasi;
+  double from_start = 0;  ///< expected steps from the launch
+};
 
 struct ChainSteps {
   double from_start = 0;
@@ -16,16 +29,21 @@ struct ChainSteps {
   double worst_start = 0;
 };
 
-/// Expected steps of a chain whose every state reaches rest. The worst start is the lowest state a survivor can have,
-/// at the phase where that is worst; its landings are drawn with `draws` (each at most 16384, the first four).
-ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space,
-                       const markov::SampledChain& sampled, const std::vector<markov::DrawOptions>& draws);
+/// Expected steps of a sampled chain. The worst start is the lowest state a survivor can have, at the phase where that
+/// is worst; its landings are drawn with `draws` (each at most 16384, the first four).
+ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space, const SolvedChain& solved,
+                       const std::vector<markov::DrawOptions>& draws);
+
+/// The middle of every cell.
+std::vector<double> midpoints(const markov::StateSpace& space);
 
 /// Fills everything of `result` that is read off one chain (all but the estimates and their errors).
-void summarize(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
-               const StudyOptions& options, Metastability& result);
+/// @param states  that the chain's states stand for: the midpoints of the cells of `space`, or the nodes in them
+void summarize(const Problem& problem, const markov::StateSpace& space, std::span<const double> states,
+               const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options,
+               Metastability& result);
 
-/// The same for a chain of which some launches never come to rest.
+/// The same for a chain with states that never come to rest. Expected steps are infinite unless all launches rest.
 void summarize_endless(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
                        const StudyOptions& options, Metastability& result);
 

@@ -22,8 +22,12 @@ constexpr double safety = 2;  // of the error over the changes it is told from
 
 struct Level {
   markov::NodeSpace space;
-  markov::IntegratedChain integrated;
-  double from_start = 0, failure_rate = 0, worst_start = 0;
+  markov::SampledChain chain;
+  SolvedChain solved;
+  double worst_start = 0;
+
+  double from_start() const { return solved.from_start; }
+  double failure_rate() const { return solved.quasi.failure_rate; }
 };
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
@@ -32,29 +36,25 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
 
 // Nothing if the nodes are too few to lead to rest, or so few that interpolation makes nonsense of it.
 std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::size_t panels) {
-  Level level{rows.space(panels), {}};
-  level.integrated = rows.chain(problem, level.space);
-  const markov::SampledChain& sampled = level.integrated.chain;
-  const markov::Reachability reach = markov::classify(sampled.chain);
+  const markov::NodeSpace space = rows.space(panels);
+  markov::SampledChain chain = rows.chain(problem, space).chain;
+  const markov::Reachability reach = markov::classify(chain.chain);
   if (std::find(reach.must_rest.begin(), reach.must_rest.end(), 0) != reach.must_rest.end()) return std::nullopt;
   try {
-    const markov::ChainSolver solver(sampled.chain);
-    const std::vector<double> mean = markov::mean_first_passage(solver);
-    level.from_start = 1 + dot(sampled.launch.after, mean);
-    level.failure_rate = markov::quasi_stationary(solver).failure_rate;
+    SolvedChain solved(chain);
+    Level level{space, std::move(chain), std::move(solved)};
+    const std::vector<double>& mean = level.solved.mean;
     int worst = 0;
-    for (int p = 1; p < level.space.phases(); ++p)
-      if (mean[static_cast<std::size_t>(p) * level.space.nodes()] <
-          mean[static_cast<std::size_t>(worst) * level.space.nodes()])
+    for (int p = 1; p < space.phases(); ++p)
+      if (mean[static_cast<std::size_t>(p) * space.nodes()] < mean[static_cast<std::size_t>(worst) * space.nodes()])
         worst = p;
     const double lowest = problem.map.state_interval(worst).first;
-    level.worst_start = 1 + dot(rows.row(problem, level.space, lowest, worst).after, mean);
+    level.worst_start = 1 + dot(rows.row(problem, space, lowest, worst).after, mean);
+    if (level.from_start() >= 1 && level.worst_start >= 1 && level.failure_rate() > 0) return level;
   } catch (const markov::ConvergenceError&) {
-    if (rows.collocated()) return std::nullopt;
-    throw;
+    if (!rows.collocated()) throw;
   }
-  if (!(level.from_start >= 1 && level.worst_start >= 1 && level.failure_rate > 0)) return std::nullopt;
-  return level;
+  return std::nullopt;
 }
 
 // The error left in one result after each refinement. Two levels may agree by chance, and the corner of the density
@@ -82,45 +82,6 @@ std::size_t more(std::size_t panels) {
 
 Estimate estimate(double value, double error) { return {value, value * std::exp(-error), value * std::exp(error)}; }
 
-struct MeanSd {
-  double mean = 0, sd = 0;
-};
-
-// Of the observable at the nodes first .. last - 1.
-MeanSd observe(const Problem& problem, const markov::NodeSpace& space, const std::vector<double>& mass,
-               std::size_t first, std::size_t last) {
-  double total = 0, one = 0, two = 0;
-  for (std::size_t i = first; i < last; ++i) {
-    const double value = problem.observable(space.node(i));
-    total += mass[i];
-    one += mass[i] * value;
-    two += mass[i] * value * value;
-  }
-  one /= total;
-  return {one, std::sqrt(std::max(0.0, two / total - one * one))};
-}
-
-// The summary of the chain, with the observable at the nodes in place of the cells' midpoints.
-void describe(const Problem& problem, const Level& level, const StudyOptions& options, Metastability& result) {
-  const markov::SampledChain& sampled = level.integrated.chain;
-  summarize(problem, level.space.cells(), sampled, options, result);
-  const markov::ChainSolver solver(sampled.chain);
-  const std::vector<double> nu = markov::quasi_stationary(solver).distribution;
-  const std::size_t n = level.space.nodes();
-  for (std::size_t p = 0; p < result.survivors.by_phase.size(); ++p) {
-    const MeanSd phase = observe(problem, level.space, nu, p * n, (p + 1) * n);
-    result.survivors.by_phase[p].mean = phase.mean;
-    result.survivors.by_phase[p].sd = phase.sd;
-  }
-  const MeanSd all = observe(problem, level.space, nu, 0, nu.size());
-  result.survivors.mean = all.mean;
-  result.survivors.sd = all.sd;
-  const std::vector<double> again = markov::stationary_with_restart(solver, sampled.launch.after);
-  const MeanSd restarted = observe(problem, level.space, again, 0, again.size());
-  result.survivors.restart_mean = restarted.mean;
-  result.survivors.restart_sd = restarted.sd;
-}
-
 Metastability unresolved(const Problem& problem) {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   Metastability result;
@@ -140,7 +101,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
     if (options.progress) options.progress(done, what);
   };
   const RestReachability reach = rest_reachability(problem);
-  if (!reach.certain) {
+  if (!reach.certain || reach.safe_state) {
     StudyOptions sampled = options;
     sampled.method = Method::sampled;
     return study(problem, sampled);
@@ -164,8 +125,8 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
     done += 0.5 * (0.95 - done);
     bool met = false;
     if (coarse && fine) {
-      steps_error.refine(fine->from_start, coarse->from_start);
-      rate_error.refine(fine->failure_rate, coarse->failure_rate);
+      steps_error.refine(fine->from_start(), coarse->from_start());
+      rate_error.refine(fine->failure_rate(), coarse->failure_rate());
       worst_error.refine(fine->worst_start, coarse->worst_start);
       error = std::max(steps_error.error(), rate_error.error());
       met = error <= options.tolerance;
@@ -182,9 +143,9 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   Metastability result;
   result.method = Method::integrated;
   result.cells = fine->space.nodes();
-  result.steps.from_start = estimate(fine->from_start, steps_error.error());
-  result.spectrum.failure_rate = estimate(fine->failure_rate, rate_error.error());
-  result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate, rate_error.error());
+  result.steps.from_start = estimate(fine->from_start(), steps_error.error());
+  result.spectrum.failure_rate = estimate(fine->failure_rate(), rate_error.error());
+  result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate(), rate_error.error());
   result.steps.worst_start = estimate(fine->worst_start, worst_error.error());
   result.steps.discretization_error = error;
   result.steps.safe_state = reach.safe_state;
@@ -195,7 +156,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
                                    result.steps.discretization_error, result.cells);
   }
   tell(0.96, "summary");
-  describe(problem, *fine, options, result);
+  summarize(problem, fine->space.cells(), fine->space.states(), fine->chain, fine->solved, options, result);
   return result;
 }
 

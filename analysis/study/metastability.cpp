@@ -9,6 +9,7 @@
 
 #include "analysis/statistics/t_interval.h"
 #include "analysis/study/chain_summary.h"
+#include "analysis/study/consistency.h"
 #include "analysis/study/integrated_study.h"
 #include "analysis/study/pilot.h"
 #include "analysis/study/rest_reachability.h"
@@ -22,7 +23,8 @@ namespace {
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t first_cells = 128;
 constexpr std::size_t first_samples = 4096;
-constexpr int sizes = 3;  // cell sizes a ladder holds: cells, cells / 2, cells / 4
+constexpr std::size_t most_endless = 2048;  // cells a phase
+constexpr int sizes = 3;                    // cell sizes a ladder holds: cells, cells / 2, cells / 4
 // The extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
 constexpr double change_over_error = 3;
 
@@ -50,20 +52,22 @@ class Study {
 
   Metastability run() {
     const RestReachability reach = rest_reachability(problem_);
-    Metastability result = reach.certain ? finite() : infinite_case();
+    Metastability result = reach.certain ? finite(reach.safe_state.has_value()) : endless();
     result.steps.safe_state = reach.safe_state;
     return result;
   }
 
  private:
-  Metastability finite() {
+  // `beside`: some states never come to rest, but the launch does not reach them.
+  Metastability finite(bool beside) {
     for (;;) {
       tell(0, "pilot");
-      const std::optional<Pilot> pilot = solve_pilot(problem_, options_);
+      const std::optional<Pilot> pilot = solve_pilot(problem_, options_, beside);
       if (pilot) {
         std::optional<Metastability> result = refine(*pilot);
         if (result) return *std::move(result);
       }
+      if (beside) return endless();  // cells smear the launch over them, or no launch survives at all
       // Rest is possible, but no draw came to it, or hardly: look deeper into the tails, as far as doubles go.
       if (!can_look_deeper()) return unresolved();
       options_.tail = std::max(1e-300, options_.tail * options_.tail * options_.tail);
@@ -92,8 +96,9 @@ class Study {
           chains[k].push_back(
               markov::discretize(problem_.map, space, problem_.launch, {.draws = draws, .threads = inner}));
         for (std::size_t s = 0; s < sizes; ++s) {
+          if (pilot.beside) chains[k][s] = without_unreached(std::move(chains[k][s]));
           if (rests(chains[k][s]))
-            steps[s][first + k] = chain_steps(problem_.map, ladder.spaces[s], chains[k][s], {draws});
+            steps[s][first + k] = chain_steps(problem_.map, ladder.spaces[s], SolvedChain(chains[k][s]), {draws});
           else
             steps[s][first + k].from_start = infinite;
         }
@@ -121,12 +126,13 @@ class Study {
       const Ladder ladder = climb(pilot, cells, samples, done, next);
       done = next;
       if (!ladder.rest_resolved) return std::nullopt;
-      Metastability result = assess(ladder, cells, samples);
+      Assessed assessed = assess(ladder, cells, samples);
+      Metastability& result = assessed.result;
       // A failure this rare may hang on noise rarer than the draws reach.
       if (can_look_deeper() && std::log(result.spectrum.failure_rate.value) < 0.6 * std::log(options_.tail))
         return std::nullopt;
       // What is read off the finest chain as it is must be within the tolerance too.
-      const double unextrapolated = std::abs(std::log(result.steps.from_start.value / result.steps.distribution.mean));
+      const double unextrapolated = std::abs(std::log(result.steps.from_start.value / assessed.finest.from_start));
       const double change = change_over_error * result.steps.discretization_error;
       const double half = std::hypot(result.steps.discretization_error, result.steps.sampling_error);
       const auto within = [&](double error) { return std::max(error, unextrapolated) <= options_.tolerance; };
@@ -155,18 +161,27 @@ class Study {
             options_.tolerance, half, result.steps.discretization_error, result.steps.sampling_error, cells, samples);
       }
       tell(0.96, "summary");
-      summarize(problem_, ladder.spaces.back(), ladder.pooled.back(), options_, result);
-      return result;
+      const markov::StateSpace& space = ladder.spaces.back();
+      summarize(problem_, space, midpoints(space), ladder.pooled.back(), assessed.finest, options_, result);
+      return std::move(result);
     }
   }
 
+  struct Assessed {
+    Metastability result;
+    SolvedChain finest;
+  };
+
   // Expected steps with their errors from the ladder.
-  Metastability assess(const Ladder& ladder, std::size_t cells, std::size_t samples) const {
+  Assessed assess(const Ladder& ladder, std::size_t cells, std::size_t samples) const {
     std::vector<markov::DrawOptions> draws;
     for (int r = 0; r < options_.replicates; ++r) draws.push_back(draw_options(options_, samples, r));
     std::vector<ChainSteps> pooled;
-    for (std::size_t s = 0; s < sizes; ++s)
-      pooled.push_back(chain_steps(problem_.map, ladder.spaces[s], ladder.pooled[s], draws));
+    std::optional<SolvedChain> finest;
+    for (std::size_t s = 0; s < sizes; ++s) {
+      finest.emplace(ladder.pooled[s]);
+      pooled.push_back(chain_steps(problem_.map, ladder.spaces[s], *finest, draws));
+    }
 
     Metastability result;
     result.cells = cells;
@@ -185,7 +200,6 @@ class Study {
       const double half = std::hypot(discretization, sampling);
       return Estimate{std::exp(extrapolated), std::exp(extrapolated - half), std::exp(extrapolated + half)};
     };
-    result.steps.distribution.mean = pooled.back().from_start;
     double unused_d = 0, unused_s = 0;
     result.steps.from_start =
         estimate(&ChainSteps::from_start, result.steps.discretization_error, result.steps.sampling_error);
@@ -196,11 +210,11 @@ class Study {
     for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
       result.steps.replicate_logs.push_back(
           extrapolate(std::log(ladder.replicate[2][r].from_start), std::log(ladder.replicate[1][r].from_start)));
-    return result;
+    return {std::move(result), *std::move(finest)};
   }
 
-  // Rest is out of reach for some launches: no first passage, but a stationary regime.
-  Metastability infinite_case() {
+  // Some states never come to rest: no first passage, but a stationary regime.
+  Metastability endless() {
     Metastability result;
     result.status = Status::rest_unreachable;
     result.message = "infinite: rest is unreachable";
@@ -208,12 +222,26 @@ class Study {
     result.samples = options_.samples == 0 ? 4 * first_samples : options_.samples;
     result.replicates = 1;
     tell(0.1, "stationary distribution");
-    const markov::StateSpace space = markov::covering_space(problem_.map, problem_.launch, result.cells, options_.seed);
-    const markov::SampledChain sampled =
-        markov::discretize(problem_.map, space, problem_.launch,
-                           {.draws = draw_options(options_, result.samples, 0), .threads = options_.threads});
-    tell(0.7, "summary");
-    summarize_endless(problem_, space, sampled, options_, result);
+    for (;; result.cells *= 2) {
+      const markov::StateSpace space =
+          markov::covering_space(problem_.map, problem_.launch, result.cells, options_.seed);
+      const markov::SampledChain sampled =
+          markov::discretize(problem_.map, space, problem_.launch,
+                             {.draws = draw_options(options_, result.samples, 0), .threads = options_.threads});
+      if (!never_rests(sampled)) {
+        if (options_.cells == 0 && result.cells < most_endless) continue;
+        throw markov::ConvergenceError(
+            "endless study", static_cast<double>(result.cells),
+            "the states that never come to rest are too close to those that do for these cells");
+      }
+      tell(0.7, "summary");
+      summarize_endless(problem_, space, sampled, options_, result);
+      break;
+    }
+    if (std::isfinite(result.steps.from_start.value)) {
+      result.status = Status::converged;
+      result.message.clear();
+    }
     return result;
   }
 
@@ -267,8 +295,10 @@ void StudyOptions::validate() const {
 
 Metastability study(const Problem& problem, const StudyOptions& options) {
   options.validate();
-  if (options.method == Method::integrated) return integrated_study(problem, options);
-  return Study(problem, options).run();
+  Metastability result =
+      options.method == Method::integrated ? integrated_study(problem, options) : Study(problem, options).run();
+  require_consistent(result);
+  return result;
 }
 
 Metastability study(const Setting& setting, const StudyOptions& options) {

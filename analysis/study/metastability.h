@@ -1,5 +1,21 @@
 #pragma once
 // The metastability study of one setting: expected steps before failure and what goes with them, with their errors.
+//
+// Example:
+//   #include <metastable/analysis/study/metastability.h>
+//
+//   #include <cstdio>
+//
+//   int main() {
+//     metastable::analysis::Setting setting;  // the paper's wheel, here on its steeper ramp
+//     setting.slope_deg = 9.59;
+//     setting.initial_speed = {5.83, 0.28};  // mean, sd [rad/s]
+//     const auto study = metastable::analysis::study(setting, {.tolerance = 0.005});
+//     const auto [value, lower, upper] = study.steps.from_start;
+//     std::printf("%.2f steps before failure (95 %%: %.2f to %.2f)\n", value, lower, upper);
+//   }
+// prints
+//   @@STUDY@@
 
 #include <cstddef>
 #include <cstdint>
@@ -110,8 +126,16 @@ struct Spectrum {
 /// The metastable regime: what survivors look like once the start is forgotten.
 struct Survivors {
   std::vector<PhaseDistribution> by_phase;
-  double mean = 0, sd = 0;                  ///< of the observable over all phases (equal shares)
-  double restart_mean = 0, restart_sd = 0;  ///< stationary, with a new launch after each rest
+  double mean = 0, sd = 0;  ///< of the observable over all phases (equal shares)
+  /// Stationary, with a new launch after each rest; NaN where every launch rests at once.
+  double restart_mean = 0, restart_sd = 0;
+};
+
+/// One number of a chain, told in two ways that share little.
+struct Agreement {
+  std::string what;
+  double one = 0, other = 0;
+  double tolerance = 0;  ///< relative
 };
 
 /// What a study answers, and what it was made with.
@@ -126,7 +150,8 @@ struct Metastability {
   StepsToRest steps;
   Spectrum spectrum;
   Survivors survivors;
-  std::vector<Share> violations;  ///< of the return map's assumptions
+  std::vector<Share> violations;      ///< of the return map's assumptions
+  std::vector<Agreement> agreements;  ///< of the finest chain, checked before the study is given (consistency.h)
 };
 
 /// Pilot grid, graded cells, replicated draws, three cell sizes, refinement until the tolerance is met.
@@ -136,7 +161,8 @@ struct Metastability {
 /// interval_95: t-interval over the replicates' extrapolations and, as an independent error, a third of the difference
 /// of the last two extrapolations of all draws.
 /// Method::integrated: integrated_study().
-/// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails
+/// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails or the results
+/// contradict each other (consistency.h)
 Metastability study(const Problem& problem, const StudyOptions& options = {});
 
 /// The same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.

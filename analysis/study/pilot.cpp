@@ -1,6 +1,7 @@
 #include "analysis/study/pilot.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "markov/chain/solver.h"
@@ -25,17 +26,27 @@ std::vector<double> early_visits(const markov::SampledChain& sampled) {
 
 }  // namespace
 
-std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& options) {
+std::size_t with_launch(const Problem& problem, std::size_t cells, std::uint64_t seed) {
+  return static_cast<std::size_t>(
+      std::ceil(static_cast<double>(cells) * markov::launch_cells(problem.map, problem.launch, seed)));
+}
+
+std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& options, bool beside) {
+  const std::size_t cells = with_launch(problem, pilot_cells, options.seed);
   for (double reach = 1.2;; reach *= reach > 3 ? 10 : 1.5) {
-    markov::StateSpace space = markov::covering_space(problem.map, problem.launch, pilot_cells, options.seed, reach);
-    const markov::SampledChain sampled =
+    markov::StateSpace space = markov::covering_space(problem.map, problem.launch, cells, options.seed, reach);
+    markov::SampledChain sampled =
         markov::discretize(problem.map, space, problem.launch,
                            {.draws = draw_options(options, pilot_samples, 0), .threads = options.threads});
+    if (beside) {
+      if (sampled.launch.rest == 1) return std::nullopt;
+      sampled = without_unreached(std::move(sampled));
+    }
     if (!rests(sampled)) return std::nullopt;
     const markov::ChainSolver solver(sampled.chain);
     const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
     if (markov::top_share(space, quasi.distribution) < 1e-10 || reach > 1e6)
-      return Pilot{std::move(space), quasi.distribution, quasi.survival_weight, early_visits(sampled)};
+      return Pilot{std::move(space), quasi.distribution, quasi.survival_weight, early_visits(sampled), beside};
   }
 }
 
@@ -51,6 +62,31 @@ markov::DrawOptions draw_options(const StudyOptions& options, std::size_t sample
 bool rests(const markov::SampledChain& sampled) {
   const markov::Reachability reach = markov::classify(sampled.chain);
   return std::all_of(reach.must_rest.begin(), reach.must_rest.end(), [](auto yes) { return yes != 0; });
+}
+
+bool never_rests(const markov::SampledChain& sampled) {
+  const markov::Reachability reach = markov::classify(sampled.chain);
+  return std::any_of(reach.can_rest.begin(), reach.can_rest.end(), [](auto yes) { return yes == 0; });
+}
+
+markov::SampledChain without_unreached(markov::SampledChain sampled) {
+  const markov::Chain& chain = sampled.chain;
+  const markov::Reachability reach = markov::classify(chain);
+  const std::vector<std::uint8_t> met = markov::reachable_from(chain, sampled.launch.after);
+  std::vector<std::size_t> row_start{0};
+  std::vector<std::uint32_t> column;
+  std::vector<double> value, kill(chain.kill().begin(), chain.kill().end());
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    if (met[i] || reach.must_rest[i]) {
+      column.insert(column.end(), chain.columns(i).begin(), chain.columns(i).end());
+      value.insert(value.end(), chain.values(i).begin(), chain.values(i).end());
+    } else {
+      kill[i] = 1;
+    }
+    row_start.push_back(value.size());
+  }
+  sampled.chain = markov::Chain(std::move(row_start), std::move(column), std::move(value), std::move(kill));
+  return sampled;
 }
 
 }  // namespace metastable::analysis

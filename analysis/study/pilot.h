@@ -2,6 +2,7 @@
 // A coarse solve that says where the cells of a study belong.
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -15,18 +16,27 @@ namespace metastable::analysis {
 struct Pilot {
   markov::StateSpace space;
   std::vector<double> nu, h, visits;  ///< as in markov::graded_space()
+  bool beside = false;                ///< some states never come to rest, but no launch leads to them
   /// Cells of one phase, graded.
   markov::StateSpace graded(std::size_t cells) const { return markov::graded_space(space, nu, h, visits, cells); }
 };
 
 /// Wide enough for the metastable regime; nothing if some of the pilot's states do not come to rest with the draws that
 /// reach `options.tail`.
-std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& options);
+/// @param beside  such states are left out as long as the launch does not lead to them (and leads anywhere)
+std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& options, bool beside = false);
+
+/// As many cells as give the bulk `cells` of them where a fast launch needs some of its own.
+std::size_t with_launch(const Problem& problem, std::size_t cells, std::uint64_t seed);
 
 /// The draws of one replicate of a study.
 markov::DrawOptions draw_options(const StudyOptions& options, std::size_t samples, int replicate);
 
-/// Does every state of the chain come to rest for certain?
+/// Does every state of the chain come to rest for certain? Is there one that never does?
 bool rests(const markov::SampledChain& sampled);
+bool never_rests(const markov::SampledChain& sampled);
+
+/// The chain in which states that need not come to rest, and that the launch does not lead to, rest at once.
+markov::SampledChain without_unreached(markov::SampledChain sampled);
 
 }  // namespace metastable::analysis

@@ -15,7 +15,7 @@ struct Problem {
   /// What is reported of a state (a wheel: omega = sqrt(x) [rad/s]).
   std::function<double(double state)> observable = [](double state) { return state; };
   /// Number of the event whose survival means that the end of the course is reached (a ramp: its last collision).
-  std::optional<int> last_event;
+  std::optional<int> last_event = {};
 };
 
 }  // namespace metastable::analysis

@@ -24,7 +24,7 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr std::size_t first_panels = 4;
 
 Benchmark rough_terrain(double sd_deg) {
-  const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = sd_deg * degree});
+  const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = sd_deg * degree});
   const double start = wheel.fixed_point();
   return {fmt::format("rough terrain, sd {} deg", sd_deg),
           {wheel, {[start](double) { return start; }, 0}, [](double state) { return state; }, {}},

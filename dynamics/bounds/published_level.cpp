@@ -46,7 +46,7 @@ PublishedLevel::PublishedLevel(const WheelMap& map, int phase) {
   force1_ = (r2 + square(y)) * scale;
   kept = around(map.stance(phase > 0 ? phase - 1 : map.phases() - 1).inertia) / inertia;
   kappa = square(chord) / inertia;
-  delta = mass * Interval(model.gravity) * around(std::sin(c.slope)) * chord / inertia *
+  delta = mass * Interval(model.gravity) * around(std::sin(c.slope_rad)) * chord / inertia *
           sqrt(Interval(model.contact_mass) / Interval(model.ramp_stiffness));
   barrier = around(map.stance(phase).barrier);
   gain = around(map.stance(phase).gain);

@@ -46,7 +46,7 @@ class Body {
   double mass_, spin_, arm_x_, arm_y_;
 };
 
-// The collision as it unfolds.
+// Follows the collision as it unfolds.
 class March {
  public:
   March(const Impact& impact, const Body& body)

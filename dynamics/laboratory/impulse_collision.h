@@ -1,11 +1,11 @@
 #pragma once
-// One collision integrated over its normal impulse: the laboratory's counterpart of the contact laws.
+// Integrates one collision over its normal impulse, as the laboratory's counterpart of the contact laws.
 
 #include "dynamics/wheel/contact_law.h"
 
 namespace metastable::dynamics {
 
-/// A body about to hit a surface with one point. "Along" is down the ramp, "up" is out of the surface.
+/// A body that is about to hit a surface with one point. "Along" is down the ramp, "up" is out of the surface.
 struct Impact {
   Law law = Law::published;  ///< published or coulomb
   double mass = 0;           ///< [kg]

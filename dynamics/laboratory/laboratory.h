@@ -19,9 +19,9 @@
 
 namespace metastable::dynamics {
 
-/// One ramp and launch.
+/// A condition has one ramp and one launch.
 struct LaboratoryCondition {
-  double slope = 0;  ///< stated [rad]
+  double slope_rad = 0;  ///< stated
   double ramp_length = 3.66;
   double launch_mean = 0, launch_sd = 0;  ///< omega just before collision 1 [rad/s]
   int first_landing_leg = 0;
@@ -71,8 +71,8 @@ class Laboratory {
   explicit Laboratory(LaboratorySetup setup);
 
   const LaboratorySetup& setup() const { return setup_; }
-  /// Trial `index` of the order. Random numbers from Philox at counter (trial, event): the same bits in any order.
-  /// Some 50 us a collision.
+  /// Runs trial `index` of the order. Random numbers come from Philox at counter (trial, event): the bits are the same
+  /// in any order. A collision takes some 50 us.
   LaboratoryTrial run(std::size_t index) const;
 
  private:
@@ -88,7 +88,7 @@ class Laboratory {
   TruncatedNormal restitution_, friction_;
 };
 
-/// The wheel's angle in the moments of a trial at time t [s] (cubic Hermite between them).
+/// Where the wheel's angle stands at time t [s] of a trial (cubic Hermite between its moments).
 double angle_at(const std::vector<Moment>& motion, double time);
 
 }  // namespace metastable::dynamics

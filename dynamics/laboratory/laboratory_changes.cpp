@@ -13,49 +13,53 @@ namespace metastable::dynamics {
 namespace {
 
 using Values = std::span<const double>;
-using Change = std::function<void(LaboratoryChanges&, Values)>;
+struct Change {
+  std::function<void(LaboratoryChanges&, Values)> make;
+  bool may_repeat = false;  // another leg, another patch
+};
 
 const std::map<std::string, Change, std::less<>>& changes() {
   using C = LaboratoryChanges;
   static const std::map<std::string, Change, std::less<>> all{
-      {"contact_distribution",
-       [](C& c, Values v) {
+      {"contact_distribution", {[](C& c, Values v) {
          c.stated.restitution_mean = v[0], c.stated.restitution_sd = v[1];
          c.stated.friction_mean = v[2], c.stated.friction_sd = v[3];
-       }},
-      {"initial_speed", [](C& c, Values v) { c.launch_mean = v[0], c.launch_sd = v[1]; }},
-      {"leg_lengths", [](C& c, Values v) { c.stated.leg_lengths.assign(v.begin(), v.end()); }},
+       }}},
+      {"initial_speed", {[](C& c, Values v) { c.launch_mean = v[0], c.launch_sd = v[1]; }}},
+      {"leg_lengths", {[](C& c, Values v) { c.stated.leg_lengths.assign(v.begin(), v.end()); }}},
       {"leg_contact",
-       [](C& c, Values v) {
-         c.legs.push_back({static_cast<int>(v[0]), v[1], v[2]});
-       }},
-      {"hub_eccentricity", [](C& c, Values v) { c.mass_offset = v[0], c.mass_angle = v[1]; }},
-      {"inertia", [](C& c, Values v) { c.inertia_ratio = v[0]; }},
-      {"slope_offset", [](C& c, Values v) { c.slope_offset_deg = v[0]; }},
-      {"slope_profile", [](C& c, Values v) { c.sag = v[0], c.sag_from = v[1], c.sag_to = v[2]; }},
-      {"axle_drag_viscous", [](C& c, Values v) { c.linear_drag = v[0]; }},
-      {"rolling_resistance", [](C& c, Values v) { c.constant_drag = v[0]; }},
-      {"air_drag", [](C& c, Values v) { c.quadratic_drag = v[0]; }},
-      {"speed_dependent_restitution", [](C& c, Values v) { c.restitution_exponent = v[0]; }},
-      {"speed_dependent_friction", [](C& c, Values v) { c.stribeck_amplitude = v[0], c.stribeck_speed = v[1]; }},
-      {"contact_memory", [](C& c, Values v) { c.memory = v[0]; }},
+       {[](C& c, Values v) {
+          c.legs.push_back({static_cast<int>(v[0]), v[1], v[2]});
+        },
+        true}},
+      {"hub_eccentricity", {[](C& c, Values v) { c.mass_offset = v[0], c.mass_angle_rad = v[1]; }}},
+      {"inertia", {[](C& c, Values v) { c.inertia_ratio = v[0]; }}},
+      {"slope_offset", {[](C& c, Values v) { c.slope_offset_deg = v[0]; }}},
+      {"slope_profile", {[](C& c, Values v) { c.sag = v[0], c.sag_from = v[1], c.sag_to = v[2]; }}},
+      {"axle_drag_viscous", {[](C& c, Values v) { c.linear_drag = v[0]; }}},
+      {"rolling_resistance", {[](C& c, Values v) { c.constant_drag = v[0]; }}},
+      {"air_drag", {[](C& c, Values v) { c.quadratic_drag = v[0]; }}},
+      {"speed_dependent_restitution", {[](C& c, Values v) { c.restitution_exponent = v[0]; }}},
+      {"speed_dependent_friction", {[](C& c, Values v) { c.stribeck_amplitude = v[0], c.stribeck_speed = v[1]; }}},
+      {"contact_memory", {[](C& c, Values v) { c.memory = v[0]; }}},
       {"friction_patch",
-       [](C& c, Values v) {
-         c.patches.push_back({v[0], v[1], v[2]});
-       }},
-      {"trial_drift", [](C& c, Values v) { c.drift = v[0]; }},
-      {"trial_spread", [](C& c, Values v) { c.trial_sd = v[0]; }},
-      {"contact_outliers", [](C& c, Values v) { c.outlier_share = v[0], c.outlier_ratio = v[1]; }},
-      {"sensor_noise", [](C& c, Values v) { c.sensor_noise = v[0]; }},
-      {"sensor_bias", [](C& c, Values v) { c.sensor_bias = v[0]; }},
-      {"bounce", [](C& c, Values v) { c.rebound_lost = v[0]; }},
-      {"ramp_vibration", [](C& c, Values v) { c.vibration = v[0], c.vibration_hz = v[1]; }},
-      {"slip_reversal", [](C& c, Values) { c.slip_reversal = true; }},
+       {[](C& c, Values v) {
+          c.patches.push_back({v[0], v[1], v[2]});
+        },
+        true}},
+      {"trial_drift", {[](C& c, Values v) { c.drift = v[0]; }}},
+      {"trial_spread", {[](C& c, Values v) { c.trial_sd = v[0]; }}},
+      {"contact_outliers", {[](C& c, Values v) { c.outlier_share = v[0], c.outlier_ratio = v[1]; }}},
+      {"sensor_noise", {[](C& c, Values v) { c.sensor_noise = v[0]; }}},
+      {"sensor_bias", {[](C& c, Values v) { c.sensor_bias = v[0]; }}},
+      {"bounce", {[](C& c, Values v) { c.rebound_lost = v[0]; }}},
+      {"ramp_vibration", {[](C& c, Values v) { c.vibration = v[0], c.vibration_hz = v[1]; }}},
+      {"slip_reversal", {[](C& c, Values) { c.slip_reversal = true; }}},
   };
   return all;
 }
 
-// The same effect through the catalogue's own checks.
+// Takes the effect through the catalogue's own checks.
 void check(const Effect& effect, const NominalValues& stated) {
   const EffectInfo& info = effect_info(effect.id);
   std::map<std::string, std::vector<double>> named;
@@ -83,9 +87,12 @@ LaboratoryChanges laboratory_changes(const NominalValues& stated, const std::vec
   std::set<std::string> seen;
   for (const Effect& effect : effects) {
     check(effect, stated);
-    if (!seen.insert(effect.id).second && effect.id != "leg_contact" && effect.id != "friction_patch")
+    const auto found = changes().find(effect.id);
+    if (found == changes().end())
+      throw std::logic_error(fmt::format("laboratory_changes: nothing says what {} changes", effect.id));
+    if (!seen.insert(effect.id).second && !found->second.may_repeat)
       throw std::invalid_argument(fmt::format("effect {}: given twice", effect.id));
-    changes().at(effect.id)(c, effect.values);
+    found->second.make(c, effect.values);
   }
   const std::map<std::string, double LaboratoryChanges::*, std::less<>> sizes{
       {"sloshing_fluid", &LaboratoryChanges::slosh},      {"planks", &LaboratoryChanges::planks},

@@ -23,7 +23,7 @@ struct LaboratoryChanges {
   double launch_mean = 0, launch_sd = 0;
   std::vector<LegChange> legs;
   std::vector<PatchChange> patches;
-  double mass_offset = 0, mass_angle = 0;
+  double mass_offset = 0, mass_angle_rad = 0;
   double inertia_ratio = 1;
   double slope_offset_deg = 0;
   double sag = 0, sag_from = 0, sag_to = 0;

@@ -1,13 +1,13 @@
 #pragma once
-// The laboratory's ramp: a plane, or a plane with a parabolic sag over a stretch of it.
+// The laboratory's ramp is a plane, or a plane with a parabolic sag over a stretch of it.
 
 namespace metastable::dynamics {
 
-/// Height of the surface over the plane of the stated slope, along that plane [m].
+/// Gives the height of the surface over the plane of the stated slope, along that plane [m].
 class RampSurface {
  public:
   RampSurface() = default;
-  /// Sags by `sag` [m] halfway between `from` and `to` [m] (from < to); negative: bows up. Plane elsewhere.
+  /// Sags by `sag` [m] halfway between `from` and `to` [m] (from < to); negative: bows up. Elsewhere it is plane.
   RampSurface(double sag, double from, double to) : sag_(sag), from_(from), to_(to) {}
 
   double height(double along) const {

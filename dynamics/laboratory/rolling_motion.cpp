@@ -38,26 +38,27 @@ class Stance {
     const double coupling = body_.fluid_coupling * (s[1] - s[2]);
     const double drag = body_.constant_drag + body_.linear_drag * s[1] + body_.quadratic_drag * s[1] * s[1];
     // Gravity, (sin, -cos) of the slope in these axes, about the foot; turning down the ramp counts positive.
-    const double weight = body_.mass * body_.gravity * (arm.x * std::cos(body_.slope) + arm.z * std::sin(body_.slope));
+    const double weight =
+        body_.mass * body_.gravity * (arm.x * std::cos(body_.slope_rad) + arm.z * std::sin(body_.slope_rad));
     rate = {s[1], (weight - drag - coupling) / inertia_, body_.fluid_inertia > 0 ? coupling / body_.fluid_inertia : 0};
   }
 
   Pose pose(const State& s) const { return {start_.foot, start_.leg, s[0], s[1], s[2]}; }
-  // Height of the next leg's tip over the surface.
+  // How high the next leg's tip is over the surface.
   double clearance(const State& s) const {
     const Point at = tip(body_, pose(s), (start_.leg + 1) % body_.legs());
     return at.z - surface_.height(at.x);
   }
-  // Ground reaction normal to the surface, over the mass [m/s^2].
+  // What the ground's reaction normal to the surface is, over the mass [m/s^2].
   double reaction(const State& s) const {
     State rate{};
     (*this)(s, rate, 0);
     const Point arm = arm_at(s[0]);
-    // Acceleration of the centre of mass: turning at speed s[1] down the ramp about the foot.
+    // The centre of mass accelerates as it turns at speed s[1] down the ramp about the foot.
     const Point acceleration{rate[1] * arm.z - s[1] * s[1] * arm.x, -rate[1] * arm.x - s[1] * s[1] * arm.z};
     const double rise = surface_.rise(start_.foot.x);
-    return (acceleration.z + body_.gravity * std::cos(body_.slope)) * std::cos(rise) -
-           (acceleration.x - body_.gravity * std::sin(body_.slope)) * std::sin(rise);
+    return (acceleration.z + body_.gravity * std::cos(body_.slope_rad)) * std::cos(rise) -
+           (acceleration.x - body_.gravity * std::sin(body_.slope_rad)) * std::sin(rise);
   }
   double inertia() const { return inertia_; }
 
@@ -73,16 +74,16 @@ class Stance {
   double inertia_;
 };
 
-// From the pose at which the foot lifts: the centre of mass on its parabola, the wheel turning evenly.
+// From the pose at which the foot lifts the centre of mass follows its parabola and the wheel turns evenly.
 Touch fly(const RollingBody& body, const RampSurface& surface, const Pose& lift, double energy, const auto& note) {
   const Point c = centre_of_mass(body, lift);
   const Point arm{c.x - lift.foot.x, c.z - lift.foot.z};
   const Point velocity{lift.speed * arm.z, -lift.speed * arm.x};
-  const Point pull{body.gravity * std::sin(body.slope), -body.gravity * std::cos(body.slope)};
+  const Point pull{body.gravity * std::sin(body.slope_rad), -body.gravity * std::cos(body.slope_rad)};
   // The pose at time t: the old foot moves with the body.
   const auto at = [&](double t) {
     Pose pose = lift;
-    pose.angle += lift.speed * t;
+    pose.angle_rad += lift.speed * t;
     pose.foot = {0, 0};
     const Point free = centre_of_mass(body, pose);
     pose.foot = {c.x + velocity.x * t + pull.x * t * t / 2 - free.x,
@@ -107,7 +108,7 @@ Touch fly(const RollingBody& body, const RampSurface& surface, const Pose& lift,
         touch.time = t + passage;
         touch.leg = leg;
         touch.before = at(touch.time);
-        touch.turn = lift.speed * touch.time;
+        touch.turn_rad = lift.speed * touch.time;
         touch.flew = true;
         const Point now{velocity.x + pull.x * touch.time, velocity.z + pull.z * touch.time};
         const Point foot = tip(body, touch.before, leg), mass = centre_of_mass(body, touch.before);
@@ -129,7 +130,7 @@ Touch fly(const RollingBody& body, const RampSurface& surface, const Pose& lift,
 double RollingBody::leg_angle() const { return 2 * std::numbers::pi / legs(); }
 
 Point hub(const RollingBody& body, const Pose& pose) {
-  const Point leg = toward(pose.angle, body.leg_length[static_cast<std::size_t>(pose.leg)]);
+  const Point leg = toward(pose.angle_rad, body.leg_length[static_cast<std::size_t>(pose.leg)]);
   return {pose.foot.x - leg.x, pose.foot.z - leg.z};
 }
 
@@ -137,14 +138,14 @@ Point tip(const RollingBody& body, const Pose& pose, int leg) {
   if (leg == pose.leg) return pose.foot;
   const Point centre = hub(body, pose);
   const Point along =
-      toward(pose.angle - (leg - pose.leg) * body.leg_angle(), body.leg_length[static_cast<std::size_t>(leg)]);
+      toward(pose.angle_rad - (leg - pose.leg) * body.leg_angle(), body.leg_length[static_cast<std::size_t>(leg)]);
   return {centre.x + along.x, centre.z + along.z};
 }
 
 Point centre_of_mass(const RollingBody& body, const Pose& pose) {
   const Point centre = hub(body, pose);
   if (body.offset == 0) return centre;
-  const Point off = toward(pose.angle + pose.leg * body.leg_angle() - body.offset_angle, body.offset);
+  const Point off = toward(pose.angle_rad + pose.leg * body.leg_angle() - body.offset_angle_rad, body.offset);
   return {centre.x + off.x, centre.z + off.z};
 }
 
@@ -172,7 +173,7 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
     if (moments) moments->push_back({time, turn, speed});
   };
   const Stance stance(body, surface, start, inertia);
-  State state{start.angle, start.speed, start.fluid_speed};
+  State state{start.angle_rad, start.speed, start.fluid_speed};
   double time = 0;
   // Small against the pendulum's time and against a radian: the method is of order 8.
   const double length = body.leg_length[static_cast<std::size_t>(start.leg)];
@@ -210,24 +211,24 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
     if (body.flight) look([&](const State& s) { return stance.reaction(s); }, lifted);
     if (body.flight && began == 0 && stance.reaction(from) <= 0) first = 0, event = lifted;
     if (event == none) {
-      note(time, state[0] - start.angle, state[1]);
+      note(time, state[0] - start.angle_rad, state[1]);
       continue;
     }
     const State at = moved(first);
     const double when = began + first;
-    note(when, at[0] - start.angle, at[1]);
+    note(when, at[0] - start.angle_rad, at[1]);
     if (event == touched) {
       Touch touch = touch_standing(body, stance.pose(at), inertia);
       touch.time = when;
-      touch.turn = at[0] - start.angle;
+      touch.turn_rad = at[0] - start.angle_rad;
       return touch;
     }
     if (event == turned) return rest_at(stance.pose(at), when);
-    const double turn = at[0] - start.angle;
+    const double turn = at[0] - start.angle_rad;
     Touch touch = fly(body, surface, stance.pose(at), stance.inertia() * at[1] * at[1] / 2,
                       [&](double t, double turned_on, double speed) { note(when + t, turn + turned_on, speed); });
     touch.time += when;
-    touch.turn += turn;
+    touch.turn_rad += turn;
     return touch;
   }
   return rest_at(stance.pose(state), time);
@@ -237,16 +238,16 @@ std::vector<Moment> run_up(const RollingBody& body, const RampSurface& surface, 
                            double seconds) {
   const Stance stance(body, surface, end, inertia);
   std::vector<Moment> moments{{0, 0, end.speed}};
-  State state{end.angle, end.speed, end.fluid_speed};
+  State state{end.angle_rad, end.speed, end.fluid_speed};
   constexpr double step = 0.005;
   for (double time = 0; time > -seconds;) {
     const double length = std::min(step, seconds + time);
     State earlier{};
     Stepper().do_step(std::cref(stance), state, time, earlier, -length);
     time -= length;
-    if (earlier[1] <= 0 || earlier[0] < end.angle - body.leg_angle()) break;
+    if (earlier[1] <= 0 || earlier[0] < end.angle_rad - body.leg_angle()) break;
     state = earlier;
-    moments.push_back({time, state[0] - end.angle, state[1]});
+    moments.push_back({time, state[0] - end.angle_rad, state[1]});
   }
   std::reverse(moments.begin(), moments.end());
   return moments;
@@ -261,7 +262,7 @@ Pose landing_pose(const RollingBody& body, const RampSurface& surface, int leg, 
   const auto chord = [&](double angle) {
     Pose trial;
     trial.leg = pose.leg;
-    trial.angle = angle;
+    trial.angle_rad = angle;
     return tip(body, trial, leg);
   };
   const auto value = [&](double angle) {
@@ -269,8 +270,8 @@ Pose landing_pose(const RollingBody& body, const RampSurface& surface, int leg, 
     return c.z - (surface.height(along) - surface.height(along - c.x));
   };
   const double low = 0, high = body.leg_angle();
-  pose.angle = low + root([&](double part) { return value(low + part); }, value(low), high - low, value(high));
-  const Point c = chord(pose.angle);
+  pose.angle_rad = low + root([&](double part) { return value(low + part); }, value(low), high - low, value(high));
+  const Point c = chord(pose.angle_rad);
   pose.foot = {along - c.x, surface.height(along - c.x)};
   return pose;
 }

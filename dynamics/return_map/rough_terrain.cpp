@@ -20,7 +20,7 @@ constexpr double widest_sd = 10 * degree;  // beyond it slopes wrap around
 struct Joined {
   double keep, gain, amplitude, best;
   explicit Joined(const RoughTerrainWheel::Options& o) {
-    const double a = o.half_leg_angle, cosine = std::cos(2 * a);
+    const double a = o.half_leg_angle_rad, cosine = std::cos(2 * a);
     keep = cosine * cosine;
     gain = 2 * o.gravity / o.leg_length;
     const double along = (1 - keep) * std::cos(a), across = (1 + keep) * std::sin(a);
@@ -40,25 +40,26 @@ void require(bool valid, const char* name, double value, const char* range) {
 
 RoughTerrainWheel::RoughTerrainWheel(Options options) : options_(options) {
   const Options& o = options_;
-  require(std::abs(o.mean_slope) < 45 * degree, "mean_slope [deg]", o.mean_slope / degree, "(-45, 45)");
-  require(o.sd_slope >= 0 && o.sd_slope <= widest_sd, "sd_slope [deg]", o.sd_slope / degree, "[0, 10]");
-  require(o.half_leg_angle > 0 && o.half_leg_angle < 45 * degree, "half_leg_angle [deg]", o.half_leg_angle / degree,
-          "(0, 45)");
+  require(std::abs(o.mean_slope_rad) < 45 * degree, "mean_slope [deg]", o.mean_slope_rad / degree, "(-45, 45)");
+  require(o.sd_slope_rad >= 0 && o.sd_slope_rad <= widest_sd, "sd_slope [deg]", o.sd_slope_rad / degree, "[0, 10]");
+  require(o.half_leg_angle_rad > 0 && o.half_leg_angle_rad < 45 * degree, "half_leg_angle [deg]",
+          o.half_leg_angle_rad / degree, "(0, 45)");
   require(o.gravity > 0 && std::isfinite(o.gravity), "gravity [m/s^2]", o.gravity, "(0, inf)");
   require(o.leg_length > 0 && std::isfinite(o.leg_length), "leg_length [m]", o.leg_length, "(0, inf)");
 }
 
 double RoughTerrainWheel::next(double state, double slope) const {
-  const double a = options_.half_leg_angle, cosine = std::cos(2 * a), gain = 2 * options_.gravity / options_.leg_length;
+  const double a = options_.half_leg_angle_rad, cosine = std::cos(2 * a),
+               gain = 2 * options_.gravity / options_.leg_length;
   return cosine * cosine * (state + gain * (1 - std::cos(a + slope))) - gain * (1 - std::cos(a - slope));
 }
 
 double RoughTerrainWheel::fixed_point() const {
-  const double cosine = std::cos(2 * options_.half_leg_angle);
-  const double fixed = next(0, options_.mean_slope) / (1 - cosine * cosine);
+  const double cosine = std::cos(2 * options_.half_leg_angle_rad);
+  const double fixed = next(0, options_.mean_slope_rad) / (1 - cosine * cosine);
   if (!(fixed > 0))
     throw std::domain_error(
-        fmt::format("fixed point: the wheel rests on a slope of {:.6g} deg", options_.mean_slope / degree));
+        fmt::format("fixed point: the wheel rests on a slope of {:.6g} deg", options_.mean_slope_rad / degree));
   return fixed;
 }
 
@@ -68,26 +69,26 @@ std::pair<double, double> RoughTerrainWheel::state_interval(int) const {
 }
 
 std::optional<double> RoughTerrainWheel::landing(double state, int, std::span<const double> score) const {
-  const double landed = next(state, options_.mean_slope + options_.sd_slope * score[0]);
+  const double landed = next(state, options_.mean_slope_rad + options_.sd_slope_rad * score[0]);
   if (landed <= 0) return std::nullopt;
   return landed;
 }
 
 std::optional<double> RoughTerrainWheel::rest_probability(double state, int) const {
   const Joined joined(options_);
-  if (options_.sd_slope == 0) return next(state, options_.mean_slope) <= 0 ? 1 : 0;
+  if (options_.sd_slope_rad == 0) return next(state, options_.mean_slope_rad) <= 0 ? 1 : 0;
   // Rest where cos(gamma - best) <= threshold: slopes too flat, and slopes too steep.
   const double threshold = -joined.extreme(state, 0) / (joined.gain * joined.amplitude);
   if (threshold >= 1) return 1;
   if (threshold < -1) return 0;
   const double reach = std::acos(threshold);
-  return normal_cdf((joined.best - reach - options_.mean_slope) / options_.sd_slope) +
-         normal_cdf((options_.mean_slope - joined.best - reach) / options_.sd_slope);
+  return normal_cdf((joined.best - reach - options_.mean_slope_rad) / options_.sd_slope_rad) +
+         normal_cdf((options_.mean_slope_rad - joined.best - reach) / options_.sd_slope_rad);
 }
 
 double RoughTerrainWheel::landing_density(double state, int phase, std::span<const double> next,
                                           std::span<double> density) const {
-  const double sd = options_.sd_slope;
+  const double sd = options_.sd_slope_rad;
   if (sd == 0)
     throw std::invalid_argument("method integrated: a constant slope leaves no density; use the sampled method");
   const Joined joined(options_);
@@ -98,15 +99,15 @@ double RoughTerrainWheel::landing_density(double state, int phase, std::span<con
     if (!(std::abs(cosine) < 1)) continue;
     const double angle = std::acos(cosine), speed = reach * std::sqrt((1 - cosine) * (1 + cosine));
     for (const double slope : {joined.best - angle, joined.best + angle})
-      density[k] += normal_density((slope - options_.mean_slope) / sd) / (sd * speed);
+      density[k] += normal_density((slope - options_.mean_slope_rad) / sd) / (sd * speed);
   }
   return *rest_probability(state, phase);
 }
 
 std::pair<double, double> RoughTerrainWheel::landing_range(double state, int) const {
   const auto landed = [](double x) { return x > 0 ? x : -infinity; };
-  if (options_.sd_slope == 0) {
-    const double only = landed(next(state, options_.mean_slope));
+  if (options_.sd_slope_rad == 0) {
+    const double only = landed(next(state, options_.mean_slope_rad));
     return {only, only};
   }
   const Joined joined(options_);

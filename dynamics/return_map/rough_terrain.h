@@ -13,11 +13,11 @@ namespace metastable::dynamics {
 class RoughTerrainWheel {
  public:
   struct Options {
-    double mean_slope = 0;                        ///< [rad]
-    double sd_slope = 0;                          ///< [rad], >= 0
-    double half_leg_angle = 0.39269908169872414;  ///< a [rad], pi/8: eight legs
-    double gravity = 9.8;                         ///< g [m/s^2]
-    double leg_length = 1.0;                      ///< l [m]
+    double mean_slope_rad = 0;                        ///< [rad]
+    double sd_slope_rad = 0;                          ///< [rad], >= 0
+    double half_leg_angle_rad = 0.39269908169872414;  ///< a [rad], pi/8: eight legs
+    double gravity = 9.8;                             ///< g [m/s^2]
+    double leg_length = 1.0;                          ///< l [m]
   };
   /// @throws std::invalid_argument naming the quantity and its range
   explicit RoughTerrainWheel(Options options);
@@ -35,7 +35,7 @@ class RoughTerrainWheel {
   /// From the error function at the slope where x' = 0: full relative accuracy.
   std::optional<double> rest_probability(double state, int phase) const;
   /// Density of x' at each of the next states, from the (at most two) slopes that lead there; returns the probability
-  /// of rest. @throws std::invalid_argument for sd_slope = 0
+  /// of rest. @throws std::invalid_argument for sd_slope_rad = 0
   double landing_density(double state, int phase, std::span<const double> next, std::span<double> density) const;
   std::pair<double, double> landing_range(double state, int phase) const;
 

@@ -37,11 +37,11 @@ Stance make_stance(const Wheel& wheel, Law law, double length, const Triangle& l
   if (!(s.inertia > 0))
     throw std::invalid_argument(
         fmt::format("inertia: {} kg m^2 about a foot at {} m is outside (0, inf)", s.inertia, length));
-  s.start_angle = landed.beta_second + slope;
-  s.end_angle = std::numbers::pi - (next.beta_first - slope);
+  s.start_angle_rad = landed.beta_second_rad + slope;
+  s.end_angle_rad = std::numbers::pi - (next.beta_first_rad - slope);
   s.pendulum = 2 * wheel.hub_mass * wheel.gravity * length / s.inertia;
-  s.barrier = s.start_angle < std::numbers::pi / 2 ? s.pendulum * (1 - std::sin(s.start_angle)) : 0;
-  s.gain = s.pendulum * (std::sin(s.start_angle) - std::sin(s.end_angle));
+  s.barrier = s.start_angle_rad < std::numbers::pi / 2 ? s.pendulum * (1 - std::sin(s.start_angle_rad)) : 0;
+  s.gain = s.pendulum * (std::sin(s.start_angle_rad) - std::sin(s.end_angle_rad));
   return s;
 }
 
@@ -112,7 +112,7 @@ Collision WheelMap::collision(int phase, double omega) const {
   c.contact_y = t.hub_height;
   c.chord = t.chord;
   c.normal_speed = t.chord * omega;
-  c.slope = slope_;
+  c.slope_rad = slope_;
   return c;
 }
 
@@ -184,8 +184,8 @@ double WheelMap::duration(double next_state, int phase) const {
   // With theta = pi/2 + 2 phi: omega^2 = apex + 2 pendulum sin^2(phi).
   const Stance& s = stance(phase);
   const double lift = 2 * s.pendulum;
-  const double start = std::sin((s.start_angle - std::numbers::pi / 2) / 2);
-  const double end = std::sin((s.end_angle - std::numbers::pi / 2) / 2);
+  const double start = std::sin((s.start_angle_rad - std::numbers::pi / 2) / 2);
+  const double end = std::sin((s.end_angle_rad - std::numbers::pi / 2) / 2);
   const double apex = next_state - lift * end * end;
   if (start >= 0) {
     if (apex + lift * start * start < 0) return infinity;
@@ -204,8 +204,8 @@ bool WheelMap::violates(int which, double state, int phase, std::span<const doub
     const Triangle& t = triangle(phase);
     const double stance_length = stance(phase > 0 ? phase - 1 : phases() - 1).length;
     const Stance& s = stance(phase);
-    return state * stance_length > wheel_.gravity * std::sin(t.beta_first - slope_) ||
-           after_collision(state, phase, noise_.draw(score)) * s.length > wheel_.gravity * std::sin(s.start_angle);
+    return state * stance_length > wheel_.gravity * std::sin(t.beta_first_rad - slope_) ||
+           after_collision(state, phase, noise_.draw(score)) * s.length > wheel_.gravity * std::sin(s.start_angle_rad);
   }
   const Loss l = loss(phase, std::sqrt(state), noise_.draw(score));
   if (l.jammed) return false;
@@ -254,7 +254,7 @@ WheelMap::Table WheelMap::tabulate(int phase, std::span<const double> score) con
 
 double lift_speed(const WheelMap& map, int phase) {
   const Stance& before = map.stance(phase > 0 ? phase - 1 : map.phases() - 1);
-  const double pull = map.wheel().gravity * std::sin(map.triangle(phase).beta_first - map.slope());
+  const double pull = map.wheel().gravity * std::sin(map.triangle(phase).beta_first_rad - map.slope());
   return std::sqrt(std::max(0.0, pull) / before.length);
 }
 

@@ -25,10 +25,10 @@ struct Stance {
       0;  ///< omega+^2 needed to carry the hub over the foot [rad^2/s^2]: 2/I M g L (1 - sin(beta2 + gamma))
   double gain =
       0;  ///< omega^2 gained until the next collision [rad^2/s^2]: 2/I M g L (sin(beta2+gamma) - sin(beta1'-gamma))
-  double start_angle = 0;  ///< beta2 + gamma [rad], leg to the horizontal at landing
-  double end_angle = 0;    ///< pi - (beta1' - gamma) [rad], at the next collision
-  double pendulum = 0;     ///< 2 M g L / I [rad^2/s^2]
-  double length = 0;       ///< L [m]
+  double start_angle_rad = 0;  ///< beta2 + gamma [rad], leg to the horizontal at landing
+  double end_angle_rad = 0;    ///< pi - (beta1' - gamma) [rad], at the next collision
+  double pendulum = 0;         ///< 2 M g L / I [rad^2/s^2]
+  double length = 0;           ///< L [m]
 };
 
 /// One collision followed by one stance. Losses that the return map needs, for u0 = 0, proportional to omega^2

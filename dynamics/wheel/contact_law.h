@@ -26,8 +26,8 @@ struct Collision {
   double chord = 0;           ///< c [m]
   double normal_speed = 0;    ///< v0 = c omega [m/s], approach speed of the foot, > 0
   double tangential_speed =
-      0;             ///< u0 [m/s], > 0: the foot slides UPHILL (the paper's positive sense); 0 for a rolling wheel
-  double slope = 0;  ///< gamma [rad]
+      0;                 ///< u0 [m/s], > 0: the foot slides UPHILL (the paper's positive sense); 0 for a rolling wheel
+  double slope_rad = 0;  ///< gamma
 };
 
 /// Energies of one collision [J]; each may be read on its own, total() is what the return map takes off.

@@ -28,6 +28,9 @@ struct EffectInfo {
   std::vector<EffectParameter> parameters;
 };
 
+/// The one effect that is no missing physics: other contact parameters, which a recalibration refits.
+inline constexpr std::string_view contact_distribution_id = "contact_distribution";
+
 /// All effects, in a fixed order.
 const std::vector<EffectInfo>& effect_catalogue();
 /// @throws std::invalid_argument naming the id and all known ones

@@ -39,7 +39,7 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
     leg.eccentric_phase = -static_cast<double>(k) * wheel.leg_angle();
     const double offset2 = extension.hub_forward * extension.hub_forward + extension.hub_aside * extension.hub_aside;
     if (offset2 > 0) {
-      // A centre of mass nearer to the foot or farther from it: parallel axes.
+      // A centre of mass nearer to the foot or farther from it changes the inertia by parallel axes.
       const auto along = [&](double phase) {  // of the offset, towards the leg
         return extension.hub_forward * std::cos(phase) - extension.hub_aside * std::sin(phase);
       };
@@ -50,7 +50,6 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
   }
   drag_ = extension.viscous != 0 || extension.rolling != 0 || extension.air != 0;
   profile_ = extension.sag != 0;
-  for (const double c : extension.slope_change) profile_ = profile_ || c != 0;
 }
 
 double ExtendedWheel::local_slope(double position) const {
@@ -72,10 +71,6 @@ double ExtendedWheel::local_slope(double position) const {
         break;
     }
   }
-  const double u = std::clamp(t, -1.0, 1.0);
-  const auto& c = e.slope_change;
-  change += c[0] * u + c[1] * (1.5 * u * u - 0.5) + c[2] * u * (2.5 * u * u - 1.5) +
-            c[3] * ((35 * u * u - 30) * u * u + 3) / 8;
   return slope_ + change;
 }
 
@@ -83,14 +78,14 @@ ExtendedWheel::Path ExtendedWheel::path(const StepContext& context) const {
   const Leg& leg = geometry_[index(context.leg)];
   const Triangle& ahead = geometry_[index(context.leg + 1)].triangle;
   Path p;
-  p.start = leg.triangle.beta_second + local_slope(context.position - leg.triangle.chord / 2);
-  p.end = pi - (ahead.beta_first - local_slope(context.position + ahead.chord / 2));
+  p.start = leg.triangle.beta_second_rad + local_slope(context.position - leg.triangle.chord / 2);
+  p.end = pi - (ahead.beta_first_rad - local_slope(context.position + ahead.chord / 2));
   const double weight = 2 * model_.mass * model_.gravity / leg.inertia;
   p.inertia = leg.inertia;
   p.pendulum = weight * leg.length;
   p.gain = p.pendulum * (std::sin(p.start) - std::sin(p.end));
   if (extension_.hub_forward != 0 || extension_.hub_aside != 0) {
-    // Height of the centre of mass over the foot: L sin(theta) - e sin(theta - phase of the offset from this leg).
+    // The centre of mass is L sin(theta) - e sin(theta - phase of the offset from this leg) over the foot.
     const auto height = [&](double theta) {
       const double at = theta - leg.eccentric_phase;
       return extension_.hub_aside * std::cos(at) - extension_.hub_forward * std::sin(at);
@@ -100,7 +95,7 @@ ExtendedWheel::Path ExtendedWheel::path(const StepContext& context) const {
   return p;
 }
 
-// omega^2 that the resisting torques take off over the stance.
+// Returns the omega^2 that the resisting torques take off over the stance.
 double ExtendedWheel::work(const Path& p, double omega_plus_squared) const {
   if (!drag_) return 0;
   using Rule = boost::math::quadrature::gauss<double, 7>;
@@ -163,13 +158,13 @@ Collision ExtendedWheel::collision(const StepContext& context, double omega) con
   c.contact_x = leg.triangle.contact_x;
   c.contact_y = leg.triangle.hub_height;
   if (extension_.hub_forward != 0 || extension_.hub_aside != 0) {  // the impulse acts about the centre of mass
-    const double at = leg.triangle.beta_second - leg.eccentric_phase;
+    const double at = leg.triangle.beta_second_rad - leg.eccentric_phase;
     c.contact_x -= extension_.hub_forward * std::cos(at) + extension_.hub_aside * std::sin(at);
     c.contact_y += extension_.hub_aside * std::cos(at) - extension_.hub_forward * std::sin(at);
   }
   c.chord = leg.triangle.chord;
   c.normal_speed = leg.triangle.chord * omega;
-  c.slope = local_slope(context.position - leg.triangle.chord / 2);
+  c.slope_rad = local_slope(context.position - leg.triangle.chord / 2);
   return c;
 }
 

@@ -39,7 +39,7 @@ Loss published_loss(const ContactModel& model, const Collision& c, const Contact
   Loss loss;
   const auto finish = [&](double slip_before, double slip_after) {
     loss.slip_distance = j * (slip_before - slip_after);
-    loss.potential = model.mass * model.gravity * loss.slip_distance * std::sin(c.slope);
+    loss.potential = model.mass * model.gravity * loss.slip_distance * std::sin(c.slope_rad);
     return loss;
   };
 

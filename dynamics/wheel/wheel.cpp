@@ -50,8 +50,8 @@ Triangle triangle(double first, double second, double leg_angle) {
   t.chord = std::sqrt(first * first + second * second - 2 * first * second * cosine);
   t.hub_height = first * second * std::sin(leg_angle) / t.chord;
   t.contact_x = second * (second - first * cosine) / t.chord;
-  t.beta_first = std::atan2(t.hub_height, first * (first - second * cosine) / t.chord);
-  t.beta_second = std::atan2(t.hub_height, t.contact_x);
+  t.beta_first_rad = std::atan2(t.hub_height, first * (first - second * cosine) / t.chord);
+  t.beta_second_rad = std::atan2(t.hub_height, t.contact_x);
   return t;
 }
 

@@ -34,12 +34,12 @@ struct Wheel {
 
 /// Both feet on the ramp: stance leg `first`, landing leg `second`: a collision's geometry.
 struct Triangle {
-  double chord = 0;        ///< c [m], distance between the feet
-  double hub_height = 0;   ///< h [m], of the hub over the ramp = y_cp
-  double beta_first = 0;   ///< angle of the stance leg to the ramp [rad]
-  double beta_second = 0;  ///< angle of the landing leg to the ramp [rad]
-  double contact_x =
-      0;  ///< x_cp [m] = second leg * cos(beta_second), a distance; negative only if the foot lies uphill of the hub
+  double chord = 0;            ///< c [m], distance between the feet
+  double hub_height = 0;       ///< h [m], of the hub over the ramp = y_cp
+  double beta_first_rad = 0;   ///< angle of the stance leg to the ramp [rad]
+  double beta_second_rad = 0;  ///< angle of the landing leg to the ramp [rad]
+  double contact_x = 0;  ///< x_cp [m] = second leg * cos(beta_second_rad), a distance; negative only if the foot lies
+                         ///< uphill of the hub
 };
 /// @param first, second leg lengths [m]; @param leg_angle alpha [rad]
 Triangle triangle(double first, double second, double leg_angle);

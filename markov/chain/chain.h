@@ -17,9 +17,13 @@ class ConvergenceError : public std::runtime_error {
   const std::string& solver() const { return solver_; }
   double residual() const { return residual_; }
 
+ protected:
+  /// For failures that are no residual: the message as it is.
+  explicit ConvergenceError(const std::string& message) : std::runtime_error(message) {}
+
  private:
   std::string solver_;
-  double residual_;
+  double residual_ = 0;
 };
 
 /// Discrete-time absorbing chain on states 0 .. size()-1 plus one absorbing state, rest.

@@ -116,11 +116,10 @@ Survival::Survival(const ChainSolver& solver, const QuasiStationary& quasi, cons
   std::vector<double> log_step;  // not the differences of log_head_: a hazard of 1e-12 would lose its digits there
   double difference = std::numeric_limits<double>::infinity();
   for (int step = 0; step < limit; ++step) {
-    if (std::isinf(log_factor_) && surviving <= kRoundedStay) surviving = 0;
+    if (surviving <= (std::isinf(log_factor_) ? kRoundedStay : 0)) surviving = 0;
     log_step.push_back(log_survival(surviving, failing));
     log_head_.push_back(log_head_.back() + log_step.back());
-    if (surviving == 0) return;
-    if (log_head_.back() < kLogNobody) {  // nobody is left to settle
+    if (log_head_.back() < kLogNobody) {  // nobody is left to settle, and nobody comes back
       log_factor_ = -std::numeric_limits<double>::infinity();
       return;
     }
@@ -152,6 +151,15 @@ double Survival::log_at(double n) const {
 double Survival::at(double n) const {
   if (!(n >= 0)) throw std::invalid_argument("survival: the number of steps must be >= 0");
   return std::isinf(n) ? 0.0 : std::exp(log_at(std::floor(n)));
+}
+
+double Survival::mean() const {
+  double sum = 0;
+  for (const double log_p : log_head_) sum += std::exp(log_p);
+  if (std::isinf(log_factor_)) return sum;
+  double period = 0;
+  for (auto log_p = log_head_.end() - period_; log_p != log_head_.end(); ++log_p) period += std::exp(*log_p);
+  return sum + period * std::exp(log_factor_) / -std::expm1(log_factor_);
 }
 
 double Survival::quantile(double p) const {

@@ -52,6 +52,8 @@ class Survival {
   /// Smallest whole n with P(steps <= n) >= p, 0 < p < 1 (otherwise std::invalid_argument); rounded to double above
   /// 9e15.
   double quantile(double p) const;
+  /// Sum of P(steps > n) over all n, the tail in closed form: the expected steps, without a linear system [steps].
+  double mean() const;
 
  private:
   double log_at(double n) const;

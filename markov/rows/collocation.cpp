@@ -148,12 +148,16 @@ std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
 std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& map, const LaunchState& launch,
                                                           int threads) {
   const int phases = map.phases();
-  double lower = map.state_interval(0).first, highest = 0;
+  double lower = map.state_interval(0).first, highest_lower = lower, highest = 0;
   for (int p = 0; p < phases; ++p) {
-    lower = std::min(lower, map.state_interval(p).first);
-    highest = std::max(highest, map.state_interval(p).second);
+    const auto [least, most] = map.state_interval(p);
+    lower = std::min(lower, least);
+    highest_lower = std::max(highest_lower, least);
+    highest = std::max(highest, most);
   }
-  const double launched = launch.state(3), length = std::max({launched - lower, 0.1 * std::abs(launched), 1e-3});
+  const double launched = launch.state(3);  // which may be slower than any survivor
+  const double length =
+      std::max({launched - lower, 0.1 * std::abs(launched), 0.5 * std::abs(highest_lower), 1e-3});
   double upper = std::min(highest, lower + 1.2 * length);
   for (;;) {
     std::vector<std::pair<double, double>> ranges;

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::size_t block_size = 1024;   // draws landed at a time
 constexpr std::size_t rows_together = 16;  // rows that share a block while it is in cache
+constexpr double mostly_rests = 0.95;      // launches whose few survivors may be those of a tail
 
 // Draws of one phase: phases and the launch have randomisations of their own.
 DrawOptions draws_of_phase(DrawOptions options, int phase) {
@@ -141,19 +142,30 @@ SampledChain discretize(const AnyReturnMap& map, const StateSpace& space, const 
 
 Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch,
                   const DrawOptions& options, int threads) {
-  const Draws draws = make_draws(map.noise_dimension(), draws_of_phase(options, space.phases()));
-  const auto dimension = static_cast<std::size_t>(draws.dimension);
-  std::vector<double> landing(draws.count());
-  parallel_for((draws.count() + block_size - 1) / block_size, threads, [&](std::size_t b) {
-    const std::size_t first = b * block_size, count = std::min(block_size, draws.count() - first);
-    std::vector<double> start(count);
-    for (std::size_t k = 0; k < count; ++k) start[k] = launch.state(normal_score(draws.offset[first + k]));
-    map.tabulate(launch.phase, std::span(draws.score).subspan(first * dimension, count * dimension))
-        ->land(0.0, 1.0, start, 0, std::span(landing).subspan(first, count));
-  });
   const int next_phase = (launch.phase + 1) % space.phases();
-  std::vector<double> sums(space.cells() + 1, 0.0);
-  space.grid(next_phase).tally(landing, draws.weight, sums);
+  const auto noise = static_cast<std::size_t>(map.noise_dimension());
+  // `tails`: the launch's score is drawn as the noise is, not by equal shares.
+  const auto land = [&](bool tails) {
+    const Draws draws =
+        make_draws(map.noise_dimension() + (tails ? 1 : 0), draws_of_phase(options, space.phases() + (tails ? 1 : 0)));
+    const auto dimension = static_cast<std::size_t>(draws.dimension);
+    std::vector<double> landing(draws.count());
+    parallel_for((draws.count() + block_size - 1) / block_size, threads, [&](std::size_t b) {
+      const std::size_t first = b * block_size, count = std::min(block_size, draws.count() - first);
+      std::vector<double> start(count), score;
+      for (std::size_t k = 0; k < count; ++k) {
+        const auto drawn = std::span(draws.score).subspan((first + k) * dimension, dimension);
+        start[k] = launch.state(tails ? drawn.back() : normal_score(draws.offset[first + k]));
+        score.insert(score.end(), drawn.begin(), drawn.begin() + static_cast<std::ptrdiff_t>(noise));
+      }
+      map.tabulate(launch.phase, score)->land(0.0, 1.0, start, 0, std::span(landing).subspan(first, count));
+    });
+    std::vector<double> sums(space.cells() + 1, 0.0);
+    space.grid(next_phase).tally(landing, draws.weight, sums);
+    return sums;
+  };
+  std::vector<double> sums = land(false);
+  if (sums[0] > mostly_rests && options.weighting == Weighting::weighted) sums = land(true);
   Launch row;
   row.rest = sums[0];
   row.after.assign(space.size(), 0.0);

@@ -39,7 +39,8 @@ struct Discretization {
 SampledChain discretize(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch,
                         const Discretization& options);
 
-/// The launch row alone: where event number 1 leads.
+/// The launch row alone: where event number 1 leads. Launches of which hardly any survive are drawn down to the tail
+/// as well, where draws are weighted: those few may go on for ever so long.
 Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch, const DrawOptions& draws,
                   int threads = 1);
 

@@ -53,10 +53,11 @@ Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double st
 }
 
 std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads) {
-  double lower = 0, highest = 0;
+  double lower = map.state_interval(0).first, highest_lower = lower, highest = 0;
   for (int p = 0; p < map.phases(); ++p) {
     const auto [least, most] = map.state_interval(p);
-    lower = p == 0 ? least : std::min(lower, least);
+    lower = std::min(lower, least);
+    highest_lower = std::max(highest_lower, least);
     highest = std::max(highest, most);
   }
   // One upper edge for all phases: what the launch leaves high up at one phase comes by at the next.
@@ -65,7 +66,9 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     for (int p = 0; p < map.phases(); ++p) all.emplace_back(map.state_interval(p).first, upper);
     return all;
   };
-  const double launched = launch.state(3), length = std::max({launched - lower, 0.1 * std::abs(launched), 1e-3});
+  const double launched = launch.state(3);  // which may be slower than any survivor
+  const double length =
+      std::max({launched - lower, 0.1 * std::abs(launched), 0.5 * std::abs(highest_lower), 1e-3});
   double upper = std::min(highest, lower + 1.2 * length);
   for (std::size_t panels = map.phases() > 1 ? 1 : 2;;) {
     const NodeSpace space(ranges(upper), panels);

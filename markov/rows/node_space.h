@@ -33,6 +33,7 @@ class NodeSpace {
   std::size_t nodes() const { return panels_ * order; }  ///< per phase
   std::size_t size() const { return node_.size(); }
   double node(std::size_t state) const { return node_[state]; }
+  std::span<const double> states() const { return node_; }  ///< nodes of all phases
   double weight(std::size_t state) const { return weight_[state]; }
   /// Nodes of one phase.
   std::span<const double> nodes(int phase) const;

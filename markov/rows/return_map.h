@@ -1,5 +1,30 @@
 #pragma once
 // The only thing markov/ knows of the world: a stochastic return map.
+//
+// Example:
+//   #include <metastable/analysis/study/metastability.h>
+//
+//   #include <cmath>
+//   #include <cstdio>
+//
+//   // The energy of a hopper just before it lands: part of it is lost, the leg adds 1, and the ground is uneven.
+//   struct Hopper {
+//     std::pair<double, double> state_interval(int) const { return {0, INFINITY}; }
+//     int phases() const { return 1; }
+//     int noise_dimension() const { return 1; }
+//     std::optional<double> landing(double energy, int, std::span<const double> score) const {
+//       const double next = 0.6 * energy + 1 + 0.8 * score[0];
+//       return next > 0 ? std::optional(next) : std::nullopt;  // nothing: it falls
+//     }
+//   };
+//
+//   int main() {
+//     const metastable::analysis::Problem from_rest{Hopper{}, {[](double) { return 1.0; }, 0}};
+//     const auto study = metastable::analysis::study(from_rest);
+//     std::printf("falls after %.1f hops on average\n", study.steps.from_start.value);
+//   }
+// prints
+//   @@HOPPER@@
 
 #include <concepts>
 #include <cstddef>

@@ -15,6 +15,10 @@ constexpr std::size_t probe_draws = 2048;  // to find the end of the bulk
 constexpr double probe_level = 0.02;       // noise exceeded once in 50 events
 constexpr double sparse = 0.15;            // cells per factor of e beyond the bulk, relative to the bulk's
 constexpr double grading_ratio = 4.0;      // widest over narrowest cell, in pilot cells
+constexpr double least_bulk = 0.3;         // of the lowest state
+constexpr double far_above = 4.0;          // the regime: where the landings of a launch are a transient of their own
+constexpr double beyond_launch = 1.5;      // what the cells hold above its landings
+constexpr int most_steps = 1000;           // mapped to find the end of the bulk
 
 // State below which all but probe_level of the landings from `state` fall; rest counts as lowest.
 double high_landing(const NoiseTable& table, std::span<const double> weight, double state) {
@@ -32,9 +36,14 @@ double high_landing(const NoiseTable& table, std::span<const double> weight, dou
   return rest_landing;
 }
 
-// Width of the bulk over the lowest state: the launch's own landings, then its top edge mapped until it no longer
-// rises.
-double bulk_width(const AnyReturnMap& map, const LaunchState& launch, double lowest, std::uint64_t seed) {
+// Widths over the lowest state.
+struct Widths {
+  double bulk = 0, launched = 0;
+};
+
+// The bulk holds the launch's own landings and ends where its top edge, mapped, no longer rises. Launches far above
+// that are left out of it: their landings fall to the bulk within some steps.
+Widths widths(const AnyReturnMap& map, const LaunchState& launch, double lowest, std::uint64_t seed) {
   const int phases = map.phases();
   const Draws draws = make_draws(map.noise_dimension(), {.count = probe_draws, .seed = seed});
   std::vector<std::unique_ptr<NoiseTable>> tables;
@@ -43,14 +52,34 @@ double bulk_width(const AnyReturnMap& map, const LaunchState& launch, double low
     return std::max(
         lowest, high_landing(*tables[static_cast<std::size_t>((launch.phase + step) % phases)], draws.weight, state));
   };
-  double top = land(launch.state(launch_reach), 0);
-  const double most = lowest + 10 * std::max(top - lowest, std::abs(lowest));  // reached if most noise gains energy
-  for (int step = 1, quiet = 0; step < 1000 && quiet < phases && top < most; ++step) {
+  const double least = std::max(least_bulk * std::abs(lowest), 1e-6 * std::max(1.0, std::abs(lowest)));
+  const double launched = std::max(land(launch.state(launch_reach), 0), lowest + least);
+  const double most = lowest + 10 * std::max(launched - lowest, std::abs(lowest));  // if most noise gains energy
+  double top = launched, fallen = launched;
+  for (int step = 1, quiet = 0; step < most_steps && quiet < phases && top < most; ++step) {
     const double next = land(top, step);
     quiet = next > top + 1e-3 * (top - lowest) ? 0 : quiet + 1;
     top = std::max(top, next);
   }
-  return std::max(std::min(top, most) - lowest, 1e-6 * std::max(1.0, std::abs(lowest)));
+  for (int step = 1, quiet = 0; step < most_steps && quiet < phases && fallen > lowest; ++step) {
+    const double next = land(fallen, step);
+    quiet = next < fallen - 1e-3 * (fallen - lowest) ? 0 : quiet + 1;
+    fallen = std::min(fallen, next);
+  }
+  const double regime = std::max(fallen - lowest, least);
+  if (top == launched && launched - lowest > far_above * regime) return {regime, launched - lowest};
+  const double bulk = std::min(top, most) - lowest;
+  return {bulk, bulk};
+}
+
+// Of the end of the cells, in bulks: up to 1 it is the share of the bulk; beyond it, sparse cells on a logarithmic
+// scale.
+double place(double end) { return end <= 1 ? end : 1 + sparse * std::log(end); }
+
+double highest_low(const AnyReturnMap& map) {
+  double lowest = map.state_interval(0).first;
+  for (int p = 1; p < map.phases(); ++p) lowest = std::max(lowest, map.state_interval(p).first);
+  return lowest;
 }
 
 }  // namespace
@@ -68,18 +97,21 @@ StateSpace StateSpace::halved() const {
   return StateSpace(std::move(grids));
 }
 
+double launch_cells(const AnyReturnMap& map, const LaunchState& launch, std::uint64_t seed) {
+  const Widths width = widths(map, launch, highest_low(map), seed);
+  return width.launched > width.bulk ? place(beyond_launch * width.launched / width.bulk) : 1;
+}
+
 StateSpace covering_space(const AnyReturnMap& map, const LaunchState& launch, std::size_t cells, std::uint64_t seed,
                           double reach) {
   if (!(reach >= 1)) throw std::invalid_argument("state space: reach below 1");
-  double lowest = map.state_interval(0).first;
-  for (int p = 1; p < map.phases(); ++p) lowest = std::max(lowest, map.state_interval(p).first);
-  const double bulk = bulk_width(map, launch, lowest, seed);
+  const Widths width = widths(map, launch, highest_low(map), seed);
+  const double bulk = width.bulk;
+  if (width.launched > bulk) reach = std::max(reach, beyond_launch * width.launched / bulk);
   std::vector<Grid> grids;
   for (int p = 0; p < map.phases(); ++p) {
     const auto [lower, upper] = map.state_interval(p);
-    const double own_reach = std::isfinite(upper) ? std::clamp((upper - lower) / bulk, 1e-6, reach) : reach;
-    // Place s in [0, 1] is the bulk; beyond it, sparse cells on a logarithmic scale.
-    const double last = own_reach <= 1 ? own_reach : 1 + sparse * std::log(own_reach);
+    const double last = place(std::isfinite(upper) ? std::clamp((upper - lower) / bulk, 1e-6, reach) : reach);
     std::vector<double> edges(cells + 1);
     for (std::size_t i = 0; i <= cells; ++i) {
       const double s = last * static_cast<double>(i) / static_cast<double>(cells);

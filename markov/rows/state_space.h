@@ -38,11 +38,15 @@ struct LaunchState {
 
 /// Cells over the map's own reach. Lower edges: lowest state a survivor can have at each phase. The bulk, cut into
 /// equal cells, ends where landings from its top edge under noise exceeded once in 50 events no longer lead higher, and
-/// holds the landings after the launch. Beyond it cells widen in proportion to the distance from the lower edge, up to
-/// `reach` times the bulk (a map that can gain energy spreads survivors over decades); a finite upper end of the map's
-/// own interval is kept instead when it is lower. @param cells per phase, >= 1; @param reach >= 1
+/// holds the landings after a launch that is not far above that. Beyond it cells widen in proportion to the distance
+/// from the lower edge, up to `reach` times the bulk (a map that can gain energy spreads survivors over decades) and
+/// past the landings of a fast launch; a finite upper end of the map's own interval is kept instead when it is lower.
+/// @param cells per phase, >= 1; @param reach >= 1
 StateSpace covering_space(const AnyReturnMap& map, const LaunchState& launch, std::size_t cells, std::uint64_t seed,
                           double reach = 1.5);
+
+/// How many times the cells of the bulk it takes to hold the landings of a fast launch as well; 1 if the bulk does.
+double launch_cells(const AnyReturnMap& map, const LaunchState& launch, std::uint64_t seed);
 
 /// The same range cut so that cells are small where they matter. By Galerkin's argument the relative error of the
 /// failure rate is the sum over cells of width^3 nu'(x) h'(x) / 12 (nu quasi-stationary density, h relative survival),

@@ -43,10 +43,12 @@ Command steps() {
             o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
             add_standard_errors(o);
             o.add("json", "FILE|-", "", "Write the results as JSON");
+            o.add_flag("explain", "What stands behind the words of the answer");
           },
           [](const Options& o, const std::string& line) {
             StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
             request.sensitivities = o.flag("sensitivities");
+            request.explain = o.flag("explain");
             request.standard_errors = standard_errors(o, request.setting);
             run_steps(request);
           }};
@@ -188,7 +190,7 @@ std::string command_line(int argc, const char* const* argv) {
 int parse_and_run(int argc, const char* const* argv) {
   CLI::App app("Metastability of walking machines: the rimless wheel on a ramp", "metastable");
   app.require_subcommand(1);
-  app.set_version_flag("--version", "metastable " + version());
+  app.set_version_flag("--version", version_text());
   app.footer(
       "Exit codes: 0 done, 2 wrong option or file (one that cannot be written too), 3 a computation failed, 130 "
       "interrupted, 143 terminated.");

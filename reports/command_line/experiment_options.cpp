@@ -129,7 +129,7 @@ Command simulate() {
               analysis::CameraOptions& camera = request.camera.emplace();
               if (o.given("angle-rate")) camera.rate = o.number("angle-rate");
               if (stand_in) camera.decimals = 5;  // a twentieth of the noise; keeps the folder small
-              if (o.given("angle-noise")) camera.noise_sd = o.number("angle-noise");
+              if (o.given("angle-noise")) camera.noise_sd_rad = o.number("angle-noise");
               camera.seed = request.seed;
               camera.threads = request.threads;
               camera.validate();

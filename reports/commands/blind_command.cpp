@@ -30,6 +30,7 @@
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
 #include "reports/output/seal.h"
+#include "reports/output/text_table.h"
 #include "reports/output/version.h"
 
 extern char** environ;
@@ -322,7 +323,7 @@ void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
   const std::vector<Table> tables = blind_tables(grades, reached, answers, provenance);
   for (const Table& table : tables) folder.section(table.id + "-section", table.title, "", {}, {table});
   folder.write_index();
-  fmt::print("{}", to_markdown(tables.front()));
+  fmt::print("{}", to_text(tables.front(), 1000, terminal_width()));
   fmt::print("\n{}\n", (out / "index.html").string());
 }
 

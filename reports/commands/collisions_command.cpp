@@ -51,7 +51,7 @@ Files write_files(const analysis::Experiment& experiment, const std::vector<anal
                      c.fit ? fmt::format("{:.6g}", c.fit->omega_plus) : "");
       position += map.advance(leg % map.phases());
       const std::string fit = c.fit ? fmt::format("{:.6f},{:.6g},{:.6g},{:.3g}", c.fit->time, c.fit->omega_minus,
-                                                  c.fit->omega_plus, c.fit->residual_sd)
+                                                  c.fit->omega_plus, c.fit->residual_sd_rad)
                                     : ",,,";
       fmt::format_to(std::back_inserter(files.details), "{},{:.6f},{:.6g},{},{:.6f},{:.6g},{}\n", key, c.peak_time,
                      c.peak, fit, c.apex_time, c.apex, c.bounces);

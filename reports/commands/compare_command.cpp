@@ -53,9 +53,9 @@ void run_compare(const CompareRequest& request) {
     return analysis::compare(request.settings, options, request.collisions);
   }();
   const CompareExtras extras = from_standard_errors(request, comparison);
-  std::vector<RestThresholds> thresholds;
+  std::vector<analysis::RestThresholds> thresholds;
   for (std::size_t i = 0; i < comparison.studies.size(); ++i)
-    thresholds.push_back(rest_thresholds(comparison.studies[i]));
+    thresholds.push_back(analysis::rest_thresholds(comparison.studies[i]));
   if (json) {
     std::string settings;
     for (const analysis::Setting& setting : request.settings) settings += setting.describe() + "\n";

@@ -12,6 +12,7 @@
 #include "reports/description/describe_tables.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
+#include "reports/output/text_table.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -39,10 +40,7 @@ void run_describe(const DescribeRequest& request) {
   if (!description.fits.empty()) tables.push_back(fits_table(description, provenance));
   if (laws) tables.push_back(laws_table(*laws, provenance));
   if (!pages) {
-    for (Table& table : tables) {
-      table.provenance = {};
-      fmt::print("{}\n", to_markdown(table));
-    }
+    for (const Table& table : tables) fmt::print("{}\n", to_text(table, 1000, terminal_width()));
     return;
   }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/likelihood/diagnose.h"
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_json.h"
@@ -66,6 +67,7 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
   page.title = title.empty() ? "Diagnosis" : title;
   page.intro = d.sentences;
   page.intro.insert(page.intro.begin(), fmt::format("Verdict: {}.", analysis::verdict_name(d.verdict)));
+  page.intro.push_back("Next: " + analysis::next_step(d));
   page.provenance = provenance;
   Sections sections(pages, provenance);
   sections.add("gap", "Is there a gap?",
@@ -115,7 +117,7 @@ void run_diagnose(const DiagnoseRequest& request) {
     json->commit();
   }
   if (request.json == "-") return;
-  fmt::print("{}", diagnosis_text(diagnosis));
+  fmt::print("{}", diagnosis_text(diagnosis, terminal_width()));
   if (!request.out.empty()) fmt::print("\n{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
+#include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/likelihood/diagnose.h"
 #include "analysis/paper/step_balance.h"
 #include "analysis/paper/worked_examples.h"
@@ -47,14 +48,14 @@ Table answers(const std::string& id, const std::string& title, const std::string
       .columns = {{what},
                   {"verdict"},
                   {"95 % set, or the nearest"},
-                  {"p"},
+                  {"p", "", NumberFormat::p_value},
                   {"gap, nats"},
                   {"recalibrated"},
                   {"with effect"},
-                  {"closed (90 %)"},
+                  {.name = "closed (90 %)", .level = 90},
                   {"CRPS, rad/s"},
                   {"with effect"},
-                  {"steps observed"},
+                  {.name = "steps observed (90 %)", .level = 90},
                   {"as given"},
                   {"with effect"}}};
 }
@@ -66,11 +67,11 @@ void add_answer(Table& table, const std::string& what, const Diagnosis& d) {
   std::vector<Cell> row{what, analysis::verdict_name(d.verdict), causes, d.gap.p_as_given};
   if (d.shrinkage.measures.size() >= 2) {
     const analysis::Shrinkage &nats = d.shrinkage.measures[0], &crps = d.shrinkage.measures[1];
-    row.insert(row.end(), {nats.baseline, nats.recalibrated, nats.with_effect,
-                           nats.closed ? Cell(fmt::format("{:.0f} % ({:.0f} to {:.0f})", 100 * *nats.closed,
-                                                          100 * *nats.closed_lower, 100 * *nats.closed_upper))
-                                       : Cell("not to be said"),
-                           crps.baseline, crps.with_effect});
+    row.insert(row.end(),
+               {nats.baseline, nats.recalibrated, nats.with_effect,
+                analysis::closed_is_known(nats) ? Cell(Estimate{*nats.closed, *nats.closed_lower, *nats.closed_upper})
+                                                : Cell(analysis::closed_unknown(nats)),
+                crps.baseline, crps.with_effect});
   } else {
     row.insert(row.end(), {"", "", "", "", "", ""});
   }
@@ -91,15 +92,15 @@ Table said(const std::string& id, const std::string& title, const Diagnosis& d) 
   return table;
 }
 
-const char* source_name(analysis::Source source) {
+const char* source_name(analysis::VariabilitySource source) {
   switch (source) {
-    case analysis::Source::none:
+    case analysis::VariabilitySource::none:
       return "nothing";
-    case analysis::Source::launch:
+    case analysis::VariabilitySource::launch:
       return "launch speeds (H1)";
-    case analysis::Source::legs:
+    case analysis::VariabilitySource::legs:
       return "differences of the legs (H2)";
-    case analysis::Source::contact:
+    case analysis::VariabilitySource::contact:
       return "restitution and friction (H3)";
   }
   throw std::logic_error("source without a name");
@@ -209,7 +210,7 @@ class Lessons {
     Table table = answers("hypotheses", "The paper's hypotheses as effects: each source believed half as wide as it is",
                           "believed half as wide");
     const Experiment stand_in = laboratory({});
-    for (const analysis::Source source : analysis::sources)
+    for (const analysis::VariabilitySource source : analysis::variability_sources)
       add_answer(table, source_name(source),
                  diagnosed(believed_half_as_wide(stand_in, source), source_name(source), request_));
     table.notes.push_back(

@@ -71,7 +71,7 @@ class Report {
         options.progress = study_progress(progress_);
         Studied one{analysis::study(setting, options), {}};
         options.progress(1, "");
-        one.thresholds = rest_thresholds(one.study);
+        one.thresholds = analysis::rest_thresholds(one.study);
         settings.push_back(setting);
         studied.push_back(std::move(one));
       }

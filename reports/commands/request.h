@@ -27,6 +27,7 @@ struct StepsRequest {
   std::string json;      ///< file, "-" for standard output, "" for none
   std::string command;   ///< the command line, for provenance
   bool certify = false;  ///< guaranteed bounds as well
+  bool explain = false;  ///< what the words mean at length
   bool sensitivities = false;
   std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to the expected steps
 };

@@ -5,7 +5,9 @@
 #include <optional>
 
 #include "analysis/study/certify.h"
+#include "analysis/study/consistency.h"
 #include "reports/output/output_file.h"
+#include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/study_json.h"
 #include "reports/study/study_progress.h"
@@ -22,13 +24,14 @@ void run_steps(const StepsRequest& request) {
     options.progress = study_progress(progress);
     return analysis::study(request.setting, options);
   }();
-  const RestThresholds thresholds = rest_thresholds(study);
+  const analysis::RestThresholds thresholds = analysis::rest_thresholds(study);
   StepsExtras extras;
   if (request.certify) {
     Progress progress("certificate", study_units);
     extras.certified = analysis::certify(
         request.setting,
         {.tolerance = request.study.tolerance, .threads = request.study.threads, .progress = study_progress(progress)});
+    analysis::require_consistent(study, *extras.certified);
   }
   if (request.sensitivities || !request.standard_errors.empty()) {
     Progress progress("sensitivities", study_units);
@@ -50,6 +53,8 @@ void run_steps(const StepsRequest& request) {
   if (extras.propagated)
     fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
   if (extras.sensitivities) fmt::print("\n{}", sensitivities_text(*extras.sensitivities));
+  if (study.status != analysis::Status::rest_unresolved)
+    fmt::print("\n{}", words_text(study, request.explain, terminal_width()));
 }
 
 }  // namespace metastable::reports

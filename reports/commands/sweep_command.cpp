@@ -14,6 +14,7 @@
 #include "reports/output/figure.h"
 #include "reports/output/file_lock.h"
 #include "reports/output/input_file.h"
+#include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
 #include "reports/output/progress.h"
 #include "reports/output/version.h"
@@ -28,7 +29,7 @@ constexpr std::size_t most_map_rows = 16;
 // Everything the numbers depend on; a partial file with another head belongs to another sweep.
 std::string head(const SweepRequest& request) {
   const analysis::StudyOptions& study = request.study;
-  std::string text = fmt::format("# sweep: {}; the axes vary\n# axes:", request.setting.describe());
+  std::string text = fmt::format("# sweep: {}\n# axes:", analysis::sweep_description(request.setting, request.axes));
   for (const analysis::Axis& axis : request.axes) {
     text += fmt::format(" {} =", analysis::parameter_name(axis.parameter));
     for (const double value : axis.values) text += fmt::format(" {}", value);
@@ -109,7 +110,8 @@ std::optional<Figure> figure(const SweepRequest& request, const std::vector<std:
   Figure figure;
   figure.id = "sweep";
   figure.title = "Expected steps before failure";
-  figure.provenance = {request.command, request.setting.describe(), request.study.seed, version()};
+  figure.provenance = {request.command, analysis::sweep_description(request.setting, request.axes), request.study.seed,
+                       version()};
   // The two axes shown; further ones stay at their first value.
   const analysis::Axis& across = axes.front();
   const std::size_t second = axes.size() > 1 ? 1 : 0;
@@ -193,13 +195,18 @@ void run_sweep(const SweepRequest& request) {
     };
     if (!kept) append(so_far);
     Progress progress("sweep", size);
-    progress.advance(had);
-    analysis::sweep(request.setting, request.axes, had, request.study,
-                    [&](std::size_t, const analysis::SweepPoint& point) {
-                      rows.push_back(row(point));
-                      append(rows.back());
-                      progress.advance();
-                    });
+    analysis::StudyOptions study = request.study;
+    study.progress = [](double, const std::string&) { check_interrupt(); };
+    try {
+      progress.advance(had);
+      analysis::sweep(request.setting, request.axes, had, study, [&](std::size_t, const analysis::SweepPoint& point) {
+        rows.push_back(row(point));
+        append(rows.back());
+        progress.advance();
+      });
+    } catch (const Interrupted& interrupted) {
+      throw Interrupted(interrupted, fmt::format("{} of {} points kept; the same command goes on", rows.size(), size));
+    }
     journal.close();
     std::error_code error;
     std::filesystem::rename(partial, out, error);

@@ -27,6 +27,15 @@ Cell effect(const analysis::EffectSize& e) {
   return Estimate{e.value, e.lower, e.upper};
 }
 
+// Where even the best parameters make the transitions next to impossible, the number says no more than that.
+Cell log_likelihood_cell(const analysis::ContactFit& fit) {
+  constexpr double hopeless = -20;  // [nats] a transition: one in 5e8
+  const double value = fit.log_likelihood;
+  if (value < hopeless * static_cast<double>(fit.transitions))
+    return NotShown{{value, value, value}, fmt::format("below {:.0f} a transition", hopeless)};
+  return value;
+}
+
 }  // namespace
 
 Estimate mean_interval(const analysis::SpeedSummary& s) {
@@ -34,7 +43,7 @@ Estimate mean_interval(const analysis::SpeedSummary& s) {
   return {s.mean, s.mean - half, s.mean + half};
 }
 
-std::string p_text(double p) { return p < 1e-6 ? "< 1e-6" : fmt::format("{:.2g}", p); }
+Cell p_cell(double p) { return std::isnan(p) ? Cell("") : Cell(p); }
 
 Table conditions_table(const analysis::Description& description, const Provenance& provenance) {
   Table table;
@@ -143,10 +152,10 @@ Table tests_table(const analysis::Description& description, const Provenance& pr
                    {"values"},
                    {"n"},
                    {"difference of means", "rad/s", NumberFormat::fixed, 3},
-                   {"P Welch"},
-                   {"P pooled t"},
-                   {"P Kolmogorov-Smirnov"},
-                   {"P Anderson-Darling"},
+                   {"P Welch", "", NumberFormat::p_value, 2},
+                   {"P pooled t", "", NumberFormat::p_value, 2},
+                   {"P Kolmogorov-Smirnov", "", NumberFormat::p_value, 2},
+                   {"P Anderson-Darling", "", NumberFormat::p_value, 2},
                    {"Hedges' g", "", NumberFormat::fixed, 2},
                    {"P(first > second)", "", NumberFormat::fixed, 3},
                    {"distance D", "", NumberFormat::fixed, 3},
@@ -156,8 +165,8 @@ Table tests_table(const analysis::Description& description, const Provenance& pr
     const auto add = [&](const std::optional<analysis::SampleComparison>& s, const char* values, bool meet) {
       if (!s) return;
       table.rows.push_back({pair, values, fmt::format("{}, {}", s->count_a, s->count_b), effect(s->welch.difference),
-                            p_text(s->welch.p), p_text(s->pooled.p), p_text(s->kolmogorov_smirnov.p),
-                            p_text(s->anderson_darling.p), effect(s->hedges), effect(s->superiority),
+                            p_cell(s->welch.p), p_cell(s->pooled.p), p_cell(s->kolmogorov_smirnov.p),
+                            p_cell(s->anderson_darling.p), effect(s->hedges), effect(s->superiority),
                             effect(s->distance), meet ? (c.meet ? Cell(*c.meet) : Cell("never")) : Cell("")});
     };
     add(c.trial_means, "trial means", true);
@@ -218,7 +227,7 @@ Table fits_table(const analysis::Description& description, const Provenance& pro
     const bool fitted = f.fit.status != analysis::ContactFit::Status::impossible;
     for (std::size_t i = 0; i < 4; ++i)
       row.push_back(fitted ? Cell(Estimate{f.fit.value[i], f.fit.lower_95[i], f.fit.upper_95[i]}) : Cell(""));
-    row.push_back(fitted ? Cell(f.fit.log_likelihood) : Cell(""));
+    row.push_back(fitted ? log_likelihood_cell(f.fit) : Cell(""));
     table.rows.push_back(std::move(row));
   }
   table.notes = {
@@ -248,7 +257,7 @@ Table laws_table(const analysis::LawComparison& comparison, const Provenance& pr
                    {"sd between trials", "rad/s", NumberFormat::fixed, 3},
                    {"sd between collisions", "rad/s", NumberFormat::fixed, 3},
                    {"share that rests", "", NumberFormat::fixed, 3},
-                   {"P same speed"}};
+                   {"P same speed", "", NumberFormat::p_value, 2}};
   for (const analysis::LawRow& r : comparison.rows) {
     if (r.trials == 0) {
       table.rows.push_back({r.condition, r.source, "", "no fit", "", "", "", ""});
@@ -257,7 +266,7 @@ Table laws_table(const analysis::LawComparison& comparison, const Provenance& pr
     table.rows.push_back({r.condition, r.source, r.trials, mean_cell(r.steady),
                           r.steady.count > 1 ? Cell(r.steady.sd) : Cell(""),
                           r.steady.count > 0 ? Cell(r.collision_sd) : Cell(""),
-                          r.outcomes_known ? cell(r.rest_share) : Cell(""), r.p_speed ? p_text(*r.p_speed) : ""});
+                          r.outcomes_known ? cell(r.rest_share) : Cell(""), r.p_speed ? p_cell(*r.p_speed) : Cell("")});
   }
   table.notes = {
       "Steady: from the 13th collision on, by the trials that got there; empty if none did. Brackets: 95 %. P: Welch's "

@@ -26,7 +26,7 @@ Table laws_table(const analysis::LawComparison& comparison, const Provenance& pr
 
 /// Mean of two values or more with its t-interval.
 Estimate mean_interval(const analysis::SpeedSummary& s);
-/// One test as a table's rows do: "0.012", "< 1e-6".
-std::string p_text(double p);
+/// A p-value; empty where the test has none.
+Cell p_cell(double p);
 
 }  // namespace metastable::reports

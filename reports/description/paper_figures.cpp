@@ -28,14 +28,22 @@ void add_experiment(Figure& figure, const analysis::PaperExperiments& experiment
   figure.x.high = 16.5;
 }
 
-template <std::size_t Lines>
 Figure panel(const std::string& id, const std::string& title,
-             const std::array<analysis::StudiedProfile, Lines>& profiles, const Provenance& provenance) {
+             const std::vector<const analysis::StudiedProfile*>& profiles, const Provenance& provenance) {
   Figure figure = profile_figure(id, title, provenance);
-  for (std::size_t i = 0; i < Lines; ++i)
-    add_profile(figure, profiles[i].profile, profiles[i].label, static_cast<int>(i));
+  int colour = 0;
+  for (const analysis::StudiedProfile* profile : profiles)
+    add_profile(figure, profile->profile, profile->label, colour++);
   figure.reference_lines = {{true, 9, "first leg again"}};
   return figure;
+}
+
+// The lines of one panel.
+template <class Runs, class Run>
+std::vector<const analysis::StudiedProfile*> lines(const Runs& runs, analysis::StudiedProfile Run::*profile) {
+  std::vector<const analysis::StudiedProfile*> all;
+  for (const Run& run : runs) all.push_back(&(run.*profile));
+  return all;
 }
 
 }  // namespace
@@ -50,16 +58,17 @@ Figure fig4_experiment_figure(const analysis::PaperExperiments& experiments, con
 }
 
 std::vector<Figure> fig4_figures(const VariantStudy& study, const Provenance& provenance) {
-  return {panel(id_of("fig4-" + study.variant.name), study.variant.name + ", 9.59°", study.fig4, provenance)};
+  return {panel(id_of("fig4-" + study.variant.name), study.variant.name + ", 9.59°",
+                {&study.fig4.fast, &study.fig4.slow}, provenance)};
 }
 
 std::vector<Figure> fig6_figures(const VariantStudy& study, const analysis::PaperExperiments& experiments,
                                  const Provenance& provenance) {
   std::vector<Figure> figures;
-  for (std::size_t j = 0; j < 4; ++j) {
-    const std::string title = fmt::format("{}, μ = {:.2f}", study.variant.name, analysis::fig6_friction[j]);
-    figures.push_back(panel(id_of(fmt::format("fig6-{}-{:.2f}", study.variant.name, analysis::fig6_friction[j])), title,
-                            study.fig6[j], provenance));
+  for (const analysis::LaunchPanel& of : study.fig6) {
+    const std::string title = fmt::format("{}, μ = {:.2f}", study.variant.name, of.friction);
+    figures.push_back(panel(id_of(fmt::format("fig6-{}-{:.2f}", study.variant.name, of.friction)), title,
+                            lines(of.runs, &analysis::LaunchRun::measured_legs), provenance));
     add_experiment(figures.back(), experiments);
   }
   return figures;
@@ -68,10 +77,10 @@ std::vector<Figure> fig6_figures(const VariantStudy& study, const analysis::Pape
 std::vector<Figure> fig7_figures(const VariantStudy& study, const analysis::PaperExperiments& experiments,
                                  const Provenance& provenance) {
   std::vector<Figure> figures;
-  for (std::size_t j = 0; j < 4; ++j) {
-    const std::string title = fmt::format("{}, sd of μ {:.2f}", study.variant.name, analysis::fig7_friction_sd[j]);
-    figures.push_back(panel(id_of(fmt::format("fig7-{}-{:.2f}", study.variant.name, analysis::fig7_friction_sd[j])),
-                            title, study.fig7[j], provenance));
+  for (const analysis::SpreadPanel& of : study.fig7) {
+    const std::string title = fmt::format("{}, sd of μ {:.2f}", study.variant.name, of.friction_sd);
+    figures.push_back(panel(id_of(fmt::format("fig7-{}-{:.2f}", study.variant.name, of.friction_sd)), title,
+                            lines(of.runs, &analysis::SpreadRun::profile), provenance));
     add_experiment(figures.back(), experiments);
   }
   return figures;
@@ -87,16 +96,15 @@ std::vector<Figure> fig8_figures(const VariantStudy& study, const Provenance& pr
   figure.provenance = provenance;
   Series tangential{"tangential, net", Style::points, {}, {}, {}, {}, 0},
       normal{"normal", Style::points, {}, {}, {}, {}, 1};
-  for (std::size_t k = 0; k < 4; ++k) {
-    const double sd = 0.05 * static_cast<double>(k + 1);
+  for (const auto& [sd, losses] : study.fig8) {
     const auto add = [](Series& series, double x, const analysis::MeanSpread& spread) {
       series.x.push_back(x);
       series.y.push_back(spread.mean);
       series.lower.push_back(spread.mean - spread.sd);
       series.upper.push_back(spread.mean + spread.sd);
     };
-    add(tangential, sd - 0.002, study.fig8[k].tangential_net);
-    add(normal, sd + 0.002, study.fig8[k].normal);
+    add(tangential, sd - 0.002, losses.tangential_net);
+    add(normal, sd + 0.002, losses.normal);
   }
   figure.series = {std::move(tangential), std::move(normal)};
   return {figure};
@@ -105,10 +113,10 @@ std::vector<Figure> fig8_figures(const VariantStudy& study, const Provenance& pr
 std::vector<Figure> fig9_figures(const VariantStudy& study, const analysis::PaperExperiments& experiments,
                                  const Provenance& provenance) {
   std::vector<Figure> figures;
-  for (std::size_t n = 0; n < 4; ++n) {
-    const std::string title = fmt::format("{}, mean of μ {:.1f}", study.variant.name, analysis::fig9_friction[n]);
-    figures.push_back(panel(id_of(fmt::format("fig9-{}-{:.1f}", study.variant.name, analysis::fig9_friction[n])), title,
-                            study.fig9[n], provenance));
+  for (const analysis::MeanPanel& of : study.fig9) {
+    const std::string title = fmt::format("{}, mean of μ {:.1f}", study.variant.name, of.friction);
+    figures.push_back(panel(id_of(fmt::format("fig9-{}-{:.1f}", study.variant.name, of.friction)), title,
+                            lines(of.runs, &analysis::MeanRun::profile), provenance));
     add_experiment(figures.back(), experiments);
   }
   return figures;

@@ -13,8 +13,11 @@ using analysis::VariantStudy;
 // Mean steady speed over trials, with its interval.
 Cell steady_cell(const std::vector<double>& trial_means) {
   if (trial_means.size() < 2) return "";
-  return mean_interval(analysis::summarize(trial_means));
+  return mean_interval(analysis::speed_summary(trial_means));
 }
+
+// Whether its steady speeds can be tested.
+bool reaches_steady(const StudiedProfile& profile) { return profile.steady.size() >= 2; }
 
 Cell sd_cell(double sd) { return sd > 0 ? Cell(sd) : Cell(""); }
 
@@ -41,6 +44,14 @@ const char* const variants_note =
 std::string finding_text(const analysis::Finding& finding) {
   if (finding.ours.empty()) return "";
   return analysis::verdict_text(finding.verdict) + ": " + finding.ours;
+}
+
+// The verdict on a claim under one variant. @throws std::out_of_range if it was not studied
+analysis::ClaimVerdict verdict_of(const analysis::Claim& claim, const Studies& studies, dynamics::Law law,
+                                  analysis::RestReading reading) {
+  std::size_t at = 0;
+  while (at < studies.size() && (studies[at].variant.law != law || studies[at].variant.reading != reading)) ++at;
+  return claim.findings.at(at).verdict;
 }
 
 Table start(const char* id, const std::string& title, const Provenance& provenance) {
@@ -82,20 +93,18 @@ Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& s
     table.rows.push_back(std::move(row));
   };
   // Figures first: at 7.02 deg with sds of 0.1.
-  const auto plain = [](const Estimate& e) {
-    return fmt::format("{:.3f} ({:.3f} to {:.3f})", e.value, e.lower, e.upper);
-  };
   add("steady speed [rad/s]", [&](const VariantStudy& s) {
-    const std::vector<double>& means = s.fig7[1][1].trial_means;
+    const std::vector<double>& means = s.usual_spreads().profile.trial_means;
     if (means.size() < 2) return std::string("none gets there");
-    return plain(mean_interval(analysis::summarize(means)));
+    return format_estimate(mean_interval(analysis::speed_summary(means)));
   });
   add("trials that rest within 16 collisions", [](const VariantStudy& s) {
-    return s.variant.reading == analysis::RestReading::goes_on ? std::string("cannot")
-                                                               : fmt::format("{:.3f}", s.fig7[1][1].rest_share);
+    return s.variant.reading == analysis::RestReading::goes_on
+               ? std::string("cannot")
+               : fmt::format("{:.3f}", s.usual_spreads().profile.rest_share);
   });
   add("largest source of the steady speed's variance (total index)", [](const VariantStudy& s) {
-    const std::vector<analysis::SobolIndex>& group = s.variance[1].steady_speed.group;
+    const std::vector<analysis::SobolIndex>& group = s.usual_variance().shares.steady_speed.group;
     std::size_t most = 0;
     for (std::size_t g = 1; g < group.size(); ++g)
       if (group[g].total.value > group[most].total.value) most = g;
@@ -103,13 +112,17 @@ Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& s
                          : fmt::format("{} ({:.2f})", analysis::variance_sources[most], group[most].total.value);
   });
   add("friction's net loss, normal loss [J]", [](const VariantStudy& s) {
-    return fmt::format("{:.3f}, {:.3f}", s.fig8[1].tangential_net.mean, s.fig8[1].normal.mean);
+    return fmt::format("{:.3f}, {:.3f}", s.usual_losses().losses.tangential_net.mean,
+                       s.usual_losses().losses.normal.mean);
   });
   std::size_t kept = 0;
   for (const analysis::Claim& claim : claims) {
-    const analysis::ClaimVerdict goes_on = claim.findings[0].verdict, rests = claim.findings[1].verdict,
-                                 coulomb = claim.findings[2].verdict;
-    const bool reading = goes_on != rests, law = coulomb != goes_on && coulomb != rests;
+    using enum analysis::RestReading;
+    const analysis::ClaimVerdict published_goes_on = verdict_of(claim, studies, dynamics::Law::published, goes_on),
+                                 published_rests = verdict_of(claim, studies, dynamics::Law::published, rests),
+                                 coulomb = verdict_of(claim, studies, dynamics::Law::coulomb, rests);
+    const bool reading = published_goes_on != published_rests,
+               law = coulomb != published_goes_on && coulomb != published_rests;
     if (!reading && !law) {
       ++kept;
       continue;
@@ -175,10 +188,9 @@ Table variance_table(const Studies& studies, const Provenance& provenance) {
     if (s.variant.reading == analysis::RestReading::goes_on) continue;  // one law, one set of indices
     const std::string law(dynamics::law_name(s.variant.law));
     for (const bool steps : {false, true})
-      for (std::size_t f = 0; f < s.variance.size(); ++f) {
-        const analysis::SobolResult& result = steps ? s.variance[f].steps : s.variance[f].steady_speed;
-        std::vector<Cell> row{law, steps ? "steps" : "steady speed [rad/s]", analysis::variance_friction[f],
-                              result.mean, result.sd};
+      for (const auto& [friction, shares] : s.variance) {
+        const analysis::SobolResult& result = steps ? shares.steps : shares.steady_speed;
+        std::vector<Cell> row{law, steps ? "steps" : "steady speed [rad/s]", friction, result.mean, result.sd};
         for (std::size_t g = 0; g < analysis::variance_sources.size(); ++g) {
           if (result.group.empty()) {
             row.insert(row.end(), {"", ""});
@@ -208,8 +220,8 @@ Table fig4_table(const Studies& studies, const analysis::PaperExperiments& exper
                    {"fast, steady", "rad/s", NumberFormat::significant, 4},
                    {"slow, steady", "rad/s", NumberFormat::significant, 4},
                    {"difference", "rad/s", NumberFormat::fixed, 3},
-                   {"P, trial means"},
-                   {"P, all collisions"},
+                   {"P, trial means", "", NumberFormat::p_value, 2},
+                   {"P, all collisions", "", NumberFormat::p_value, 2},
                    {"not told apart from collision"}};
   const auto add = [&](const std::string& source, const analysis::TrialSpeeds& fast,
                        const analysis::TrialSpeeds& slow) {
@@ -219,14 +231,14 @@ Table fig4_table(const Studies& studies, const analysis::PaperExperiments& exper
     if (c.trial_means)
       row.insert(row.end(), {Estimate{c.trial_means->welch.difference.value, c.trial_means->welch.difference.lower,
                                       c.trial_means->welch.difference.upper},
-                             p_text(c.trial_means->welch.p), p_text(c.all_collisions->pooled.p)});
+                             p_cell(c.trial_means->welch.p), p_cell(c.all_collisions->pooled.p)});
     else
       row.insert(row.end(), {"", "", ""});
     row.push_back(c.meet ? Cell(*c.meet) : Cell("never"));
     table.rows.push_back(std::move(row));
   };
   add(experiment_name(experiments), experiments.fast_959, experiments.slow_959);
-  for (const VariantStudy& s : studies) add(s.variant.name, s.fig4[0].speeds, s.fig4[1].speeds);
+  for (const VariantStudy& s : studies) add(s.variant.name, s.fig4.fast.speeds, s.fig4.slow.speeds);
   table.notes = {
       "Simulated with η, μ ~ N(0.4, 0.1²): the paper states no contact for this figure. Paper: P > 0.07 beyond the "
       "12th collision (two-sided t-test).",
@@ -237,26 +249,27 @@ Table fig4_table(const Studies& studies, const analysis::PaperExperiments& exper
 Table fig6_table(const Studies& studies, const Provenance& provenance) {
   Table table = start("fig6", "Fig. 6: three launch speeds, constant friction, η ~ N(0.4, 0.2²), 7.02 deg", provenance);
   table.columns = {{"variant"}, {"μ", "", NumberFormat::fixed, 2}};
-  for (const double launch : analysis::fig6_launch)
-    table.columns.push_back({fmt::format("steady, launch {}", launch), "rad/s", NumberFormat::significant, 4});
+  if (!studies.empty())
+    for (const analysis::LaunchRun& run : studies.front().fig6.front().runs)
+      table.columns.push_back({fmt::format("steady, launch {}", run.launch), "rad/s", NumberFormat::significant, 4});
   table.columns.push_back({"sd of a collision", "rad/s", NumberFormat::fixed, 3});
-  for (const char* pair : {"P 1-2", "P 1-3", "P 2-3"}) table.columns.push_back({pair});
-  for (const char* pair : {"P 1-2 by trial", "P 1-3 by trial", "P 2-3 by trial"}) table.columns.push_back({pair});
+  for (const char* pair : {"P 1-2", "P 1-3", "P 2-3"}) table.columns.push_back({pair, "", NumberFormat::p_value, 2});
+  for (const char* pair : {"P 1-2 by trial", "P 1-3 by trial", "P 2-3 by trial"})
+    table.columns.push_back({pair, "", NumberFormat::p_value, 2});
   table.columns.push_back({"trials that rest", "", NumberFormat::fixed, 3});
   for (const VariantStudy& s : studies)
-    for (std::size_t j = 0; j < 4; ++j) {
-      std::vector<Cell> row{s.variant.name, analysis::fig6_friction[j]};
-      for (const StudiedProfile& profile : s.fig6[j]) row.push_back(steady_cell(profile.trial_means));
-      row.push_back(sd_cell(s.fig6[j][2].steady_sd()));
-      const auto p_cells = [&](const std::array<double, 3>& p) {
-        constexpr std::array<std::array<std::size_t, 2>, 3> pairs{{{0, 1}, {0, 2}, {1, 2}}};
-        for (std::size_t i = 0; i < 3; ++i)
-          row.push_back(
-              s.fig6[j][pairs[i][0]].steady.size() < 2 || s.fig6[j][pairs[i][1]].steady.size() < 2 ? "" : p_text(p[i]));
-      };
-      p_cells(s.fig6_p[j]);
-      p_cells(s.fig6_p_trials[j]);
-      row.emplace_back(s.fig6[j][2].rest_share);
+    for (const analysis::LaunchPanel& panel : s.fig6) {
+      std::vector<Cell> row{s.variant.name, panel.friction};
+      for (const analysis::LaunchRun& run : panel.runs) row.push_back(steady_cell(run.measured_legs.trial_means));
+      const StudiedProfile& fastest = panel.runs.back().measured_legs;
+      row.push_back(sd_cell(fastest.steady_sd()));
+      for (double analysis::SteadyTest::*p : {&analysis::SteadyTest::p, &analysis::SteadyTest::p_by_trial})
+        for (const analysis::LaunchPair& pair : panel.pairs) {
+          const bool both = reaches_steady(panel.run(pair.first).measured_legs) &&
+                            reaches_steady(panel.run(pair.second).measured_legs);
+          row.push_back(both ? p_cell(pair.alike.*p) : Cell(""));
+        }
+      row.emplace_back(fastest.rest_share);
       table.rows.push_back(std::move(row));
     }
   table.notes = {
@@ -275,15 +288,15 @@ Table equal_legs_table(const Studies& studies, const Provenance& provenance) {
                    {"launch", "rad/s", NumberFormat::fixed, 2},
                    {"measured legs", "rad/s", NumberFormat::significant, 4},
                    {"equal legs", "rad/s", NumberFormat::significant, 4},
-                   {"P"},
-                   {"P by trial"}};
+                   {"P", "", NumberFormat::p_value, 2},
+                   {"P by trial", "", NumberFormat::p_value, 2}};
   for (const VariantStudy& s : studies)
-    for (std::size_t j = 0; j < 4; ++j)
-      for (std::size_t k = 0; k < 3; ++k) {
-        const bool both = s.fig6[j][k].steady.size() >= 2 && s.equal_legs[j][k].steady.size() >= 2;
-        table.rows.push_back({s.variant.name, analysis::fig6_friction[j], analysis::fig6_launch[k],
-                              steady_cell(s.fig6[j][k].trial_means), steady_cell(s.equal_legs[j][k].trial_means),
-                              both ? p_text(s.legs_p[j][k]) : "", both ? p_text(s.legs_p_trials[j][k]) : ""});
+    for (const analysis::LaunchPanel& panel : s.fig6)
+      for (const auto& [launch, measured, equal, alike] : panel.runs) {
+        const bool both = reaches_steady(measured) && reaches_steady(equal);
+        table.rows.push_back({s.variant.name, panel.friction, launch, steady_cell(measured.trial_means),
+                              steady_cell(equal.trial_means), both ? p_cell(alike.p) : Cell(""),
+                              both ? p_cell(alike.p_by_trial) : Cell("")});
       }
   table.notes = {
       "Steady speeds (from the 13th collision on) of the runs of Fig. 6. Paper: P > 0.1 everywhere. Collisions 13 to "
@@ -302,18 +315,15 @@ Table fig7_table(const Studies& studies, const analysis::PaperExperiments& exper
                    {"sd of a collision", "rad/s", NumberFormat::fixed, 3},
                    {"trials that rest", "", NumberFormat::fixed, 3},
                    {fmt::format("{} less simulated", experiment_name(experiments)), "rad/s", NumberFormat::fixed, 3},
-                   {"P"}};
+                   {"P", "", NumberFormat::p_value, 2}};
   for (const VariantStudy& s : studies)
-    for (std::size_t j = 0; j < 4; ++j)
-      for (std::size_t k = 0; k < 3; ++k) {
-        const StudiedProfile& profile = s.fig7[j][k];
-        const std::optional<analysis::TTest>& test = s.fig7_test[j][k];
+    for (const analysis::SpreadPanel& panel : s.fig7)
+      for (const auto& [restitution_sd, profile, test] : panel.runs)
         table.rows.push_back(
-            {s.variant.name, analysis::fig7_friction_sd[j], analysis::fig7_restitution_sd[k],
-             steady_cell(profile.trial_means), sd_cell(profile.steady_sd()), profile.rest_share,
+            {s.variant.name, panel.friction_sd, restitution_sd, steady_cell(profile.trial_means),
+             sd_cell(profile.steady_sd()), profile.rest_share,
              test ? Cell(Estimate{test->difference.value, test->difference.lower, test->difference.upper}) : Cell(""),
-             test ? p_text(test->p) : ""});
-      }
+             test ? p_cell(test->p) : Cell("")});
   table.notes = {
       "η ~ N(0.4, sd²), μ ~ N(0.4, sd²), launch N(7.35, 0.19²) rad/s. P: pooled t-test of all collisions from the 13th "
       "on "
@@ -333,17 +343,17 @@ Table fig8_table(const Studies& studies, const Provenance& provenance) {
                    {"normal, sd", "J", NumberFormat::fixed, 3},
                    {"paper"}};
   for (const VariantStudy& s : studies)
-    for (std::size_t k = 0; k < 4; ++k) {
-      const analysis::MeanSpread &t = s.fig8[k].tangential_net, &n = s.fig8[k].normal;
-      table.rows.push_back({s.variant.name, 0.05 * static_cast<double>(k + 1), with_error(t.mean, t.standard_error),
-                            t.sd,
-                            k == 0   ? "0.05 (0.03)"
-                            : k == 3 ? "0.11 (0.19)"
-                                     : "",
+    for (const auto& [sd, losses] : s.fig8) {
+      const analysis::MeanSpread &t = losses.tangential_net, &n = losses.normal;
+      const bool narrowest = sd == s.fig8.front().sd, widest = sd == s.fig8.back().sd;
+      table.rows.push_back({s.variant.name, sd, with_error(t.mean, t.standard_error), t.sd,
+                            narrowest ? "0.05 (0.03)"
+                            : widest  ? "0.11 (0.19)"
+                                      : "",
                             with_error(n.mean, n.standard_error), n.sd,
-                            k == 0   ? "0.17 (0.06)"
-                            : k == 3 ? "0.17 (0.1)"
-                                     : ""});
+                            narrowest ? "0.17 (0.06)"
+                            : widest  ? "0.17 (0.1)"
+                                      : ""});
     }
   table.notes = {
       "Launch N(7.35, 0.19²) rad/s, 16 collisions. Net: friction loss less the potential energy gained by slipping "
@@ -362,13 +372,10 @@ Table fig9_table(const Studies& studies, const Provenance& provenance) {
                    {"steady speed", "rad/s", NumberFormat::significant, 4},
                    {"trials that rest", "", NumberFormat::fixed, 3}};
   for (const VariantStudy& s : studies)
-    for (std::size_t n = 0; n < 4; ++n)
-      for (std::size_t m = 0; m < 3; ++m) {
-        const StudiedProfile& profile = s.fig9[n][m];
-        table.rows.push_back({s.variant.name, analysis::fig9_friction[n], analysis::fig9_restitution[m],
-                              sd_cell(profile.transient_sd()), sd_cell(profile.steady_sd()),
-                              steady_cell(profile.trial_means), profile.rest_share});
-      }
+    for (const analysis::MeanPanel& panel : s.fig9)
+      for (const auto& [restitution, profile] : panel.runs)
+        table.rows.push_back({s.variant.name, panel.friction, restitution, sd_cell(profile.transient_sd()),
+                              sd_cell(profile.steady_sd()), steady_cell(profile.trial_means), profile.rest_share});
   table.notes = {"Launch N(7.35, 0.19²) rad/s. Sds between trials; empty where fewer than two trials get that far.",
                  variants_note};
   return table;

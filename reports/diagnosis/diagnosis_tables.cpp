@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/statistics/interval_95.h"
 #include "dynamics/wheel/effect_catalogue.h"
 
@@ -27,6 +28,24 @@ std::string short_number(double value) {
   return std::isnan(value) ? "unknown" : format_number(value, NumberFormat::general, 3);
 }
 
+// A number whose 90 % interval may not be known.
+Cell with_interval(double value, double lower, double upper) {
+  if (std::isnan(value) || std::isnan(lower) || std::isnan(upper)) return known(value);
+  return Estimate{value, lower, upper};
+}
+
+Cell with_interval(const EstimatedParameter& p) {
+  return p.fitted ? with_interval(p.value, p.lower, p.upper) : known(p.value);
+}
+
+// A nested model that comes out worse than the one it holds, or evidence of e^-100, says that the fit is no good.
+Cell unless_hopeless(double value) {
+  constexpr double hopeless = -100;
+  if (value < hopeless)
+    return NotShown{{value, value, value}, fmt::format("< {}", format_number(hopeless, NumberFormat::general, 3))};
+  return known(value);
+}
+
 // "leg 4, friction_ratio 0.879 (0.864 to 0.894)"; a list without its intervals.
 std::string parameters_text(const std::vector<EstimatedParameter>& parameters) {
   std::string text;
@@ -35,8 +54,8 @@ std::string parameters_text(const std::vector<EstimatedParameter>& parameters) {
     const bool goes_on = i > 0 && parameters[i - 1].name == p.name;
     const bool in_list = goes_on || (i + 1 < parameters.size() && parameters[i + 1].name == p.name);
     text += goes_on ? "; " : (text.empty() ? "" : ", ") + p.name + " ";
-    text += short_number(p.value);
-    if (p.fitted && !in_list) text += fmt::format(" ({} to {})", short_number(p.lower), short_number(p.upper));
+    const bool interval = p.fitted && !in_list && !std::isnan(p.value + p.lower + p.upper);
+    text += interval ? format_estimate({p.value, p.lower, p.upper}, NumberFormat::general) : short_number(p.value);
   }
   return text;
 }
@@ -80,8 +99,7 @@ Table data_table(const Diagnosis& d) {
 Table gap_table(const Diagnosis& d) {
   return {.id = "gap",
           .title = "Is there a gap?",
-          .notes = {"The chance levels are not followed below 10⁻¹²: a p of one or two of those is at most that."},
-          .columns = {{"model"}, {"against"}, {"p", "", NumberFormat::significant, 2}},
+          .columns = {{"model"}, {"against"}, {"p", "", NumberFormat::p_value, 2}},
           .rows = {{"as given", "anything, the launch and the contact included", d.gap.p_as_given},
                    {"as given", "other contact parameters", d.gap.p_recalibration},
                    {"recalibrated", "anything else", d.gap.p_value},
@@ -92,10 +110,8 @@ Table gap_table(const Diagnosis& d) {
 Table contact_table(const Diagnosis& d) {
   Table table{.id = "contact",
               .title = "Recalibrated parameters",
-              .columns = {{"parameter"}, {"value"}, {"low 90 %"}, {"high 90 %"}}};
-  for (const EstimatedParameter& p : d.gap.contact)
-    table.rows.push_back(
-        {p.name, known(p.value), p.fitted ? known(p.lower) : Cell(""), p.fitted ? known(p.upper) : Cell("")});
+              .columns = {{"parameter"}, {.name = "value (90 %)", .level = 90}}};
+  for (const EstimatedParameter& p : d.gap.contact) table.rows.push_back({p.name, with_interval(p)});
   return table;
 }
 
@@ -109,7 +125,7 @@ Table where_table(const Diagnosis& d) {
                           {"size (simultaneous 95 % band)", "", NumberFormat::significant, 2},
                           {"of"},
                           {"score"},
-                          {"adjusted p", "", NumberFormat::significant, 2}}};
+                          {"adjusted p", "", NumberFormat::p_value, 2}}};
   for (const GapCell& cell : beyond_chance(d.gap.recalibrated))
     table.rows.push_back({cell.facet, cell.aspect, cell.at,
                           Estimate{cell.size, cell.size - cell.band, cell.size + cell.band}, cell.unit, cell.statistic,
@@ -133,8 +149,8 @@ Table map_table(const Diagnosis& d) {
                           {"size"},
                           {"band"},
                           {"of"},
-                          {"adjusted p"},
-                          {"false discovery"}}};
+                          {"adjusted p", "", NumberFormat::p_value},
+                          {"false discovery", "", NumberFormat::p_value}}};
   const auto score_of = [](const analysis::GapMap& map, std::size_t i, const GapCell& cell) {
     const bool same = i < map.cells.size() && map.cells[i].facet == cell.facet && map.cells[i].at == cell.at &&
                       map.cells[i].aspect == cell.aspect;
@@ -157,7 +173,7 @@ Table causes_table(const Diagnosis& d) {
                           {"probability", "", NumberFormat::fixed, 3},
                           {"95 % set"},
                           {"2 Δ ln L", "", NumberFormat::fixed, 1},
-                          {"p alone", "", NumberFormat::significant, 2},
+                          {"p alone", "", NumberFormat::p_value, 2},
                           {"ln Bayes factor", "", NumberFormat::fixed, 1},
                           {"parameters (90 % intervals)"}}};
   std::vector<std::pair<double, std::vector<Cell>>> rows;
@@ -165,8 +181,8 @@ Table causes_table(const Diagnosis& d) {
     const std::string name = cause.name();
     const bool inside = std::find(d.causes.set.begin(), d.causes.set.end(), name) != d.causes.set.end();
     rows.push_back({cause.probability,
-                    {name, cause.probability, inside ? "in" : "", known(cause.gain), known(cause.p_value),
-                     known(cause.evidence), parameters_text(cause)}});
+                    {name, cause.probability, inside ? "in" : "", unless_hopeless(cause.gain), known(cause.p_value),
+                     unless_hopeless(cause.evidence), parameters_text(cause)}});
   }
   for (const auto& [name, p] :
        {std::pair("no gap", d.causes.p_no_gap), std::pair("recalibration", d.causes.p_recalibrate),
@@ -181,36 +197,40 @@ Table parameters_table(const Diagnosis& d) {
   Table table{.id = "parameters",
               .title = "Parameters of the effects",
               .notes = {"Without interval: chosen from a list (a leg, an interval, a frequency)."},
-              .columns = {{"cause"}, {"effect"}, {"parameter"}, {"value"}, {"low 90 %"}, {"high 90 %"}, {"unit"}}};
+              .columns = {{"cause"}, {"effect"}, {"parameter"}, {.name = "value (90 %)", .level = 90}, {"unit"}}};
   for (const Cause& cause : d.causes.ranked)
     for (std::size_t e = 0; e < cause.parameters.size(); ++e)
       for (const EstimatedParameter& p : cause.parameters[e])
-        table.rows.push_back({cause.name(), cause.effects.at(e), p.name, known(p.value),
-                              p.fitted ? known(p.lower) : Cell(""), p.fitted ? known(p.upper) : Cell(""),
+        table.rows.push_back({cause.name(), cause.effects.at(e), p.name, with_interval(p),
                               std::string(effect_unit(cause.effects.at(e), p.name))});
   return table;
 }
 
 Table shrinkage_table(const Diagnosis& d) {
-  Table table{.id = "shrinkage",
-              .title = "How far it shrinks, held out",
-              .notes = {"Floor: the same measure on data of the last model itself. Closed: (as given − with effect) / "
-                        "(as given − floor); empty where that denominator's interval covers zero."},
-              .columns = {{"measure"},
-                          {"unit"},
-                          {"as given"},
-                          {"as given, low 90 %"},
-                          {"as given, high 90 %"},
-                          {"recalibrated"},
-                          {"with effect"},
-                          {"floor"},
-                          {"closed"},
-                          {"closed, low 90 %"},
-                          {"closed, high 90 %"}}};
-  for (const analysis::Shrinkage& s : d.shrinkage.measures)
-    table.rows.push_back({s.measure, s.unit, known(s.baseline), known(s.baseline_lower), known(s.baseline_upper),
-                          known(s.recalibrated), known(s.with_effect), known(s.floor), known(s.closed),
-                          known(s.closed_lower), known(s.closed_upper)});
+  Table table{
+      .id = "shrinkage",
+      .title = "How far it shrinks, held out",
+      .notes =
+          {"Floor: the same measure on data of the last model itself. Closed: (as given − with effect) / (as given "
+           "− floor); not known where the gap may be none or the interval is wider than the gap.",
+           "Nats: natural logarithms of the likelihood; a model better by 0.1 nats a collision makes each collision "
+           "exp(0.1) = 1.1 times as probable."},
+      .columns = {{"measure"},
+                  {"unit"},
+                  {.name = "as given (90 %)", .level = 90},
+                  {"recalibrated"},
+                  {"with effect"},
+                  {"floor"},
+                  {.name = "closed (90 %)", .level = 90}}};
+  for (const analysis::Shrinkage& s : d.shrinkage.measures) {
+    Cell closed = analysis::closed_unknown(s);
+    if (s.closed && s.closed_lower && s.closed_upper) {
+      const Estimate share{*s.closed, *s.closed_lower, *s.closed_upper};
+      closed = analysis::closed_is_known(s) ? Cell(share) : Cell(NotShown{share, analysis::closed_unknown(s)});
+    }
+    table.rows.push_back({s.measure, s.unit, with_interval(s.baseline, s.baseline_lower, s.baseline_upper),
+                          known(s.recalibrated), known(s.with_effect), known(s.floor), closed});
+  }
   return table;
 }
 
@@ -218,14 +238,9 @@ Table steps_table(const Diagnosis& d) {
   const analysis::StepsBeforeFailure& s = d.shrinkage.steps;
   return {.id = "steps",
           .title = "Expected steps before failure",
-          .columns = {{"observed"},
-                      {"observed, low 90 %"},
-                      {"observed, high 90 %"},
-                      {"as given"},
-                      {"recalibrated"},
-                      {"with effect"}},
-          .rows = {{positive(s.observed), positive(s.observed_lower), positive(s.observed_upper), positive(s.baseline),
-                    positive(s.recalibrated), positive(s.with_effect)}}};
+          .columns = {{.name = "observed (90 %)", .level = 90}, {"as given"}, {"recalibrated"}, {"with effect"}},
+          .rows = {{s.observed > 0 ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
+                    positive(s.baseline), positive(s.recalibrated), positive(s.with_effect)}}};
 }
 
 Table profile_table(const Diagnosis& d) {

@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "analysis/diagnosis/diagnosis_sentences.h"
 #include "reports/diagnosis/diagnosis_tables.h"
 #include "reports/output/text_table.h"
 
@@ -34,33 +35,38 @@ Table visibility_lines(const analysis::Diagnosis& d) {
   return table;
 }
 
-// "0.99 (0.94 to 1.05)"
 Table shrinkage_lines(const analysis::Diagnosis& d) {
   Table table{
       .id = "shrinkage",
       .title = "How far it shrinks",
+      .notes =
+          {"Nats: natural logarithms of the likelihood. A model better by 0.1 nats a collision makes each collision "
+           "exp(0.1) = 1.1 times as probable, a hundred of them 22,000 times."},
       .columns = {
           {"measure"}, {"unit"}, {"as given"}, {"recalibrated"}, {"with effect"}, {"floor"}, {"closed (90 %)"}}};
-  const auto percent = [](double share) { return fmt::format("{:.0f}", 100 * share); };
   const auto known = [](double value) { return std::isnan(value) ? Cell("") : Cell(value); };
-  for (const analysis::Shrinkage& s : d.shrinkage.measures)
+  for (const analysis::Shrinkage& s : d.shrinkage.measures) {
+    std::string closed = analysis::closed_unknown(s);
+    if (analysis::closed_is_known(s)) {
+      const DecimalEstimate e =
+          to_decimal({100 * *s.closed, 100 * *s.closed_lower, 100 * *s.closed_upper}, NumberFormat::general, 3);
+      closed = fmt::format("{} % ({} to {})", plain_text(e.value), plain_text(e.lower), plain_text(e.upper));
+    }
     table.rows.push_back(
-        {s.measure, s.unit, known(s.baseline), known(s.recalibrated), known(s.with_effect), known(s.floor),
-         s.closed && s.closed_lower && s.closed_upper
-             ? fmt::format("{} % ({} to {})", percent(*s.closed), percent(*s.closed_lower), percent(*s.closed_upper))
-             : std::string("not to be said")});
+        {s.measure, s.unit, known(s.baseline), known(s.recalibrated), known(s.with_effect), known(s.floor), closed});
+  }
   return table;
-}
-
-std::string part(const Table& table, std::size_t most = 1000) {
-  return table.rows.empty() ? "" : "\n" + to_text(table, most);
 }
 
 }  // namespace
 
-std::string diagnosis_text(const analysis::Diagnosis& d) {
+std::string diagnosis_text(const analysis::Diagnosis& d, std::size_t width) {
+  const auto part = [&](const Table& table, std::size_t most = 1000) {
+    return table.rows.empty() ? "" : "\n" + to_text(table, most, width);
+  };
   std::string text = fmt::format("verdict: {}\n", analysis::verdict_name(d.verdict));
-  for (const std::string& sentence : d.sentences) text += wrapped(sentence);
+  for (const std::string& sentence : d.sentences) text += wrapped(sentence, "", width);
+  text += wrapped("Next: " + analysis::next_step(d), "", width);
   text += part(gap_table(d));
   text += part(contact_table(d));
 

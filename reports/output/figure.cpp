@@ -50,7 +50,7 @@ std::string tick(std::string_view text) {
   return quote(doubled);
 }
 
-std::string axis_label(const Axis& axis) {
+std::string axis_label(const FigureAxis& axis) {
   return axis.unit.empty() ? axis.label : axis.label + " [" + axis.unit + "]";
 }
 
@@ -300,7 +300,7 @@ void check_bars(const Figure& figure, const BarChart& bars) {
                   bars.value.size(), bars.lower.size(), bars.upper.size(), bars.colour.size()));
 }
 
-void append_bars(std::string& script, const BarChart& bars, const Axis& x, const std::string& ends) {
+void append_bars(std::string& script, const BarChart& bars, const FigureAxis& x, const std::string& ends) {
   const std::size_t n = bars.name.size();
   std::string boxes = "$bars << END\n", labels = "$labels << END\n", whiskers;
   double least = 0, most = 0;
@@ -335,7 +335,7 @@ void append_bars(std::string& script, const BarChart& bars, const Axis& x, const
       ", \\\n     $labels using 1:2:3 with labels noenhanced left offset character 0.6,0 textcolor rgb '#222222'\n";
 }
 
-std::string range(const Axis& axis) {
+std::string range(const FigureAxis& axis) {
   const auto end = [](const std::optional<double>& value) { return value ? number(*value) : std::string("*"); };
   return "[" + end(axis.low) + ":" + end(axis.high) + "]";
 }

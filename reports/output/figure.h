@@ -9,7 +9,7 @@
 
 namespace metastable::reports {
 
-struct Axis {
+struct FigureAxis {
   std::string label;
   std::string unit = {};           ///< "" for none; shown as "label [unit]"
   bool logarithmic = false;        ///< values <= 0 are then left out
@@ -79,8 +79,8 @@ enum class Legend { top_right, top_left, bottom_right, bottom_left, below, none 
 struct Figure {
   std::string id;     ///< short name of letters, digits and '-': file name and HTML anchor
   std::string title;  ///< shown above the figure and the SVG's <title>; "" for none
-  Axis x;
-  Axis y;
+  FigureAxis x;
+  FigureAxis y;
   std::vector<Series> series = {};
   std::vector<ReferenceLine> reference_lines = {};
   Diagonal diagonal = Diagonal::no;

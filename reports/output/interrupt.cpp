@@ -17,6 +17,9 @@ extern "C" void remember_signal(int signal) { received_signal = signal; }
 Interrupted::Interrupted(int signal)
     : std::runtime_error(signal == SIGTERM ? "terminated" : "interrupted"), exit_code_(128 + signal) {}
 
+Interrupted::Interrupted(const Interrupted& one, const std::string& more)
+    : std::runtime_error(one.what() + (": " + more)), exit_code_(one.exit_code()) {}
+
 void catch_interrupts() {
   struct sigaction action {};
   action.sa_handler = remember_signal;

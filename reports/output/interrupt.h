@@ -2,6 +2,7 @@
 // Ctrl-C and SIGTERM as an exception, so that temporaries are removed and nothing is left half-written.
 
 #include <stdexcept>
+#include <string>
 
 namespace metastable::reports {
 
@@ -9,6 +10,8 @@ namespace metastable::reports {
 class Interrupted : public std::runtime_error {
  public:
   explicit Interrupted(int signal);
+  /// The same interruption, with what became of the work: "interrupted: ...".
+  Interrupted(const Interrupted& one, const std::string& more);
   int exit_code() const { return exit_code_; }
 
  private:

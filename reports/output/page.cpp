@@ -19,7 +19,7 @@ constexpr const char* page_template = R"html(<!DOCTYPE html>
 :root { --ink: #1c1f23; --soft: #5b636e; --rule: #d9dee4; --link: #0b5c96; }
 * { box-sizing: border-box; }
 body { margin: 0; color: var(--ink); background: #fff; font: 16px/1.55 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; }
-header, main, footer { max-width: 72rem; margin: 0 auto; padding: 0 1.25rem; }
+header, main, footer { max-width: 120rem; margin: 0 auto; padding: 0 1.25rem; }
 header { padding-top: 2.5rem; }
 h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 .75rem; }
 h2 { font-size: 1.3rem; line-height: 1.3; margin: 0 0 .35rem; }
@@ -34,11 +34,13 @@ figure svg { display: block; width: 100%; max-width: 44rem; height: auto; }
 figcaption { font-size: .95rem; max-width: 46rem; }
 figure.table figcaption { font-weight: 600; margin-bottom: .4rem; }
 .scroll { overflow-x: auto; }
-table { width: max-content; border-collapse: collapse; font-size: .92rem; font-variant-numeric: tabular-nums; border-top: 2px solid var(--ink); border-bottom: 2px solid var(--ink); }
-th, td { padding: .3rem .8rem; text-align: right; white-space: nowrap; vertical-align: bottom; }
-th { white-space: normal; max-width: 11rem; border-bottom: 1px solid var(--ink); font-weight: 600; }
+table { border-collapse: collapse; font-size: .92rem; font-variant-numeric: tabular-nums; border-top: 2px solid var(--ink); border-bottom: 2px solid var(--ink); }
+th, td { padding: .3rem .8rem; text-align: right; white-space: nowrap; vertical-align: top; }
+th { white-space: normal; max-width: 11rem; border-bottom: 1px solid var(--ink); font-weight: 600; vertical-align: bottom; }
 th.text, td.text { text-align: left; }
-td.text { white-space: normal; max-width: 20rem; vertical-align: top; }
+td.text, td.said { white-space: normal; max-width: 36rem; overflow-wrap: break-word; }
+.long { min-width: 14rem; }
+td.said { max-width: 16rem; color: var(--soft); }
 tbody tr:nth-child(even) { background: #f5f7f9; }
 .unit { font-weight: 400; color: var(--soft); }
 .note, .files, dl { font-size: .88rem; color: var(--soft); }

@@ -16,56 +16,7 @@ namespace {
 
 constexpr std::string_view minus_sign = "−";
 constexpr std::string_view infinite_word = "infinite";
-
-/// "-1.20e+07" taken apart: sign, mantissa digits, power of ten (0: none).
-struct Decimal {
-  bool negative = false;
-  std::string mantissa;
-  int exponent = 0;
-};
-
-void drop_trailing_zeros(std::string& digits) {
-  if (digits.find('.') == std::string::npos) return;
-  digits.erase(digits.find_last_not_of('0') + 1);
-  if (digits.back() == '.') digits.pop_back();
-}
-
-/// Finite numbers only. Powers of ten below 1e-3 and from 1e5 on, unless the format is fixed.
-Decimal to_decimal(double number, NumberFormat format, int digits) {
-  Decimal decimal;
-  if (number == 0 && format != NumberFormat::fixed) {
-    decimal.mantissa = "0";
-    return decimal;
-  }
-  std::string text;
-  if (format == NumberFormat::fixed) {
-    text = fmt::format("{:.{}f}", number, digits);
-  } else {
-    // The exponent after rounding decides, so that 99999 to three digits is 1.00e5.
-    const std::string scientific = fmt::format("{:.{}e}", number, digits - 1);
-    const std::size_t e = scientific.find('e');
-    const int exponent = std::stoi(scientific.substr(e + 1));
-    if (exponent < -3 || exponent >= 5) {
-      text = scientific.substr(0, e);
-      decimal.exponent = exponent;
-    } else {
-      double rounded = 0;
-      std::from_chars(scientific.data(), scientific.data() + scientific.size(), rounded);
-      text = fmt::format("{:.{}f}", rounded, std::max(0, digits - 1 - exponent));
-    }
-    if (format == NumberFormat::general) drop_trailing_zeros(text);
-  }
-  decimal.negative = text.front() == '-' && text.find_first_of("123456789") != std::string::npos;
-  decimal.mantissa = text.front() == '-' ? text.substr(1) : text;
-  return decimal;
-}
-
-std::string superscript(int exponent) {
-  static constexpr std::array<std::string_view, 10> digit{"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
-  std::string text = exponent < 0 ? "⁻" : "";
-  for (const char c : std::to_string(std::abs(exponent))) text += digit[static_cast<std::size_t>(c - '0')];
-  return text;
-}
+constexpr std::size_t html_long = 60;  // characters of a text that wants a wide column
 
 std::string full_precision(double number) {
   if (std::isinf(number)) return number > 0 ? std::string(infinite_word) : "-" + std::string(infinite_word);
@@ -76,10 +27,9 @@ std::string full_precision(double number) {
 
 bool has_nan(const Cell::Value& value) {
   if (const double* number = std::get_if<double>(&value)) return std::isnan(*number);
-  if (const Estimate* e = std::get_if<Estimate>(&value)) {
-    return std::isnan(e->value) || std::isnan(e->lower) || std::isnan(e->upper);
-  }
-  return false;
+  const NotShown* hidden = std::get_if<NotShown>(&value);
+  const Estimate* e = hidden ? &hidden->number : std::get_if<Estimate>(&value);
+  return e && (std::isnan(e->value) || std::isnan(e->lower) || std::isnan(e->upper));
 }
 
 void validate(const Table& table) {
@@ -103,10 +53,18 @@ bool column_has(const Table& table, std::size_t column) {
                              [&](const auto& row) { return std::holds_alternative<T>(row[column].value()); });
 }
 
+bool has_interval(const Table& table, std::size_t column) {
+  return column_has<Estimate>(table, column) || std::ranges::any_of(table.rows, [&](const auto& row) {
+           const NotShown* hidden = std::get_if<NotShown>(&row[column].value());
+           return hidden && hidden->number.lower < hidden->number.upper;
+         });
+}
+
 /// Text columns are set flush left, all others flush right.
 bool is_text(const Table& table, std::size_t column) {
   return column_has<std::string>(table, column) && !column_has<double>(table, column) &&
-         !column_has<std::int64_t>(table, column) && !column_has<Estimate>(table, column);
+         !column_has<std::int64_t>(table, column) && !column_has<Estimate>(table, column) &&
+         !column_has<NotShown>(table, column);
 }
 
 std::string heading(const Column& column, std::string_view suffix = "") {
@@ -114,7 +72,7 @@ std::string heading(const Column& column, std::string_view suffix = "") {
   return column.unit.empty() ? text : text + " [" + column.unit + "]";
 }
 
-/// A cell as people read it. `escape` is for text, `number` formats one number.
+/// A cell as people read it. `escape` is for text, `number` for a Decimal.
 template <typename Escape, typename Number>
 std::string show(const Cell& cell, const Column& column, Escape escape, Number number) {
   struct Visitor {
@@ -127,17 +85,15 @@ std::string show(const Cell& cell, const Column& column, Escape escape, Number n
       if (whole < 0) text.replace(0, 1, minus_sign);
       return escape(text);
     }
-    std::string operator()(double value) const { return number(value, column); }
-    std::string operator()(const Estimate& e) const {
-      return number(e.value, column) + " (" + number(e.lower, column) + escape(" to ") + number(e.upper, column) + ")";
+    std::string operator()(double value) const { return number(to_decimal(value, column.format, column.digits)); }
+    std::string operator()(const Estimate& estimate) const {
+      const DecimalEstimate e = to_decimal(estimate, column.format, column.digits);
+      return number(e.value) + " (" + number(e.lower) + escape(" to ") + number(e.upper) + ")";
     }
     std::string operator()(Infinite) const { return std::string(infinite_word); }
+    std::string operator()(const NotShown& hidden) const { return escape(hidden.said); }
   };
   return std::visit(Visitor{column, escape, number}, cell.value());
-}
-
-std::string plain_number(double value, const Column& column) {
-  return format_number(value, column.format, column.digits);
 }
 
 // CSV
@@ -161,6 +117,7 @@ void append_csv_cell(std::vector<std::string>& fields, const Cell& cell, bool wi
     void operator()(const Estimate& e) const {
       for (const double number : {e.value, e.lower, e.upper}) fields.push_back(full_precision(number));
     }
+    void operator()(const NotShown& hidden) const { (*this)(hidden.number); }
     void operator()(Infinite) const { fields.emplace_back(infinite_word); }
   };
   std::visit(Visitor{fields}, cell.value());
@@ -316,12 +273,12 @@ std::string escape_latex(std::string_view text) {
   return out;
 }
 
-std::string latex_number(double value, const Column& column) {
-  if (std::isinf(value)) return (value < 0 ? "$-$" : "") + std::string(infinite_word);
-  const Decimal d = to_decimal(value, column.format, column.digits);
+std::string latex_number(const Decimal& d) {
+  if (d.infinite) return (d.negative ? "$-$" : "") + std::string(infinite_word);
   if (d.exponent == 0 && !d.negative) return d.mantissa;
-  const std::string power = d.exponent == 0 ? "" : fmt::format(" \\times 10^{{{}}}", d.exponent);
-  return fmt::format("${}{}{}$", d.negative ? "-" : "", d.mantissa, power);
+  const std::string power =
+      d.exponent == 0 ? "" : fmt::format("{}10^{{{}}}", d.mantissa.empty() ? "" : " \\times ", d.exponent);
+  return fmt::format("${}{}{}{}$", d.less_than ? "< " : "", d.negative ? "-" : "", d.mantissa, power);
 }
 
 constexpr std::size_t latex_page = 45;          // rows of a page; longer tables break
@@ -410,14 +367,6 @@ std::vector<std::string> provenance_lines(const Provenance& provenance) {
   return lines;
 }
 
-std::string format_number(double number, NumberFormat format, int digits) {
-  if (std::isnan(number)) throw std::invalid_argument("not a number (NaN) cannot be shown");
-  if (std::isinf(number)) return (number < 0 ? std::string(minus_sign) : "") + std::string(infinite_word);
-  const Decimal d = to_decimal(number, format, digits);
-  return (d.negative ? std::string(minus_sign) : "") + d.mantissa +
-         (d.exponent == 0 ? "" : "×10" + superscript(d.exponent));
-}
-
 std::string escape_html(std::string_view text) {
   std::string out;
   for (const char c : text) {
@@ -459,14 +408,14 @@ std::string to_csv(const Table& table) {
   std::vector<std::string> fields;
   for (std::size_t j = 0; j < table.columns.size(); ++j) {
     fields.push_back(csv_field(heading(table.columns[j])));
-    if (!column_has<Estimate>(table, j)) continue;
-    fields.push_back(csv_field(heading(table.columns[j], " low95")));
-    fields.push_back(csv_field(heading(table.columns[j], " high95")));
+    if (!has_interval(table, j)) continue;
+    for (const char* end : {"low", "high"})
+      fields.push_back(csv_field(heading(table.columns[j], fmt::format(" {}{}", end, table.columns[j].level))));
   }
   append_row(fields);
   for (const auto& row : table.rows) {
     fields.clear();
-    for (std::size_t j = 0; j < row.size(); ++j) append_csv_cell(fields, row[j], column_has<Estimate>(table, j));
+    for (std::size_t j = 0; j < row.size(); ++j) append_csv_cell(fields, row[j], has_interval(table, j));
     append_row(fields);
   }
   return out;
@@ -481,7 +430,8 @@ std::string to_markdown(const Table& table) {
   for (const auto& row : table.rows) {
     out += "\n|";
     for (std::size_t j = 0; j < row.size(); ++j) {
-      out += fmt::format(" {} |", show(row[j], table.columns[j], escape_markdown, plain_number));
+      out += fmt::format(" {} |", show(row[j], table.columns[j], escape_markdown,
+                                       [](const Decimal& d) { return escape_markdown(plain_text(d)); }));
     }
   }
   out += '\n';
@@ -539,7 +489,14 @@ std::string to_html(const Table& table) {
   std::string out = fmt::format("<figure class=\"table\" id=\"table-{}\">\n<figcaption>{}</figcaption>\n",
                                 escape_html(table.id), escape_html(table.title));
   out += "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>";
-  const auto kind = [&](std::size_t j) { return is_text(table, j) ? " class=\"text\"" : ""; };
+  const auto kind = [&](std::size_t j) {
+    if (!is_text(table, j)) return "";
+    const bool long_text = std::ranges::any_of(table.rows, [&](const auto& row) {
+      const auto* text = std::get_if<std::string>(&row[j].value());
+      return text && text->size() > html_long;
+    });
+    return long_text ? " class=\"text long\"" : " class=\"text\"";
+  };
   for (std::size_t j = 0; j < table.columns.size(); ++j) {
     out += fmt::format("<th scope=\"col\"{}>{}", kind(j), escape_html(table.columns[j].name));
     if (!table.columns[j].unit.empty()) {
@@ -551,7 +508,10 @@ std::string to_html(const Table& table) {
   for (const auto& row : table.rows) {
     out += "<tr>";
     for (std::size_t j = 0; j < row.size(); ++j) {
-      out += fmt::format("<td{}>{}</td>", kind(j), show(row[j], table.columns[j], escape_html, plain_number));
+      const bool said = std::holds_alternative<NotShown>(row[j].value());
+      out += fmt::format(
+          "<td{}>{}</td>", said ? " class=\"said\"" : kind(j),
+          show(row[j], table.columns[j], escape_html, [](const Decimal& d) { return escape_html(plain_text(d)); }));
     }
     out += "</tr>\n";
   }

@@ -8,8 +8,8 @@
 #include <variant>
 #include <vector>
 
-#include "analysis/statistics/estimate.h"
 #include "analysis/statistics/interval_95.h"
+#include "analysis/statistics/number_text.h"
 
 namespace metastable::reports {
 
@@ -26,6 +26,15 @@ std::vector<std::string> provenance_lines(const Provenance& provenance);
 
 /// Ends may be infinite.
 using analysis::Estimate;
+// How numbers are shown.
+using analysis::Decimal;
+using analysis::DecimalEstimate;
+using analysis::format_estimate;
+using analysis::format_number;
+using analysis::NumberFormat;
+using analysis::plain_text;
+using analysis::to_decimal;
+
 /// Normal 95 % interval.
 inline Estimate with_error(double value, double standard_error) {
   const double half = analysis::normal_95 * standard_error;
@@ -33,6 +42,12 @@ inline Estimate with_error(double value, double standard_error) {
 }
 /// Rendered as the word "infinite".
 struct Infinite {};
+
+/// A number that says too little to be shown: CSV has it, people read what there is to say.
+struct NotShown {
+  Estimate number;   ///< equal ends: without an interval
+  std::string said;  ///< "not known: ..."
+};
 
 /// One cell: text, whole number, number, number with interval, or infinite. Empty text: an empty cell. An infinite
 /// double is shown as "infinite" too; a NaN is refused when the table is rendered.
@@ -45,18 +60,13 @@ class Cell {
   requires(!std::same_as<T, bool>) Cell(T whole) : value_(static_cast<std::int64_t>(whole)) {}
   Cell(Estimate estimate) : value_(estimate) {}
   Cell(Infinite infinite) : value_(infinite) {}
+  Cell(NotShown not_shown) : value_(std::move(not_shown)) {}
 
-  using Value = std::variant<std::string, std::int64_t, double, Estimate, Infinite>;
+  using Value = std::variant<std::string, std::int64_t, double, Estimate, Infinite, NotShown>;
   const Value& value() const { return value_; }
 
  private:
   Value value_;
-};
-
-enum class NumberFormat {
-  significant,  ///< `digits` significant digits, trailing zeros kept: 7.020
-  general,      ///< at most `digits` significant digits, trailing zeros dropped: 7.02
-  fixed,        ///< `digits` decimals
 };
 
 struct Column {
@@ -64,6 +74,7 @@ struct Column {
   std::string unit = {};  ///< "" for none
   NumberFormat format = NumberFormat::significant;
   int digits = 3;  ///< 1..17 (fixed: 0..17); of the shown renderings, CSV always has full precision
+  int level = 95;  ///< of the intervals in this column [%]
 };
 
 struct Table {
@@ -79,8 +90,8 @@ struct Table {
 /// give the same bytes for the same table in every locale. Text may hold any UTF-8.
 
 /// RFC 4180 quoting with line ends LF. Title, notes and provenance come first as lines that start with "# "; then a
-/// header "name [unit]", then the rows at full precision. A column with an Estimate becomes three: "name [unit]",
-/// "name low95 [unit]", "name high95 [unit]". Infinite is the word "infinite".
+/// header "name [unit]", then the rows at full precision. A column with intervals becomes three: "name [unit]",
+/// "name low95 [unit]", "name high95 [unit]", the level being the column's. Infinite is the word "infinite".
 std::string to_csv(const Table& table);
 /// One field of such a file: in quotes where it holds a comma, a quote or a line end, or starts with '#'.
 std::string csv_field(const std::string& text);
@@ -91,10 +102,6 @@ std::string to_markdown(const Table& table);
 std::string to_latex(const Table& table);
 /// A <figure> with id "table-<id>" holding the <table>, for page.h.
 std::string to_html(const Table& table);
-
-/// `number` as the tables show it, in plain text: "1.23×10⁷", "−0.5", "infinite". Unless the format is fixed, numbers
-/// below 0.001 and from 100 000 on are shown with a power of ten. @throws std::invalid_argument for NaN
-std::string format_number(double number, NumberFormat format, int digits);
 
 /// &, <, >, " and ' as entities.
 std::string escape_html(std::string_view text);

@@ -8,11 +8,20 @@
 
 namespace metastable::reports {
 
+/// Characters of a line where standard output is no terminal.
+inline constexpr std::size_t line_width = 100;
+
+/// Characters of a line on standard output: the width of its terminal (COLUMNS where that does not tell it, at least
+/// 40), else line_width, so that what is piped is the same everywhere.
+std::size_t terminal_width();
+
 /// Title, then aligned columns (text flush left, the rest flush right) and the notes; at most `most` rows, and how many
-/// were left out. Columns that are empty in all rows are not shown. Same errors as the renderings of table.h.
-std::string to_text(const Table& table, std::size_t most = 1000);
+/// were left out. Columns that are empty in all rows are not shown. Lines hold at most `width` characters: headings
+/// and text wrap, then numbers before their interval; nothing is cut. Where most rows take several lines, an empty line
+/// stands between them. Same errors as the renderings of table.h.
+std::string to_text(const Table& table, std::size_t most = 1000, std::size_t width = line_width);
 
 /// `text` in lines of at most `width` characters, broken at spaces, every line after `indent`.
-std::string wrapped(const std::string& text, const std::string& indent = "", std::size_t width = 100);
+std::string wrapped(const std::string& text, const std::string& indent = "", std::size_t width = line_width);
 
 }  // namespace metastable::reports

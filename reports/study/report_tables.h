@@ -7,15 +7,15 @@
 #include "analysis/paper/energy_losses.h"
 #include "analysis/sensitivity/sweep.h"
 #include "analysis/study/metastability.h"
+#include "analysis/study/rest_thresholds.h"
 #include "reports/output/table.h"
-#include "reports/study/study_json.h"
 
 namespace metastable::reports {
 
 /// A study of a setting with what else is known of its rest.
 struct Studied {
   analysis::Metastability study;
-  RestThresholds thresholds;
+  analysis::RestThresholds thresholds;
 };
 
 /// All ramps under all laws side by side: quantities down, settings across.

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "analysis/study/rest_reachability.h"
 #include "dynamics/wheel/contact_law.h"
 
 namespace metastable::reports {
@@ -76,7 +75,7 @@ Json provenance_json(const Provenance& provenance) {
           {"version", provenance.version}};
 }
 
-Json study_json(const analysis::Metastability& study, const RestThresholds& thresholds) {
+Json study_json(const analysis::Metastability& study, const analysis::RestThresholds& thresholds) {
   const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
   const double median = study.steps.distribution.quantile(0.5).value_or(study.steps.from_start.value);
@@ -133,14 +132,7 @@ Json study_json(const analysis::Metastability& study, const RestThresholds& thre
 
 }  // namespace
 
-RestThresholds rest_thresholds(const analysis::Metastability& study) {
-  RestThresholds thresholds;
-  if (study.steps.safe_state) thresholds.safe_speed = std::sqrt(*study.steps.safe_state);
-  thresholds.safe_slope_deg = analysis::safe_slope_deg(study.setting.value());
-  return thresholds;
-}
-
-std::string steps_json(const analysis::Metastability& study, const RestThresholds& thresholds,
+std::string steps_json(const analysis::Metastability& study, const analysis::RestThresholds& thresholds,
                        const Provenance& provenance, const StepsExtras& extras) {
   Json json = {{"schema", 1}};
   json.update(study_json(study, thresholds));
@@ -151,8 +143,9 @@ std::string steps_json(const analysis::Metastability& study, const RestThreshold
   return json.dump(2) + "\n";
 }
 
-std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,
-                         const Provenance& provenance, const CompareExtras& extras) {
+std::string compare_json(const analysis::Comparison& comparison,
+                         const std::vector<analysis::RestThresholds>& thresholds, const Provenance& provenance,
+                         const CompareExtras& extras) {
   Json json = {{"schema", 1}, {"settings", Json::array()}, {"contrasts", Json::array()}};
   for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
     json["settings"].push_back(study_json(comparison.studies[i], thresholds[i]));

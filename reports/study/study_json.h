@@ -10,16 +10,10 @@
 #include "analysis/sensitivity/sensitivity.h"
 #include "analysis/study/certify.h"
 #include "analysis/study/metastability.h"
+#include "analysis/study/rest_thresholds.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {
-
-/// What else is known of a setting's rest: thresholds beside its study.
-struct RestThresholds {
-  std::optional<double> safe_speed;      ///< launches at least this fast never come to rest [rad/s]
-  std::optional<double> safe_slope_deg;  ///< steeper ramps have such launches [deg]
-};
-RestThresholds rest_thresholds(const analysis::Metastability& study);
 
 /// What `steps` finds beyond the study, where it is asked for.
 struct StepsExtras {
@@ -36,11 +30,12 @@ struct CompareExtras {
 
 /// The result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as many
 /// digits as a double holds. Keys as in the README ("steps --json").
-std::string steps_json(const analysis::Metastability& study, const RestThresholds& thresholds,
+std::string steps_json(const analysis::Metastability& study, const analysis::RestThresholds& thresholds,
                        const Provenance& provenance, const StepsExtras& extras = {});
 
 /// The result of `compare`: "settings" (each as in steps_json) and "contrasts".
-std::string compare_json(const analysis::Comparison& comparison, const std::vector<RestThresholds>& thresholds,
-                         const Provenance& provenance, const CompareExtras& extras = {});
+std::string compare_json(const analysis::Comparison& comparison,
+                         const std::vector<analysis::RestThresholds>& thresholds, const Provenance& provenance,
+                         const CompareExtras& extras = {});
 
 }  // namespace metastable::reports

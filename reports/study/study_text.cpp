@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+
+#include "reports/output/table.h"
+#include "reports/output/text_table.h"
 
 namespace metastable::reports {
 namespace {
@@ -11,13 +13,31 @@ namespace {
 // Six significant digits, trailing zeros dropped: what a terminal line holds.
 std::string show(double value) { return std::isinf(value) ? "infinite" : fmt::format("{:.6g}", value); }
 
-// As many digits as the interval supports, and one more.
-std::string to_the_digit(double value, double half_width) {
-  const int digits = half_width > 0 ? static_cast<int>(std::ceil(std::log10(std::abs(value) / half_width))) + 2 : 12;
-  return fmt::format("{:.{}g}", value, std::clamp(digits, 3, 12));
-}
-
 std::string line(const std::string& name, const std::string& value) { return fmt::format("  {:<38}{}\n", name, value); }
+
+struct Word {
+  const char *name, *line, *more;
+};
+
+constexpr Word always[] = {
+    {"step", "one collision of the next leg with the ramp",
+     "The collision that leads to rest is counted too, so that expected steps are 1 at least."},
+    {"failure", "after a collision the wheel is too slow to vault over its standing leg: it rests",
+     "Reaching the end of the ramp is no failure: the expected steps are those of a ramp without end."}};
+constexpr Word until_failure[] = {
+    {"metastable regime", "wheels that still roll long after the launch",
+     "Their speeds no longer remember the launch: they have the quasi-stationary distribution, the left eigenvector of "
+     "the chain for its largest eigenvalue lambda_1, and every further step fails with probability 1 - lambda_1."},
+    {"worst start", "the slowest speed with which a step can end and the wheel roll on",
+     "Expected steps from there are the fewest that a rolling wheel has."},
+    {"relaunched", "the long-run mean if every wheel that rests is launched again at once", ""}};
+constexpr Word assumptions[] = {
+    {"foot lifts", "too fast for gravity alone to hold the standing foot on the ramp",
+     "The model holds it there. Where this is frequent, real wheels hop and the numbers are the model's alone."},
+    {"negative loss", "one of the two losses of the collision, normal or along the ramp, is below zero",
+     "The contact law is used outside the range that it was made for."},
+    {"energy gain", "the collision gives energy to the wheel",
+     "No passive contact does; a share that is not small speaks against the law or its friction and restitution."}};
 
 std::string spread_text(const analysis::Accumulated& total) {
   return fmt::format("sd {}, median {}, 5 to 95 %: {} to {}", show(total.sd), show(*total.quantile(0.5)),
@@ -30,11 +50,26 @@ std::string total_line(const std::string& name, const analysis::Accumulated& tot
 
 }  // namespace
 
+std::string words_text(const analysis::Metastability& study, bool more, std::size_t width) {
+  std::string text = "Words\n";
+  const auto say = [&](const Word& word) {
+    text += wrapped(fmt::format("{}: {}{}", word.name, word.line, more ? "." : ""), "  ", width);
+    if (more && *word.more != '\0') text += wrapped(word.more, "    ", width);
+  };
+  for (const Word& word : always) say(word);
+  if (study.status != analysis::Status::rest_unreachable)
+    for (const Word& word : until_failure) say(word);
+  for (const analysis::Share& share : study.violations)
+    for (const Word& word : assumptions)
+      if (share.name == word.name) say(word);
+  if (!more) text += "  --explain says more\n";
+  return text;
+}
+
 std::string estimate_text(const analysis::Estimate& estimate) {
   if (std::isinf(estimate.value)) return "infinite";
-  const double half = 0.5 * (estimate.upper - estimate.lower);
-  return fmt::format("{} (95 % interval {} to {})", to_the_digit(estimate.value, half),
-                     to_the_digit(estimate.lower, half), to_the_digit(estimate.upper, half));
+  const DecimalEstimate e = to_decimal(estimate, NumberFormat::general, 12);
+  return fmt::format("{} (95 % interval {} to {})", plain_text(e.value), plain_text(e.lower), plain_text(e.upper));
 }
 
 std::string sensitivities_text(const analysis::Sensitivities& sensitivities) {
@@ -44,23 +79,25 @@ std::string sensitivities_text(const analysis::Sensitivities& sensitivities) {
   for (const analysis::Sensitivity& one : sensitivities.ranked) {
     const std::string_view unit = analysis::parameter_unit(one.parameter);
     text += fmt::format("  {:<20}{:>10.5g} {:<8}{:>15}{:>11.2g}{:>22.3f} %\n", analysis::sensitivity_name(one),
-                        one.value, unit == "1" ? "" : unit, to_the_digit(one.derivative, one.error), one.error,
-                        100 * std::expm1(0.01 * one.elasticity()));
+                        one.value, unit == "1" ? "" : unit,
+                        plain_text(to_decimal({one.derivative, one.derivative - one.error, one.derivative + one.error},
+                                              NumberFormat::significant, 3)
+                                       .value),
+                        one.error, 100 * std::expm1(0.01 * one.elasticity()));
   }
   return text;
 }
 
 std::string propagated_text(const analysis::Propagated& propagated) {
-  const double half = 0.5 * (propagated.interval.upper - propagated.interval.lower);
+  const DecimalEstimate e = to_decimal(propagated.interval, NumberFormat::general, 6);
   std::string shares;
   for (const analysis::Propagated::Share& one : propagated.shares)
     shares += fmt::format("{}{} {:.0f} %", shares.empty() ? "" : ", ", analysis::parameter_name(one.parameter),
                           100 * one.share);
-  return fmt::format("{} to {} (variance: {})", to_the_digit(propagated.interval.lower, half),
-                     to_the_digit(propagated.interval.upper, half), shares);
+  return fmt::format("{} to {} (variance: {})", plain_text(e.lower), plain_text(e.upper), shares);
 }
 
-std::string thresholds_text(const RestThresholds& thresholds) {
+std::string thresholds_text(const analysis::RestThresholds& thresholds) {
   std::string text = thresholds.safe_speed
                          ? fmt::format("out of reach for launches of {:.4g} rad/s and faster", *thresholds.safe_speed)
                          : std::string("within reach at every speed");
@@ -70,7 +107,7 @@ std::string thresholds_text(const RestThresholds& thresholds) {
   return text;
 }
 
-std::string study_text(const analysis::Metastability& study, const RestThresholds& thresholds) {
+std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds) {
   const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
   std::string text = setting.describe() + "\n\n";
@@ -81,7 +118,7 @@ std::string study_text(const analysis::Metastability& study, const RestThreshold
     text += line("expected steps before failure", estimate_text(study.steps.from_start));
     text += line("  from the metastable regime", estimate_text(study.steps.from_quasi_stationary));
     text += line("  from the worst start", estimate_text(study.steps.worst_start));
-    text += line("failure rate per step", fmt::format("{:.6g}", study.spectrum.failure_rate.value));
+    text += line("failure rate per step", estimate_text(study.spectrum.failure_rate));
     text += line("steps", spread_text(study.steps.distribution));
     if (study.steps.seconds) text += total_line("seconds", *study.steps.seconds);
     if (study.steps.metres) text += total_line("metres", *study.steps.metres);

@@ -1,15 +1,22 @@
 #pragma once
 // A study in words and numbers for the terminal, and its words shared with tables and pages.
 
+#include <cstddef>
 #include <string>
 
+#include "analysis/sensitivity/propagation.h"
+#include "analysis/sensitivity/sensitivity.h"
 #include "analysis/study/metastability.h"
-#include "reports/study/study_json.h"
+#include "analysis/study/rest_thresholds.h"
 
 namespace metastable::reports {
 
 /// Everything `metastable steps` prints.
-std::string study_text(const analysis::Metastability& study, const RestThresholds& thresholds);
+std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds);
+
+/// What the words of study_text() mean: a line each, or with `more` what stands behind them as well; lines of at most
+/// `width` characters.
+std::string words_text(const analysis::Metastability& study, bool more, std::size_t width);
 
 /// The sensitivities as a table, ranked, or why there are none.
 std::string sensitivities_text(const analysis::Sensitivities& sensitivities);
@@ -21,6 +28,6 @@ std::string propagated_text(const analysis::Propagated& propagated);
 std::string estimate_text(const analysis::Estimate& estimate);
 
 /// What the thresholds mean, one sentence.
-std::string thresholds_text(const RestThresholds& thresholds);
+std::string thresholds_text(const analysis::RestThresholds& thresholds);
 
 }  // namespace metastable::reports

@@ -38,8 +38,8 @@ inline Experiment wheel_design(std::size_t trials, std::size_t collisions, bool 
   return e;
 }
 
-inline Term term(const TransitionModel& model, const std::string& id, std::vector<double> variant,
-                 std::vector<double> values) {
+inline EffectTerm term(const TransitionModel& model, const std::string& id, std::vector<double> variant,
+                       std::vector<double> values) {
   for (const Candidate& candidate : model.candidates())
     if (candidate.id == id) return {&candidate, std::move(variant), std::move(values)};
   throw std::invalid_argument("no candidate " + id);

@@ -33,7 +33,7 @@ class Line : public TransitionModel {
     slope.id = "slope";
     slope.parameters = {{0, -100, 100, 1e-4}};
     slope.report = [](const std::vector<double>&, const std::vector<double>& v) {
-      return std::vector<Named>{{"slope", v[0]}};
+      return std::vector<NamedValue>{{"slope", v[0]}};
     };
     Candidate upward = slope;
     upward.id = "upward";
@@ -48,10 +48,10 @@ class Line : public TransitionModel {
   std::string condition_name(std::size_t) const override { return "all"; }
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
-  Evaluation evaluate(std::span<const double> n, std::span<const Term> terms) const override {
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
     Evaluation e;
     double slope = 0;
-    for (const Term& t : terms) slope += t.values[0];
+    for (const EffectTerm& t : terms) slope += t.values[0];
     for (std::size_t i = 0; i < y_.size(); ++i) {
       const double z = (y_[i] - n[0] - slope * w_[i]) / std::exp(n[1]);
       e.score.push_back(z);
@@ -60,7 +60,7 @@ class Line : public TransitionModel {
     }
     return e;
   }
-  std::unique_ptr<TransitionModel> simulate(std::span<const double>, std::span<const Term>,
+  std::unique_ptr<TransitionModel> simulate(std::span<const double>, std::span<const EffectTerm>,
                                             std::uint64_t) const override {
     return std::make_unique<Line>(*this);
   }
@@ -69,11 +69,13 @@ class Line : public TransitionModel {
     return {};
   }
   std::pair<double, double> rests() const override { return {0, 0}; }
-  double expected_steps(std::span<const double>, std::span<const Term>, std::uint64_t) const override { return 1; }
+  double expected_steps(std::span<const double>, std::span<const EffectTerm>, std::uint64_t) const override {
+    return 1;
+  }
   const std::vector<std::string>& notes() const override { return notes_; }
-  std::vector<Named> report_nuisances(std::span<const double> n) const override { return {{"mean", n[0]}}; }
+  std::vector<NamedValue> report_nuisances(std::span<const double> n) const override { return {{"mean", n[0]}}; }
 
- private:
+ protected:
   std::vector<double> y_, w_;
   std::vector<Event> events_;
   std::vector<Nuisance> nuisances_;

@@ -46,7 +46,7 @@ inline Collision make_collision(double first, double second, double omega, doubl
   c.chord = t.chord;
   c.normal_speed = t.chord * omega;
   c.tangential_speed = tangential;
-  c.slope = slope;
+  c.slope_rad = slope;
   return c;
 }
 

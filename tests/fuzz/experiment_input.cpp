@@ -60,7 +60,7 @@ void check_angles(const std::vector<analysis::MeasuredAngle>& angles) {
   for (const analysis::MeasuredAngle& trial : angles) {
     require(trial.number > last);
     last = trial.number;
-    const std::vector<double>&time = trial.recording.time, &angle = trial.recording.angle;
+    const std::vector<double>&time = trial.recording.time, &angle = trial.recording.angle_rad;
     require(time.size() >= 2 && time.size() == angle.size());
     for (std::size_t k = 0; k < time.size(); ++k) {
       require(std::isfinite(time[k]) && std::isfinite(angle[k]));

@@ -117,12 +117,7 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
   expect(g, "left-out effect unexplained, or of its ambiguity group", 2, 3);
 }
 
-TEST(BlindGrade, EveryEffectHasRightfulPlaces) {
-  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())
-    EXPECT_FALSE(rightful_places(info.id).empty()) << info.id;
-  EXPECT_TRUE(rightful_places("sloshing_fluid").empty());
-  EXPECT_THROW(grade({BlindTruth{}}, {}), std::invalid_argument);
-}
+TEST(BlindGrade, AnswersMustBeAsManyAsTruths) { EXPECT_THROW(grade({BlindTruth{}}, {}), std::invalid_argument); }
 
 }  // namespace
 }  // namespace metastable::analysis::test

@@ -4,10 +4,9 @@
 
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <stdexcept>
 
-#include "analysis/description/transitions.h"
+#include "analysis/description/landings.h"
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/statistics/minimize.h"
@@ -57,8 +56,8 @@ TEST(ContactFit, FastLikelihoodAgreesWithTheExactDensity) {
       const Experiment experiment = simulated(setting, 12, 3);
       const ContactFitOptions options{setting.law, transition};
       std::vector<dynamics::WheelMap> maps{setting.map()};
-      const auto transitions = transition == Transition::step ? step_transitions(experiment, {0}, maps)
-                                                              : collision_transitions(experiment, {0}, maps);
+      const auto transitions = transition == Transition::step ? step_landings(experiment, {0}, maps)
+                                                              : collision_landings(experiment, {0}, maps);
       const ContactLikelihood fast(maps, transitions, 0);
       EXPECT_EQ(fast.impossible(), 0u);
       EXPECT_GT(fast.possible_rests(), 0u);

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/experiment/reality.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/likelihood/coast_down_transitions.h"
+#include "analysis/likelihood/wheel_nuisances.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/rotor.h"
 
@@ -27,7 +27,7 @@ std::unique_ptr<TransitionModel> data(
     const std::vector<std::pair<std::string, std::pair<std::vector<double>, std::vector<double>>>>& effects,
     std::uint64_t seed, std::vector<double> contact = {}) {
   const auto design = wheel_transitions(test::wheel_design(100, 14));
-  std::vector<Term> terms;
+  std::vector<EffectTerm> terms;
   for (const auto& [id, sizes] : effects) terms.push_back(term(*design, id, sizes.first, sizes.second));
   if (contact.empty()) contact = nominal_values(*design);
   return design->simulate(contact, terms, seed);
@@ -68,7 +68,7 @@ TEST(Diagnosis, ItsProbabilitiesAgreeWithItsVerdict) {
 TEST(Diagnosis, CallsOtherContactParametersRecalibration) {
   const auto design = wheel_transitions(test::wheel_design(100, 14));
   std::vector<double> contact = nominal_values(*design);
-  contact[2] += 0.05;  // friction's mean
+  contact[WheelSlot::friction_mean] += 0.05;
   const Diagnosis d = diagnose(*data({}, 22, contact), quick());
   EXPECT_EQ(d.verdict, Verdict::recalibrate);
   EXPECT_LT(d.gap.p_recalibration, 1e-6);
@@ -76,8 +76,7 @@ TEST(Diagnosis, CallsOtherContactParametersRecalibration) {
   EXPECT_GT(d.shrinkage.measures[0].baseline, 10 * std::abs(d.shrinkage.measures[0].recalibrated));
 }
 
-TEST(Diagnosis, NamesTheCauseItsSizeAndWhatItCloses) {
-  const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.3}}}}, 23), quick());
+void expect_named(const Diagnosis& d) {
   EXPECT_EQ(d.verdict, Verdict::explained);
   EXPECT_EQ(d.causes.set, std::vector<std::string>{"leg_contact"});
   ASSERT_FALSE(d.causes.ranked.empty());
@@ -86,30 +85,40 @@ TEST(Diagnosis, NamesTheCauseItsSizeAndWhatItCloses) {
   const double half = (parameters[1].upper - parameters[1].lower) / 2;
   EXPECT_NEAR(parameters[1].value, 1.3, 2.5 * half);  // half: 1.64 standard errors
   EXPECT_LT(half, 0.1);
+  EXPECT_LT(d.gap.p_value, 1e-6);
+}
+
+void expect_closed(const Diagnosis& d) {
   ASSERT_TRUE(d.shrinkage.measures[0].closed);
   EXPECT_GT(*d.shrinkage.measures[0].closed, 0.8);
-  EXPECT_LT(d.gap.p_value, 1e-6);
-  // Where: leg 3 comes first.
-  const auto first = std::min_element(
-      d.gap.recalibrated.cells.begin(), d.gap.recalibrated.cells.end(),
-      [](const GapCell& a, const GapCell& b) { return std::abs(a.statistic) > std::abs(b.statistic); });
+}
+
+void expect_leg_three_first(const GapMap& map) {
+  const auto first = std::min_element(map.cells.begin(), map.cells.end(), [](const GapCell& a, const GapCell& b) {
+    return std::abs(a.statistic) > std::abs(b.statistic);
+  });
   EXPECT_EQ(first->facet, "leg");
   EXPECT_EQ(first->at.substr(0, 5), "leg 3");
 }
 
 // What the refitted contact takes up of a shift is given back in its size. A friction of 1.3 times 0.35 takes 0.79 to
 // 0.95 rad/s from omega+ at 4.5 to 5.5 rad/s.
-TEST(Diagnosis, SizesOnTheMapAreThoseOfTheCause) {
-  const auto model = data({{"leg_contact", {{3, 0}, {1.3}}}}, 23);
-  const Diagnosis d = diagnose(*model, quick());
-  const auto size = [](const GapMap& map) {
-    for (const GapCell& cell : map.cells)
-      if (cell.facet == "leg" && cell.aspect == "mean" && cell.at.starts_with("leg 3")) return cell.size;
-    ADD_FAILURE() << "no cell of leg 3";
-    return 0.0;
-  };
-  EXPECT_NEAR(size(d.gap.as_given), -0.87, 0.2);
-  EXPECT_NEAR(size(d.gap.recalibrated), -0.87, 0.2);
+void expect_size_of_the_cause(const GapMap& map) {
+  const auto cell = std::find_if(map.cells.begin(), map.cells.end(), [](const GapCell& one) {
+    return one.facet == "leg" && one.aspect == "mean" && one.at.starts_with("leg 3");
+  });
+  ASSERT_NE(cell, map.cells.end());
+  EXPECT_NEAR(cell->size, -0.87, 0.2);
+}
+
+// One diagnosis (each test is a process of its own): name, size, what it closes, and the map's place and sizes.
+TEST(Diagnosis, NamesTheCauseItsSizeItsPlaceAndWhatItCloses) {
+  const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.3}}}}, 23), quick());
+  expect_named(d);
+  expect_closed(d);
+  expect_leg_three_first(d.gap.recalibrated);
+  expect_size_of_the_cause(d.gap.as_given);
+  expect_size_of_the_cause(d.gap.recalibrated);
 }
 
 TEST(Diagnosis, NamesBothOfTwoCauses) {

@@ -100,16 +100,16 @@ class Jagged : public TransitionModel {
   std::string condition_name(std::size_t condition) const override { return model_->condition_name(condition); }
   const std::vector<Nuisance>& nuisances() const override { return model_->nuisances(); }
   const std::vector<Candidate>& candidates() const override { return model_->candidates(); }
-  Evaluation evaluate(std::span<const double> nuisance, std::span<const Term> terms) const override {
+  Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override {
     Evaluation e = model_->evaluate(nuisance, terms);
-    for (const Term& term : terms)
+    for (const EffectTerm& term : terms)
       if (term.candidate->id == effect_) {
         const double off = std::abs(term.values[0] - term.candidate->parameters[0].neutral);
         for (double& one : e.log_density) one += off < 1e-2 ? 3 * off : -5;
       }
     return e;
   }
-  std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const Term> terms,
+  std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override {
     return model_->simulate(nuisance, terms, seed);
   }
@@ -118,12 +118,12 @@ class Jagged : public TransitionModel {
     return model_->alternatives(nuisance, seed);
   }
   std::pair<double, double> rests() const override { return model_->rests(); }
-  double expected_steps(std::span<const double> nuisance, std::span<const Term> terms,
+  double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                         std::uint64_t seed) const override {
     return model_->expected_steps(nuisance, terms, seed);
   }
   const std::vector<std::string>& notes() const override { return model_->notes(); }
-  std::vector<Named> report_nuisances(std::span<const double> nuisance) const override {
+  std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const override {
     return model_->report_nuisances(nuisance);
   }
 

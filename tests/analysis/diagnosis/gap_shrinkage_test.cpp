@@ -15,7 +15,7 @@ namespace {
 // A torque that the nominal losses lack: held out, its fit closes the gap; recalibration alone does not.
 TEST(GapShrinkage, TheTrueEffectClosesTheGap) {
   const auto design = coast_down_transitions(test::coasting_rotor());
-  const Term truth = test::term(*design, "rolling_resistance", {}, {0.02});
+  const EffectTerm truth = test::term(*design, "rolling_resistance", {}, {0.02});
   const auto data = design->simulate(nominal_values(*design), std::vector{truth}, 5);
   const Fit recalibrated = fit(*data, nominal_values(*data), {});
   const Fit with = fit(*data, recalibrated.nuisance, {test::term(*data, "rolling_resistance", {}, {0.01})});

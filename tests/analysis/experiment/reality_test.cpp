@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/stand_in.h"
@@ -13,9 +14,14 @@
 namespace metastable::analysis::test {
 namespace {
 
-RealityFiles make(RealityOptions reality, FolderOptions folder) {
+std::vector<RealityCondition> six_of_each() {
   auto conditions = stand_in_conditions(stand_in_setting());
   for (RealityCondition& c : conditions) c.trials = 6;
+  return conditions;
+}
+
+RealityFiles make(RealityOptions reality, FolderOptions folder) {
+  const auto conditions = six_of_each();
   const dynamics::LaboratorySetup setup = laboratory_setup(conditions, reality);
   return reality_files(conditions, setup, run_laboratory(setup, reality.threads), folder);
 }
@@ -40,6 +46,75 @@ TEST(Reality, FolderIsReadBackByTheStrictReader) {
   for (std::size_t t = 1; t < experiment.trials.size(); ++t)
     turns += experiment.trials[t].condition != experiment.trials[t - 1].condition;
   EXPECT_GT(turns, 4);
+}
+
+void expect_same(const Experiment& a, const Experiment& b) {
+  EXPECT_EQ(a.title, b.title);
+  EXPECT_EQ(a.system, b.system);
+  EXPECT_EQ(a.wheel.leg_length, b.wheel.leg_length);
+  EXPECT_EQ(a.wheel.hub_mass, b.wheel.hub_mass);
+  EXPECT_EQ(a.wheel.inertia, b.wheel.inertia);
+  EXPECT_EQ(a.wheel.radius_of_gyration, b.wheel.radius_of_gyration);
+  EXPECT_EQ(a.wheel.contact_mass, b.wheel.contact_mass);
+  EXPECT_EQ(a.wheel.ramp_stiffness, b.wheel.ramp_stiffness);
+  EXPECT_EQ(a.wheel.gravity, b.wheel.gravity);
+  EXPECT_EQ(a.contact.law, b.contact.law);
+  const auto same = [](const Spread& x, const Spread& y) { return x.mean == y.mean && x.sd == y.sd; };
+  EXPECT_TRUE(same(a.contact.restitution, b.contact.restitution));
+  EXPECT_TRUE(same(a.contact.friction, b.contact.friction));
+  EXPECT_EQ(a.sensor.rate, b.sensor.rate);
+  EXPECT_EQ(a.sensor.noise_sd, b.sensor.noise_sd);
+  EXPECT_EQ(a.notes, b.notes);
+  EXPECT_EQ(a.columns.leg, b.columns.leg);
+  EXPECT_EQ(a.columns.time, b.columns.time);
+  EXPECT_EQ(a.columns.position, b.columns.position);
+  EXPECT_EQ(a.columns.omega_plus, b.columns.omega_plus);
+  EXPECT_EQ(a.columns.outcomes, b.columns.outcomes);
+  ASSERT_EQ(a.conditions.size(), b.conditions.size());
+  for (std::size_t c = 0; c < a.conditions.size(); ++c) {
+    const Condition &x = a.conditions[c], &y = b.conditions[c];
+    EXPECT_EQ(x.id, y.id);
+    EXPECT_EQ(x.slope_deg, y.slope_deg);
+    EXPECT_EQ(x.ramp_length, y.ramp_length);
+    EXPECT_EQ(x.first_landing_leg, y.first_landing_leg);
+    ASSERT_EQ(x.initial_speed.has_value(), y.initial_speed.has_value());
+    EXPECT_TRUE(!x.initial_speed || same(*x.initial_speed, *y.initial_speed));
+  }
+  ASSERT_EQ(a.trials.size(), b.trials.size());
+  for (std::size_t t = 0; t < a.trials.size(); ++t) {
+    const MeasuredTrial &x = a.trials[t], &y = b.trials[t];
+    EXPECT_EQ(x.number, y.number);
+    EXPECT_EQ(x.condition, y.condition);
+    EXPECT_EQ(x.outcome, y.outcome);
+    ASSERT_EQ(x.collisions.size(), y.collisions.size());
+    for (std::size_t k = 0; k < x.collisions.size(); ++k) {
+      const MeasuredCollision &c = x.collisions[k], &d = y.collisions[k];
+      EXPECT_EQ(std::tie(c.number, c.leg, c.time, c.position, c.omega_minus, c.omega_plus),
+                std::tie(d.number, d.leg, d.time, d.position, d.omega_minus, d.omega_plus));
+    }
+  }
+}
+
+// In memory, with the digits of the files, for every subset of what may be left unsaid and for laws with a gyration.
+TEST(Reality, ExperimentInMemoryIsTheOneReadBackFromItsFiles) {
+  for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb})
+    for (std::size_t subset = 0; subset < std::size_t{1} << droppable().size();
+         subset += law == dynamics::Law::published ? 1 : 37) {
+      auto conditions = six_of_each();
+      for (RealityCondition& c : conditions) {
+        c.setting.law = law;
+        c.trials = 2;
+        c.setting.first_landing_leg = 3;
+      }
+      FolderOptions folder{.title = "in \"memory\"", .restitution = Spread{0.5, 0.07}};
+      for (std::size_t k = 0; k < droppable().size(); ++k)
+        if (subset >> k & 1) folder.dropped.push_back(droppable()[k]);
+      if (subset % 3 == 0) folder.camera = CameraOptions{};
+      const dynamics::LaboratorySetup setup =
+          laboratory_setup(conditions, {.sensor_noise = 0.01, .shuffled = true, .seed = subset + 1});
+      const auto run = run_laboratory(setup, 1);
+      expect_same(experiment_of(conditions, setup, run, folder), read(reality_files(conditions, setup, run, folder)));
+    }
 }
 
 TEST(Reality, WhatIsDroppedIsNotTold) {

@@ -66,12 +66,29 @@ void expect_the_torque(const Diagnosis& d) {
   EXPECT_NEAR(torque, (2.1 - 0.09) / (4 * std::numbers::pi), 0.03) << cause.name();
 }
 
+// Numbers that cannot be negative have intervals that are not; the map speaks of the shifts that a drum makes.
+void expect_physical(const Diagnosis& d) {
+  for (const EstimatedParameter& p : d.gap.contact)
+    if (p.value > 0 && p.name != "linear" && p.name != "quadratic" && p.name != "constant") {
+      EXPECT_GE(p.lower, 0) << p.name;
+    }
+  for (const GapCell& cell : d.gap.as_given.cells) {
+    if (cell.unit == "rad/s") {
+      EXPECT_LT(std::abs(cell.size), 0.5) << cell.at;  // a revolution loses 0.03 to 0.3
+    }
+    if (cell.facet == "position") {
+      EXPECT_TRUE(cell.at.ends_with(" rad")) << cell.at;
+    }
+  }
+}
+
 TEST(CoastDownDiagnosis, NamesTheRollingResistanceOfATyre) {
   for (unsigned seed = 1; seed < 4; ++seed) {
     const Diagnosis d = diagnosed(measured({}, seed, "free"), true, {measured(tyre, seed + 10, "tyre")});
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     EXPECT_EQ(d.verdict, Verdict::explained);
     expect_the_torque(d);
+    expect_physical(d);
     for (const std::string& name : d.causes.set) EXPECT_NE(name.find("rolling_resistance"), std::string::npos) << name;
     EXPECT_NE(d.causes.size.find("rolling_resistance +"), std::string::npos) << d.causes.size;
   }
@@ -91,23 +108,6 @@ TEST(CoastDownDiagnosis, NamesNothingLargeWhereNothingWasAdded) {
   const Diagnosis d = diagnosed(free, true, {measured(again, 2, "again")});
   EXPECT_TRUE(d.verdict == Verdict::no_gap || d.verdict == Verdict::recalibrate)
       << verdict_name(d.verdict) << d.causes.size;
-}
-
-// Numbers that cannot be negative have intervals that are not; the map speaks of the shifts that a drum makes.
-TEST(CoastDownDiagnosis, ItsNumbersArePhysical) {
-  const Diagnosis d = diagnosed(measured({}, 1, "free"), true, {measured(tyre, 11, "tyre")});
-  for (const EstimatedParameter& p : d.gap.contact)
-    if (p.value > 0 && p.name != "linear" && p.name != "quadratic" && p.name != "constant") {
-      EXPECT_GE(p.lower, 0) << p.name;
-    }
-  for (const GapCell& cell : d.gap.as_given.cells) {
-    if (cell.unit == "rad/s") {
-      EXPECT_LT(std::abs(cell.size), 0.5) << cell.at;  // a revolution loses 0.03 to 0.3
-    }
-    if (cell.facet == "position") {
-      EXPECT_TRUE(cell.at.ends_with(" rad")) << cell.at;
-    }
-  }
 }
 
 }  // namespace

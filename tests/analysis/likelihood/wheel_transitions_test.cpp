@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "analysis/diagnosis/model_fit.h"
@@ -25,9 +26,9 @@ TEST(WheelTransitions, FitsFindTheSizesOfEffects) {
                                 {"hub_eccentricity", {}, {2e-4, -1e-4}}, {"sensor_noise", {}, {1e-4}},
                                 {"sensor_bias", {1, 1}, {0.02}}};
   for (const Case& one : cases) {
-    const Term truth = term(*design, one.id, one.variant, one.values);
+    const EffectTerm truth = term(*design, one.id, one.variant, one.values);
     const auto data = design->simulate(nominal_values(*design), std::vector{truth}, 11);
-    Term start = term(*data, one.id, one.variant, one.values);
+    EffectTerm start = term(*data, one.id, one.variant, one.values);
     for (double& value : start.values) value *= 0.9;
     const Fit found = fit(*data, nominal_values(*data), {start});
     EXPECT_TRUE(found.converged) << one.id << ' ' << found.reason;

@@ -37,7 +37,7 @@ TEST(AngleFile, ReadsWhatSimulateWrites) {
   const Setting setting = paper_setting(9.59, false);
   const auto trials = simulate_trials(setting, {.trials = 5, .seed = 3});
   const ExperimentFiles files = experiment_files(setting, trials, "t", {});
-  const CameraOptions camera{.rate = 250, .noise_sd = 0, .seed = 1, .threads = 1};
+  const CameraOptions camera{.rate = 250, .noise_sd_rad = 0, .seed = 1, .threads = 1};
   const ExperimentSource source{.folder = "",
                                 .experiment_toml = files.experiment_toml,
                                 .collisions_csv = {},
@@ -48,7 +48,7 @@ TEST(AngleFile, ReadsWhatSimulateWrites) {
   for (std::size_t t = 0; t < angles.size(); ++t) {
     const AngleRecording recording = record_angle(setting.map(), trials[t], camera, t);
     ASSERT_EQ(angles[t].recording.time.size(), recording.time.size());
-    EXPECT_NEAR(angles[t].recording.angle.back(), recording.angle.back(), 1e-8);
+    EXPECT_NEAR(angles[t].recording.angle_rad.back(), recording.angle_rad.back(), 1e-8);
     EXPECT_LT(recording.time.front(), 0);
     EXPECT_GT(recording.time.back(), trials[t].collisions.back().time);
   }
@@ -58,11 +58,13 @@ TEST(AngleFile, RecordsTurnAtTheSpeedsOfTheTrial) {
   const Setting setting = paper_setting(9.59, false);
   const auto trials = simulate_trials(setting, {.trials = 1, .seed = 3});
   const AngleRecording r =
-      record_angle(setting.map(), trials[0], {.rate = 20000, .noise_sd = 0, .seed = 1, .threads = 1}, 0);
+      record_angle(setting.map(), trials[0], {.rate = 20000, .noise_sd_rad = 0, .seed = 1, .threads = 1}, 0);
   for (const dynamics::TrialCollision& c : trials[0].collisions) {
     std::size_t i = 0;
     while (r.time[i] < c.time) ++i;
-    const auto speed = [&](std::size_t k) { return (r.angle[k + 1] - r.angle[k]) / (r.time[k + 1] - r.time[k]); };
+    const auto speed = [&](std::size_t k) {
+      return (r.angle_rad[k + 1] - r.angle_rad[k]) / (r.time[k + 1] - r.time[k]);
+    };
     EXPECT_NEAR(speed(i - 2), c.omega_minus, 0.01);
     EXPECT_NEAR(speed(i), c.omega_plus, 0.01);
   }

@@ -24,7 +24,7 @@ Score score(const Setting& setting, double rate, double noise, const FinderOptio
   double fits = 0, bias = 0, squares = 0, plus = 0, plus_squares = 0, times = 0;
   for (std::size_t t = 0; t < trials.size(); ++t) {
     const AngleRecording recording =
-        record_angle(map, trials[t], {.rate = rate, .noise_sd = noise, .seed = 2, .threads = 1}, t);
+        record_angle(map, trials[t], {.rate = rate, .noise_sd_rad = noise, .seed = 2, .threads = 1}, t);
     const FoundTrial found = find_collisions(recording, map, setting.first_landing_leg, options);
     s.due += static_cast<double>(trials[t].collisions.size());
     for (const FoundCollision& c : found.collisions) {
@@ -89,7 +89,7 @@ TEST(CollisionFinder, StopsAtTheNumberAskedForAndFindsTheApex) {
   const auto trials = simulate_trials(setting, {.trials = 1, .collisions = 16, .seed = 4});
   const dynamics::WheelMap map = setting.map();
   const AngleRecording recording =
-      record_angle(map, trials[0], {.rate = 500, .noise_sd = 0, .seed = 1, .threads = 1}, 0);
+      record_angle(map, trials[0], {.rate = 500, .noise_sd_rad = 0, .seed = 1, .threads = 1}, 0);
   const FoundTrial found = find_collisions(recording, map, 0, {.collisions = 5});
   ASSERT_EQ(found.collisions.size(), 5u);
   EXPECT_EQ(found.stopped, "");
@@ -115,7 +115,7 @@ TEST(CollisionFinder, CountsPeaksBetweenCollisionsAsBounces) {
     // 45 degrees a step; half way through the steps a smaller tooth.
     const double tooth = phase < 0.6 ? 1.5 * phase / 0.6 : (phase - 0.6) / 0.4 * 2.6;
     recording.time.push_back(t);
-    recording.angle.push_back(angle);
+    recording.angle_rad.push_back(angle);
     angle += (3.927 - 0.97 + tooth) / rate;
   }
   const FoundTrial found = find_collisions(recording, map, 0, {.window = 11, .collisions = 5});
@@ -129,7 +129,7 @@ TEST(CollisionFinder, RefusesWhatItCannotRead) {
   AngleRecording slow{{0, 0.1, 0.2, 0.3, 0.4, 0.5}, {0, 0, 0, 0, 0, 0}};
   EXPECT_THROW(find_collisions(slow, map, 0, {}), std::invalid_argument);
   AngleRecording still;
-  for (int i = 0; i < 100; ++i) still.time.push_back(i / 120.0), still.angle.push_back(0);
+  for (int i = 0; i < 100; ++i) still.time.push_back(i / 120.0), still.angle_rad.push_back(0);
   const FoundTrial none = find_collisions(still, map, 0, {});
   EXPECT_TRUE(none.collisions.empty());
   EXPECT_EQ(none.stopped, "no peak rises 0.4 rad/s above both sides");

@@ -48,16 +48,18 @@ TEST(PaperStudy, ReadingsAndLawsDiffer) {
   EXPECT_EQ(units, 3 * paper_study_units());
   const VariantStudy &goes_on = studies[0], &rests = studies[1], &coulomb = studies[2];
   // Without a rest rule all trials have 16 collisions; with it nearly all rest at 7.02 deg; under coulomb none.
-  EXPECT_EQ(goes_on.fig7[1][1].steady.size(), 200u * 4);
-  EXPECT_EQ(goes_on.fig7[1][1].rest_share, 0);
-  EXPECT_GT(rests.fig7[1][1].rest_share, 0.95);
-  EXPECT_EQ(coulomb.fig7[1][1].rest_share, 0);
-  EXPECT_EQ(coulomb.fig7[1][1].steady.size(), 200u * 4);
+  EXPECT_EQ(goes_on.usual_spreads().profile.steady.size(), 200u * 4);
+  EXPECT_EQ(goes_on.usual_spreads().profile.rest_share, 0);
+  EXPECT_GT(rests.usual_spreads().profile.rest_share, 0.95);
+  EXPECT_EQ(coulomb.usual_spreads().profile.rest_share, 0);
+  EXPECT_EQ(coulomb.usual_spreads().profile.steady.size(), 200u * 4);
   // Fig. 8 (energy_losses_test.cpp: spreads of 0.05 and 0.2), to the sampling error of 200 trials.
-  EXPECT_NEAR(goes_on.fig8[0].tangential_net.mean, 0.066, 4 * goes_on.fig8[0].tangential_net.standard_error + 5e-4);
-  EXPECT_NEAR(goes_on.fig8[3].normal.mean, 0.141, 4 * goes_on.fig8[3].normal.standard_error + 5e-4);
+  EXPECT_NEAR(goes_on.fig8.front().losses.tangential_net.mean, 0.066,
+              4 * goes_on.fig8.front().losses.tangential_net.standard_error + 5e-4);
+  EXPECT_NEAR(goes_on.fig8.back().losses.normal.mean, 0.141,
+              4 * goes_on.fig8.back().losses.normal.standard_error + 5e-4);
   // The first collision's speeds are the launch's.
-  EXPECT_NEAR(goes_on.fig6[0][2].profile[0].mean, 7.35, 4 * 0.198 / std::sqrt(200.0));
+  EXPECT_NEAR(goes_on.fig6.front().run(3).measured_legs.profile[0].mean, 7.35, 4 * 0.198 / std::sqrt(200.0));
 
   const std::vector<Claim> claims = paper_claims(studies, experiments);
   for (const Claim& claim : claims) EXPECT_EQ(claim.findings.size(), 3u) << claim.claim;
@@ -70,7 +72,7 @@ TEST(PaperStudy, ReadingsAndLawsDiffer) {
     return claim.claim.find("the fastest launch") != std::string::npos;
   });
   ASSERT_NE(fastest, claims.end());
-  EXPECT_TRUE(rests.fig6[3][2].trial_means.empty());
+  EXPECT_TRUE(rests.fig6.back().run(3).measured_legs.trial_means.empty());
   EXPECT_EQ(fastest->findings[0].verdict, ClaimVerdict::not_reproduced);
   EXPECT_EQ(fastest->findings[1].verdict, ClaimVerdict::not_applicable);
   const std::vector<Hypothesis> hypotheses = paper_hypotheses(studies);
@@ -89,9 +91,9 @@ TEST(PaperStudy, SameBitsOnAnyNumberOfThreadsAndOwnNumbersForEveryProfile) {
   one.samples = three.samples = 32;
   const Variant coulomb = paper_variants()[2];
   const VariantStudy a = study_variant(coulomb, experiments, one), b = study_variant(coulomb, experiments, three);
-  EXPECT_EQ(a.fig9[3][2].steady, b.fig9[3][2].steady);
-  EXPECT_EQ(a.variance[2].steady_speed.sd, b.variance[2].steady_speed.sd);
-  EXPECT_NE(a.fig7[0][0].speeds[0][0], a.fig7[0][1].speeds[0][0]);
+  EXPECT_EQ(a.fig9.back().high_restitution().steady, b.fig9.back().high_restitution().steady);
+  EXPECT_EQ(a.variance[2].shares.steady_speed.sd, b.variance[2].shares.steady_speed.sd);
+  EXPECT_NE(a.fig7[0].runs[0].profile.speeds[0][0], a.fig7[0].runs[1].profile.speeds[0][0]);
   one.trials = 19;
   EXPECT_THROW(study_variant(coulomb, experiments, one), std::invalid_argument);
 }

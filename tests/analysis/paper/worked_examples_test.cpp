@@ -36,8 +36,10 @@ TEST(WorkedExamples, WithoutTheChargeOnStickingRestIsRarer) {
 
 TEST(WorkedExamples, OneSourceAtATimeIsBelievedHalfAsWide) {
   const Experiment e = test::wheel_design(2, 3);
-  const Experiment none = believed_half_as_wide(e, Source::none), launch = believed_half_as_wide(e, Source::launch),
-                   legs = believed_half_as_wide(e, Source::legs), contact = believed_half_as_wide(e, Source::contact);
+  const Experiment none = believed_half_as_wide(e, VariabilitySource::none),
+                   launch = believed_half_as_wide(e, VariabilitySource::launch),
+                   legs = believed_half_as_wide(e, VariabilitySource::legs),
+                   contact = believed_half_as_wide(e, VariabilitySource::contact);
   EXPECT_EQ(none.wheel.leg_length, e.wheel.leg_length);
   EXPECT_EQ(none.conditions[0].initial_speed->sd, e.conditions[0].initial_speed->sd);
   for (std::size_t i = 0; i < e.conditions.size(); ++i)
@@ -54,7 +56,7 @@ TEST(WorkedExamples, OneSourceAtATimeIsBelievedHalfAsWide) {
 TEST(WorkedExamples, ALaunchThatIsNotStatedHasNoWidth) {
   Experiment e = test::wheel_design(2, 3);
   e.conditions[1].initial_speed.reset();
-  EXPECT_THROW(believed_half_as_wide(e, Source::launch), std::invalid_argument);
+  EXPECT_THROW(believed_half_as_wide(e, VariabilitySource::launch), std::invalid_argument);
 }
 
 TEST(WorkedExamples, BothLawsWithAndWithoutTheSpeedAfter) {

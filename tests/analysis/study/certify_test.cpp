@@ -70,6 +70,17 @@ TEST(Certify, AConstantLaunchIsThatState) {
   EXPECT_LT(c.upper, 6.4);
 }
 
+// Nodes once had to begin above where they ended.
+TEST(Certify, LaunchesTooSlowToVaultTakeOneStep) {
+  Setting setting = with_friction(9.59, true, {0.4, 0.1});
+  setting.initial_speed = {1, 0.1};
+  const CertifiedSteps c = certify(setting, {.largest_cells = 100});
+  ASSERT_TRUE(c.exists);
+  EXPECT_LE(c.lower, 1);
+  EXPECT_GE(c.upper, 1);
+  EXPECT_LT(c.width(), 0.01);
+}
+
 TEST(Certify, ThreadsDoNotMatter) {
   const Setting setting = with_friction(9.59, true, {0.4, 0.1});
   const CertifiedSteps one = certify(setting, {.largest_cells = 60, .threads = 1});

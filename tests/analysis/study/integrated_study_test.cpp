@@ -65,7 +65,7 @@ TEST(IntegratedStudy, ErrorCoversFinerNodes) {
 
 TEST(IntegratedStudy, ReproducesTheSixtyDigitValuesOfRoughTerrain) {
   constexpr double degree = std::numbers::pi / 180;
-  const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = 1.5 * degree});
+  const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = 1.5 * degree});
   const double start = wheel.fixed_point();
   StudyOptions options;
   options.method = Method::integrated;

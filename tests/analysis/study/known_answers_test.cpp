@@ -59,7 +59,7 @@ struct Rough {
 class RoughTerrain : public testing::TestWithParam<Rough> {
  protected:
   Problem problem() const {
-    const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = GetParam().sd_deg * degree});
+    const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = GetParam().sd_deg * degree});
     const double start = wheel.fixed_point();
     return {wheel, {[start](double) { return start; }, 0}, [](double x) { return std::sqrt(x); }, {}};
   }
@@ -92,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(KnownAnswers, RoughTerrain,
 
 // To 1e-3 at 2 deg on sampled cells, with the kill rates from the error function.
 TEST(KnownAnswers, RoughTerrainOnSampledCellsToOneInAThousand) {
-  const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = 2 * degree});
+  const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = 2 * degree});
   const double start = wheel.fixed_point();
   const markov::LaunchState launch{[start](double) { return start; }, 0};
   const markov::StateSpace space = markov::covering_space(wheel, launch, 800, 1);

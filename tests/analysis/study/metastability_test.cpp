@@ -59,9 +59,9 @@ TEST(Metastability, AgreesWithMonteCarloTrials) {
       const double before = c.omega_minus * c.omega_minus, after = c.omega_plus * c.omega_plus;
       const int leg = c.leg, stance = (leg + 7) % 8;
       lifted += before * setting.wheel.leg_length[static_cast<std::size_t>(stance)] >
-                    9.81 * std::sin(map.triangle(leg).beta_first - map.slope()) ||
+                    9.81 * std::sin(map.triangle(leg).beta_first_rad - map.slope()) ||
                 after * setting.wheel.leg_length[static_cast<std::size_t>(leg)] >
-                    9.81 * std::sin(map.triangle(leg).beta_second + map.slope());
+                    9.81 * std::sin(map.triangle(leg).beta_second_rad + map.slope());
     }
   }
   const auto check = [](const Accumulated& total, std::vector<double> values, double slack) {
@@ -253,11 +253,61 @@ TEST(Metastability, SettingsThatSoonRestAreAnswered) {
   EXPECT_DOUBLE_EQ(steps(Law::published, 7.02, {0, 0}, {0.4, 0.1}, {0.4, 0.1}), 1.0);
 }
 
+// Uneven legs, from a launch of which all trials rest at once: survival once rose again after the first step.
+TEST(Metastability, LaunchesTooSlowToVaultRestAtOnce) {
+  Setting setting = paper_setting(9.59, false);
+  setting.friction = {0.3, 0.05};
+  const double regime = study(setting.problem(), {}).steps.from_quasi_stationary.value;
+  setting.initial_speed = {1, 0.1};
+  for (const Method method : {Method::sampled, Method::integrated}) {
+    StudyOptions options;
+    options.method = method;
+    const Metastability result = study(setting.problem(), options);
+    EXPECT_NEAR(result.steps.from_start.value, 1, 1e-12);
+    EXPECT_EQ(result.steps.survival[0], 1);
+    for (std::size_t n = 1; n < result.steps.survival.size(); ++n) EXPECT_LT(result.steps.survival[n], 1e-15);
+    EXPECT_LT(*result.steps.reach_end, 1e-15);
+    EXPECT_NEAR(result.steps.from_quasi_stationary.value / regime, 1, 0.02);  // the launch has no say in it
+  }
+}
+
+// Each once stretched the cells over the launch. By a million trials: 6.4694 (s.e. 0.0034), 8.1936 (0.0043).
+TEST(Metastability, FastLaunchesDoNotStretchTheCells) {
+  Setting setting = paper_setting(7.02, false);
+  const double regime = study(setting.problem(), {}).steps.from_quasi_stationary.value;
+  const auto study_of = [&](Spread launch) {
+    setting.initial_speed = launch;
+    return study(setting.problem(), {});
+  };
+  for (const auto& [speed, trials] : {std::pair(50.0, 6.4694), std::pair(300.0, 8.1936)}) {
+    const Metastability result = study_of({speed, 0.1});
+    EXPECT_EQ(result.status, Status::converged);
+    EXPECT_NEAR(result.steps.from_start.value / trials, 1, 0.004);
+    EXPECT_NEAR(result.steps.from_quasi_stationary.value / regime, 1, 2e-4);
+  }
+  // Ten times the speed takes as many steps more to lose as any ten times do.
+  const double slow = study_of({1e4, 1}).steps.from_start.value, middle = study_of({1e5, 10}).steps.from_start.value,
+               fast = study_of({1e6, 100}).steps.from_start.value;
+  EXPECT_NEAR((fast - middle) / (middle - slow), 1, 0.03);
+}
+
+// A wheel a hundred times as long, launched as fast, is the same wheel launched ten times as fast.
+TEST(Metastability, LengthsAndSpeedsScale) {
+  Setting small = paper_setting(7.02, true), large = small;
+  for (double& length : large.wheel.leg_length) length *= 100;
+  large.wheel.ramp_stiffness /= 100;  // the contact lasts ten times as long, as everything does
+  large.initial_speed = {7.35, 0.19};
+  small.initial_speed = {73.5, 1.9};
+  const Metastability a = study(small.problem(), {}), b = study(large.problem(), {});
+  EXPECT_NEAR(a.steps.from_start.value / b.steps.from_start.value, 1, 1e-6);
+  EXPECT_NEAR(a.survivors.mean / b.survivors.mean, 10, 1e-5);
+}
+
 TEST(Metastability, FailuresRarerThanTheDrawsReachDeepenTheTail) {
   // Rough terrain at a spread of 0.6 deg: 1.4e31 steps, beyond tails of 1e-30.
   constexpr double degree = M_PI / 180;
   const auto rough = [&](double sd_deg) {
-    const dynamics::RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = sd_deg * degree});
+    const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = sd_deg * degree});
     const double start = wheel.fixed_point();
     return Problem{wheel, {[start](double) { return start; }, 0}, [](double x) { return std::sqrt(x); }, {}};
   };

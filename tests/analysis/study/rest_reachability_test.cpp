@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "analysis/study/metastability.h"
+#include "dynamics/return_map/trials.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {
@@ -77,6 +78,49 @@ TEST(RestReachability, SlowLaunchesOfAnEndlessWheelRest) {
   const double threshold = std::sqrt(*result.steps.safe_state);
   EXPECT_NEAR(*result.steps.reach_end, 0.5 * std::erfc((threshold - 3) / 0.1 / std::sqrt(2.0)), 2e-3);
   EXPECT_EQ(result.steps.distribution.quantile(0.5), 1.0);
+}
+
+// The wheel could roll for ever, but no launch gets that far: once "infinite", or no answer at all.
+TEST(RestReachability, LaunchesThatAllRestAreFiniteBesideStatesThatNeverDo) {
+  for (const double slope : {7.02, 9.59}) {
+    Setting setting = coulomb(slope);
+    setting.initial_speed = {1, 0.1};
+    for (const Method method : {Method::sampled, Method::integrated}) {
+      StudyOptions options;
+      options.method = method;
+      const Metastability result = study(setting.problem(), options);
+      EXPECT_EQ(result.status, Status::converged);
+      EXPECT_EQ(result.message, "");
+      EXPECT_NEAR(result.steps.from_start.value, 1, 1e-12);
+      EXPECT_LT(result.steps.survival[1], 1e-15);
+      EXPECT_EQ(result.steps.distribution.quantile(0.95), 1);
+      EXPECT_TRUE(std::isinf(result.steps.from_quasi_stationary.value));
+    }
+  }
+}
+
+// The stationary speed does not depend on how the wheel was launched.
+TEST(RestReachability, FastLaunchesOfAnEndlessWheelSettle) {
+  const double usual = study(coulomb(7.02).problem(), {}).survivors.mean;
+  for (const double speed : {50.0, 300.0}) {
+    Setting setting = coulomb(7.02);
+    setting.initial_speed = {speed, 0.1};
+    EXPECT_NEAR(study(setting.problem(), {}).survivors.mean, usual, 2e-4);
+  }
+}
+
+// Some launches roll for ever; others survive some steps and rest all the same.
+TEST(RestReachability, LaunchesOnBothSidesOfTheThresholdAreTold) {
+  Setting setting = coulomb(3.6);
+  setting.initial_speed = {3.0, 0.1};
+  const Metastability result = study(setting.problem(), {});
+  EXPECT_TRUE(std::isinf(result.steps.from_start.value));
+  double rest = 0;
+  const dynamics::WheelMap map = setting.map();
+  constexpr int trials = 4000;
+  for (std::uint64_t i = 0; i < trials; ++i) rest += dynamics::steps_to_rest(map, setting.launch(), 0, 1, i, 300) < 300;
+  rest /= trials;
+  EXPECT_NEAR(1 - result.steps.survival.back(), rest, 5 * std::sqrt(rest * (1 - rest) / trials));
 }
 
 }  // namespace

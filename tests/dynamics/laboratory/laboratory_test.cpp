@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
+#include "dynamics/return_map/trials.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {
@@ -43,7 +45,7 @@ void compare_with_return_map(const LaboratorySetup& setup) {
   int compared = 0, rests = 0;
   for (const LaboratoryTrial& trial : run_all(setup)) {
     const LaboratoryCondition& condition = setup.conditions[trial.condition];
-    const WheelMap map(setup.wheel, condition.slope, setup.law, ContactNoise::normal(0.54, 0.045, 0.352, 0.043));
+    const WheelMap map(setup.wheel, condition.slope_rad, setup.law, ContactNoise::normal(0.54, 0.045, 0.352, 0.043));
     for (std::size_t k = 0; k < trial.collisions.size(); ++k) {
       const LaboratoryCollision& c = trial.collisions[k];
       const int phase = c.leg % map.phases();
@@ -101,8 +103,60 @@ double drag_work(const std::string& text) {
   const LaboratoryTrial trial = lab.run(0);
   const LaboratoryCollision &a = trial.collisions.at(0), &b = trial.collisions.at(1);
   const double inertia = 1.39 * 0.1519 * 0.1519, chord = 2 * 0.1519 * std::sin(22.5 * degree);
-  const double gravity = 1.39 * 9.81 * chord * std::sin(setup.conditions[0].slope);
+  const double gravity = 1.39 * 9.81 * chord * std::sin(setup.conditions[0].slope_rad);
   return gravity - inertia / 2 * (b.omega_minus * b.omega_minus - a.omega_plus * a.omega_plus);
+}
+
+// The inertia about a foot that the laboratory's motion shows: what the hub's fall gave, turned into rotation.
+double shown_inertia(const LaboratorySetup& setup, const LaboratoryTrial& trial, std::size_t k) {
+  const Wheel& wheel = setup.wheel;
+  const auto leg = static_cast<std::size_t>(trial.collisions[k].leg);
+  const double slope = setup.conditions[trial.condition].slope, own = wheel.leg_length[leg];
+  // Height of the hub over the foot it stands on when another foot touches behind (1) or ahead (-1).
+  const auto height = [&](double other, double side) {
+    const double chord = std::sqrt(own * own + other * other - 2 * own * other * std::cos(std::numbers::pi / 4));
+    const double to_ramp = std::acos((own * own + chord * chord - other * other) / (2 * own * chord));
+    return own * std::sin(to_ramp + side * slope);
+  };
+  const double fall = height(wheel.leg_length[(leg + 7) % 8], 1) - height(wheel.leg_length[(leg + 1) % 8], -1);
+  const double before = trial.collisions[k].omega_plus, after = trial.collisions[k + 1].omega_minus;
+  return 2 * wheel.hub_mass * wheel.gravity * fall / (after * after - before * before);
+}
+
+// A ring of points about the hub has the inertia of a wheel with that radius of gyration.
+double ring_inertia(double mass, double radius, double length) {
+  constexpr int points = 720;
+  double sum = 0;
+  for (int i = 0; i < points; ++i) {
+    const double phi = 2 * std::numbers::pi * i / points;
+    const double x = radius * std::cos(phi), z = length + radius * std::sin(phi);
+    sum += mass / points * (x * x + z * z);
+  }
+  return sum;
+}
+
+// Written twice, in the laboratory and for the contact laws: neither asks the other.
+TEST(Laboratory, ItsInertiaIsThatOfTheLaws) {
+  for (const Law law : {Law::published, Law::coulomb})
+    for (const bool stated : {false, true}) {
+      LaboratorySetup setup = paper_setup(law);
+      setup.wheel.radius_of_gyration = 0.06;
+      if (stated) setup.wheel.inertia = 0.04;
+      const Laboratory lab(setup);
+      int compared = 0;
+      for (std::size_t t = 0; t < 4; ++t) {
+        const LaboratoryTrial trial = lab.run(t);
+        for (std::size_t k = 0; k + 1 < trial.collisions.size(); ++k, ++compared) {
+          const double length = setup.wheel.leg_length[static_cast<std::size_t>(trial.collisions[k].leg)];
+          const double shown = shown_inertia(setup, trial, k);
+          EXPECT_NEAR(shown / stance_inertia(setup.wheel, law, length), 1, 1e-8) << law_name(law) << ' ' << length;
+          if (law == Law::coulomb && !stated) {
+            EXPECT_NEAR(shown / ring_inertia(setup.wheel.hub_mass, 0.06, length), 1, 1e-8);
+          }
+        }
+      }
+      EXPECT_GT(compared, 20) << law_name(law) << ' ' << stated;
+    }
 }
 
 TEST(Laboratory, ResistingTorquesDoTheirWork) {
@@ -286,7 +340,7 @@ TEST(Laboratory, RefusesWhatItCannotBuild) {
     change(setup);
     return message_of([&] { const Laboratory lab(setup); });
   };
-  EXPECT_EQ(message([](LaboratorySetup& s) { s.conditions[1].slope = 0.5; }),
+  EXPECT_EQ(message([](LaboratorySetup& s) { s.conditions[1].slope_rad = 0.5; }),
             "condition 1: slope: 28.6479 deg is outside (0, 22.5) deg");
   EXPECT_EQ(message([](LaboratorySetup& s) { s.order.push_back(2); }), "order: condition 2 is outside [0, 2)");
   EXPECT_EQ(message([](LaboratorySetup& s) {

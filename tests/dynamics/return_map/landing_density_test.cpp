@@ -50,7 +50,7 @@ TEST(LandingDensity, OfOneRestitutionIsThatOfFriction) {
 }
 
 TEST(LandingDensity, OfRoughTerrainSumsToTheSurvivors) {
-  const RoughTerrainWheel wheel({.mean_slope = 8 * degree, .sd_slope = 2 * degree});
+  const RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = 2 * degree});
   for (const double state : {0.2, 1.0}) {
     const auto density = [&](double next) {
       double at = 0;

@@ -16,7 +16,9 @@
 namespace metastable::dynamics::test {
 namespace {
 
-RoughTerrainWheel wheel(double sd) { return RoughTerrainWheel({.mean_slope = 8 * degree, .sd_slope = sd * degree}); }
+RoughTerrainWheel wheel(double sd) {
+  return RoughTerrainWheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = sd * degree});
+}
 
 TEST(RoughTerrain, FixedPointIsFixed) {
   const RoughTerrainWheel w = wheel(0);
@@ -24,7 +26,7 @@ TEST(RoughTerrain, FixedPointIsFixed) {
   EXPECT_EQ(*w.rest_probability(w.fixed_point(), 0), 0);
   const auto [least, most] = w.landing_range(w.fixed_point(), 0);
   EXPECT_EQ(least, most);
-  EXPECT_THROW(RoughTerrainWheel({.mean_slope = 1 * degree}).fixed_point(), std::domain_error);
+  EXPECT_THROW(RoughTerrainWheel({.mean_slope_rad = 1 * degree}).fixed_point(), std::domain_error);
 }
 
 RC_GTEST_PROP(RoughTerrain, RestIsWhereTheSlopeIsTooFlat, ()) {
@@ -33,7 +35,7 @@ RC_GTEST_PROP(RoughTerrain, RestIsWhereTheSlopeIsTooFlat, ()) {
   // Root of next(state, slope) by bisection; the upper tail (slopes beyond 45 deg) is out of reach here.
   double flat = -60 * degree, steep = 45 * degree;
   for (int k = 0; k < 80; ++k) (w.next(state, (flat + steep) / 2) <= 0 ? flat : steep) = (flat + steep) / 2;
-  const double expected = normal_cdf((flat - 8 * degree) / w.options().sd_slope);
+  const double expected = normal_cdf((flat - 8 * degree) / w.options().sd_slope_rad);
   RC_ASSERT(std::abs(*w.rest_probability(state, 0) - expected) <= 1e-10 * expected);
 }
 
@@ -56,7 +58,7 @@ TEST(RoughTerrain, BenchmarkKillRates) {
   using Rule = boost::math::quadrature::gauss<double, 60>;
   for (const auto& [sd, expected] : reference) {
     const RoughTerrainWheel w = wheel(sd);
-    const double top = w.fixed_point() + 10 * sd * 0.45, scale = w.options().sd_slope;
+    const double top = w.fixed_point() + 10 * sd * 0.45, scale = w.options().sd_slope_rad;
     std::vector<double> node, weight;
     for (std::size_t i = 0; i < Rule::abscissa().size(); ++i)
       for (double side : {-1.0, 1.0}) {
@@ -92,11 +94,11 @@ TEST(RoughTerrain, BenchmarkKillRates) {
 }
 
 TEST(RoughTerrain, IllegalInputIsNamed) {
-  EXPECT_EQ(message_of([] { RoughTerrainWheel({.mean_slope = 0, .sd_slope = -1 * degree}); }),
+  EXPECT_EQ(message_of([] { RoughTerrainWheel({.mean_slope_rad = 0, .sd_slope_rad = -1 * degree}); }),
             "sd_slope [deg]: -1 is outside [0, 10]");
-  EXPECT_EQ(message_of([] { RoughTerrainWheel({.mean_slope = 60 * degree}); }),
+  EXPECT_EQ(message_of([] { RoughTerrainWheel({.mean_slope_rad = 60 * degree}); }),
             "mean_slope [deg]: 60 is outside (-45, 45)");
-  EXPECT_EQ(message_of([] { RoughTerrainWheel({.half_leg_angle = 50 * degree}); }),
+  EXPECT_EQ(message_of([] { RoughTerrainWheel({.half_leg_angle_rad = 50 * degree}); }),
             "half_leg_angle [deg]: 50 is outside (0, 45)");
   EXPECT_EQ(message_of([] { RoughTerrainWheel({.gravity = 0}); }), "gravity [m/s^2]: 0 is outside (0, inf)");
   EXPECT_EQ(message_of([] { RoughTerrainWheel({.leg_length = -1}); }), "leg_length [m]: -1 is outside (0, inf)");

@@ -87,7 +87,7 @@ RC_GTEST_PROP(WheelMap, TableLandsLikeTheMap, ()) {
 
 double duration_by_quadrature(const Stance& s, double next_state) {
   // Both halves in terms of the distance from the apex, where the wheel is slowest.
-  const double apex = next_state - s.pendulum * (1 - std::sin(s.end_angle));
+  const double apex = next_state - s.pendulum * (1 - std::sin(s.end_angle_rad));
   boost::math::quadrature::tanh_sinh<double> rule;
   const auto half = [&](double width) {
     const auto pace = [&](double t) { return 1 / std::sqrt(apex + 2 * s.pendulum * std::pow(std::sin(t / 2), 2)); };
@@ -95,7 +95,7 @@ double duration_by_quadrature(const Stance& s, double next_state) {
     for (int i = 0; i < 40; ++i, edge /= 3) sum += rule.integrate(pace, edge / 3, edge);
     return sum + rule.integrate(pace, 0.0, edge);
   };
-  return half(s.end_angle - std::numbers::pi / 2) + half(std::numbers::pi / 2 - s.start_angle);
+  return half(s.end_angle_rad - std::numbers::pi / 2) + half(std::numbers::pi / 2 - s.start_angle_rad);
 }
 
 TEST(WheelMap, DurationAgreesWithQuadrature) {
@@ -123,8 +123,8 @@ TEST(WheelMap, DurationWithoutABarrier) {
     const double next = s.gain + 0.01;  // omega+^2 = 0.01
     boost::math::quadrature::tanh_sinh<double> rule;
     const double expected = rule.integrate(
-        [&](double t) { return 1 / std::sqrt(0.01 + s.pendulum * (std::sin(s.start_angle) - std::sin(t))); },
-        s.start_angle, s.end_angle);
+        [&](double t) { return 1 / std::sqrt(0.01 + s.pendulum * (std::sin(s.start_angle_rad) - std::sin(t))); },
+        s.start_angle_rad, s.end_angle_rad);
     EXPECT_NEAR(map.duration(next, p) / expected, 1, 1e-9);
     EXPECT_EQ(map.duration(s.gain - 1e-3, p), std::numeric_limits<double>::infinity());
   }

@@ -51,8 +51,8 @@ TEST(ExtendedWheel, TorquesTakeTheirWork) {
                                      plain.leg_length[static_cast<std::size_t>(leg)], plain.leg_angle());
     const Triangle ahead = triangle(plain.leg_length[static_cast<std::size_t>(leg)],
                                     plain.leg_length[static_cast<std::size_t>((leg + 1) % 8)], plain.leg_angle());
-    double theta = landed.beta_second + 9.59 * degree, omega = plus;
-    const double end = std::numbers::pi - (ahead.beta_first - 9.59 * degree);
+    double theta = landed.beta_second_rad + 9.59 * degree, omega = plus;
+    const double end = std::numbers::pi - (ahead.beta_first_rad - 9.59 * degree);
     constexpr double step = 1e-6;
     while (theta < end) {  // midpoint rule
       const auto rate = [&](double angle, double speed) {

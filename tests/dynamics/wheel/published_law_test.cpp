@@ -55,7 +55,7 @@ Loss integrated(const Collision& c, const Contact& contact, double j) {
                                                 : whole;
   const double before = stop > 0 ? loss.tangential_pre * slipping / stop : 0;
   const double after = end > stop ? loss.tangential_post * (whole - slipping) / (end - stop) : 0;
-  loss.potential = j * 1.39 * 9.81 * (before - after) * std::sin(c.slope);
+  loss.potential = j * 1.39 * 9.81 * (before - after) * std::sin(c.slope_rad);
   return loss;
 }
 

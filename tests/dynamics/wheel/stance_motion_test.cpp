@@ -34,7 +34,7 @@ TEST(StanceMotion, PassesTheNextCollisionWhenTheClosedFormSays) {
     for (const double excess : {0.5, 3.0, 20.0}) {
       const double after = stance.barrier + excess;
       const auto [time, speed] =
-          stance_passage(stance.pendulum, {stance.start_angle, std::sqrt(after)}, stance.end_angle);
+          stance_passage(stance.pendulum, {stance.start_angle_rad, std::sqrt(after)}, stance.end_angle_rad);
       EXPECT_NEAR(time, map.duration(after + stance.gain, phase), 1e-8);
       EXPECT_NEAR(speed, std::sqrt(after + stance.gain), 1e-7);
     }
@@ -44,7 +44,7 @@ TEST(StanceMotion, PassesTheNextCollisionWhenTheClosedFormSays) {
 TEST(StanceMotion, TurnsBackBelowTheBarrier) {
   const Stance stance = paper_map(7.02).stance(0);
   const double speed = std::sqrt(0.9 * stance.barrier);
-  EXPECT_TRUE(std::isinf(stance_passage(stance.pendulum, {stance.start_angle, speed}, stance.end_angle).first));
+  EXPECT_TRUE(std::isinf(stance_passage(stance.pendulum, {stance.start_angle_rad, speed}, stance.end_angle_rad).first));
 }
 
 }  // namespace

@@ -23,18 +23,18 @@ TEST(Triangle, EqualLegsAreThePapersEquation36) {
   const double alpha = std::numbers::pi / 4, length = 0.1519;
   const Triangle t = triangle(length, length, alpha);
   EXPECT_NEAR(t.chord, 2 * length * std::sin(alpha / 2), 1e-15);
-  EXPECT_NEAR(t.beta_first, std::numbers::pi / 2 - alpha / 2, 1e-14);
-  EXPECT_NEAR(t.beta_second, 67.5 * degree, 1e-14);
-  EXPECT_NEAR(t.contact_x, length * std::cos(t.beta_second), 1e-15);
+  EXPECT_NEAR(t.beta_first_rad, std::numbers::pi / 2 - alpha / 2, 1e-14);
+  EXPECT_NEAR(t.beta_second_rad, 67.5 * degree, 1e-14);
+  EXPECT_NEAR(t.contact_x, length * std::cos(t.beta_second_rad), 1e-15);
 }
 
 RC_GTEST_PROP(Triangle, AnglesSumToPiAndSidesClose, ()) {
   const double first = uniform(0.05, 2), second = uniform(0.05, 2), alpha = uniform(0.1, 2);
   const Triangle t = triangle(first, second, alpha);
-  RC_ASSERT(std::abs(t.beta_first + t.beta_second + alpha - std::numbers::pi) < 1e-12);
-  RC_ASSERT(std::abs(first * std::cos(t.beta_first) + second * std::cos(t.beta_second) - t.chord) < 1e-12);
-  RC_ASSERT(std::abs(first * std::sin(t.beta_first) - t.hub_height) < 1e-12);
-  RC_ASSERT(std::abs(second * std::cos(t.beta_second) - t.contact_x) < 1e-12);
+  RC_ASSERT(std::abs(t.beta_first_rad + t.beta_second_rad + alpha - std::numbers::pi) < 1e-12);
+  RC_ASSERT(std::abs(first * std::cos(t.beta_first_rad) + second * std::cos(t.beta_second_rad) - t.chord) < 1e-12);
+  RC_ASSERT(std::abs(first * std::sin(t.beta_first_rad) - t.hub_height) < 1e-12);
+  RC_ASSERT(std::abs(second * std::cos(t.beta_second_rad) - t.contact_x) < 1e-12);
 }
 
 TEST(Wheel, IllegalInputIsNamed) {

@@ -12,6 +12,7 @@
 #include "markov/passage/first_passage.h"
 #include "markov/passage/quasi_stationary.h"
 #include "markov/rows/discretization.h"
+#include "tests/markov/exact_answers.h"
 #include "tests/markov/reference_chains.h"
 
 namespace metastable::markov {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "tests/markov/exact_answers.h"
 #include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/markov/exact_answers.h"
 #include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
 

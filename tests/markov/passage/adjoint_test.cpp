@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "tests/markov/exact_answers.h"
 #include "tests/markov/reference_chains.h"
 
 namespace metastable::markov {

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <random>
 
+#include "tests/markov/exact_answers.h"
 #include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
 

@@ -12,6 +12,7 @@
 #include "markov/chain/sparse_solver.h"
 #include "markov/passage/first_passage.h"
 #include "markov/passage/quasi_stationary.h"
+#include "tests/markov/exact_answers.h"
 #include "tests/markov/reference_chains.h"
 
 namespace metastable::markov {

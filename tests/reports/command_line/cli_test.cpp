@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -219,6 +220,59 @@ TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
   EXPECT_EQ(read(path("part.csv")), whole);
 }
 
+TEST_F(CommandLine, SweepCutShortByASignalSaysWhatItKept) {
+  const std::vector<std::string> words = with(
+      {"sweep", "--friction-sd", "0.1,0.2", "--friction-mean", "0.3,0.4", "--out", path("s.csv"), "--threads", "1"},
+      quick);
+  ASSERT_EQ(metastable(words).code, 0);
+  const std::string whole = read(path("s.csv"));
+  std::filesystem::remove(path("s.csv"));
+  std::size_t at = 0;
+  for (int line = 0; line < 8; ++line) at = whole.find('\n', at) + 1;
+  std::ofstream(path("s.csv.partial")) << whole.substr(0, at);
+  catch_interrupts();
+  std::raise(SIGINT);
+  const Ran cut = metastable(words);
+  clear_interrupt();
+  EXPECT_EQ(cut.code, 130);
+  EXPECT_EQ(cut.err, "metastable: interrupted: 3 of 4 points kept; the same command goes on\n");
+  EXPECT_EQ(metastable(words).code, 0);
+  EXPECT_EQ(read(path("s.csv")), whole);
+  // The head states no value that the axes replace.
+  const std::string head = whole.substr(0, whole.find('\n'));
+  EXPECT_NE(head.find("mu ~ N(varies, varies^2)"), std::string::npos) << head;
+  EXPECT_NE(head.find("7.02 deg"), std::string::npos) << head;
+  EXPECT_EQ(whole.find("N(0.4, 0.1^2), omega"), std::string::npos) << whole;
+}
+
+TEST_F(CommandLine, StepsExplainsItsWords) {
+  const Ran brief = metastable(with({"steps"}, quick)), full = metastable(with({"steps", "--explain"}, quick));
+  ASSERT_EQ(brief.code, 0) << brief.err;
+  for (const char* word : {"\n  step: ", "\n  failure: ", "\n  metastable regime: ", "\n  worst start: ",
+                           "\n  foot lifts: ", "--explain says more"})
+    EXPECT_NE(brief.out.find(word), std::string::npos) << word << brief.out;
+  EXPECT_EQ(brief.out.find("quasi-stationary distribution"), std::string::npos);
+  EXPECT_NE(full.out.find("quasi-stationary distribution"), std::string::npos) << full.out;
+  EXPECT_GT(full.out.size(), brief.out.size());
+  // Where nothing fails there is no regime that ends.
+  const Ran endless = metastable(with({"steps", "--law", "coulomb"}, quick));
+  EXPECT_EQ(endless.out.find("metastable regime: "), std::string::npos) << endless.out;
+}
+
+TEST_F(CommandLine, VerifySaysOnceWhoseFailureNegativeTimesAre) {
+  const Ran ran = metastable({"verify", "--nodes", "128"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto count = [&](const std::string& part) {
+    int found = 0;
+    for (std::size_t at = ran.out.find(part); at != std::string::npos; at = ran.out.find(part, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("negative time"), 1) << ran.out;
+  EXPECT_LT(ran.out.find("negative time"), ran.out.find("The rough-terrain wheel")) << ran.out;
+  EXPECT_EQ(count("version: "), 1) << ran.out;
+  EXPECT_EQ(count("seed: "), 1) << ran.out;
+}
+
 TEST_F(CommandLine, SimulateWritesAnExperimentOnce) {
   const std::vector<std::string> words{"simulate", "--trials", "5", "--out", path("trials")};
   const Ran ran = metastable(words);
@@ -314,7 +368,12 @@ TEST_F(CommandLine, HelpAndVersion) {
   EXPECT_EQ(metastable({"--help"}).code, 0);
   const Ran version = metastable({"--version"});
   EXPECT_EQ(version.code, 0);
-  EXPECT_TRUE(version.out.starts_with("metastable 0.1.0"));
+  EXPECT_TRUE(std::regex_match(
+      version.out,
+      std::regex("metastable 0\\.2\\.0(\\+g[0-9a-f]+(-dirty)?)?\nbuilt by \\w+ \\d+[.\\d]* .*\nwith .*\n")))
+      << version.out;
+  for (const char* library : {"Boost 1.", "CLI11 ", "Eigen 3.", "KLU 1.", "OpenSSL ", "Spectra 1.", "fmt ", "toml++ "})
+    EXPECT_NE(version.out.find(library), std::string::npos) << library;
   for (const char* command : {"steps", "compare", "sweep", "simulate", "report"}) {
     const Ran help = metastable({command, "--help"});
     EXPECT_EQ(help.code, 0);

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 
 #include "dynamics/wheel/effect_catalogue.h"
@@ -163,10 +164,11 @@ TEST(DiagnosisJson, InfiniteIsAWordAndUnknownIsNull) {
 }
 
 TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
-  const std::string text = diagnosis_text(sample());
+  const std::string text = diagnosis_text(sample(), 400);
   EXPECT_EQ(text.find("verdict: explained\nOne cause explains it: leg_contact.\n"), 0U);
   std::size_t last = 0;
-  for (const char* part : {"Is there a gap?",
+  for (const char* part : {"Next: Tell the causes apart before changing the model: slope 8.5 deg would do it best",
+                           "Is there a gap?",
                            "Where it lies",
                            "leg 3, collision",
                            "Which effect",
@@ -174,7 +176,7 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
                            "none of these",
                            "How far it shrinks",
                            "95 % (88 to 100)",
-                           "not to be said",
+                           "not known: the gap as given may be none",
                            "Expected steps before failure",
                            "infinite",
                            "What these data could have seen",
@@ -194,6 +196,52 @@ TEST(DiagnosisText, SaysTheVerdictFirstAndAnswersEveryQuestion) {
     const std::size_t at = text.find(part, last);
     EXPECT_NE(at, std::string::npos) << part << "\n" << text;
     if (at != std::string::npos) last = at;
+  }
+}
+
+TEST(DiagnosisText, EveryVerdictSaysWhatToDoNext) {
+  analysis::Diagnosis d = sample();
+  const auto next = [&] {
+    const std::string text = diagnosis_text(d, 1000);
+    const std::size_t at = text.find("\nNext: ");
+    return at == std::string::npos ? text : text.substr(at + 7, text.find('\n', at + 1) - at - 7);
+  };
+  d.causes.set = {"leg_contact"};
+  EXPECT_NE(next().find("Give the model leg_contact"), std::string::npos) << next();
+  d.verdict = analysis::Verdict::no_gap;
+  EXPECT_NE(next().find("Use the model as it is"), std::string::npos) << next();
+  d.verdict = analysis::Verdict::recalibrate;
+  EXPECT_NE(next().find("experiment.toml"), std::string::npos) << next();
+  d.verdict = analysis::Verdict::unexplained;
+  EXPECT_NE(next().find("Check the measurement first"), std::string::npos) << next();
+}
+
+// What says nothing is not shown as a number; files and JSON keep it.
+TEST(DiagnosisText, SaysLessWhereLessIsKnown) {
+  analysis::Diagnosis d = sample();
+  d.gap.p_as_given = 1e-23;
+  d.causes.ranked[0].p_value = 5e-72;
+  d.causes.ranked[1].evidence = -732427.8;
+  analysis::Shrinkage& wide = d.shrinkage.measures[0];
+  wide.closed = 1.37, wide.closed_lower = -1.41, wide.closed_upper = 1.42;
+  const std::string text = diagnosis_text(d, 400);
+  for (const char* absurd : {"10⁻²³", "10⁻⁷²", "732427", "7.32×10⁵", "137 %"})
+    EXPECT_EQ(text.find(absurd), std::string::npos) << absurd << text;
+  for (const char* said : {"< 10⁻¹²", "< −100", "not known: 90 % interval −140 to 140 %, wider than the gap"})
+    EXPECT_NE(text.find(said), std::string::npos) << said << text;
+  EXPECT_NE(to_csv(shrinkage_table(d)).find(",1.37,-1.41,1.42"), std::string::npos) << to_csv(shrinkage_table(d));
+  EXPECT_NE(to_csv(causes_table(d)).find(",-732427.8,"), std::string::npos) << to_csv(causes_table(d));
+  EXPECT_EQ(parsed(d).at("shrinkage").at("closed"), 1.37);
+  EXPECT_EQ(parsed(d).at("gap").at("p_value_as_given"), 1e-23);
+}
+
+TEST(DiagnosisText, NoLineIsLongerThanTheWindow) {
+  for (const std::size_t width : {80U, 100U, 160U}) {
+    std::istringstream lines(diagnosis_text(sample(), width));
+    for (std::string line; std::getline(lines, line);)
+      EXPECT_LE(std::count_if(line.begin(), line.end(), [](char c) { return (c & 0xC0) != 0x80; }),
+                static_cast<std::ptrdiff_t>(width))
+          << line;
   }
 }
 
@@ -239,24 +287,6 @@ TEST(DiagnosisPage, HoldsFiguresAndTablesAndLoadsNothing) {
       EXPECT_TRUE(std::filesystem::exists(folder / "tables" / (std::string(name) + ending))) << name << ending;
   std::filesystem::remove_all(folder);
 }
-
-TEST(TextTable, AlignsColumnsAndLeavesOutEmptyOnes) {
-  const Table table{.id = "t",
-                    .title = "Title",
-                    .columns = {{"name"}, {"nothing"}, {"η", "rad/s"}},
-                    .rows = {{"a", "", 1.5}, {"long", "", Infinite{}}, {"c", "", 2.0}}};
-  EXPECT_EQ(to_text(table, 2),
-            "Title\n"
-            "  name  η [rad/s]\n"
-            "  a          1.50\n"
-            "  long   infinite\n"
-            "  and 1 more\n");
-  Table bad = table;
-  bad.rows[1][2] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(to_text(bad), std::invalid_argument);
-}
-
-TEST(TextTable, WrapsAtSpaces) { EXPECT_EQ(wrapped("one two three", "  ", 9), "  one two\n  three\n"); }
 
 TEST(EffectsJson, ListsTheCatalogue) {
   const auto json = nlohmann::json::parse(effects_json());

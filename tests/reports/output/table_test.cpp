@@ -40,6 +40,35 @@ TEST(Table, CsvHasProvenanceFullPrecisionAndIntervalColumns) {
             "\"coulomb, \"\"smooth\"\"\",9.59,infinite,,,-400\n");
 }
 
+TEST(Table, IntervalsOfAnotherLevelAndNumbersThatSayNothing) {
+  const Table table{.id = "t",
+                    .title = "T",
+                    .columns = {{.name = "closed (90 %)", .level = 90}, {"p", "", NumberFormat::p_value, 2}},
+                    .rows = {{Estimate{0.97, 0.93, 1.01}, 0.031},
+                             {NotShown{{1.37, -1.41, 1.42}, "not known: wider than 1 & the gap"}, 1e-23}}};
+  EXPECT_EQ(to_csv(table),
+            "# T\nclosed (90 %),closed (90 %) low90,closed (90 %) high90,p\n"
+            "0.97,0.93,1.01,0.031\n1.37,-1.41,1.42,1e-23\n");
+  EXPECT_NE(
+      to_markdown(table).find("| 0.97 (0.93 to 1.01) | 0.031 |\n| not known: wider than 1 & the gap | &lt; 10⁻¹² |"),
+      std::string::npos)
+      << to_markdown(table);
+  EXPECT_NE(to_html(table).find("<td class=\"said\">not known: wider than 1 &amp; the gap</td><td>&lt; 10⁻¹²</td>"),
+            std::string::npos)
+      << to_html(table);
+  EXPECT_NE(to_latex(table).find("not known: wider than 1 \\& the gap & $< 10^{-12}$ \\\\"), std::string::npos)
+      << to_latex(table);
+}
+
+TEST(Table, HtmlGivesLongTextAWideColumn) {
+  const Table table{.id = "t",
+                    .title = "T",
+                    .columns = {{"where"}, {"claim"}},
+                    .rows = {{"Fig. 4", std::string(61, 'x')}, {"Fig. 6", "short"}}};
+  const std::string html = to_html(table);
+  EXPECT_NE(html.find("<td class=\"text\">Fig. 6</td><td class=\"text long\">short</td>"), std::string::npos) << html;
+}
+
 TEST(Table, CsvNumbersReadBackExactly) {
   for (const double value : {0.1, 1.0 / 3, 6.02214076e23, 5e-324, -1.7976931348623157e308}) {
     Table table{.id = "t", .title = "t", .columns = {{"x"}}, .rows = {{value}}};

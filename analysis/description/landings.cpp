@@ -1,4 +1,4 @@
-#include "analysis/description/transitions.h"
+#include "analysis/description/landings.h"
 
 #include <algorithm>
 
@@ -9,7 +9,7 @@ bool wanted(const std::vector<std::size_t>& conditions, std::size_t condition) {
   return std::find(conditions.begin(), conditions.end(), condition) != conditions.end();
 }
 
-MeasuredTransition start(const MeasuredTrial& trial, const MeasuredCollision& c, const dynamics::WheelMap& map) {
+MeasuredLanding start(const MeasuredTrial& trial, const MeasuredCollision& c, const dynamics::WheelMap& map) {
   return {trial.condition, map.phases() == 1 ? 0 : *c.leg % map.phases(), c.omega_minus * c.omega_minus, {}, false};
 }
 
@@ -25,14 +25,13 @@ dynamics::Wheel fitted_wheel(const Experiment& experiment) {
   return wheel;
 }
 
-std::vector<MeasuredTransition> step_transitions(const Experiment& experiment,
-                                                 const std::vector<std::size_t>& conditions,
-                                                 const std::vector<dynamics::WheelMap>& maps) {
-  std::vector<MeasuredTransition> all;
+std::vector<MeasuredLanding> step_landings(const Experiment& experiment, const std::vector<std::size_t>& conditions,
+                                           const std::vector<dynamics::WheelMap>& maps) {
+  std::vector<MeasuredLanding> all;
   for (const MeasuredTrial& trial : experiment.trials) {
     if (!wanted(conditions, trial.condition)) continue;
     for (std::size_t k = 0; k < trial.collisions.size(); ++k) {
-      MeasuredTransition t = start(trial, trial.collisions[k], maps[trial.condition]);
+      MeasuredLanding t = start(trial, trial.collisions[k], maps[trial.condition]);
       if (k + 1 < trial.collisions.size()) {
         const double next = trial.collisions[k + 1].omega_minus;
         t.landing = next * next;
@@ -47,15 +46,15 @@ std::vector<MeasuredTransition> step_transitions(const Experiment& experiment,
   return all;
 }
 
-std::vector<MeasuredTransition> collision_transitions(const Experiment& experiment,
-                                                      const std::vector<std::size_t>& conditions,
-                                                      const std::vector<dynamics::WheelMap>& maps) {
-  std::vector<MeasuredTransition> all;
+std::vector<MeasuredLanding> collision_landings(const Experiment& experiment,
+                                                const std::vector<std::size_t>& conditions,
+                                                const std::vector<dynamics::WheelMap>& maps) {
+  std::vector<MeasuredLanding> all;
   for (const MeasuredTrial& trial : experiment.trials) {
     if (!wanted(conditions, trial.condition)) continue;
     for (const MeasuredCollision& c : trial.collisions) {
       if (!c.omega_plus) continue;
-      MeasuredTransition t = start(trial, c, maps[trial.condition]);
+      MeasuredLanding t = start(trial, c, maps[trial.condition]);
       const dynamics::Stance& stance = maps[trial.condition].stance(t.phase);
       const double after = *c.omega_plus * *c.omega_plus;
       t.rested = after < stance.barrier;

@@ -1,0 +1,114 @@
+#include "analysis/likelihood/trial_follower.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "dynamics/wheel/truncated_normal.h"
+
+namespace metastable::analysis {
+namespace {
+
+using dynamics::StepContext;
+
+struct Node {  // of Gauss-Hermite's rules for the standard normal
+  double score, weight;
+};
+constexpr std::array<Node, 5> five_nodes{{{-2.856970013872806, 0.01125741132772069},
+                                          {-1.355626179974266, 0.2220759220056126},
+                                          {0, 0.5333333333333333},
+                                          {1.355626179974266, 0.2220759220056126},
+                                          {2.856970013872806, 0.01125741132772069}}};
+
+std::size_t collision_of(const Event& event) { return static_cast<std::size_t>(event.number) - 1; }
+
+}  // namespace
+
+TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, const dynamics::ExtendedWheel& wheel,
+                             const WheelHypothesis& hypothesis)
+    : measured_(measured),
+      run_(run),
+      wheel_(wheel),
+      friction_sd_(hypothesis.extension.trial_friction_sd),
+      nodes_(friction_sd_ > 0 ? five_nodes.size() : 1),
+      filters_(nodes_, SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
+                                   measured.slack)) {
+  static_assert(five_nodes.size() == most_nodes);
+  if (nodes_ > 1)
+    for (std::size_t q = 0; q < nodes_; ++q) log_weight_[q] = std::log(five_nodes[q].weight);
+}
+
+void TrialFollower::come_to(const Event& event) {
+  const std::size_t k = collision_of(event);
+  if (!is_contact(event.kind) || next_ == k) return;
+  for (SpeedFilter& filter : filters_) filter.start(run_.collisions[k].before);
+  next_ = k;
+}
+
+double TrialFollower::friction_shift(std::size_t node) const {
+  return nodes_ == 1 ? 0 : five_nodes[node].score * friction_sd_;
+}
+
+double TrialFollower::largest_log_weight() const {
+  return *std::max_element(log_weight_.begin(), log_weight_.begin() + nodes_);
+}
+
+double TrialFollower::chance_of_rest(const Event& event) {
+  if (!is_contact(event.kind)) return 0;
+  come_to(event);
+  double sum = 0, weights = 0;
+  for (std::size_t q = 0; q < nodes_; ++q) {
+    StepContext here = run_.collisions[collision_of(event)].context;
+    here.friction_shift = friction_shift(q);
+    const double w = std::exp(log_weight_[q] - largest_log_weight());
+    sum += w * filters_[q].chance_below(wheel_, here, wheel_.barrier(here));
+    weights += w;
+  }
+  return sum / weights;
+}
+
+SpeedFilter::Out TrialFollower::seen_by(SpeedFilter& filter, const Event& event, double friction_shift) const {
+  const std::size_t k = collision_of(event);
+  const RunCollision& m = run_.collisions[k];
+  StepContext here = m.context;
+  here.friction_shift = friction_shift;
+  switch (event.kind) {
+    case EventKind::launch:
+      return filter.launch(measured_.conditions[run_.condition], m.before);
+    case EventKind::collision:
+      return filter.collision(wheel_, here, *m.after);
+    case EventKind::stance:
+      return filter.stance(wheel_, here, run_.collisions[k + 1].before);
+    case EventKind::step:
+      return filter.step(wheel_, here, run_.collisions[k + 1].before);
+    case EventKind::rest:
+    case EventKind::survival:
+      return filter.rest(wheel_, here, m.after ? jam_bound(measured_) : wheel_.barrier(here),
+                         event.kind == EventKind::rest);
+  }
+  throw std::logic_error("TrialFollower: unknown kind of event");
+}
+
+SpeedFilter::Out TrialFollower::see(const Event& event) {
+  come_to(event);
+  next_.reset();
+  if (event.kind == EventKind::launch) next_ = 0;
+  if (event.kind == EventKind::stance || event.kind == EventKind::step) next_ = collision_of(event) + 1;
+  if (nodes_ == 1) return seen_by(filters_[0], event, 0);
+  // The density is averaged over the nodes, which are weighed anew by it.
+  const double largest = largest_log_weight();
+  double before = 0, now = 0, below = 0, unit = 0;
+  for (std::size_t q = 0; q < nodes_; ++q) {
+    const SpeedFilter::Out out = seen_by(filters_[q], event, friction_shift(q));
+    const double w = std::exp(log_weight_[q] - largest);
+    before += w;
+    now += w * std::exp(out.log_density);
+    below += w * dynamics::normal_cdf(out.score);
+    unit += w * out.unit;
+    log_weight_[q] += out.log_density;
+  }
+  return {now > 0 ? std::max(least_log_density, std::log(now / before)) : least_log_density,
+          score_of_probability(below / before), unit / before};
+}
+
+}  // namespace metastable::analysis

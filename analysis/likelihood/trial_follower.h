@@ -1,0 +1,48 @@
+#pragma once
+// One trial followed through its events, as wheel_events() lists them.
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "analysis/diagnosis/transition_model.h"
+#include "analysis/likelihood/speed_filter.h"
+#include "analysis/likelihood/wheel_hypothesis.h"
+#include "analysis/likelihood/wheel_runs.h"
+
+namespace metastable::analysis {
+
+/// What each event of one trial says, given those before it. A friction of the trial's own is integrated over by five
+/// Gauss-Hermite nodes: every node follows the trial, weighted by what it has explained. Where no event leads up to a
+/// collision (no launch is stated, or the stances are left out), its reported speed is where the trial goes on from.
+class TrialFollower {
+ public:
+  /// All references must outlive the follower.
+  /// @param wheel  under the hypothesis, on the ramp of the trial's condition
+  TrialFollower(const WheelRuns& measured, const WheelRun& run, const dynamics::ExtendedWheel& wheel,
+                const WheelHypothesis& hypothesis);
+
+  /// The chance that the collision of this event, which comes next, ends in rest; 0 for events of no collision.
+  double chance_of_rest(const Event& event);
+  /// Log density, normal score and unit of the event that comes next.
+  SpeedFilter::Out see(const Event& event);
+
+ private:
+  static constexpr std::size_t most_nodes = 5;
+
+  void come_to(const Event& event);
+  SpeedFilter::Out seen_by(SpeedFilter& filter, const Event& event, double friction_shift) const;
+  double friction_shift(std::size_t node) const;
+  double largest_log_weight() const;
+
+  const WheelRuns& measured_;
+  const WheelRun& run_;
+  const dynamics::ExtendedWheel& wheel_;
+  double friction_sd_;  // of the trial's own; 0: one node, without a shift
+  std::size_t nodes_;
+  std::vector<SpeedFilter> filters_;             // by node
+  std::array<double, most_nodes> log_weight_{};  // of the nodes
+  std::optional<std::size_t> next_;              // the collision that the filters have come to
+};
+
+}  // namespace metastable::analysis

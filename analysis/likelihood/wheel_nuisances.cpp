@@ -1,0 +1,41 @@
+#include "analysis/likelihood/wheel_nuisances.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace metastable::analysis {
+
+std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise) {
+  const Spread &eta = nominal.restitution, &mu = nominal.friction;
+  using Slot = WheelSlot;
+  std::vector<Nuisance> all(noise ? Slot::log_noise_sd + 1 : Slot::tails + 1);
+  all[Slot::restitution_mean] = {"restitution_mean", eta.mean, 0.08, 1e-4, 0.02, 0.98};
+  all[Slot::log_restitution_sd] = {"log restitution_sd", std::log(std::max(0.01, eta.sd)), 0.4, 1e-3, std::log(0.005),
+                                   std::log(0.4)};
+  all[Slot::friction_mean] = {"friction_mean", mu.mean, 0.08, 1e-4, 0.02, 1.5};
+  all[Slot::log_friction_sd] = {"log friction_sd", std::log(std::max(0.01, mu.sd)), 0.4, 1e-3, std::log(0.005),
+                                std::log(0.5)};
+  all[Slot::skew] = {"skew", 0, 0.06, 1e-3, -0.5, 0.5};
+  all[Slot::tails] = {"tails", 0, 0.06, 1e-3, -0.4, 0.4};
+  if (noise) all[Slot::log_noise_sd] = {"log noise_sd", std::log(*noise), 0.5, 1e-3, std::log(1e-4), 0};
+  return all;
+}
+
+WheelHypothesis hypothesis_at(std::span<const double> nuisance) {
+  using Slot = WheelSlot;
+  WheelHypothesis hypothesis{.contact = {nuisance[Slot::restitution_mean], std::exp(nuisance[Slot::log_restitution_sd]),
+                                         nuisance[Slot::friction_mean], std::exp(nuisance[Slot::log_friction_sd])},
+                             .tilt = ScoreTilt(nuisance[Slot::skew], nuisance[Slot::tails]),
+                             .extension = {}};
+  if (nuisance.size() > Slot::log_noise_sd) hypothesis.noise = std::exp(nuisance[Slot::log_noise_sd]);
+  return hypothesis;
+}
+
+void set_contact(std::vector<double>& nuisance, const dynamics::ContactSpread& contact) {
+  nuisance[WheelSlot::restitution_mean] = contact.restitution_mean;
+  nuisance[WheelSlot::log_restitution_sd] = std::log(contact.restitution_sd);
+  nuisance[WheelSlot::friction_mean] = contact.friction_mean;
+  nuisance[WheelSlot::log_friction_sd] = std::log(contact.friction_sd);
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,39 @@
+#pragma once
+// What a recalibration refits of a wheel, each in a slot of its own of the model's list of nuisances.
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "analysis/diagnosis/transition_model.h"
+#include "analysis/experiment/experiment.h"
+#include "analysis/likelihood/wheel_hypothesis.h"
+#include "dynamics/wheel/collision_density.h"
+
+namespace metastable::analysis {
+
+/// Where each nuisance stands in the list. Spreads and the noise are refitted by their logarithms; log_noise_sd is
+/// there only where the noise is refitted.
+struct WheelSlot {
+  enum : std::size_t {
+    restitution_mean,
+    log_restitution_sd,
+    friction_mean,
+    log_friction_sd,
+    skew,
+    tails,
+    log_noise_sd
+  };
+};
+
+/// @param noise  sd of reported speeds to start from, where it is refitted [rad/s]
+std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise);
+
+/// What these values of the nuisances suppose of the wheel, without effects.
+WheelHypothesis hypothesis_at(std::span<const double> nuisance);
+
+/// Sets the slots of the contact; the others keep their values.
+void set_contact(std::vector<double>& nuisance, const dynamics::ContactSpread& contact);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,30 @@
+#pragma once
+// Numbers of a study that must agree, compared before anything is printed.
+
+#include <string>
+
+#include "analysis/study/certify.h"
+#include "analysis/study/metastability.h"
+#include "markov/chain/chain.h"
+
+namespace metastable::analysis {
+
+/// Two numbers that must agree and do not; the message holds both. The command line turns it into exit code 3.
+class Contradiction : public markov::ConvergenceError {
+ public:
+  explicit Contradiction(const std::string& what) : ConvergenceError("contradiction: " + what) {}
+};
+
+/// Survival starts at 1, does not rise, and sums to no more than the expected steps; every interval holds its value;
+/// expected steps are at least 1, rates lie in [0, 1]; and all of Metastability::agreements hold.
+/// study() asks this of every result. @throws Contradiction
+void require_consistent(const Metastability& study);
+
+/// Do the study's interval of the expected steps and the guaranteed bounds overlap? @throws Contradiction if not
+void require_consistent(const Metastability& study, const CertifiedSteps& certified);
+
+/// Do two 95 % intervals of one quantity overlap? @throws Contradiction if not, naming both
+void require_overlap(const std::string& what, const std::string& name_a, const Estimate& a, const std::string& name_b,
+                     const Estimate& b);
+
+}  // namespace metastable::analysis
