@@ -24,7 +24,8 @@ bool guarded(std::string_view text) {
 
 std::string csv_field(const std::string& text) {
   const std::string plain = guarded(text) ? "'" + text : text;
-  if (plain.find_first_of(",\"\r\n") == std::string::npos && !plain.starts_with('#')) return plain;
+  const auto special = [](char c) { return c == ',' || c == '"' || static_cast<unsigned char>(c) < ' '; };
+  if (std::ranges::none_of(plain, special) && !plain.starts_with('#')) return plain;
   std::string quoted = "\"";
   for (const char c : plain) {
     if (c == '"') quoted += '"';

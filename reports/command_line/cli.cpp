@@ -10,6 +10,7 @@
 #include <new>
 #include <optional>
 #include <ranges>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -216,7 +217,10 @@ int parse_and_run(int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {  // --help, --version
-    return app.exit(success);
+    std::ostringstream text;
+    const int code = app.exit(success, text, text);
+    fmt::print("{}", text.view());
+    return code;
   } catch (const CLI::ParseError& error) {
     for (const CLI::App* sub : subcommands)  // before what may be missing because of it
       for (const std::string& word : sub->remaining())

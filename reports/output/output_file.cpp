@@ -63,7 +63,6 @@ OutputError::OutputError(const fs::path& path, const std::string& reason)
     : std::invalid_argument("cannot write " + (path.empty() ? std::string("''") : path.string()) + ": " + reason) {}
 
 OutputFile::OutputFile(const fs::path& path) : path_(path) {
-  file_.imbue(std::locale::classic());
   buffer_.imbue(std::locale::classic());
   if (path == "-") return;
   if (path.empty()) throw OutputError(path, "the name is empty");
@@ -91,10 +90,7 @@ OutputFile::~OutputFile() {
   fs::remove(temporary_, ignored);
 }
 
-std::ostream& OutputFile::stream() {
-  if (target_.empty()) return buffer_;
-  return file_;
-}
+std::ostream& OutputFile::stream() { return buffer_; }
 
 void OutputFile::commit() {
   errno = 0;
@@ -102,6 +98,9 @@ void OutputFile::commit() {
     if (!(std::cout << buffer_.view() << std::flush)) throw OutputError("standard output", last_reason());
     return;
   }
+  const std::string_view content = buffer_.view();
+  file_.write(content.data(), static_cast<std::streamsize>(content.size())).flush();
+  if (!file_) throw OutputError(path_, last_reason());
   file_.close();
   if (!file_) throw OutputError(path_, last_reason());
   if (temporary_.empty()) return;

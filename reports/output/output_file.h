@@ -36,7 +36,7 @@ class OutputFile {
   std::filesystem::path target_;     // path_ with symbolic links resolved; empty: standard output
   std::filesystem::path temporary_;  // empty: nothing to rename or remove
   std::ofstream file_;
-  std::ostringstream buffer_;  // standard output until commit
+  std::ostringstream buffer_;  // until commit
 };
 
 /// Writes the whole of `content` into `path` ("-": standard output), or nothing. @throws OutputError

@@ -166,10 +166,10 @@ TEST(Experiment, RefusesWhatNoWheelCanHave) {
       "experiment.toml:2:17: wheel.inertia_kg_m2: 0.0035 kg m^2 is below M (mean L)^2 = 0.03138 kg m^2, the least "
       "about the stance foot; if it is the inertia about the hub, 0.03488 kg m^2 is meant");
   EXPECT_EQ(of("hub_mass_kg = 1.39\n", "inertia_kg_m2 = 0.0349\nhub_mass_kg = 1.39\n"), "");
-  EXPECT_EQ(of("hub_mass_kg = 1.39\n", "inertia_kg_m2 = 1e6\nhub_mass_kg = 1.39\n").substr(0, 79),
+  EXPECT_EQ(of("hub_mass_kg = 1.39\n", "inertia_kg_m2 = 1e6\nhub_mass_kg = 1.39\n").substr(0, 80),
             "experiment.toml:2:17: wheel.inertia_kg_m2: 1000000 kg m^2 is above 0.3138 kg m^2");
   EXPECT_EQ(of("hub_mass_kg = 1.39\n", "radius_of_gyration_m = 2\nhub_mass_kg = 1.39\n"),
-            "experiment.toml:2:24: wheel.radius_of_gyration_m: 2 m is outside [0, 0.4508] m (3 mean legs)");
+            "experiment.toml:2:24: wheel.radius_of_gyration_m: 2 m is outside [0, 0.4507] m (3 mean legs)");
   EXPECT_EQ(of("1.39", "1.39", "a,1,1,0,1e308\n"),
             "collisions.csv:2:9: omega_minus_rad_s: 1e+308 is outside [0, 1000]");
 }

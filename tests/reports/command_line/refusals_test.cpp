@@ -58,7 +58,7 @@ TEST_F(Refusals, OfOptionsThatDoNothing) {
        "--friction-sd: has no meaning under --law plastic"},
       {{"steps", "--method", "integrated", "--samples", "256"}, "--samples: has a meaning under --method sampled only"},
       {{"steps", "--json", ""}, "--json: what is given is empty"},
-      {{"effects", "--json="}, "--json: what is given is empty"},
+      {{"effects", "--json", ""}, "--json: what is given is empty"},
       {{"diagnose", ""}, "DIR: what is given is empty"},
       {{"steps", "--config", file("a.toml", "leg-count = 12\n")},
        "--leg-count: has a meaning where --legs is one length; it is 'paper'"},

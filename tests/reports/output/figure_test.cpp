@@ -38,13 +38,6 @@ std::size_t count(const std::string& text, const std::string& part) {
   return n;
 }
 
-// As gnuplot writes text into SVG.
-std::string escape_text(const std::string& text) {
-  std::string out;
-  for (const char c : text) out += c == '"' ? std::string("&quot;") : std::string(1, c);
-  return out;
-}
-
 std::string error_of(const Figure& figure) {
   try {
     gnuplot_script(figure);
@@ -76,8 +69,8 @@ TEST(Figure, AnyTextIsALabel) {
     lines.title = lines.series[0].label = lines.x.label = text;
     lines.reference_lines = {{.vertical = true, .at = 1, .label = text}};
     for (const Figure& figure : {bars, map, lines}) {
-      const std::string svg = render_svg(figure), shown = ">" + escape_text(text) + "<";
-      EXPECT_GE(count(svg, shown), 2u) << shown << svg;
+      const std::string svg = render_svg(figure), shown = ">" + text + "<";
+      EXPECT_GE(count(svg, shown), 2u) << figure.id << " " << shown;
     }
   }
 }
