@@ -36,7 +36,7 @@ std::string read_file(const std::filesystem::path& path) {
   for (;;) {
     pollfd waiting{file.number, POLLIN, 0};
     const int ready = ::poll(&waiting, 1, 50);
-    check_interrupt();
+    if (ready <= 0 || S_ISFIFO(status.st_mode)) check_interrupt();
     if (ready <= 0) continue;
     const ssize_t count = ::read(file.number, buffer, sizeof buffer);
     if (count > 0) text.append(buffer, static_cast<std::size_t>(count));
