@@ -1,7 +1,6 @@
 #pragma once
 // The wheel's step with physical extensions: what each effect of the catalogue does inside the return map.
 
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -20,7 +19,6 @@ struct Extension {
   Shape sag_shape = Shape::parabola;             ///< of the surface between sag_from and sag_to
   double sag = 0;                                ///< depth in the middle of that stretch [m]
   double sag_from = 0, sag_to = 1;               ///< [m] down the ramp from foot 1
-  std::array<double, 4> slope_change{};          ///< local slope as Legendre polynomials 1..4 over that stretch [rad]
   double viscous = 0;                            ///< resisting torque by omega [N m s]
   double rolling = 0;                            ///< constant resisting torque [N m]
   double air = 0;                                ///< resisting torque by omega^2 [N m s^2]
