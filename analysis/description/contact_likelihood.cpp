@@ -164,8 +164,7 @@ ContactLikelihood::ContactLikelihood(const std::vector<dynamics::WheelMap>& maps
                                      std::span<const MeasuredLanding> transitions, int threads)
     : threads_(threads) {
   std::map<std::pair<std::size_t, int>, Surface> surfaces;
-  for (const MeasuredLanding& t : transitions)
-    surfaces.try_emplace({t.condition, t.phase}, maps[t.condition], t.phase);
+  for (const MeasuredLanding& t : transitions) surfaces.try_emplace({t.condition, t.phase}, maps[t.condition], t.phase);
   std::vector<Observed> all(transitions.size());
   markov::parallel_for(transitions.size(), threads, [&](std::size_t number) {
     const MeasuredLanding& t = transitions[number];

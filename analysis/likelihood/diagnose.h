@@ -11,7 +11,8 @@
 //     const auto diagnosis = metastable::analysis::diagnose(
 //         arguments[1], {.catalogue = {"leg_contact", "slope_offset"}, .draws = 200});
 //     std::printf("%s\n", verdict_name(diagnosis.verdict).c_str());
-//     for (const auto& cause : diagnosis.causes.ranked) std::printf("%s: %.2f\n", cause.name().c_str(), cause.probability);
+//     for (const auto& cause : diagnosis.causes.ranked) std::printf("%s: %.2f\n", cause.name().c_str(),
+//     cause.probability);
 //   }
 // prints
 //   @@DIAGNOSE@@

@@ -31,8 +31,8 @@ struct Point {
   double x = 0, z = 0;  ///< down the plane, out of it [m]
 };
 
-/// How the wheel stands on one foot, or just off it. `angle_rad` is how far the hub has passed over the foot's leg, from
-/// the normal of the plane [rad]; it grows as the wheel rolls down, at `speed` [rad/s].
+/// How the wheel stands on one foot, or just off it. `angle_rad` is how far the hub has passed over the foot's leg,
+/// from the normal of the plane [rad]; it grows as the wheel rolls down, at `speed` [rad/s].
 struct Pose {
   Point foot;
   int leg = 0;

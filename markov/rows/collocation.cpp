@@ -156,8 +156,7 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
     highest = std::max(highest, most);
   }
   const double launched = launch.state(3);  // which may be slower than any survivor
-  const double length =
-      std::max({launched - lower, 0.1 * std::abs(launched), 0.5 * std::abs(highest_lower), 1e-3});
+  const double length = std::max({launched - lower, 0.1 * std::abs(launched), 0.5 * std::abs(highest_lower), 1e-3});
   double upper = std::min(highest, lower + 1.2 * length);
   for (;;) {
     std::vector<std::pair<double, double>> ranges;

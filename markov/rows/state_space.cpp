@@ -20,7 +20,7 @@ constexpr double far_above = 4.0;          // the regime: where the landings of 
 constexpr double beyond_launch = 1.5;      // what the cells hold above its landings
 constexpr int most_steps = 1000;           // mapped to find the end of the bulk
 
-// State below which all but probe_level of the landings from `state` fall; rest counts as lowest.
+// Returns the state below which all but probe_level of the landings from `state` fall; rest counts as lowest.
 double high_landing(const NoiseTable& table, std::span<const double> weight, double state) {
   std::vector<double> landing(weight.size());
   const std::vector<double> offset(weight.size(), 0.0);
@@ -141,7 +141,7 @@ StateSpace graded_space(const StateSpace& pilot, std::span<const double> nu, std
       visits_above += at(visits, used - 1);
       if (nu_above > 1e-13 || visits_above > 1e-9) break;
     }
-    // Monitor per pilot cell, centred differences of the density and of h, smoothed over neighbours.
+    // The monitor of a pilot cell takes centred differences of the density and of h, smoothed over neighbours.
     std::vector<double> monitor(used, 0.0);
     for (std::size_t c = 0; c < used; ++c) {
       const std::size_t a = c == 0 ? 0 : c - 1, b = std::min(c + 1, n - 1);

@@ -1,4 +1,5 @@
 #include "analysis/diagnosis/gap_shrinkage.h"
+#include "analysis/diagnosis/model_fit.h"
 
 #include <gtest/gtest.h>
 

@@ -111,7 +111,7 @@ double drag_work(const std::string& text) {
 double shown_inertia(const LaboratorySetup& setup, const LaboratoryTrial& trial, std::size_t k) {
   const Wheel& wheel = setup.wheel;
   const auto leg = static_cast<std::size_t>(trial.collisions[k].leg);
-  const double slope = setup.conditions[trial.condition].slope, own = wheel.leg_length[leg];
+  const double slope = setup.conditions[trial.condition].slope_rad, own = wheel.leg_length[leg];
   // Height of the hub over the foot it stands on when another foot touches behind (1) or ahead (-1).
   const auto height = [&](double other, double side) {
     const double chord = std::sqrt(own * own + other * other - 2 * own * other * std::cos(std::numbers::pi / 4));

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <numeric>
 
-#include "tests/markov/message.h"
 #include "tests/markov/exact_answers.h"
+#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
 
 namespace metastable::markov {
