@@ -8,11 +8,11 @@
 //
 //   int main(int, char** arguments) {
 //     // A folder with experiment.toml, collisions.csv and trials.csv; of the catalogue only what is suspected.
-//     const auto diagnosis = metastable::analysis::diagnose(
+//     const auto answer = metastable::analysis::diagnose(
 //         arguments[1], {.catalogue = {"leg_contact", "slope_offset"}, .draws = 200});
-//     std::printf("%s\n", verdict_name(diagnosis.verdict).c_str());
-//     for (const auto& cause : diagnosis.causes.ranked) std::printf("%s: %.2f\n", cause.name().c_str(),
-//     cause.probability);
+//     std::printf("%s\n", verdict_name(answer.verdict).c_str());
+//     for (const auto& cause : answer.causes.ranked)
+//       std::printf("%s: %.2f\n", cause.name().c_str(), cause.probability);
 //   }
 // prints
 //   @@DIAGNOSE@@

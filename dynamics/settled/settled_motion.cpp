@@ -63,8 +63,8 @@ SettledRoll::SettledRoll(const SettledMotion& motion, int leg, double omega_minu
     : motion_(&motion),
       leg_(leg),
       contact_(static_cast<std::size_t>(motion.wheel().legs()), old),
-      sine_(motion.wheel().gravity * std::sin(motion.wheel().slope)),
-      cosine_(motion.wheel().gravity * std::cos(motion.wheel().slope)) {
+      sine_(motion.wheel().gravity * std::sin(motion.wheel().slope_rad)),
+      cosine_(motion.wheel().gravity * std::cos(motion.wheel().slope_rad)) {
   require_range("omega-", omega_minus, omega_minus > 0 && std::isfinite(omega_minus), "(0, inf) rad/s");
   check(old);
   set_contact(landed);

@@ -47,7 +47,7 @@ void SettledWheel::validate() const {
   require(tip_radius >= 0 && tip_radius <= shortest / 20, "tip_radius", tip_radius,
           fmt::format("[0, {:.6g}] m, a twentieth of the shortest leg", shortest / 20));
   require(gravity > 0 && std::isfinite(gravity), "gravity", gravity, "(0, inf) m/s^2");
-  require(slope > 0 && slope < steepest_slope(legs()), "slope", slope,
+  require(slope_rad > 0 && slope_rad < steepest_slope(legs()), "slope", slope_rad,
           fmt::format("(0, {:.6g}) rad", steepest_slope(legs())));
   require(constant_drag >= 0, "constant_drag", constant_drag, "[0, inf) N m");
   require(linear_drag >= 0, "linear_drag", linear_drag, "[0, inf) N m s");
@@ -63,7 +63,7 @@ SettledWheel settled_wheel(const Wheel& wheel, double slope, double tip_radius) 
   settled.leg_length = wheel.leg_length;
   settled.mass = wheel.hub_mass;
   settled.gravity = wheel.gravity;
-  settled.slope = slope;
+  settled.slope_rad = slope;
   settled.tip_radius = tip_radius;
   settled.radius_of_gyration = wheel.radius_of_gyration.value_or(assumed_gyration);
   if (!wheel.radius_of_gyration && wheel.inertia) {
@@ -83,12 +83,12 @@ StandingFoot::StandingFoot(const SettledWheel& wheel, int leg)
       radius_(wheel.tip_radius),
       gravity_(wheel.gravity),
       gyration_sq_(wheel.gyration_sq()),
-      sine_(std::sin(wheel.slope)),
-      cosine_(std::cos(wheel.slope)) {
+      sine_(std::sin(wheel.slope_rad)),
+      cosine_(std::cos(wheel.slope_rad)) {
   const double between = wheel.leg_angle();
   landing_ = -both_down(length_, wheel.length(leg - 1), between);
   next_ = both_down(length_, wheel.length(leg + 1), between);
-  apex_ = -wheel.slope - std::asin(radius_ * sine_ / length_);
+  apex_ = -wheel.slope_rad - std::asin(radius_ * sine_ / length_);
   pace_ = triangle(length_, wheel.length(leg + 1), between).chord + radius_ * (next_ - landing_);
 }
 

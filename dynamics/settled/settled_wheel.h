@@ -16,7 +16,7 @@ struct SettledWheel {
   double radius_of_gyration = 0.05;                      ///< r_g [m] about the hub, > 0: J = M r_g^2
   double tip_radius = 0;                                 ///< r [m], in [0, shortest leg / 20]
   double gravity = 9.81;                                 ///< g [m/s^2], > 0
-  double slope = 0;                                      ///< gamma [rad], in (0, pi / legs)
+  double slope_rad = 0;                                  ///< gamma, in (0, pi / legs)
   /// Torque against the spin: constant [N m], by omega [N m s], by omega |omega| [N m s^2]; all >= 0.
   double constant_drag = 0, linear_drag = 0, quadratic_drag = 0;
 

@@ -15,7 +15,7 @@ namespace {
 SettledWheel paper(double slope_deg, double rest_speed = 1e-8) {
   SettledWheel wheel;
   wheel.radius_of_gyration = std::sqrt(0.0025 / 1.39);
-  wheel.slope = slope_deg * degree;
+  wheel.slope_rad = slope_deg * degree;
   wheel.rest_speed = rest_speed;
   return wheel;
 }
@@ -212,7 +212,7 @@ TEST(SettledMotion, IllegalInputIsNamed) {
             "settled: radius_of_gyration: 0 is outside (0, inf) m");
   EXPECT_EQ(broken([](SettledWheel& w) { w.tip_radius = 0.01; }),
             "settled: tip_radius: 0.01 is outside [0, 0.00754] m, a twentieth of the shortest leg");
-  EXPECT_EQ(broken([](SettledWheel& w) { w.slope = 0.5; }), "settled: slope: 0.5 is outside (0, 0.392699) rad");
+  EXPECT_EQ(broken([](SettledWheel& w) { w.slope_rad = 0.5; }), "settled: slope: 0.5 is outside (0, 0.392699) rad");
   const SettledMotion motion(paper(7.02));
   EXPECT_EQ(message_of([&] { motion.land(0, 5, {1, 0.4}); }), "settled: restitution: 1 is outside [0, 1)");
   EXPECT_EQ(message_of([&] { motion.land(0, 5, {0.4, -1}); }), "settled: friction: -1 is outside [0, inf)");
