@@ -22,6 +22,7 @@ using markov::LandingSource;
 
 constexpr double beyond_top = 1.3;     // how far above the top edge the drift looks, relative
 constexpr double top_noise = 4;        // the top edge: where noise of so many sds leads no higher
+constexpr double usual_noise = 3;      // launches of so many sds count where nodes are spent on them
 constexpr double launch_noise = 8;     // and launches of so many sds lie below
 constexpr double least_range = 2;      // states the nodes cover, over the lowest
 constexpr double least_launch = 0.01;  // of the lowest state: launches below it are not told apart
@@ -74,7 +75,8 @@ double top_state(const dynamics::WheelMap& map, const dynamics::TruncatedNormal&
 
 // Where nodes have to begin for launches too slow to come from a step: less is as good as rest at the first one.
 double lowest_of_launch(const dynamics::TruncatedNormal& launch, double lowest) {
-  if (launch.mean() * launch.mean() >= lowest) return lowest;
+  const double usual = std::max(0.0, launch.mean() - usual_noise * launch.sd());
+  if (usual * usual >= lowest) return lowest;
   const double slow = std::max(0.0, launch.mean() - launch_noise * launch.sd() - 0.1);
   return std::max(slow * slow, least_launch * lowest);
 }

@@ -192,9 +192,8 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
   if (!options.brief && !sampled.advance.empty()) result.steps.metres = reward(sampled.advance);
   result.agreements.push_back(
       {"expected steps, solved and summed over survival", result.steps.distribution.mean, survival.mean(), same_chain});
-  if (quasi.revolution_failure_rate < 1)
-    result.agreements.push_back({"failure rate, and that of its survivors", -std::log1p(-quasi.revolution_failure_rate),
-                                 -log_survival_of_a_revolution(solver, quasi), same_chain});
+  result.agreements.push_back({"failure rate of a revolution, and that of its survivors", quasi.revolution_failure_rate,
+                               -std::expm1(log_survival_of_a_revolution(solver, quasi)), same_chain});
   const std::size_t shown = survival_steps(problem);
   for (std::size_t n = 0; n < shown; ++n) result.steps.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.steps.reach_end = survival.at(*problem.last_event);

@@ -17,8 +17,10 @@ constexpr double kRounding = 1e-11;    // a change that has stopped falling belo
 constexpr int kStagnant = 8;           // iterations without a smaller change
 constexpr double kRateAccuracy = 1e-14;
 constexpr double kStays = 1e-12;
-constexpr double kNobody = 1e-13;  // lambda_1 of interpolated rows from which nobody survives: rounding
-constexpr int kNobodyLeft = 100;   // iterations spent on its vectors
+constexpr double kNobody = 1e-13;        // lambda_1 of interpolated rows from which nobody survives: rounding
+constexpr int kNobodyLeft = 100;         // iterations spent on its vectors
+constexpr double kHardlyAnybody = 1e-6;  // lambda_1 of rows that keep so few that neighbouring eigenvalues are rounding
+constexpr int kFewLeft = 1000;           // iterations spent on theirs
 
 double total(const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); }
 
@@ -135,7 +137,9 @@ LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
     left_done = left_rule.done(left_change) || left_done;
     right_done = right_rule.done(right_change) || right_done;
     const bool settled = left_done && right_done && (rate_change <= kRateAccuracy || left_change <= kAccuracy);
-    if (settled || (pair.iterations >= kNobodyLeft && std::abs(1 - rate) <= kNobody)) return pair;
+    if (settled || (pair.iterations >= kNobodyLeft && std::abs(1 - rate) <= kNobody) ||
+        (pair.iterations >= kFewLeft && std::abs(1 - rate) <= kHardlyAnybody))
+      return pair;
   }
   throw ConvergenceError("inverse iteration", pair.residual,
                          "still changing after " + std::to_string(kIterations) + " iterations");

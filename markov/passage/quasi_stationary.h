@@ -29,8 +29,9 @@ struct QuasiStationary {
 /// Iterates inversely with the subtraction-free factors, each time followed by one step of the chain (iterates stay
 /// positive; an iteration shrinks the rest by (1 - lambda_1) |lambda_2| / (lambda_1 |1 - lambda_2|)). A chain that
 /// cannot visit a state twice has lambda_1 = 0: failure_rate = 1, and the distribution is that of the last survivors
-/// (zero on classes they do not reach). An iteration takes O(n^2) for full rows.
-/// Where nobody survives (lambda_1 < 1e-13) the vectors are those of 100 iterations, settled or not.
+/// (zero on classes they do not reach). O(n^2) an iteration for full rows.
+/// Where nobody survives (lambda_1 < 1e-13) the vectors are those of 100 iterations, settled or not; where hardly
+/// anybody does (lambda_1 < 1e-6), of 1000.
 /// @throws ConvergenceError("inverse iteration", residual, ...) after 10000 iterations.
 QuasiStationary quasi_stationary(const ChainSolver& solver);
 

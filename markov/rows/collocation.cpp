@@ -18,6 +18,7 @@ namespace {
 constexpr double least_scaled = 1e-6;     // survivors of a row whose total is worth correcting
 constexpr double least_panel = 1e-7;      // between two edges, of the range
 constexpr double most_above = 1e-13;      // survivors beyond the upper edge
+constexpr double few_lower = 1.5;         // lowest states that the first try covers above the lowest one
 constexpr double most_launched = 1e-9;    // landings of the launch beyond it
 constexpr std::size_t cells = 64;         // of a phase, to find it
 constexpr std::size_t few_points = 4000;  // of a row
@@ -155,8 +156,8 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
     highest_lower = std::max(highest_lower, least);
     highest = std::max(highest, most);
   }
-  const double launched = launch.state(3);  // which may be slower than any survivor
-  const double length = std::max({launched - lower, 0.1 * std::abs(launched), 0.5 * std::abs(highest_lower), 1e-3});
+  const double launched = std::max(launch.state(3), highest_lower + few_lower * std::abs(highest_lower));
+  const double length = std::max({launched - lower, 0.1 * std::abs(launched), 1e-3});
   double upper = std::min(highest, lower + 1.2 * length);
   for (;;) {
     std::vector<std::pair<double, double>> ranges;

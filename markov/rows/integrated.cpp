@@ -12,6 +12,7 @@ namespace metastable::markov {
 namespace {
 
 constexpr double most_above = 1e-13;    // survivors beyond the upper edge
+constexpr double few_lower = 1.5;       // lowest states that the first try covers above the lowest one
 constexpr double most_launched = 1e-9;  // landings of the launch beyond it
 constexpr std::size_t most_pilot_panels = 64;
 constexpr double least_scaled = 1e-6;  // survivors of a row whose total is worth correcting
@@ -66,8 +67,8 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     for (int p = 0; p < map.phases(); ++p) all.emplace_back(map.state_interval(p).first, upper);
     return all;
   };
-  const double launched = launch.state(3);  // which may be slower than any survivor
-  const double length = std::max({launched - lower, 0.1 * std::abs(launched), 0.5 * std::abs(highest_lower), 1e-3});
+  const double launched = std::max(launch.state(3), highest_lower + few_lower * std::abs(highest_lower));
+  const double length = std::max({launched - lower, 0.1 * std::abs(launched), 1e-3});
   double upper = std::min(highest, lower + 1.2 * length);
   for (std::size_t panels = map.phases() > 1 ? 1 : 2;;) {
     const NodeSpace space(ranges(upper), panels);

@@ -1,0 +1,73 @@
+#include "analysis/study/consistency.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/analysis/settings.h"
+
+namespace metastable::analysis {
+namespace {
+
+const Metastability& sound() {
+  static const Metastability result = study(paper_setting(9.59, true).problem(), {.tolerance = 0.05, .brief = true});
+  return result;
+}
+
+template <class Check>
+void expect_contradiction(Check check, const std::string& part) {
+  try {
+    check();
+    FAIL() << part;
+  } catch (const Contradiction& error) {
+    EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+  }
+}
+
+TEST(Consistency, ASoundStudyPassesAndEachFaultIsNamed) {
+  EXPECT_NO_THROW(require_consistent(sound()));
+  EXPECT_GE(sound().agreements.size(), 2u);
+  Metastability rising = sound();
+  rising.steps.survival[5] = rising.steps.survival[4] * 1.001;
+  expect_contradiction([&] { require_consistent(rising); }, "survival of 5 steps");
+  Metastability few = sound();
+  few.steps.distribution.mean = 2;
+  expect_contradiction([&] { require_consistent(few); }, "the expected steps are 2");
+  Metastability outside = sound();
+  outside.steps.from_start.upper = 0.9 * outside.steps.from_start.value;
+  expect_contradiction([&] { require_consistent(outside); }, "expected steps are");
+  Metastability rate = sound();
+  rate.agreements.back().other *= 1.01;
+  expect_contradiction([&] { require_consistent(rate); }, "by another");
+}
+
+TEST(Consistency, IntervalAndCertificateOverlap) {
+  const Estimate& steps = sound().steps.from_start;
+  CertifiedSteps certified;
+  certified.exists = true;
+  certified.lower = 0.9 * steps.lower;
+  certified.upper = 1.1 * steps.upper;
+  EXPECT_NO_THROW(require_consistent(sound(), certified));
+  certified.lower = 1.05 * steps.upper;
+  expect_contradiction([&] { require_consistent(sound(), certified); }, "certificate from");
+  certified.exists = false;
+  EXPECT_NO_THROW(require_consistent(sound(), certified));
+}
+
+// Two ways that share the return map alone: draws in cells, and exact rows on nodes.
+TEST(Consistency, SampledAndIntegratedOverlapAtEveryLaunchSpeed) {
+  Setting setting = paper_setting(7.02, true);
+  for (const double speed : {3.0, 4.2, 7.35, 30.0}) {
+    setting.initial_speed = {speed, 0.2};
+    const auto of = [&](Method method) {
+      return study(setting.problem(), {.method = method, .brief = true}).steps.from_start;
+    };
+    EXPECT_NO_THROW(
+        require_overlap("expected steps", "sampled", of(Method::sampled), "integrated", of(Method::integrated)))
+        << speed;
+  }
+}
+
+}  // namespace
+}  // namespace metastable::analysis

@@ -1,0 +1,99 @@
+// Random settings within range under every law and method: each gets an answer that holds together, and every fiftieth
+// is judged by direct simulation. METASTABLE_SETTINGS=10000 METASTABLE_FIRST_SETTING=0 is the long run.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <random>
+#include <stdexcept>
+#include <string>
+
+#include "analysis/study/metastability.h"
+#include "dynamics/return_map/trials.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr std::uint64_t usual_count = 200;
+constexpr std::uint64_t judged = 50;
+constexpr int trials = 4000;
+
+std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
+  const char* text = std::getenv(name);
+  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
+}
+
+struct Drawn {
+  Setting setting;
+  StudyOptions options;
+};
+
+Drawn draw(std::uint64_t index) {
+  std::mt19937_64 bits(index);
+  const auto uniform = [&](double from, double to) {
+    return from + (to - from) * (static_cast<double>(bits() >> 11) + 0.5) * 0x1p-53;
+  };
+  const auto spread = [&](double lower, double upper, double widest) {
+    const double mean = uniform(lower, upper), sd = uniform(0, widest);
+    return Spread{mean, uniform(0, 1) < 0.15 ? 0 : sd};
+  };
+  Drawn drawn;
+  Setting& setting = drawn.setting;
+  setting.law = dynamics::law_from_name(dynamics::law_names()[index % dynamics::law_names().size()]);
+  setting.slope_deg = uniform(0.1, 20);
+  setting.restitution = spread(0.05, 0.95, 0.3);
+  setting.friction = spread(0, 1, 0.3);
+  setting.initial_speed = uniform(0, 1) < 0.5 ? spread(0, 100, 3) : spread(0, 10, 1);
+  if (uniform(0, 1) < 0.9) setting.wheel.leg_length.assign(8, uniform(0.05, 1));
+  drawn.options.method = uniform(0, 1) < 0.5 ? Method::sampled : Method::integrated;
+  drawn.options.tolerance = 0.05;
+  drawn.options.brief = true;
+  drawn.options.threads = 1;
+  drawn.options.largest_cells = 512;
+  drawn.options.largest_samples = 1u << 14;
+  return drawn;
+}
+
+std::string name(std::uint64_t index, const Drawn& drawn) {
+  return fmt::format("{}: {}, {}", index, drawn.setting.describe(), method_name(drawn.options.method));
+}
+
+// Steps, no more than are shown of survival: a number that every law has, rolling for ever or not.
+void judge(const Setting& setting, const Metastability& study, double tolerance) {
+  const dynamics::WheelMap map = setting.map();
+  const std::size_t most = std::min<std::size_t>(study.steps.survival.size(), 64);
+  double expected = 0, sum = 0, square = 0;
+  for (std::size_t n = 0; n < most; ++n) expected += study.steps.survival[n];
+  for (std::uint64_t i = 0; i < trials; ++i) {
+    const auto steps =
+        static_cast<double>(dynamics::steps_to_rest(map, setting.launch(), setting.first_landing_leg, 2024, i, most));
+    sum += steps;
+    square += steps * steps;
+  }
+  const double mean = sum / trials, error = std::sqrt(std::max(0.0, square / trials - mean * mean) / trials);
+  EXPECT_NEAR(expected, mean, 5 * error + tolerance * mean) << "of " << most << " steps at most";
+}
+
+TEST(RandomSettings, AreAllAnsweredAndAgreeWithSimulation) {
+  const std::uint64_t first = from_environment("METASTABLE_FIRST_SETTING", 0),
+                      count = from_environment("METASTABLE_SETTINGS", usual_count);
+  for (std::uint64_t index = first; index < first + count; ++index) {
+    const Drawn drawn = draw(index);
+    SCOPED_TRACE(name(index, drawn));
+    try {
+      const Metastability result = study(drawn.setting.problem(), drawn.options);
+      EXPECT_GE(result.steps.from_start.value, 1 - 1e-9);
+      if (index % judged == 0 && result.status != Status::rest_unresolved)
+        judge(drawn.setting, result, 2 * drawn.options.tolerance);
+    } catch (const std::exception& error) {
+      ADD_FAILURE() << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace metastable::analysis
