@@ -1,5 +1,7 @@
 #include "analysis/study/exact_rows.h"
 
+#include <cstdint>
+
 #include "markov/rows/collocation.h"
 #include "markov/rows/integrated.h"
 
@@ -7,6 +9,8 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double density_error = 1e-5, density_tolerance = 2 * density_error;
+constexpr double bulk_over_regime = 2;  // rare survivors are faster than the usual ones
+constexpr std::uint64_t pilot_seed = 1;
 constexpr double rounding = 1e-13;                        // of the solvers
 constexpr int few_generations = 2, many_generations = 8;  // of edges
 
@@ -26,12 +30,13 @@ bool has_points(const Problem& problem) {
 
 ExactRows::ExactRows(const Problem& problem, double tolerance, int threads)
     : collocated_(!has_density(problem) || (tolerance < density_tolerance && has_points(problem))), threads_(threads) {
-  ranges_ = collocated_ ? markov::collocation_ranges(problem.map, problem.launch, threads)
-                        : markov::node_ranges(problem.map, problem.launch, threads);
+  bulk_ = bulk_over_regime * markov::bulk_below_launch(problem.map, problem.launch, pilot_seed);
+  ranges_ = collocated_ ? markov::collocation_ranges(problem.map, problem.launch, threads, bulk_)
+                        : markov::node_ranges(problem.map, problem.launch, threads, bulk_);
   error_ = collocated_ || !has_points(problem) ? rounding : density_error;  // without points, densities are exact
   if (collocated_ && !ranges_.empty())
     edges_ = markov::collocation_edges(problem.map, ranges_,
-                                       tolerance < density_tolerance ? many_generations : few_generations);
+                                       tolerance < density_tolerance ? many_generations : few_generations, bulk_);
 }
 
 double ExactRows::error() const { return error_; }
@@ -49,7 +54,7 @@ markov::NodeSpace ExactRows::space(std::size_t panels, const std::vector<double>
     if (collocated_)
       for (double& edge : edges[p]) edge += shift[p];
   }
-  return collocated_ ? markov::NodeSpace::between(edges, panels) : markov::NodeSpace(ranges, panels);
+  return collocated_ ? markov::NodeSpace::between(edges, panels) : markov::NodeSpace(ranges, panels, bulk_);
 }
 
 markov::IntegratedChain ExactRows::chain(const Problem& problem, const markov::NodeSpace& space) const {

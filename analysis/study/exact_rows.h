@@ -36,6 +36,7 @@ class ExactRows {
   bool collocated_ = false;
   int threads_ = 1;
   double error_ = 0;
+  double bulk_ = 0;  // over the lowest state; infinite if the launch lies in it
   std::vector<std::pair<double, double>> ranges_;
   std::vector<std::vector<double>> edges_;  // if collocated
 };

@@ -14,9 +14,10 @@ namespace {
 constexpr double kRoundedStay = 1e-12;  // probabilities of staying below this are the rounding of a row sum
 constexpr double kSumTolerance = 1e-9;
 constexpr double kMeanTolerance = 1e-6;
-constexpr double kConstantHazard = 1e-12;  // relative change of the log survival over a period
-constexpr double kNormalReach = 9;         // standard deviations beyond which a normal has no mass
-constexpr double kSameAsSpectrum = 1e-8;   // agreement wanted with the failure rate of the chain
+constexpr double kConstantHazard = 1e-12;        // relative change of the log survival over a period
+constexpr double kNormalReach = 9;               // standard deviations beyond which a normal has no mass
+constexpr double kInterpolatedRounding = 1e-14;  // of a probability that is a sum of both signs
+constexpr double kSameAsSpectrum = 1e-8;         // agreement wanted with the failure rate of the chain
 
 double dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -128,7 +129,10 @@ Survival::Survival(const ChainSolver& solver, const QuasiStationary& quasi, cons
       const double now = std::accumulate(end - period, end, 0.0);
       const double before = std::accumulate(end - 2 * period, end - period, 0.0);
       difference = std::abs(now / log_factor_ - 1);
-      if (std::abs(now - before) <= kConstantHazard * std::abs(now) && difference <= kSameAsSpectrum) return;
+      const double rounding = chain.interpolated() ? kInterpolatedRounding : 0;
+      if (std::abs(now - before) <= kConstantHazard * std::abs(now) + rounding &&
+          difference <= kSameAsSpectrum + rounding / std::abs(log_factor_))
+        return;
     }
     for (double& entry : survivors) entry /= surviving;
     failing = dot(survivors, chain.kill());
@@ -325,7 +329,9 @@ bool RewardMixture::settled() const {
   for (std::size_t i = head_.size() - period_; i < head_.size(); ++i) absorbed += head_[i].weight;
   const double survivors = std::exp(log_surviving_) + (absorbed - head_.back().weight);
   const double expected = -std::expm1(log_factor_) * survivors;
-  if (!(std::abs(absorbed - expected) <= kSameAsSpectrum * expected)) return false;
+  const double rounding = chain_.interpolated() ? std::min(1e-6, kInterpolatedRounding / -std::expm1(log_factor_)) : 0;
+  if (!(std::abs(absorbed - expected) <= (kSameAsSpectrum + rounding) * expected)) return false;
+  const double increment = kSettledIncrement + rounding;
   const double scale = largest_reward_ * static_cast<double>(period_);
   const double factor = std::exp(log_factor_);
   for (std::size_t i = head_.size() - period_; i < head_.size(); ++i) {
@@ -334,9 +340,8 @@ bool RewardMixture::settled() const {
     const Component& earlier = head_[i - 2 * period_];
     const double mean_change = now.mean - 2 * before.mean + earlier.mean;
     const double variance_change = now.variance - 2 * before.variance + earlier.variance;
-    if (std::abs(now.weight - factor * before.weight) > kSettledIncrement * now.weight ||
-        std::abs(mean_change) > kSettledIncrement * scale ||
-        std::abs(variance_change) > kSettledIncrement * scale * scale) {
+    if (std::abs(now.weight - factor * before.weight) > increment * now.weight ||
+        std::abs(mean_change) > increment * scale || std::abs(variance_change) > increment * scale * scale) {
       return false;
     }
   }

@@ -25,6 +25,7 @@ constexpr std::size_t few_points = 4000;  // of a row
 constexpr std::size_t lanes = 8;          // landings worked on together
 constexpr std::size_t few_edges = 12, many_edges = 24;
 constexpr int most_generations = 8;
+constexpr double edge_ratio = 4;  // beyond the bulk
 constexpr const char* no_points =
     "method integrated: the map does not tell its landing's distribution; use the sampled method";
 
@@ -104,16 +105,20 @@ Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double st
 
 std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
                                                    const std::vector<std::pair<double, double>>& ranges,
-                                                   int generations) {
+                                                   int generations, double bulk) {
   const bool all = cheap(map);
-  const std::size_t most = all ? many_edges : few_edges;
+  std::size_t most = all ? many_edges : few_edges;
   if (all) generations = most_generations;
   const std::size_t phases = ranges.size();
   std::vector<std::vector<double>> edges, last;
   for (const auto& [lower, upper] : ranges) {
-    edges.push_back({lower, upper});
+    edges.push_back({lower});
+    for (double width = bulk; lower + edge_ratio * width < upper; width *= edge_ratio)
+      edges.back().push_back(lower + width);
+    edges.back().push_back(upper);
     last.push_back({lower});
   }
+  most += edges.front().size() - 2;
   for (int generation = 0; generation < generations; ++generation) {
     std::vector<std::vector<double>> more = edges, before(phases);
     std::size_t largest = 0;
@@ -147,7 +152,7 @@ std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
 }
 
 std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& map, const LaunchState& launch,
-                                                          int threads) {
+                                                          int threads, double bulk) {
   const int phases = map.phases();
   double lower = map.state_interval(0).first, highest_lower = lower, highest = 0;
   for (int p = 0; p < phases; ++p) {
@@ -162,27 +167,34 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
   for (;;) {
     std::vector<std::pair<double, double>> ranges;
     for (int p = 0; p < phases; ++p) ranges.emplace_back(map.state_interval(p).first, upper);
+    // Equal cells, or as far apart as nodes where there is a bulk.
+    const auto edge = [&](std::size_t phase, std::size_t cell) {
+      const auto [from, to] = ranges[phase];
+      const double share = static_cast<double>(cell) / cells;
+      return std::isfinite(bulk) ? graded_edge(ranges[phase], bulk, share) : from + (to - from) * share;
+    };
+    std::vector<std::vector<double>> edges(static_cast<std::size_t>(phases));
+    for (std::size_t p = 0; p < edges.size(); ++p)
+      for (std::size_t c = 1; c < cells; ++c) edges[p].push_back(edge(p, c));
     const auto row = [&](double state, int phase) {
-      const int next = (phase + 1) % phases;
-      const auto [from, to] = ranges[static_cast<std::size_t>(next)];
+      const std::vector<double>& above = edges[static_cast<std::size_t>((phase + 1) % phases)];
       NodeRow result;
       result.landing.assign(cells, 0.0);
       std::vector<std::pair<double, double>> points;
       const std::optional<double> rest = map.landing_points(state, phase, {}, points);
       if (!rest) throw std::invalid_argument(no_points);
       result.rest = *rest;
-      for (const auto& [landing, weight] : points) {
-        const double place = std::clamp((landing - from) / (to - from), 0.0, 1.0) * cells;
-        result.landing[std::min(static_cast<std::size_t>(place), cells - 1)] += weight;
-      }
+      for (const auto& [landing, weight] : points)
+        result
+            .landing[static_cast<std::size_t>(std::upper_bound(above.begin(), above.end(), landing) - above.begin())] +=
+            weight;
       return result;
     };
     const auto n = static_cast<std::size_t>(phases) * cells;
     std::vector<NodeRow> of_cells(n);
     parallel_for(n, threads, [&](std::size_t i) {
       const auto phase = i / cells;
-      const auto [from, to] = ranges[phase];
-      of_cells[i] = row(from + (to - from) * (static_cast<double>(i % cells) + 0.5) / cells, static_cast<int>(phase));
+      of_cells[i] = row(0.5 * (edge(phase, i % cells) + edge(phase, i % cells + 1)), static_cast<int>(phase));
     });
     std::vector<std::size_t> row_start{0};
     std::vector<std::uint32_t> column;
@@ -226,8 +238,9 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
       if (!std::isfinite(upper)) throw std::invalid_argument("method integrated: states grow without limit");
       continue;
     }
-    for (auto& [from, to] : ranges) to = from + (to - from) * static_cast<double>(first) / cells;
-    return ranges;
+    std::vector<std::pair<double, double>> cut = ranges;
+    for (std::size_t p = 0; p < cut.size(); ++p) cut[p].second = edge(p, first);
+    return cut;
   }
 }
 

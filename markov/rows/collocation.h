@@ -1,6 +1,7 @@
 #pragma once
 // The backward form of integrated rows, for any noise: collocation of the expected steps as a function of the start.
 
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -22,13 +23,16 @@ Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double st
 /// on cells; nothing if no state comes to rest with a probability that a double can hold.
 /// @throws std::invalid_argument as collocate()
 std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& map, const LaunchState& launch,
-                                                          int threads);
+                                                          int threads,
+                                                          double bulk = std::numeric_limits<double>::infinity());
 
 /// Edges for NodeSpace: the states within `ranges` from which extreme landings just come to rest, and, `generations` -
 /// 1 times, those from which extreme landings meet such a state; no generation that takes a phase beyond `most` edges,
-/// but for the first. As many for every phase (wide panels are halved).
+/// but for the first. As many for every phase (wide panels are halved). Beyond `bulk` over the lower edge, edges at
+/// equal ratios as well.
 std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
                                                    const std::vector<std::pair<double, double>>& ranges,
-                                                   int generations);
+                                                   int generations,
+                                                   double bulk = std::numeric_limits<double>::infinity());
 
 }  // namespace metastable::markov

@@ -53,7 +53,8 @@ Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double st
   return launch_of_rows(rows(map, space), space, {[state](double) { return state; }, phase}, {}, 1);
 }
 
-std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads) {
+std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads,
+                                                   double bulk) {
   double lower = map.state_interval(0).first, highest_lower = lower, highest = 0;
   for (int p = 0; p < map.phases(); ++p) {
     const auto [least, most] = map.state_interval(p);
@@ -71,7 +72,7 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
   const double length = std::max({launched - lower, 0.1 * std::abs(launched), 1e-3});
   double upper = std::min(highest, lower + 1.2 * length);
   for (std::size_t panels = map.phases() > 1 ? 1 : 2;;) {
-    const NodeSpace space(ranges(upper), panels);
+    const NodeSpace space(ranges(upper), panels, bulk);
     const IntegratedChain pilot = integrate(map, space, launch, threads);
     const Reachability reachable = classify(pilot.chain.chain);
     const bool rests =

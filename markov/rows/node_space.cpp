@@ -29,15 +29,22 @@ Legendre legendre(double t) {
   return p;
 }
 
-NodeSpace::NodeSpace(std::vector<std::pair<double, double>> range, std::size_t panels)
-    : range_(std::move(range)), panels_(panels) {
+double graded_edge(std::pair<double, double> range, double bulk, double share) {
+  const auto [from, to] = range;
+  const double length = to - from;
+  if (bulk >= length) return from + length * share * share;
+  const double s = share * (1 + 0.5 * std::log(length / bulk));
+  return from + bulk * (s <= 1 ? s * s : std::exp(2 * (s - 1)));
+}
+
+NodeSpace::NodeSpace(std::vector<std::pair<double, double>> range, std::size_t panels, double bulk)
+    : range_(std::move(range)), panels_(panels), bulk_(bulk) {
   if (range_.empty() || panels == 0) throw std::invalid_argument("nodes: at least one phase and one panel are needed");
   for (const auto& [lower, upper] : range_) {
     if (!(lower < upper) || !std::isfinite(lower) || !std::isfinite(upper))
       throw std::invalid_argument("nodes: a range is not a finite interval");
-    const auto edge = [&, from = lower, length = upper - lower](std::size_t p) {
-      const double share = static_cast<double>(p) / static_cast<double>(panels);
-      return from + length * share * share;
+    const auto edge = [&, range = std::pair(lower, upper)](std::size_t p) {
+      return graded_edge(range, bulk, static_cast<double>(p) / static_cast<double>(panels));
     };
     for (std::size_t p = 0; p < panels; ++p) {
       const double half = 0.5 * (edge(p + 1) - edge(p)), middle = 0.5 * (edge(p + 1) + edge(p));

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -11,16 +12,19 @@
 
 namespace metastable::markov {
 
-/// Places Gauss-Legendre nodes on panels of an interval per phase; states are numbered phase by phase, ascending. Panel
-/// edges lie at the squares of equal steps: close together near the lower edge, where survivors and rest meet.
+/// Gauss-Legendre nodes on panels of an interval per phase; states are numbered phase by phase, ascending. Panel edges
+/// lie at the squares of equal steps: close together near the lower edge, where survivors and rest meet; beyond the
+/// bulk, if one is given, at equal ratios.
 class NodeSpace {
  public:
   static constexpr std::size_t order = 16;  ///< nodes a panel
 
   /// @param range  {lower, upper} edge of each phase, finite, ascending
   /// @param panels  per phase, >= 1
+  /// @param bulk  width over the lower edge, > 0
   /// @throws std::invalid_argument otherwise
-  NodeSpace(std::vector<std::pair<double, double>> range, std::size_t panels);
+  NodeSpace(std::vector<std::pair<double, double>> range, std::size_t panels,
+            double bulk = std::numeric_limits<double>::infinity());
 
   /// Suits functions with square roots or kinks at `edges`: there are `panels` panels between every two edges, where
   /// x = a + (b - a) sin^2(pi t / 2) and t is what is divided.
@@ -39,8 +43,8 @@ class NodeSpace {
   std::span<const double> nodes(int phase) const;
   std::span<const double> weights(int phase) const;
   int phase(std::size_t state) const { return static_cast<int>(state / nodes()); }
-  /// Divides the same ranges, without edges, into another number of panels.
-  NodeSpace with_panels(std::size_t panels) const { return NodeSpace(range_, panels); }
+  /// The same ranges, without edges, with another number of panels.
+  NodeSpace with_panels(std::size_t panels) const { return NodeSpace(range_, panels, bulk_); }
   std::span<const double> edges(int phase) const;  ///< as given
   /// Finds, where `edges` were given, the panel that holds a state, and the place there in [-1, 1]. States outside
   /// are moved to the nearest edge.
@@ -52,12 +56,17 @@ class NodeSpace {
   NodeSpace() = default;
   std::vector<std::pair<double, double>> range_;
   std::size_t panels_ = 0;
+  double bulk_ = std::numeric_limits<double>::infinity();
   std::size_t divided_ = 0;                 // panels between two edges
   std::vector<std::vector<double>> edges_;  // if given
   std::vector<double> node_, weight_;
 };
 
-/// Evaluates the Legendre polynomials P_0 .. P_15 at t in [-1, 1].
+/// Where `share` in [0, 1] of the panels of a range end: quadratic up to the bulk, exponential from there on, with one
+/// slope.
+double graded_edge(std::pair<double, double> range, double bulk, double share);
+
+/// Legendre polynomials P_0 .. P_15 at t in [-1, 1].
 using Legendre = std::array<double, NodeSpace::order>;
 Legendre legendre(double t);
 /// Does the same at `lanes` places side by side.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 
@@ -95,6 +96,11 @@ StateSpace StateSpace::halved() const {
   grids.reserve(grids_.size());
   for (const Grid& grid : grids_) grids.push_back(grid.halved());
   return StateSpace(std::move(grids));
+}
+
+double bulk_below_launch(const AnyReturnMap& map, const LaunchState& launch, std::uint64_t seed) {
+  const Widths width = widths(map, launch, highest_low(map), seed);
+  return width.launched > width.bulk ? width.bulk : std::numeric_limits<double>::infinity();
 }
 
 double launch_cells(const AnyReturnMap& map, const LaunchState& launch, std::uint64_t seed) {

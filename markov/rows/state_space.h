@@ -45,6 +45,9 @@ struct LaunchState {
 StateSpace covering_space(const AnyReturnMap& map, const LaunchState& launch, std::size_t cells, std::uint64_t seed,
                           double reach = 1.5);
 
+/// Width of the bulk over the lowest state where the landings of a fast launch lie far above it; infinity elsewhere.
+double bulk_below_launch(const AnyReturnMap& map, const LaunchState& launch, std::uint64_t seed);
+
 /// How many times the cells of the bulk it takes to hold the landings of a fast launch as well; 1 if the bulk does.
 double launch_cells(const AnyReturnMap& map, const LaunchState& launch, std::uint64_t seed);
 

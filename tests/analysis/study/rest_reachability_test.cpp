@@ -112,7 +112,7 @@ TEST(RestReachability, FastLaunchesOfAnEndlessWheelSettle) {
 // Some launches roll for ever; others survive some steps and rest all the same.
 TEST(RestReachability, LaunchesOnBothSidesOfTheThresholdAreTold) {
   Setting setting = coulomb(3.6);
-  setting.initial_speed = {3.0, 0.1};
+  setting.initial_speed = {3.2, 0.1};
   const Metastability result = study(setting.problem(), {});
   EXPECT_TRUE(std::isinf(result.steps.from_start.value));
   double rest = 0;
