@@ -178,17 +178,23 @@ void run_blind_make(const BlindRequest& request) {
     write_file(places.plan, plan_text(seed));
   }
   const std::vector<analysis::BlindPlan> plan = analysis::blind_plan(size, seed);
+  const auto made_before = [&](std::size_t i) {
+    return fs::exists(places.case_folder(static_cast<int>(i) + 1) / "seal.txt");
+  };
+  std::vector<std::size_t> open;
+  for (std::size_t i = 0; i < plan.size(); ++i)
+    if (!made_before(i)) open.push_back(i);
   Progress progress("making cases", plan.size());
-  markov::parallel_for(plan.size(), request.threads, [&](std::size_t i) {
+  progress.skip(plan.size() - open.size());
+  markov::parallel_for(open.size(), request.threads, [&](std::size_t k) {
+    check_interrupt();
+    const std::size_t i = open[k];
     const int number = static_cast<int>(i) + 1;
-    if (!fs::exists(places.case_folder(number) / "seal.txt")) {
-      check_interrupt();
-      analysis::BlindCase made = analysis::blind_case(
-          plan[i], number, seed,
-          [](const auto& design, const auto& effects) { return analysis::expected_power(design, effects, 3); });
-      analysis::complete_truth(made);
-      write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
-    }
+    analysis::BlindCase made = analysis::blind_case(plan[i], number, seed, [](const auto& design, const auto& effects) {
+      return analysis::expected_power(design, effects, 3);
+    });
+    analysis::complete_truth(made);
+    write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
     progress.advance();
   });
   fmt::print("{}: {} cases; truths sealed in {}\n", request.folder, plan.size(), places.sealed.string());
@@ -210,6 +216,7 @@ void run_blind_answer(const BlindRequest& request) {
   std::mutex mutex;
   std::atomic<int> failed = 0;
   Progress progress("answering", std::max<std::size_t>(1, open.size()));
+  progress.skip(0);
   markov::parallel_for(open.size(), request.threads, [&](std::size_t i) {
     check_interrupt();
     const int number = open[i];

@@ -198,7 +198,7 @@ void run_sweep(const SweepRequest& request) {
     analysis::StudyOptions study = request.study;
     study.progress = [](double, const std::string&) { check_interrupt(); };
     try {
-      progress.advance(had);
+      progress.skip(had);
       analysis::sweep(request.setting, request.axes, had, study, [&](std::size_t, const analysis::SweepPoint& point) {
         rows.push_back(row(point));
         append(rows.back());

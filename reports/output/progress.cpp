@@ -42,12 +42,23 @@ void Progress::advance(std::size_t units) {
   if (now - last_draw_ >= std::chrono::milliseconds(100)) draw(now);
 }
 
+void Progress::skip(std::size_t units) {
+  check_interrupt();
+  if (!visible_) return;
+  const std::lock_guard lock(mutex_);
+  done_ = std::min(done_ + units, total_);
+  skipped_ = std::min(skipped_ + units, total_);
+  draw(Clock::now());
+}
+
 void Progress::draw(Clock::time_point now) {
   last_draw_ = now;
   const double share = static_cast<double>(done_) / static_cast<double>(total_);
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   out_ << wipe_line << fmt::format("{}  {:.0f} % ({} of {})", label_, 100 * share, done_, total_);
-  if (elapsed > 2 && done_ > 0) out_ << ", about " << remaining(elapsed * (1 / share - 1)) << " left";
+  if (elapsed > 2 && done_ > skipped_)
+    out_ << ", about "
+         << remaining(elapsed * static_cast<double>(total_ - done_) / static_cast<double>(done_ - skipped_)) << " left";
   out_ << std::flush;
 }
 

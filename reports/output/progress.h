@@ -26,6 +26,9 @@ class Progress {
 
   /// `units` more are done. @throws Interrupted (see interrupt.h)
   void advance(std::size_t units = 1);
+  /// `units` were done before this work began: they count as done, but not for how long the rest takes. Draws the line
+  /// at once. @throws Interrupted
+  void skip(std::size_t units);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -35,6 +38,7 @@ class Progress {
   std::string label_;
   std::size_t total_;
   std::size_t done_ = 0;
+  std::size_t skipped_ = 0;
   std::ostream& out_;
   bool visible_;
   Clock::time_point start_ = Clock::now();

@@ -33,6 +33,14 @@ TEST(Progress, DrawsOneLineAndWipesIt) {
   EXPECT_EQ(out.str().find('\n'), std::string::npos);
 }
 
+// What was done before shows at once and does not make the rest look fast.
+TEST(Progress, WhatWasDoneBeforeCountsAsDone) {
+  std::ostringstream out;
+  Progress progress("working", 464, out, true);
+  progress.skip(176);
+  EXPECT_EQ(out.str(), "\r\033[Kworking  38 % (176 of 464)");
+}
+
 TEST(Progress, NeverPassesItsTotal) {
   std::ostringstream out;
   Progress progress("working", 2, out, true);
