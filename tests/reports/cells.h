@@ -51,9 +51,9 @@ inline void expect_cell(const Cell& cell, double number) {
 inline void expect_cell(const Cell& cell, const Estimate& estimate) {
   const auto* held = std::get_if<Estimate>(&cell.value());
   ASSERT_NE(held, nullptr);
-  EXPECT_DOUBLE_EQ(held->value, estimate.value);
-  EXPECT_DOUBLE_EQ(held->lower, estimate.lower);
-  EXPECT_DOUBLE_EQ(held->upper, estimate.upper);
+  EXPECT_NEAR(held->value, estimate.value, 1e-10);
+  EXPECT_NEAR(held->lower, estimate.lower, 1e-10);
+  EXPECT_NEAR(held->upper, estimate.upper, 1e-10);
 }
 /// Fails unless the cell is infinite.
 inline void expect_cell(const Cell& cell, Infinite) { EXPECT_TRUE(std::holds_alternative<Infinite>(cell.value())); }
