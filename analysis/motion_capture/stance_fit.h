@@ -1,7 +1,6 @@
 #pragma once
 // Fits one collision to angle samples: the stance motions before and after it are joined at a kink.
 
-#include <cstddef>
 #include <optional>
 #include <span>
 

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "analysis/study/setting.h"
-#include "dynamics/return_map/wheel_map.h"
 #include "markov/rows/draws.h"
 #include "markov/rows/state_space.h"
 

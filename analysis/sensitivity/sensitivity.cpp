@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <utility>
 
 #include "analysis/sensitivity/pathwise.h"
 #include "analysis/statistics/t_interval.h"

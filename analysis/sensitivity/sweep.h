@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <exception>
 #include <functional>
-#include <string>
 #include <vector>
 
 #include "analysis/sensitivity/parameter.h"

@@ -1,7 +1,6 @@
 #include "analysis/statistics/minimize.h"
 
 #include <Eigen/Dense>
-#include <cmath>
 
 namespace metastable::analysis {
 

@@ -6,7 +6,6 @@
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -20,11 +19,11 @@ constexpr double tolerance = 3e-12;
 constexpr double negligible = 1e-16;  // size of a panel over that of the largest
 constexpr std::size_t most_panels = 400;
 
-// Where on a piece of eta the variable t in [0, 1] lies, and its speed: quadratic at an end where two roots meet.
-struct Place {
+// Maps t in [0, 1] to a place on a piece of eta and its speed there: quadratic at an end where two roots meet.
+struct MappedPoint {
   double restitution, speed;
 };
-Place place(double lower, double upper, bool fold_below, bool fold_above, double t) {
+MappedPoint mapped_point(double lower, double upper, bool fold_below, bool fold_above, double t) {
   const double length = upper - lower;
   if (fold_below && fold_above) {
     const double angle = std::numbers::pi / 2 * t, s = std::sin(angle);
@@ -118,7 +117,7 @@ double LandingDensity::given_restitution(double restitution, double level, Guess
   return sum;
 }
 
-// The share that sticks: loss = a(eta) / A(mu_c) whatever mu is.
+// Adds the share that sticks: its loss is a(eta) / A(mu_c) whatever mu is.
 double LandingDensity::sticking(double level) const {
   const double share = friction_.complement(curve_.end()), normal = curve_.normal(curve_.end());
   const double squared = (1 - level * normal / curve_.energy()) / curve_.kept();
@@ -179,7 +178,7 @@ double LandingDensity::integrate(const std::vector<Piece>& all, double level) co
   };
   Guess guess;
   const auto integrand = [&](const Piece& p, double t) {
-    const Place at = place(p.lower, p.upper, p.fold_below, p.fold_above, t);
+    const MappedPoint at = mapped_point(p.lower, p.upper, p.fold_below, p.fold_above, t);
     const double weight = at.speed * restitution_.density(at.restitution);
     return weight > 0 ? weight * given_restitution(at.restitution, level, guess) : 0;
   };
@@ -204,7 +203,7 @@ double LandingDensity::integrate(const std::vector<Piece>& all, double level) co
   if (largest == 0) return 0;
   const auto evaluate = [&](Panel& p) {
     p.value = Rule::integrate([&](double t) { return integrand(*p.piece, t); }, p.from, p.to, 0, 0.0, &p.error);
-    // As in rest_probability.cpp: Boost's estimate is that of the Gauss rule on [-1, 1].
+    // As in rest_probability.cpp, Boost's estimate is that of the Gauss rule on [-1, 1].
     const double difference = p.error * (p.to - p.from) / 2;
     p.error = p.value > 0 ? p.value * std::min(1.0, std::pow(200 * difference / p.value, 1.5)) : 0;
   };

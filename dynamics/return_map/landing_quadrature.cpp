@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
-#include <optional>
 #include <stdexcept>
 
 #include "dynamics/return_map/loss_curve.h"
@@ -24,16 +23,16 @@ constexpr double unlikely = 12;       // -ln eta
 constexpr double widest = 3;          // panel [sd]
 constexpr std::size_t most_panels = 40;
 
-// Gauss-Legendre panels over t in [0, 1], where a share sin^2(pi t / 2) of an interval is the variable: a square root
-// at either end of the interval is smooth in t.
-struct Share {
+// Lays Gauss-Legendre panels over t in [0, 1], where a share sin^2(pi t / 2) of an interval is the variable: a square
+// root at either end of the interval is smooth in t.
+struct QuadraturePoint {
   double at, weight;
 };
-const std::vector<Share>& shares(std::size_t panels) {
+const std::vector<QuadraturePoint>& quadrature_points(std::size_t panels) {
   constexpr unsigned order = 16;
   using Rule = boost::math::quadrature::gauss<double, order>;
-  static const std::vector<std::vector<Share>> all = [] {
-    std::vector<std::vector<Share>> rules(most_panels);
+  static const std::vector<std::vector<QuadraturePoint>> all = [] {
+    std::vector<std::vector<QuadraturePoint>> rules(most_panels);
     for (std::size_t count = 1; count <= most_panels; ++count)
       for (std::size_t p = 0; p < count; ++p)
         for (std::size_t k = 0; k < order; ++k) {
@@ -49,19 +48,20 @@ const std::vector<Share>& shares(std::size_t panels) {
   return all[std::clamp<std::size_t>(panels, 1, most_panels) - 1];
 }
 
-// f(place, weight) at the points of an integral over [from, to] of a function that varies over `scale`.
+// Calls f(place, weight) at the points of an integral over [from, to] of a function that varies over `scale`.
 template <class F>
 void integrate(double from, double to, double scale, const F& f) {
   const double length = to - from;
   if (!(length > 0)) return;
-  for (const Share& s : shares(1 + static_cast<std::size_t>(std::numbers::pi / 2 * length / scale)))
+  for (const QuadraturePoint& s :
+       quadrature_points(1 + static_cast<std::size_t>(std::numbers::pi / 2 * length / scale)))
     f(from + length * s.at, length * s.weight);
 }
 
 struct Reach {
   double lower, upper;
 };
-// Where the density is above e^-exponent of its largest.
+// Says where the density is above e^-exponent of its largest.
 Reach reach(const TruncatedNormal& n, double exponent) {
   const double most = std::clamp(n.mean(), n.lower(), n.upper()), z = (most - n.mean()) / n.sd();
   const double far = n.sd() * std::sqrt(2 * std::max(0.0, exponent) + z * z);
@@ -101,7 +101,7 @@ class Quadrature {
   }
 
  private:
-  // The loss at a mu that may stick or jam.
+  // Returns the loss at a mu that may stick or jam.
   double at_friction(const LossCurve::Coefficients& k, double mu) const {
     if (mu < curve_.end()) return curve_.loss(k, mu);
     return curve_.coulomb() ? curve_.loss(k, curve_.end()) : infinity;
@@ -115,7 +115,7 @@ class Quadrature {
     return curve_.loss(k, which == 1 ? 0 : curve_.end());
   }
 
-  // Panels over eta in [from, to], or over -ln eta.
+  // Lays panels over eta in [from, to], or over -ln eta.
   void over(double from, double to, bool log) {
     const auto eta = [log](double u) { return log ? std::exp(-u) : u; };
     const double step = log ? 1.5 : std::min(restitution_.sd(), 2 * (friction_.constant() ? infinity : friction_.sd()));
@@ -129,7 +129,7 @@ class Quadrature {
         at.push_back(i == scan ? to : from + (to - from) * i / scan);
         value.push_back(f(at.back()));
       }
-      // A turning point of the bound itself, so that no pair of roots is missed.
+      // It is a turning point of the bound itself, so that no pair of roots is missed.
       for (std::size_t i = 1; i + 1 < at.size(); ++i) {
         if ((value[i] - value[i - 1]) * (value[i + 1] - value[i]) >= 0 || !std::isfinite(value[i])) continue;
         const double sign = value[i] > value[i - 1] ? -1 : 1;
@@ -273,7 +273,7 @@ std::vector<double> states_of_extremes(const WheelMap& map, int phase, std::span
   const ContactNoise& noise = map.noise();
   const Stance& stance = map.stance(phase);
   std::vector<double> found;
-  // The state from which `contact`, which may depend on the state, leads to `landing`.
+  // Finds the state from which `contact`, which may depend on the state, leads to `landing`.
   const auto add = [&](double landing, auto contact) {
     const double level = landing - stance.gain;
     double state = map.state_interval(phase).first;

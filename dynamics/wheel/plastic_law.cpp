@@ -1,7 +1,5 @@
 #include "dynamics/wheel/plastic_law.h"
 
-#include <cmath>
-
 namespace metastable::dynamics {
 
 Loss plastic_loss(const ContactModel& model, const Collision& c) {
@@ -13,7 +11,7 @@ Loss plastic_loss(const ContactModel& model, const Collision& c) {
   Loss loss;
   loss.normal_post = mass * v0 * ((r2 + y * y) * v0 - x * y * u0) / 2;
   loss.tangential_post = mass * u0 * ((r2 + x * x) * u0 - x * y * v0) / 2;
-  // L1 L2 cos(alpha) from the triangle: c^2 = L1^2 + L2^2 - 2 L1 L2 cos(alpha).
+  // L1 L2 cos(alpha) comes from the triangle: c^2 = L1^2 + L2^2 - 2 L1 L2 cos(alpha).
   const double l1 = c.stance_length, l2 = c.landing_length;
   loss.jammed = (l1 * l1 + l2 * l2 - c.chord * c.chord) / 2 + r2 < 0;
   return loss;

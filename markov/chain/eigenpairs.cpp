@@ -9,7 +9,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -87,7 +86,7 @@ Eigen::Index leading_index(const Eigen::VectorXcd& values) {
   return leading;
 }
 
-/// The values by falling modulus, `leading` first, a conjugate pair with its positive imaginary part first. The partner
+/// Sorts the values by falling modulus, `leading` first, of a conjugate pair the positive imaginary part. The partner
 /// of a complex value is added where Spectra's count cut the pair.
 std::vector<Complex> sorted_values(const Eigen::VectorXcd& values, Eigen::Index leading) {
   std::vector<Complex> others;

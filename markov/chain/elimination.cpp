@@ -8,7 +8,6 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "markov/chain/dense_elimination.h"
 #include "markov/parallel.h"
@@ -20,7 +19,7 @@ using Index = Eigen::Index;
 using Vector = Eigen::Map<Eigen::VectorXd>;
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
-/// Pivots eliminated together from a full matrix.
+/// So many pivots are eliminated together from a full matrix.
 constexpr std::size_t kBlock = 128;
 /// Below this size, or below this fill of the square, the row-by-row elimination is used.
 constexpr std::size_t kBlockedSize = kBlock;
@@ -29,7 +28,7 @@ constexpr double kBlockedFill = 0.6;
 constexpr std::size_t kColumnShare = 16 * dense::tile_columns, kRowShare = 96;
 std::size_t shares(std::size_t count, std::size_t share) { return (count + share - 1) / share; }
 
-/// row += weight * source, over columns [from, to).
+/// Does row += weight * source over columns [from, to).
 void add_multiple(double* row, double weight, const double* source, std::size_t from, std::size_t to) {
   const auto count = static_cast<Index>(to - from);
   Vector(row + from, count) += weight * ConstVector(source + from, count);
@@ -153,7 +152,7 @@ void Elimination::Factors::eliminate_rows() {
   }
 }
 
-/// The pivots last-1 .. first among themselves, in the columns first .. last-1 only. What lies left of these and the
+/// Eliminates the pivots last-1 .. first among themselves, in columns first .. last-1. What lies left of these and the
 /// kill rate enter the rate of leaving as one number, carried along as a kill rate is.
 void Elimination::Factors::eliminate_square(std::size_t first, std::size_t last) {
   const std::size_t pivots = last - first;
@@ -169,8 +168,8 @@ void Elimination::Factors::eliminate_square(std::size_t first, std::size_t last)
   }
 }
 
-/// The same on a full square, a block of pivots at a time: the block's square, the rest of its rows, the visits of the
-/// rows above to the block, and all that these visits lead to as one matrix product.
+/// Does the same on a full square by blocks of pivots: first the block's square, then the rest of its rows, the visits
+/// of the rows above to the block, and all that these visits lead to as one matrix product.
 void Elimination::Factors::eliminate_blocks(int threads) {
   const std::size_t n = size();
   std::vector<dense::TileRow> onward(shares(n, dense::tile_columns) * kBlock);
@@ -209,7 +208,7 @@ void Elimination::Factors::check_right_side(std::span<const double> rhs) const {
   }
 }
 
-/// (I - Q) x = b with x = c + w, w = 0 at one state: (I - Q) 1 is the kill rates, so they take that state's column, and
+/// Solves (I - Q) x = b with x = c + w, w = 0 at one state: (I - Q) 1 is the kill rates, which take its column, and
 /// the rest is far from singular however rare rest is.
 struct Elimination::Bordered final : Elimination::Solver {
   explicit Bordered(const Chain& chain);
@@ -223,7 +222,7 @@ struct Elimination::Bordered final : Elimination::Solver {
 
 Elimination::Bordered::Bordered(const Chain& chain) {
   const std::size_t n = chain.size();
-  // Where survivors are: small entries of the left solution then come from small entries, not from differences.
+  // This says where survivors are: small entries of the left solution then come from small ones, not from differences.
   constexpr int steps = 20;
   std::vector<double> survivors(n, 1.0);
   for (int step = 0; step < steps; ++step) {

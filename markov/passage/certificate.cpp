@@ -9,7 +9,6 @@
 #include "markov/chain/chain.h"
 #include "markov/chain/solver.h"
 #include "markov/parallel.h"
-#include "markov/passage/first_passage.h"
 
 namespace metastable::markov {
 namespace {
@@ -20,7 +19,7 @@ constexpr double outward = 0x1p-48;  // relative, past the rounding of the few o
 double up(double v) { return v + (std::abs(v) * outward + 1e-300); }
 double down(double v) { return v - (std::abs(v) * outward + 1e-300); }
 
-// Rows of one phase: distribution functions at (rest, cell 0, cell 1, ...), N + 1 values for N cells.
+// Holds the rows of one phase: distribution functions at (rest, cell 0, cell 1, ...), N + 1 values for N cells.
 struct Rows {
   std::vector<std::vector<double>> upper, lower;  // U and D
   std::vector<double> surplus;                    // of E W(landing above the top), per node
@@ -57,7 +56,7 @@ class Rounding {
     return row;
   }
 
-  // By how much U must exceed (D stay below) C at the ends of cell i.
+  // Returns by how much U must exceed (D stay below) C at the ends of cell i.
   std::vector<std::pair<double, double>> excess(std::size_t i, const std::vector<Range>& left,
                                                 const std::vector<Range>& right) const {
     std::vector<std::pair<double, double>> need(e_.size());
@@ -108,7 +107,7 @@ Rows make_rows(const LandingSource& source, int phase, const std::vector<double>
   return rows;
 }
 
-// An approximate solution of v = rhs + Q v, not falling along the nodes; its accuracy is checked afterwards.
+// Solves v = rhs + Q v roughly, not falling along the nodes; the accuracy is checked afterwards.
 std::vector<std::vector<double>> solve(const std::vector<Rows>& rows, bool lower) {
   const std::size_t phases = rows.size(), n = rows.front().upper.size();
   std::vector<std::size_t> start{0};
@@ -140,7 +139,7 @@ std::vector<std::vector<double>> solve(const std::vector<Rows>& rows, bool lower
   return v;
 }
 
-// Bounds of (v - Q v) / rhs over all nodes.
+// Bounds (v - Q v) / rhs over all nodes.
 Range residual(const std::vector<Rows>& rows, const std::vector<std::vector<double>>& v, bool lower) {
   const std::size_t phases = rows.size(), n = rows.front().upper.size();
   Range all{std::numeric_limits<double>::infinity(), 0};
@@ -189,7 +188,7 @@ bool drift(const LandingSource& source, double top, double beyond, Certificate& 
     extra = std::max(extra, source.overshoot(p, top, top));
     stay = std::max(stay, up(1 - source.below(p, beyond, top).lower));
   }
-  // Up to `beyond`: jump (1 - stay) >= 1 + slope extra. From there on: slope ((1 - rate)(x - K) - extra) >= 1.
+  // Up to `beyond` it needs jump (1 - stay) >= 1 + slope extra, from there on slope ((1 - rate)(x - K) - extra) >= 1.
   const double gap = down(down(1 - rate) * down(beyond - top) - extra);
   if (!(rate < 1 && stay < 1 && gap > 0)) return false;
   certificate.top_slope = up(1 / gap);

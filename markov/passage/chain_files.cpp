@@ -1,7 +1,6 @@
 #include "markov/passage/chain_files.h"
 
 #include <charconv>
-#include <cstdint>
 #include <stdexcept>
 #include <vector>
 

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <memory>
 #include <numeric>
-#include <stdexcept>
 
 #include "markov/parallel.h"
 

@@ -1,7 +1,6 @@
 #pragma once
-// A chain on nodes from its rows, however they are made.
+// Builds a chain on nodes from its rows, however they are made.
 
-#include <cstddef>
 #include <functional>
 #include <span>
 #include <vector>
@@ -12,16 +11,16 @@
 
 namespace metastable::markov {
 
-/// Where one state leads.
+/// Says where one state leads.
 struct NodeRow {
   std::vector<double> landing;  ///< on the nodes of the next phase
   double rest = 0;
   double error = 0;  ///< of the sum of both, before it was removed
 };
-/// Called from several threads at once.
+/// Makes a row; several threads call it at once.
 using MakeNodeRow = std::function<NodeRow(double state, int phase)>;
 
-/// A chain of exact rows, and how well the nodes resolve them.
+/// Holds a chain of exact rows and says how well the nodes resolve them.
 struct IntegratedChain {
   SampledChain chain;    ///< `chain.launch` by quadrature over the launch state
   double row_error = 0;  ///< largest |sum of a row - probability of surviving| before it was removed
@@ -36,11 +35,11 @@ IntegratedChain chain_of_rows(const AnyReturnMap& map, const NodeSpace& space, c
 struct LaunchPoint {
   double score, weight;
 };
-/// The launch's score by the trapezoidal rule: exact to rounding for densities wider than a third of the launch's
+/// Cuts the launch's score by the trapezoidal rule, exact to rounding for densities wider than a third of the launch's
 /// spread; by panels where rows, as functions of the state, have kinks at some of `states`.
 std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<const double> states);
 
-/// Where the launch leads, by launch_points().
+/// Finds where the launch leads, by launch_points().
 Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,
                       std::span<const double> kinks, int threads);
 

@@ -6,7 +6,6 @@
 #include <numbers>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "dynamics/return_map/wheel_map.h"
 #include "dynamics/wheel/contact_law.h"

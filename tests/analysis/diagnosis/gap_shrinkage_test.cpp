@@ -1,11 +1,11 @@
 #include "analysis/diagnosis/gap_shrinkage.h"
-#include "analysis/diagnosis/model_fit.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <stdexcept>
 
+#include "analysis/diagnosis/model_fit.h"
 #include "analysis/likelihood/coast_down_transitions.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/rotor.h"

@@ -12,7 +12,6 @@
 #include "dynamics/return_map/rough_terrain.h"
 #include "dynamics/return_map/trials.h"
 #include "markov/chain/elimination.h"
-#include "markov/parallel.h"
 #include "markov/passage/quasi_stationary.h"
 #include "markov/rows/discretization.h"
 #include "tests/analysis/settings.h"

@@ -5,8 +5,6 @@
 #include <functional>
 #include <stdexcept>
 
-#include "tests/analysis/settings.h"
-
 namespace metastable::analysis {
 namespace {
 

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <boost/math/quadrature/gauss.hpp>
-#include <cmath>
-#include <numbers>
 
 #include "dynamics/return_map/rest_probability.h"
 #include "dynamics/return_map/rough_terrain.h"

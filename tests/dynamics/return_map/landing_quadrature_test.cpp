@@ -5,7 +5,6 @@
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 #include <functional>
-#include <numbers>
 
 #include "dynamics/return_map/landing_density.h"
 #include "dynamics/return_map/rest_probability.h"

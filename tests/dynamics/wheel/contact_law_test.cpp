@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <random>
 
-#include "dynamics/wheel/stance_motion.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics {

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "markov/chain/chain.h"
 
 namespace metastable::markov {

@@ -5,13 +5,11 @@
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
 #include "markov/rows/integrated.h"
 #include "tests/markov/linear_map.h"
-#include "tests/markov/message.h"
 
 namespace metastable::markov {
 namespace {

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <string>
 
-#include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/input_error.h"
 #include "analysis/experiment/stand_in.h"
 #include "reports/commands/simulate_command.h"
