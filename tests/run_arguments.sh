@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# `./run` refuses wrong arguments with exit code 2 and a line that names them, before it builds anything.
+set -u
+run=$1/run
+failed=0
+
+refused() {  # arguments: what the message must hold, then those of ./run
+  local wanted=$1 said code
+  shift
+  said=$("$run" "$@" 2>&1 >/dev/null)
+  code=$?
+  if [[ $code != 2 || $said != *"$wanted"* ]]; then
+    printf './run %s: exit code %s, "%s"; 2 and "%s" are wanted\n' "$*" "$code" "$said" "$wanted"
+    failed=1
+  fi
+}
+
+refused "unknown command 'nonsense'" nonsense
+refused "'all' is no argument of it" build all
+refused "'here' is none of its arguments" install here
+refused '--prefix needs a folder' install --prefix
+refused '--prefix needs a folder' install --prefix=
+refused 'is no folder' install --prefix "$run"
+
+help=$("$run" help) || failed=1
+[[ $help == *'install [--prefix P]'* ]] || { echo './run help does not name install'; failed=1; }
+exit $failed
