@@ -1,12 +1,12 @@
 #pragma once
-// Splitting independent work over threads. Results must not depend on which thread does what.
+// Splits independent work over threads. Results must not depend on which thread does what.
 
 #include <cstddef>
 #include <functional>
 
 namespace metastable::markov {
 
-/// Number of threads to use when `requested` is 0: the machine's hardware concurrency, at least 1.
+/// Returns how many threads to use; when `requested` is 0, the machine's hardware concurrency, at least 1.
 int thread_count(int requested);
 
 /// Calls work(i) once for every i in [0, count) on `threads` threads (0: as many as the machine has).

@@ -1,5 +1,5 @@
 #pragma once
-// Restitution and friction of measured trials, by maximum likelihood.
+// Fits restitution and friction to measured trials by maximum likelihood.
 
 #include <array>
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace metastable::analysis {
 
-/// What is likely or not.
+/// Says which event is likely or not.
 enum class Transition {
   collision,  ///< omega_minus to omega_plus of one collision
   step,       ///< omega_minus to the omega_minus of the next
@@ -29,7 +29,7 @@ struct ContactFitOptions {
   std::function<void()> progress = {};
 };
 
-/// A direction in the space of the four parameters, of unit length.
+/// Describes a direction of unit length in the space of the four parameters.
 struct FitDirection {
   ContactParameters weight{};
   double sd = 0;  ///< standard error along it; infinite if the likelihood does not curve there
@@ -50,19 +50,19 @@ struct ContactFit {
   double log_likelihood = 0;    ///< of omega^2 [1/(rad^2/s^2)]
   ContactParameters value{};
   ContactParameters standard_error{};  ///< from the observed information; infinite where undetermined or at a bound
-  /// 95 %, by the profile of the likelihood: not symmetric, and with the other three free. Infinite ends, and 0 of an
+  /// These hold 95 % by the profile of the likelihood: not symmetric, the other three free. Infinite ends, and 0 of an
   /// sd, where the likelihood does not fall off far enough or has no maximum; infinite without `intervals`.
   ContactParameters lower_95{}, upper_95{};
   std::array<std::array<double, 4>, 4> correlation{};
   std::vector<FitDirection> directions;  ///< eigenvectors of the observed information, best determined first
 };
 
-/// What the fit cannot tell apart, in plain sentences, from its correlations and directions.
+/// Tells what the fit cannot tell apart, in plain sentences, from its correlations and directions.
 std::vector<std::string> ambiguities(const ContactFit& fit);
 
 /// Fits all trials of the named conditions together, under the wheel of the experiment.
 ///
-/// The likelihood of every landing and, after a trial's last collision, of rest or of survival
+/// It multiplies the likelihood of every landing and, after a trial's last collision, of rest or of survival
 /// (contact_likelihood.h). Quasi-Newton descents from a grid of starts on every few-th transition, then on all from
 /// the places they end at; standard errors from second differences, intervals from the profile over all maxima found
 /// (profile_interval.h). How many hold the truth, under published, of (eta mean, eta sd, mu mean, mu sd):
@@ -77,11 +77,11 @@ std::vector<std::string> ambiguities(const ContactFit& fit);
 ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size_t>& conditions,
                        const ContactFitOptions& options);
 
-/// `collision` where every collision has an omega_plus that carries the wheel over its foot whenever it went on; else
-/// `step`: such an omega_plus is not the speed with which the stance begins.
+/// Returns `collision` where every collision has an omega_plus that carries the wheel over its foot whenever it went
+/// on; else `step`: such an omega_plus is not the speed with which the stance begins.
 Transition best_transition(const Experiment& experiment);
 
-/// ln of that likelihood at given parameters from the exact density of the landing
+/// Returns ln of that likelihood at given parameters from the exact density of the landing
 /// (dynamics/return_map/landing_density.h); -infinity where a transition has none. Cost: about 50 us a transition, 1 ms
 /// a last one
 double contact_log_likelihood(const Experiment& experiment, const std::vector<std::size_t>& conditions,

@@ -43,7 +43,7 @@ struct SampleComparison {
   EffectSize hedges, superiority, distance;
   DistributionTest kolmogorov_smirnov, anderson_darling;
 };
-/// Nothing for fewer than two values in either sample.
+/// Is nothing for fewer than two values in either sample.
 std::optional<SampleComparison> compare_samples(std::span<const double> a, std::span<const double> b);
 
 struct ConditionComparison {

@@ -1,5 +1,5 @@
 #pragma once
-// A rotor coasting down: from the log of a revolution counter to an experiment with system = "coast_down".
+// Turns the log of a rotor's revolution counter into an experiment with system = "coast_down".
 
 #include <optional>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace metastable::analysis {
 
-/// The times at which the drum's counter rose.
+/// Holds the times at which the drum's counter rose.
 struct CounterLog {
   std::string name;          ///< of the condition
   std::vector<double> time;  ///< [s], rising; a tick ends a revolution
@@ -56,14 +56,14 @@ struct CoastDownRun {
 ///         `stop`, or if no block remains
 CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options);
 
-/// Terms of the loss with their standard errors.
+/// Holds the terms of the loss with their standard errors.
 struct LossFit {
   RevolutionLoss loss;
   double constant_error = 0, linear_error = 0, quadratic_error = 0;
   std::size_t transitions = 0;
   std::size_t outliers = 0;  ///< beyond five noise_sd
 };
-/// Robust regression (Huber's, tuned to 95 % efficiency) of the loss of omega^2 on 1, omega (if `linear`) and omega^2;
+/// Regresses robustly (Huber's, tuned to 95 % efficiency) the loss of omega^2 on 1, omega (if `linear`) and omega^2;
 /// noise_sd from the median absolute residual.
 /// @throws std::invalid_argument for fewer than 20 transitions
 LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear);

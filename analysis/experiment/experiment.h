@@ -14,16 +14,16 @@
 
 namespace metastable::analysis {
 
-/// What rolled. A coast-down is a rotor without legs: its collisions are revolutions, and it has no wheel or ramp.
+/// Says what rolled. A coast-down is a rotor without legs: its collisions are revolutions, and it has no wheel or ramp.
 enum class System { rimless_wheel, coast_down };
 
-/// Nominal contact: what the modeller believes.
+/// Holds the nominal contact, which the modeller believes.
 struct NominalContact {
   dynamics::Law law = dynamics::Law::published;
   Spread restitution, friction;  ///< eta, mu; zero under `plastic`, which has neither
 };
 
-/// Nominal coast-down: omega^2 [rad^2/s^2] lost per revolution = constant + linear omega + quadratic omega^2 + noise.
+/// Nominal coast-downs lose omega^2 [rad^2/s^2] a revolution: constant + linear omega + quadratic omega^2 + noise.
 struct RevolutionLoss {
   double constant = 0;   ///< [rad^2/s^2]
   double linear = 0;     ///< [rad/s]
@@ -60,7 +60,7 @@ struct MeasuredTrial {
   std::optional<dynamics::Outcome> outcome;   ///< nothing: unknown. A trial that rests does so after its last collision
 };
 
-/// How much of a column that may be missing is there.
+/// Says how much of a column that may be missing is there.
 enum class Presence { none, some, all };
 
 struct Columns {
@@ -85,11 +85,11 @@ struct Experiment {
   int legs() const { return system == System::rimless_wheel ? wheel.legs() : 1; }
 };
 
-/// The nominal model of one condition, with the stated launch or else the measured one (mean and sd at collision 1).
+/// Returns one condition's nominal model, with the stated launch or else the measured one (mean and sd at collision 1).
 /// @throws std::invalid_argument for a coast-down, an index out of range, a condition with neither launch nor trials
 Setting nominal_setting(const Experiment& experiment, std::size_t condition);
 
-/// The texts of a folder's files.
+/// Holds the texts of a folder's files.
 struct ExperimentSource {
   std::string folder;  ///< as messages name it
   std::string experiment_toml;
@@ -99,16 +99,16 @@ struct ExperimentSource {
 /// Reads the files there are. @throws InputError if experiment.toml is not there or a file cannot be read
 ExperimentSource read_source(const std::filesystem::path& folder);
 
-/// Everything but the trials: what experiment.toml says. @throws InputError with all its defects
+/// Reads everything but the trials: what experiment.toml says. @throws InputError with all its defects
 Experiment parse_description(const ExperimentSource& source);
 
-/// The whole experiment. Checked: types, ranges and names of all keys and columns; numbers finite, speeds not negative;
-/// collisions of a trial in order without repeat or gap, legs landing one after the other, time and position rising; a
-/// trial of one condition only, which experiment.toml knows; the same trials in collisions.csv and trials.csv.
-/// O(rows log trials). @throws InputError with the first 20 defects, each with file, line and column
+/// Reads the whole experiment. It checks types, ranges and names of all keys and columns; numbers finite, speeds not
+/// negative; collisions of a trial in order without repeat or gap, legs landing one after the other, time and position
+/// rising; a trial of one condition only, which experiment.toml knows; the same trials in collisions.csv and
+/// trials.csv. O(rows log trials). @throws InputError with the first 20 defects, each with file, line and column
 Experiment parse_experiment(const ExperimentSource& source);
 
-/// read_source() and parse_experiment().
+/// Does read_source() and parse_experiment().
 Experiment read_experiment(const std::filesystem::path& folder);
 
 }  // namespace metastable::analysis

@@ -1,5 +1,5 @@
 #pragma once
-// Simulated trials as an experiment folder (experiment.toml, collisions.csv, trials.csv).
+// Writes simulated trials as an experiment folder (experiment.toml, collisions.csv, trials.csv).
 
 #include <cstdint>
 #include <string>
@@ -21,38 +21,38 @@ struct SimulationOptions {
   bool rest_rule = true;    ///< false: never rest, x' < 0 is set to 0 (dynamics::TrialOptions)
 };
 
-/// Trials first .. first+trials-1 under `setting`. @throws std::invalid_argument naming the option and its range
+/// Simulates trials first .. first+trials-1 under `setting`. @throws std::invalid_argument naming option and range
 std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const SimulationOptions& options);
 
-/// One condition of a simulated experiment.
+/// Holds one condition of a simulated experiment.
 struct SimulatedCondition {
   std::string id;
   Setting setting;
   std::vector<dynamics::Trial> trials;
 };
 
-/// The three files of an experiment folder, as text. Speeds in rad/s, lengths in m, times in s.
+/// Holds the three files of an experiment folder as text. Speeds are in rad/s, lengths in m, times in s.
 struct ExperimentFiles {
   std::string experiment_toml;
   std::string collisions_csv;
   std::string trials_csv;  ///< empty: outcomes are not told, and there is no such file
 };
-/// The texts as the reader takes them. @param name  of the folder, for messages
+/// Returns the texts as the reader takes them. @param name  of the folder, for messages
 ExperimentSource source_of(const ExperimentFiles& files, const std::string& name);
 
-/// experiment.toml up to its [[condition]] tables, and one of those. Launches may be left unstated.
+/// Write experiment.toml up to its [[condition]] tables, and one of those. Launches may be left unstated.
 std::string wheel_description(const Setting& setting, Spread restitution, Spread friction, const std::string& title,
                               const std::vector<std::string>& comment);
 std::string condition_description(const std::string& id, const Setting& setting, bool launch_stated = true);
 std::string_view outcome_name(dynamics::Outcome outcome);
-/// In quotes, as TOML wants it.
+/// Quotes a text as TOML wants it.
 std::string toml_text(const std::string& text);
 
 /// Trials are numbered through all conditions. Wheel and contact are those of the first condition.
 /// @param title, comment  of experiment.toml; the comment's lines come first, each behind "# "
 ExperimentFiles experiment_files(const std::vector<SimulatedCondition>& conditions, const std::string& title,
                                  const std::vector<std::string>& comment);
-/// The same for one condition, whose id is its slope.
+/// Does the same for one condition, whose id is its slope.
 ExperimentFiles experiment_files(const Setting& setting, const std::vector<dynamics::Trial>& trials,
                                  const std::string& title, const std::vector<std::string>& comment);
 

@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// Everything found wrong with an input, one line each: "FILE:LINE:COLUMN: what". A user error: exit code 2.
+/// Lists everything found wrong with an input, one line each: "FILE:LINE:COLUMN: what". A user error: exit code 2.
 class InputError : public std::invalid_argument {
  public:
   /// @param lines not empty; what() is the lines joined by line feeds

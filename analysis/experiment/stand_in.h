@@ -1,5 +1,5 @@
 #pragma once
-// A simulated stand-in of the paper's three experiments, whose measurements are not public.
+// Simulates a stand-in of the paper's three experiments, whose measurements are not public.
 
 #include <cstdint>
 #include <vector>
@@ -14,11 +14,11 @@ namespace metastable::analysis {
 /// those of rigid-body wheels and about one trial in ten rests at 7.02 deg, the "intermittent failures" of Sec. III.
 Setting stand_in_setting();
 
-/// The conditions of stand_in() with their numbers of trials, for the virtual laboratory.
+/// Returns the conditions of stand_in() with their numbers of trials, for the virtual laboratory.
 std::vector<RealityCondition> stand_in_conditions(const Setting& base);
 
-/// The paper's conditions (Sec. III): "fast-9.59" 51 trials launched at N(5.83, 0.28^2) rad/s, "slow-9.59" 48 at
-/// N(4.51, 0.36^2), "fast-7.02" 50 at N(7.35, 0.19^2); first 16 collisions each.
+/// Simulates the paper's conditions (Sec. III): "fast-9.59" 51 trials launched at N(5.83, 0.28^2) rad/s, "slow-9.59" 48
+/// at N(4.51, 0.36^2), "fast-7.02" 50 at N(7.35, 0.19^2); first 16 collisions each.
 /// @param base  everything but slope and launch
 std::vector<SimulatedCondition> stand_in(const Setting& base, std::uint64_t seed, int threads = 0);
 

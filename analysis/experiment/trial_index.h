@@ -1,5 +1,5 @@
 #pragma once
-// The trials that a CSV file of an experiment speaks of: its columns condition and trial.
+// Keeps the trials that a CSV file of an experiment speaks of, from its columns condition and trial.
 
 #include <cstddef>
 #include <optional>
@@ -25,14 +25,14 @@ class TrialIndex {
   /// @param described   false: experiment.toml has defects, so conditions are not held against the rows
   TrialIndex(Experiment& experiment, Rows rows, bool described);
 
-  /// Place among entries() of the row that `csv` stands at; a trial not seen before is appended. Nothing: the row does
-  /// not say which trial it belongs to, or says it wrongly; reported.
+  /// Place among entries() of the row that `csv` stands at; a trial not seen before is appended. Nothing: the
+  /// row does not say which trial it belongs to, or says it wrongly; reported.
   std::optional<std::size_t> row(CsvReader& csv, std::size_t condition_column, std::size_t trial_column);
   const std::vector<Entry>& entries() const { return entries_; }
   const Entry* find(int number) const;
-  /// Whether every row so far told its trial.
+  /// Says whether every row so far told its trial.
   bool complete() const { return complete_; }
-  /// One defect in `file` for each trial that `other` (read from `other_file`) does not have.
+  /// Reports one defect in `file` for each trial that `other` (read from `other_file`) does not have.
   void report_missing(const TrialIndex& other, const std::string& file, const std::string& other_file,
                       Defects& defects) const;
 

@@ -1,5 +1,5 @@
 #pragma once
-// Energy lost per collision in simulated trials (the paper's Fig. 8).
+// Sums the energy lost per collision in simulated trials (the paper's Fig. 8).
 
 #include <cstdint>
 
@@ -27,8 +27,8 @@ struct EnergyLossOptions {
   int threads = 0;
 };
 
-/// Losses of all collisions of all trials under `setting`. O(trials x collisions); the same bits on any number of
-/// threads.
+/// Sums the losses of all collisions of all trials under `setting`. O(trials x collisions); the same bits on any number
+/// of threads.
 EnergyLosses energy_losses(const Setting& setting, const EnergyLossOptions& options);
 
 }  // namespace metastable::analysis

@@ -1,5 +1,5 @@
 #pragma once
-// The paper's statements about its simulations and experiments, each held against a study.
+// Holds the paper's statements about its simulations and experiments against a study.
 
 #include <string>
 #include <vector>

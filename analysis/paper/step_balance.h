@@ -1,5 +1,6 @@
 #pragma once
-// What measured steps keep of omega^2, against a plastic collision: where a wheel departs from every single-impact law.
+// Tells what measured steps keep of omega^2, against a plastic collision: where a wheel departs from every
+// single-impact law.
 
 #include <optional>
 #include <string>
@@ -9,8 +10,9 @@
 
 namespace metastable::analysis {
 
-/// Some steps of an experiment. A step keeps the share (x' - gain)/x of x = omega^2 before its collision, x' before the
-/// next one and `gain` what the stance adds; a plastic collision keeps ((r_g^2 + L1 L2 cos alpha)/(r_g^2 + L2^2))^2.
+/// Describes some steps of an experiment. A step keeps the share (x' - gain)/x of x = omega^2 before its collision, x'
+/// before the next one and `gain` what the stance adds; a plastic collision keeps ((r_g^2 + L1 L2 cos alpha)/(r_g^2 +
+/// L2^2))^2.
 struct StepBalance {
   std::string of;  ///< condition, leg or slide
   std::size_t steps = 0;
@@ -20,7 +22,7 @@ struct StepBalance {
   std::optional<double> slide;                   ///< mean distance to the next foot beyond the chord [m]
 };
 
-/// Correlations of kept - plastic over all steps.
+/// Holds correlations of kept - plastic over all steps.
 struct StepCorrelations {
   double speed = 0, previous = 0;  ///< with omega-; with the same of the step before
   std::optional<double> after_collision, slide;
@@ -31,8 +33,8 @@ struct StepBalances {
   StepCorrelations correlation;
 };
 
-/// Steps from the fourth collision on (launches have died away). @throws std::invalid_argument for a coast-down, for
-/// experiments without legs, and with fewer than 20 steps
+/// Takes steps from the fourth collision on (launches have died away). @throws std::invalid_argument for a coast-down,
+/// for experiments without legs, and with fewer than 20 steps
 StepBalances step_balances(const Experiment& experiment);
 
 }  // namespace metastable::analysis

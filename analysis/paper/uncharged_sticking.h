@@ -1,5 +1,5 @@
 #pragma once
-// The published law without its charge on collisions that would stick.
+// Maps the wheel by the published law without its charge on collisions that would stick.
 
 #include <optional>
 #include <span>
@@ -9,8 +9,9 @@
 
 namespace metastable::analysis {
 
-/// Return map of `published` in which a foot with mu >= mu_c = x y/(L2^2 + y^2) sticks: it does not slide, so it loses
-/// nothing to friction (21) and moves nothing along the ramp (34). Below mu_c as printed. Satisfies markov::ReturnMap.
+/// Maps as `published` does, but a foot with mu >= mu_c = x y/(L2^2 + y^2) sticks: it does not slide, so it loses
+/// nothing to friction (21) and moves nothing along the ramp (34). Below mu_c it is as printed. Satisfies
+/// markov::ReturnMap.
 class UnchargedSticking {
  public:
   /// @throws std::invalid_argument for another law than `published`
@@ -20,15 +21,15 @@ class UnchargedSticking {
   int phases() const { return map_.phases(); }
   int noise_dimension() const { return map_.noise_dimension(); }
   std::optional<double> landing(double state, int phase, std::span<const double> score) const;
-  /// omega+^2 [rad^2/s^2]
+  /// Returns omega+^2 [rad^2/s^2].
   double after_collision(double state, int phase, const dynamics::Contact& contact) const;
-  /// omega+^2 = scale x - drag sqrt(x), as WheelMap::coefficients.
+  /// Returns what omega+^2 = scale x - drag sqrt(x) is made of, as WheelMap::coefficients.
   dynamics::StepCoefficients coefficients(int phase, const dynamics::Contact& contact) const;
-  /// mu_c of the collision in which this leg lands.
+  /// Returns mu_c of the collision in which this leg lands.
   double sticking_friction(int phase) const;
 
   using Table = dynamics::WheelMap::Table;
-  /// Many draws of one phase.
+  /// Prepares many draws of one phase.
   Table tabulate(int phase, std::span<const double> score) const;
 
  private:

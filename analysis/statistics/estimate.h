@@ -1,9 +1,9 @@
 #pragma once
-// A number with its interval.
+// Holds a number with its interval.
 
 namespace metastable::analysis {
 
-/// A number with its 95 % interval; of positive quantities, value and upper end may be +infinity.
+/// Holds a number with its 95 % interval; of positive quantities, value and upper end may be +infinity.
 struct Estimate {
   double value = 0;
   double lower = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// 95 % intervals that need no sample: of a normal estimate and of a share.
+// Finds 95 % intervals that need no sample: of a normal estimate and of a share.
 
 #include <cstddef>
 
@@ -7,10 +7,10 @@
 
 namespace metastable::analysis {
 
-/// Half-width of the 95 % interval of a normal estimate, in standard errors: the normal's 97.5 % quantile.
+/// Is the half-width of a normal estimate's 95 % interval, in standard errors: the normal's 97.5 % quantile.
 inline constexpr double normal_95 = 1.959963984540054;
 
-/// count/of with its exact binomial 95 % interval (Clopper and Pearson 1934). O(1).
+/// Returns count/of with its exact binomial 95 % interval (Clopper and Pearson 1934). O(1).
 /// @param count  <= of
 /// @param of     >= 1
 /// @throws std::invalid_argument for none, or for more than there are

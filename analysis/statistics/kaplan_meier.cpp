@@ -18,14 +18,14 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int resamples = 2000;
 
-// Uniform in (0, 1) from Philox4x64 at counter (replicate, number, 2).
+// Draws a uniform in (0, 1) from Philox4x64 at counter (replicate, number, 2).
 double uniform(std::uint64_t seed, std::uint64_t replicate, std::uint64_t number) {
   const r123::Philox4x64::ctr_type counter{{replicate, number, 2, 0}};
   const r123::Philox4x64::key_type key{{seed, 0}};
   return unit_interval(r123::Philox4x64()(counter, key)[0]);
 }
 
-// Area under S over [0, steps) and S there.
+// Returns the area under S over [0, steps) and S there.
 struct Restricted {
   double area = 0, survival = 1;
 };

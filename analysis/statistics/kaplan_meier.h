@@ -1,5 +1,5 @@
 #pragma once
-// Survival in steps from trials of which some never came to rest.
+// Estimates survival in steps from trials of which some never came to rest.
 
 #include <cstdint>
 #include <span>
@@ -17,20 +17,20 @@ struct ObservedSteps {
   bool rested = false;
 };
 
-/// S(n) = P(steps > n) at n = 1, 2, ... up to the longest trial (Kaplan and Meier 1958).
+/// Estimates S(n) = P(steps > n) at n = 1, 2, ... up to the longest trial (Kaplan and Meier 1958).
 struct SurvivalPoint {
   int steps = 0;
   int at_risk = 0;            ///< trials that met collision n
   int rested = 0;             ///< of these, after it
   double survival = 1;        ///< S(n)
   double standard_error = 0;  ///< Greenwood's
-  /// 95 %, from Greenwood's variance on the log(-log) scale; before the first rest the exact binomial bound.
+  /// Its 95 % come from Greenwood's variance on the log(-log) scale, before the first rest from the binomial bound.
   double lower = 0, upper = 1;
 };
 /// @throws std::invalid_argument for no trial, or steps below 1
 std::vector<SurvivalPoint> kaplan_meier(std::span<const ObservedSteps> trials);
 
-/// Expected steps before failure from such trials.
+/// Estimates the expected steps before failure from such trials.
 struct ExpectedSteps {
   /// Area under S up to `steady_from` - 1 collisions, and beyond it S / rate: the failure rate is taken as constant in
   /// the steady state. 95 %: trials resampled for the first part, the Jeffreys distribution of the rate for the second.

@@ -1,5 +1,5 @@
 #pragma once
-// The middle of a sample.
+// Finds the middle of a sample.
 
 #include <algorithm>
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace metastable::analysis {
 
-/// The median of values, of an even number the upper of the two in the middle. O(n). @param values  not empty
+/// Returns the median of values, of an even number the upper of the two in the middle. O(n). @param values  not empty
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());

@@ -1,5 +1,5 @@
 #pragma once
-// Minimum of a smooth function of a few variables.
+// Finds the minimum of a smooth function of a few variables.
 
 #include <functional>
 #include <vector>
@@ -16,9 +16,9 @@ struct Minimum {
 /// A function with its gradient, which has the point's length.
 using SmoothFunction = std::function<double(const std::vector<double>& at, std::vector<double>& gradient)>;
 
-/// Quasi-Newton descent (BFGS; Nocedal and Wright 2006, ch. 6), for variables in which the function changes by about 1
-/// over about 1. Stops when a Newton step promises less than `tolerance` (absolute), when no step along it falls, or at
-/// `most` evaluations. The function may return +infinity outside its domain, not at `start`.
+/// Descends by quasi-Newton steps (BFGS; Nocedal and Wright 2006, ch. 6), for variables in which the function changes
+/// by about 1 over about 1. Stops when a Newton step promises less than `tolerance` (absolute), when no step along it
+/// falls, or at `most` evaluations. The function may return +infinity outside its domain, not at `start`.
 Minimum quasi_newton(const SmoothFunction& function, const std::vector<double>& start, double tolerance, int most);
 
 }  // namespace metastable::analysis

@@ -16,7 +16,7 @@ constexpr double level = normal_95;    // sqrt(2 (cost - least)) at the ends
 constexpr double close_enough = 0.02;  // of it
 constexpr double lower_by = 0.01;      // a better minimum, not rounding
 
-// The others at their best for given values of one variable.
+// Finds the others at their best for given values of one variable.
 class Profile {
  public:
   /// @param visited  points at which all but one variable are at their best; grows
@@ -47,10 +47,10 @@ class Profile {
   /// Half-width of the interval were the cost quadratic.
   double first_guess() const { return level / std::sqrt(std::max(curvature_, 16.0)); }
 
-  /// sqrt(2 (profile - least)) at a value of the variable.
+  /// Returns sqrt(2 (profile - least)) at a value of the variable.
   double operator()(double value) {
     std::optional<Minimum> best = descend(along(path_, value));
-    // Another branch, from the points of other profiles on either side.
+    // Starts another branch from the points of other profiles on either side.
     const Eigen::VectorXd *below = nullptr, *above = nullptr;
     for (const Eigen::VectorXd& x : visited_) {
       const double here = x[variable_];
@@ -76,7 +76,7 @@ class Profile {
  private:
   Eigen::Index full(Eigen::Index other) const { return other + (other >= variable_); }
 
-  // On the line through the two points nearest to the value.
+  // Starts on the line through the two points nearest to the value.
   Eigen::VectorXd along(const std::vector<Eigen::VectorXd>& points, double value) const {
     std::size_t a = 0, b = 1;
     const auto distance = [&](std::size_t i) { return std::abs(points[i][variable_] - value); };
@@ -148,7 +148,7 @@ std::pair<double, bool> end(Profile& profile, double from, double from_root, dou
       const double next = from + (inner - from) * factor;
       value = std::abs(next - from) < std::abs(limit - from) ? next : limit;
     } else {
-      // Between them along the chord, but not hugging either.
+      // The next value lies between them along the chord, but does not hug either.
       const double share = std::isfinite(outer_root) ? (level - inner_root) / (outer_root - inner_root) : 0.5;
       value = inner + std::clamp(share, 0.1, 0.9) * (outer - inner);
       if (std::abs(outer - inner) < 1e-6) return {value, std::isfinite(outer_root)};

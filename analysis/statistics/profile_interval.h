@@ -1,5 +1,5 @@
 #pragma once
-// Intervals of single variables from a likelihood of several, by its profile.
+// Finds intervals of single variables from a likelihood of several, by its profile.
 
 #include <Eigen/Core>
 #include <optional>
@@ -26,7 +26,7 @@ constexpr double off_the_guess = 0.3;
 /// 0.05.
 Eigen::MatrixXd contour_axes(const Eigen::MatrixXd& hessian);
 
-/// A local minimum and the Hessian there, finite.
+/// Holds a local minimum and the Hessian there, finite.
 struct Mode {
   Minimum minimum;
   Eigen::MatrixXd hessian;

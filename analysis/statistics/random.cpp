@@ -9,7 +9,7 @@
 namespace metastable::analysis {
 namespace {
 
-// Second words of the Philox keys: "mult", "shri", "fold".
+// These are the second words of the Philox keys: "mult", "shri", "fold".
 constexpr std::uint64_t multiplier_key = 0x6d756c74, weight_key = 0x73687269, fold_key = 0x666f6c64;
 
 r123::Philox4x64::ctr_type words(const r123::Philox4x64::ctr_type& counter, std::uint64_t seed, std::uint64_t key) {

@@ -1,5 +1,5 @@
 #pragma once
-// Random numbers of the diagnosis, by counter: the same bits on any number of threads.
+// Draws the diagnosis's random numbers by counter: they are the same bits on any number of threads.
 
 #include <Eigen/Core>
 #include <cstdint>

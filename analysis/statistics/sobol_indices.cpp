@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t blocks = 16;
 
-// Uniforms 2 p and 2 p + 1 of row `row` of matrix 0 or 1: Philox4x64 at counter (row, p, 3, matrix).
+// Draws uniforms 2 p and 2 p + 1 of row `row` of matrix 0 or 1: Philox4x64 at counter (row, p, 3, matrix).
 void fill(std::span<double> inputs, std::uint64_t seed, std::uint64_t row, std::uint64_t matrix) {
   const r123::Philox4x64::key_type key{{seed, 0}};
   for (std::size_t i = 0; i < inputs.size(); i += 2) {
@@ -42,7 +42,7 @@ std::vector<SobolResult> sobol_indices(const std::vector<std::size_t>& group_siz
     throw std::invalid_argument(fmt::format("variance shares: {} samples are below 32", options.samples));
   const std::size_t inputs = std::accumulate(group_sizes.begin(), group_sizes.end(), std::size_t{0});
   const std::size_t groups = group_sizes.size(), runs = groups + 2, rows = per_block * blocks;
-  // value[row][run][output]; runs: A, B, A with group g from B.
+  // value[row][run][output]; runs go over A, B, and A with group g from B.
   std::vector<double> value(rows * runs * outputs);
   markov::parallel_for(rows, options.threads, [&](std::size_t row) {
     std::vector<double> a(inputs), b(inputs);

@@ -1,5 +1,5 @@
 #pragma once
-// Which inputs make an output vary: Sobol' indices of groups of inputs.
+// Finds which inputs make an output vary, by Sobol' indices of groups of inputs.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-// Mean and 95 % half-width of a small sample.
+// Finds mean and 95 % half-width of a small sample.
 
 #include <cstddef>
 #include <vector>

@@ -77,7 +77,7 @@ std::vector<double> sorted(std::span<const double> values) {
   return copy;
 }
 
-// Sd of A^2 under the null hypothesis (Scholz and Stephens 1987, (4), k = 2).
+// Returns the sd of A^2 under the null hypothesis (Scholz and Stephens 1987, (4), k = 2).
 double anderson_darling_sd(double n, double m) {
   const double k = 2, total = n + m, shares = 1 / n + 1 / m;
   double h = 0, g = 0, inner = 0;
@@ -146,7 +146,7 @@ DistributionTest kolmogorov_smirnov_test(std::span<const double> a, std::span<co
   moments(a), moments(b);  // sizes
   const std::vector<double> x = sorted(a), y = sorted(b);
   const auto n = static_cast<std::int64_t>(x.size()), m = static_cast<std::int64_t>(y.size());
-  // n m D, a whole number.
+  // This is n m D, a whole number.
   std::int64_t most = 0;
   for (std::size_t i = 0, j = 0; i < x.size() || j < y.size();) {
     const double at = j == y.size() || (i < x.size() && x[i] <= y[j]) ? x[i] : y[j];

@@ -7,7 +7,7 @@
 
 namespace metastable::analysis {
 
-/// A number with its 95 % interval.
+/// Holds a number with its 95 % interval.
 struct EffectSize {
   double value = 0;
   double lower = 0;
@@ -39,17 +39,17 @@ struct DistributionTest {
   double statistic = 0;
   double p = 1;
 };
-/// Kolmogorov-Smirnov: the largest distance D of the two distribution functions. p exact by counting paths (with ties:
-/// an upper bound) up to n m = 4e6, beyond that Kolmogorov's limit. O(n m) or O(n + m).
+/// Tests by Kolmogorov-Smirnov's D, the largest distance of the two distribution functions. p exact by counting paths
+/// (with ties: an upper bound) up to n m = 4e6, beyond that Kolmogorov's limit. O(n m) or O(n + m).
 DistributionTest kolmogorov_smirnov_test(std::span<const double> a, std::span<const double> b);
-/// D with the simultaneous 95 % band of Massart (1990) for both samples: valid for any distribution, and wide.
+/// Returns D with the simultaneous 95 % band of Massart (1990) for both samples: valid for any distribution, and wide.
 EffectSize kolmogorov_smirnov_distance(std::span<const double> a, std::span<const double> b);
 
-/// Anderson-Darling, two samples: A^2 of Scholz and Stephens (1987), (6). p from the limit law of
+/// Tests two samples by Anderson-Darling's A^2, Scholz and Stephens (1987), (6). p from the limit law of
 /// the one-sample statistic (Pettitt 1976) after matching mean and variance; limit law by Marsaglia and Marsaglia
 /// (2004), its far tail by sqrt(3) erfc(sqrt(z)) (Zolotarev 1961). O(N log N). 4 or more values in all.
 DistributionTest anderson_darling_test(std::span<const double> a, std::span<const double> b);
-/// P(A^2 > z) in that limit. Absolute error below 2e-5.
+/// Returns P(A^2 > z) in that limit, to an absolute error below 2e-5.
 double anderson_darling_tail(double z);
 
 }  // namespace metastable::analysis

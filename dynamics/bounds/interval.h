@@ -7,7 +7,7 @@
 
 namespace metastable::dynamics {
 
-/// [lower, upper], lower <= upper. Operations enclose: for real a in A and b in B, a op b lies in A op B.
+/// Stands for [lower, upper], lower <= upper. Operations enclose: for real a in A and b in B, a op b lies in A op B.
 ///
 /// Error model: double operations and sqrt round to nearest (relative error at most 2^-53, or an absolute one of the
 /// smallest denormal), so moving a bound v by |v| 2^-51 + 1e-300 passes the real value. exp and log are taken to be
@@ -65,7 +65,7 @@ inline Interval square(const Interval& a) {
   const Interval s = rounding::outward(std::min(p, q), std::max(p, q));
   return {a.contains(0) ? 0 : std::max(0.0, s.lower), s.upper};
 }
-/// Square root of the part above 0.
+/// Encloses the square root of the part above 0.
 inline Interval sqrt(const Interval& a) {
   const Interval s = rounding::outward(std::sqrt(std::max(0.0, a.lower)), std::sqrt(std::max(0.0, a.upper)));
   return {std::max(0.0, s.lower), s.upper};
@@ -85,7 +85,7 @@ inline Interval normal_tail(const Interval& z) {
   return {std::max(0.0, rounding::down(0.5 * std::erfc(a), units(std::min(std::abs(a), 40.0)))),
           std::min(1.0, rounding::up(0.5 * std::erfc(b), units(std::min(std::abs(b), 40.0))))};
 }
-/// Density of the standard normal.
+/// Encloses the density of the standard normal.
 inline Interval normal_bump(const Interval& z) {
   const Interval s = square(z);
   return exp(Interval(-0.5 * s.upper, -0.5 * s.lower)) * around(0.39894228040143267794, 0x1p-52);

@@ -35,7 +35,7 @@ struct Panel : MomentPanel {
   double least_fall = 0;             // -dG/dmu from `start` on, for all speeds
 };
 
-// What is known of one panel's H = P(mu > mu*) on a set of (t, q).
+// Holds what is known of one panel's H = P(mu > mu*) on a set of (t, q).
 struct Root {
   enum class Kind { enclosed, constant, open } kind = Kind::open;
   Interval friction;  // mu* if enclosed; where it lies within [start, cap], if it does, otherwise
@@ -186,7 +186,7 @@ class LandingBounds::Table {
   }
 
   Interval score(const Interval& mu) const { return (mu - Interval(mu_.mean())) / Interval(mu_.sd()); }
-  // P(mu* < mu < cap); what lies beyond the cap is open.
+  // Returns P(mu* < mu < cap); what lies beyond the cap is open.
   Interval exceeding(const Interval& mu) const {
     const Interval all = clipped(normal_tail(score(mu)) / mu_mass_, 0, 1);
     return {std::max(0.0, rounding::down(all.lower - beyond_)), all.upper};
@@ -231,7 +231,7 @@ class LandingBounds::Table {
                  Interval(-least_u_);
   }
 
-  // Upper bounds of s and -d over mu, on a panel.
+  // These bound s and -d over mu from above, on a panel.
   std::pair<Interval, Interval> best(const Panel& p) const {
     const Interval s = level_.kept - p.over.k1 * inverse(level_.inverse_mass) - p.over.k2 * Interval(least_b_);
     return {s, p.over.k3 * Interval(-least_u_)};
@@ -243,7 +243,7 @@ class LandingBounds::Table {
   void speeds(double lowest, double highest, int count) {
     const double from = 1 / std::sqrt(highest) * (1 - 1e-9), to = 1 / std::sqrt(lowest) * (1 + 1e-9);
     for (int i = 0; i <= count; ++i) q_.push_back(from + (to - from) * i / count);
-    // From where on G falls with mu, for all speeds.
+    // From this mu on G falls with mu, for all speeds.
     const Interval q(from, to);
     for (Panel& p : panels_) {
       const double at_turn = slope(rough_shape(turn_), p, 0.5 * (from + to));
@@ -282,7 +282,7 @@ class LandingBounds::Table {
         (p.slope_at_centre.k1.middle() * f.a + p.slope_at_centre.k2.middle() * f.b) * (eta_.constant() ? 0 : eta_.sd());
     const double sd = std::hypot(by_mu, by_eta), width = step * sd;
     const double floor = level_.barrier.lower / highest, ceiling = std::max(highest / lowest, 2 * floor);
-    // What lies between nearly_none and nearly_all, scanned at both ends of q.
+    // The table covers what lies between nearly_none and nearly_all, scanned at both ends of q.
     double first = floor, last = floor;
     bool some = false, all = false;
     for (double t = floor; t < ceiling + sd / 2 && !all; t += sd / 2) {
@@ -315,7 +315,7 @@ class LandingBounds::Table {
   std::size_t index(std::size_t t, std::size_t q) const { return q * (t_.size() - 1) + t; }
   const Interval& corner(std::size_t t, std::size_t q) const { return corner_[q * t_.size() + t]; }
 
-  // Bound of C along one line of constant t: the corners of the cells q touches, whose C is monotone in t only.
+  // Bounds C along one line of constant t by the corners of the cells q touches, whose C is monotone in t only.
   double bounded(const Interval& q, std::size_t t, bool lower) const {
     const auto [first, last] = cells(q_, q);
     double bound = lower ? 1 : 0;
@@ -333,7 +333,7 @@ class LandingBounds::Table {
     const Interval u = clipped((t - Interval(t0)) / (Interval(t1) - Interval(t0)), 0, 1);
     const Interval v = clipped((q - Interval(q0)) / (Interval(q1) - Interval(q0)), 0, 1);
     const auto mix = [](const Interval& a, const Interval& b, const Interval& s) {
-      // a + (b - a) s, whose ends lie at ends of a, b and s.
+      // It encloses a + (b - a) s, whose ends lie at ends of a, b and s.
       const auto at = [&](double x, double y, double w) { return x * (1 - w) + y * w; };
       const double low = std::min(at(a.lower, b.lower, s.lower), at(a.lower, b.lower, s.upper));
       const double high = std::max(at(a.upper, b.upper, s.lower), at(a.upper, b.upper, s.upper));
@@ -369,7 +369,7 @@ class LandingBounds::Table {
     });
   }
 
-  // Root of G = t at the panel's centre, to double accuracy, not proven.
+  // Finds the root of G = t at the panel's centre, to double accuracy, not proven.
   double rough_root(const Panel& p, double t, double q, double guess) const {
     double low = p.start, high = cap_;
     if (value(rough_shape(low), p, q) <= t) return low;
@@ -386,7 +386,7 @@ class LandingBounds::Table {
     return m;
   }
 
-  // G at one mu over (panel or its centre) x q. `f` at that mu.
+  // Encloses G at one mu over (panel or its centre) x q; `f` is taken at that mu.
   Interval at(const Shape& f, const Panel& p, const Interval& q, bool whole) const {
     const Interval qc(q.middle());
     const Interval base = level_.kept - (p.at_centre.k1 * f.a + p.at_centre.k2 * f.b + qc * (p.at_centre.k3 * f.u));
@@ -432,7 +432,7 @@ class LandingBounds::Table {
         return r;
       }
     }
-    // No derivative; at least a range of H.
+    // There is no derivative, but at least a range of H.
     radius = 1.25 * magnitude(miss) / rate + 1e-15;
     for (int i = 0; i < 3; ++i, radius *= 2) {
       const double above = std::min(guess + radius, cap_), under = std::min(guess - radius, cap_);
@@ -447,7 +447,7 @@ class LandingBounds::Table {
     return r;
   }
 
-  // Mass of the strips below `start` that lands below t: known, and open.
+  // Sums the mass of the strips below `start` that lands below t: known, and open.
   std::pair<Interval, double> strip_share(const Panel& p, const Interval& t, const Interval& q) const {
     Interval known(0);
     double open = 0;
@@ -488,7 +488,7 @@ class LandingBounds::Table {
     return clipped(sum, 0, 1);
   }
 
-  // dH/d eta at the centre of the panel.
+  // Encloses dH/d eta at the centre of the panel.
   Interval eta_slope(const Panel& p, const Interval& mu, const Interval& q) const {
     const Shape f = shape(mu);
     const Drive& k = p.slope_at_centre;
@@ -497,7 +497,7 @@ class LandingBounds::Table {
     return -(normal_bump(score(mu)) / mu_mass_ * move);
   }
 
-  // d^2 H/d eta^2 over the panel.
+  // Encloses d^2 H/d eta^2 over the panel.
   Interval eta_bend(const Panel& p, const Interval& mu, const Interval& q) const {
     const Shape f = shape(mu);
     const auto combine = [&](const Drive& k, const Interval& a, const Interval& b, const Interval& u) {

@@ -1,5 +1,5 @@
 #pragma once
-// Proven bounds on where one collision lands a wheel: of the distribution function and its second derivatives.
+// Proves bounds on where one collision lands a wheel: on the distribution function and its second derivatives.
 
 #include <cstddef>
 #include <functional>
@@ -12,14 +12,14 @@
 
 namespace metastable::dynamics {
 
-/// How finely the noise is cut. Bounds hold at any resolution; finer ones are closer.
+/// Says how finely the noise is cut. Bounds hold at any resolution; finer ones are closer.
 struct BoundsResolution {
   double restitution_step = 1.0 / 12;  ///< panel of eta [sd], > 0
   double level_step = 1.0 / 16;        ///< of the table along t [sd of the landing over the state], > 0
   int speed_cells = 12;                ///< of the table along 1/omega, > 0
 };
 
-/// Bounds on C(x, e) = P(rest, or landing below e) from the state x = omega^2 [rad^2/s^2] at one phase, `published`
+/// Bounds C(x, e) = P(rest, or landing below e) from the state x = omega^2 [rad^2/s^2] at one phase, `published`
 /// law, independent truncated normal eta (or a constant) and mu.
 ///
 /// omega+^2 / x = G(mu, eta, q) = s(mu, eta) - q d(mu, eta), q = 1/omega, so that C is a function of
@@ -53,22 +53,22 @@ class LandingBounds {
   LandingBounds(LandingBounds&&) noexcept;
   LandingBounds& operator=(LandingBounds&&) noexcept;
 
-  /// C at one point. Edges below the lowest state of a survivor count as that state. O(1).
+  /// Bounds C at one point. Edges below the lowest state of a survivor count as that state. O(1).
   /// @throws std::out_of_range for states outside [lowest, highest]; so does curvature()
   Interval below(double state, double edge) const;
 
-  /// Second derivatives of C over a rectangle.
+  /// Bounds the second derivatives of C over a rectangle.
   struct Curvature {
     Interval state, edge;  ///< d^2 C/dx^2, d^2 C/de^2 where they exist
-    /// What else C may deviate from its chord across the rectangle, along x and along e.
+    /// Say what else C may deviate from its chord across the rectangle, along x and along e.
     double loose_state = 0, loose_edge = 0;
   };
-  /// Nothing where C is within 1e-22 of 0 or 1e-11 of 1 (outside the table).
+  /// Returns nothing where C is within 1e-22 of 0 or 1e-11 of 1 (outside the table).
   std::optional<Curvature> curvature(const Interval& state, const Interval& edge) const;
 
-  /// Upper bound of E max(0, landing - edge) from a state.
+  /// Bounds E max(0, landing - edge) from a state from above.
   double overshoot(double state, double edge) const;
-  /// Upper bound of d/dx E max(0, landing(x) - edge) for all states above `state`.
+  /// Bounds d/dx E max(0, landing(x) - edge) for all states above `state` from above.
   double growth(double state) const;
 
  private:

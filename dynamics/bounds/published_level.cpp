@@ -25,7 +25,7 @@ FrictionTerms<T> terms(const T& mu, const T& mass0, const T& mass1, const T& for
   return f;
 }
 
-// T_r over its factor sqrt(m_c/K_r).
+// Encloses T_r over its factor sqrt(m_c/K_r).
 Interval ringing(const Interval& eta) { return sqrt(square(around(std::numbers::pi)) + square(log(eta))); }
 
 }  // namespace

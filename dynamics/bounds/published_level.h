@@ -1,5 +1,5 @@
 #pragma once
-// omega+^2/omega^2 of the law `published`, enclosed: the function whose level sets are the landings.
+// Encloses omega+^2/omega^2 of the law `published`: the function whose level sets are the landings.
 
 #include <stdexcept>
 
@@ -8,26 +8,26 @@
 
 namespace metastable::dynamics {
 
-/// Why there are no proven bounds for a map.
+/// Says why there are no proven bounds for a map.
 class NoBounds : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// a = 1/A, b = mu B/A^2 and u = mu B/A with their first two derivatives in mu; A = 1/m_-, B = mu/n_- of (5), linear in
-/// mu.
+/// Holds a = 1/A, b = mu B/A^2 and u = mu B/A with their first two derivatives in mu; A = 1/m_-, B = mu/n_- of (5),
+/// linear in mu.
 template <class T>
 struct FrictionTerms {
   T a, a1, a2, b, b1, b2, u, u1, u2;
 };
 
-/// k1 = kappa (1 - eta^2), k2 = kappa (1 + eta)^2, k3 = delta (1 + eta) T_r, or their derivatives in eta.
+/// Holds k1 = kappa (1 - eta^2), k2 = kappa (1 + eta)^2, k3 = delta (1 + eta) T_r, or their derivatives in eta.
 struct RestitutionTerms {
   Interval k1, k2, k3;
 };
 
-/// G(mu, eta, q) = kept - k1 a - k2 b - q k3 u, q = 1/omega, for a rolling wheel (u0 = 0) at one phase: (19), (21),
-/// (33) with zeta = 0, tau = 1 + eta. Constants taken from the map are widened by 2^-46 of their values.
+/// Encloses G(mu, eta, q) = kept - k1 a - k2 b - q k3 u, q = 1/omega, for a rolling wheel (u0 = 0) at one phase: (19),
+/// (21), (33) with zeta = 0, tau = 1 + eta. Constants taken from the map are widened by 2^-46 of their values.
 class PublishedLevel {
  public:
   /// @throws NoBounds for another law, or a landing that cannot be shown to rise with the state: with mu_c below, s >=

@@ -1,5 +1,5 @@
 #pragma once
-// Probability density of a wheel's next state, in closed form up to one integral.
+// Gives the probability density of a wheel's next state, in closed form up to one integral.
 
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// Density of the landing x' of a wheel that meets the collision at `phase` with x = omega^2 [rad^2/s^2] = state, > 0.
+/// Gives the density of the landing x' of a wheel that meets the collision at `phase` with x = omega^2 = state > 0.
 ///
 /// Given eta, the loss rises and falls once in mu, g(mu) = a/A + b mu B/A^2 + c mu B/A with A and B linear in mu, so x'
 /// is reached by at most two mu, the roots of a cubic; the density is the integral over eta of f(eta) sum f(mu) /
@@ -16,9 +16,9 @@ namespace metastable::dynamics {
 /// where a root leaves [0, inf). `coulomb`: the foot sticks for every mu >= mu_c, and that share of the mass has x'
 /// from eta alone; its density is added in closed form.
 ///
-/// Relative accuracy about 1e-11, tails included. The density is smooth in x' but for a few points that move with the
-/// state: `published`: about f(eta) at 0 times f(mu) at its own least loss in size. `coulomb`: jumps and inverse square
-/// roots in the bulk of x'.
+/// Relative accuracy is about 1e-11, tails included. The density is smooth in x' but for a few points that move with
+/// the state: under `published` they are about f(eta) at 0 times f(mu) at its own least loss in size, under `coulomb`
+/// they are jumps and inverse square roots in the bulk of x'.
 class LandingDensity {
  public:
   /// Cost: about 30 us. @throws std::invalid_argument where the landing has no density (a list of contacts,
@@ -26,10 +26,10 @@ class LandingDensity {
   /// message names the reason and the sampled method
   LandingDensity(const WheelMap& map, double state, int phase);
 
-  /// At x' = next [1/(rad^2/s^2)]; 0 below the lowest state of a survivor. Cost: 10 to 50 us.
+  /// Evaluates it at x' = next [1/(rad^2/s^2)]; it is 0 below the lowest state of a survivor. Costs 10 to 50 us.
   double operator()(double next) const;
 
-  /// Throws as the constructor does.
+  /// Throws what the constructor throws.
   static void check(const WheelMap& map);
 
  private:

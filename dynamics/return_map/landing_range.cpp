@@ -27,7 +27,7 @@ std::vector<double> restitution_grid(const ContactNoise::Support& support) {
   return refined({support.restitution_lower, support.restitution_upper});
 }
 
-// Up to the last break: beyond it the law is constant or jammed, and the end of the support tells which.
+// The grid goes up to the last break: beyond it the law is constant or jammed, and the end of the support tells which.
 std::vector<double> friction_grid(const ContactNoise::Support& support, const std::vector<double>& breaks) {
   std::vector<double> edges{support.friction_lower};
   if (support.friction_lower == support.friction_upper) return edges;
@@ -50,7 +50,7 @@ class Extremes {
         friction_(friction_grid(map.noise().support(), friction_breaks(map.contact_model(), map.collision(phase, 1)))) {
   }
 
-  // Smallest sign * omega+^2.
+  // Returns the smallest sign * omega+^2.
   double least(double sign) const {
     std::size_t best_eta = 0, best_mu = 0;
     double best = infinity;

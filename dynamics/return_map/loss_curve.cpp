@@ -5,12 +5,14 @@
 #include <limits>
 #include <numbers>
 
+#include "dynamics/wheel/coulomb_law.h"
+
 namespace metastable::dynamics {
 namespace {
 
 constexpr double far_tail = 38;  // [sd]: beyond it probabilities underflow
 
-// Newton's step from mu, halving the bracket where it leaves it; sign * value rises through the root.
+// Takes Newton's step from mu, halving the bracket where it leaves it; sign * value rises through the root.
 [[gnu::always_inline]] inline double newton_step(double sign, double value, double derivative, double& low,
                                                  double& high, double& mu) {
   (sign * value < 0 ? low : high) = mu;
@@ -29,8 +31,7 @@ LossCurve::LossCurve(const WheelMap& map, double state, int phase) {
   const Collision c = map.collision(phase, 1);
   coulomb_ = model.law == Law::coulomb;
   const double x = c.contact_x, y = c.contact_y;
-  const double r2 = coulomb_ ? std::max(model.radius_of_gyration * model.radius_of_gyration, 1e-16 * (x * x + y * y))
-                             : c.landing_length * c.landing_length;
+  const double r2 = coulomb_ ? coulomb_squared_gyration(model, c) : c.landing_length * c.landing_length;
   const double scale = 1 / (model.mass * r2), coupling = (coulomb_ ? std::abs(x * y) : x * y) * scale;
   normal_0_ = (r2 + x * x) * scale;
   normal_1_ = coupling;
@@ -78,7 +79,7 @@ double LossCurve::slope(const Coefficients& k, double mu) const {
   return stationary_polynomial(k, mu) * inverse * inverse * inverse;
 }
 
-// d loss / d mu times A^3.
+// Returns d loss / d mu times A^3.
 double LossCurve::stationary_polynomial(const Coefficients& k, double mu) const {
   const double normal = normal_0_ - normal_1_ * mu, product = mu * (tangential_1_ * mu - tangential_0_),
                rise = 2 * tangential_1_ * mu - tangential_0_;
@@ -105,7 +106,7 @@ LossCurve::Extreme LossCurve::extreme(const Coefficients& k, double guess) const
   return {mu, loss(k, mu)};
 }
 
-// On (loss - level) A^2.
+// Newton's method works on (loss - level) A^2.
 double LossCurve::root(const Coefficients& k, double level, double from, double to, bool rising, double guess) const {
   const double sign = rising ? 1 : -1;
   double low = from, high = to, mu = guess > low && guess < high ? guess : 0.5 * (low + high);

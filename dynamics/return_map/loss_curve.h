@@ -1,18 +1,18 @@
 #pragma once
-// What one collision costs, as a function of friction at a given restitution.
+// Says what one collision costs, as a function of friction at a given restitution.
 
 #include "dynamics/return_map/wheel_map.h"
 
 namespace metastable::dynamics {
 
-/// Loss [J] of a rolling wheel's collision (u0 = 0) at `phase` with x = omega^2 [rad^2/s^2] = state, > 0.
+/// Knows the loss [J] of a rolling wheel's collision (u0 = 0) at `phase` with x = omega^2 [rad^2/s^2] = state, > 0.
 ///
 /// g(mu) = a/A + b mu B/A^2 + c mu B/A with A = 1/m_- and B = mu/n_- linear in mu (the paper's (19), (21), (33)); a, b,
 /// c depend on eta. `published`: it falls to its least value and rises until the foot jams. `coulomb`: it rises to its
 /// largest value and falls until mu_c, from where on the foot sticks and the loss is that at mu_c.
 class LossCurve {
  public:
-  /// g at one eta.
+  /// Describes g at one eta.
   struct Coefficients {
     double a, b, c;
   };
@@ -24,28 +24,28 @@ class LossCurve {
   LossCurve(const WheelMap& map, double state, int phase);
 
   Coefficients at(double restitution) const;
-  /// For mu in [0, end()).
+  /// Returns the loss [J] at mu in [0, end()).
   double loss(const Coefficients& k, double friction) const;
-  /// d loss / d mu.
+  /// Returns d loss / d mu.
   double slope(const Coefficients& k, double friction) const;
-  /// The least loss over [0, end()] (`coulomb`: the largest), by Newton's method within a bracket from near `guess`.
+  /// Finds the least loss over [0, end()] (`coulomb`: the largest), by Newton's method in a bracket from near `guess`.
   Extreme extreme(const Coefficients& k, double guess) const;
-  /// The one mu in [from, to] with loss = level, by Newton's method within a bracket from near `guess`.
+  /// Finds the one mu in [from, to] with loss = level, by Newton's method within a bracket from near `guess`.
   double root(const Coefficients& k, double level, double from, double to, bool rising, double guess) const;
 
-  /// The loss after which the next state is `next`, and the next state after a loss.
+  /// Return the loss after which the next state is `next`, and the next state after a loss.
   double level(double next) const { return (available_ - inertia_ * (next - gain_)) / 2; }
   double landing(double loss) const { return (available_ - 2 * loss) / inertia_ + gain_; }
   double lowest() const { return lowest_; }    ///< state of a survivor
   double inertia() const { return inertia_; }  ///< of the stance after the collision [kg m^2]
-  /// mu at which the foot sticks (`coulomb`) or jams (`published`), or beyond which its distribution underflows.
+  /// Returns the mu at which the foot sticks (`coulomb`) or jams (`published`), or beyond which its density underflows.
   double end() const { return end_; }
   bool coulomb() const { return coulomb_; }
-  /// A at mu, and what remains of eta^2 and of the energy in a: a = energy (1 - kept eta^2).
+  /// Return A at mu, and what remains of eta^2 and of the energy in a: a = energy (1 - kept eta^2).
   double normal(double friction) const { return normal_0_ - normal_1_ * friction; }
   double energy() const { return energy_; }
   double kept() const { return kept_; }
-  /// Does the foot jam at end()?
+  /// Says whether the foot jams at end().
   bool jams() const { return !coulomb_ && normal(end_) <= 1e-15 * normal_0_; }
 
  private:

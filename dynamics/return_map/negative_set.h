@@ -1,5 +1,5 @@
 #pragma once
-// Where a function of one variable is negative.
+// Finds where a function of one variable is negative.
 
 #include <boost/math/tools/minima.hpp>
 #include <boost/math/tools/roots.hpp>
@@ -14,7 +14,7 @@ struct NegativeInterval {
   double lower = 0, upper = 0;
 };
 
-/// Intervals of [edges.front(), edges.back()] on which f < 0, ascending and disjoint; bounds to double precision.
+/// Finds the intervals of [edges.front(), edges.back()] on which f < 0, ascending, disjoint, to double precision.
 ///
 /// f is continuous and smooth between consecutive edges, and finite; it need not be monotone. Each piece is scanned at
 /// `samples` (2 or more) equal steps; where the samples show a dip towards zero, beside an edge too, it is followed to
@@ -35,7 +35,7 @@ std::vector<NegativeInterval> negative_set(const F& f, std::span<const double> e
         boost::math::tools::toms748_solve(f, a, b, fa, fb, boost::math::tools::eps_tolerance<double>(52), iterations);
     roots.push_back(left + (right - left) / 2);
   };
-  // Roots between a and b, of equal signs there, if f reaches zero in a dip between them.
+  // Finds roots between a and b, of equal signs there, if f reaches zero in a dip between them.
   const auto dip = [&](double a, double fa, double b, double fb) {
     const double sign = negative(fa) ? -1 : 1;
     std::uintmax_t iterations = 60;
@@ -51,7 +51,7 @@ std::vector<NegativeInterval> negative_set(const F& f, std::span<const double> e
   const auto closer = [&](std::size_t a, std::size_t b) {
     return same_sign(a, b) && std::abs(value[a]) < std::abs(value[b]);
   };
-  // Whether |f| falls on leaving the sample at an edge towards its neighbour.
+  // Says whether |f| falls on leaving the sample at an edge towards its neighbour.
   const auto falls = [&](std::size_t edge, std::size_t neighbour) {
     return same_sign(edge, neighbour) &&
            std::abs(f(at[edge] + 1e-4 * (at[neighbour] - at[edge]))) < std::abs(value[edge]);

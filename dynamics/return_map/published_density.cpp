@@ -11,8 +11,8 @@
 
 #include "dynamics/return_map/vector_math.h"
 
-// One compiled version for each generation of vector units, chosen when the program starts. Fused multiply-adds make
-// the last bits depend on it.
+// There is one compiled version for each generation of vector units, chosen when the program starts. Fused
+// multiply-adds make the last bits depend on it.
 #ifdef METASTABLE_AVX2
 #define METASTABLE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
@@ -50,13 +50,13 @@ const Nodes& nodes() {
   return all;
 }
 
-/// For the parts of the curve: above mu_c; there with eta below split, where that matters and where it hardly does;
-/// below mu_c, before and after the least loss.
+/// Each part of the curve has its rule: above mu_c; there with eta below split, where that matters and where it hardly
+/// does; below mu_c, before and after the least loss.
 struct Rules {
   const Nodes *main, *tail, *tail_minor, *least, *lower;
 };
 
-/// One row: everything that does not depend on the landing.
+/// Holds everything of one row that does not depend on the landing.
 struct Row {
   double a0, a1, t0, t1, kappa;
   double rounding;                                                // of eta in s where mu < mu_c
@@ -80,7 +80,7 @@ struct Root {
 
 [[gnu::always_inline]] inline double square(double x) { return x * x; }
 
-// mu > mu_c with g(eta, mu) = level, for b_normal = b + c A with an A near that of the answer.
+// Finds mu > mu_c with g(eta, mu) = level, for b_normal = b + c A with an A near that of the answer.
 [[gnu::always_inline]] inline double rough_friction(const Row& r, double a, double b_normal, double level) {
   const double second = b_normal * r.t1 - level * r.a1 * r.a1;
   const double first = 2 * level * r.a0 * r.a1 - a * r.a1 - r.t0 * b_normal;
@@ -88,7 +88,7 @@ struct Root {
   return (std::sqrt(std::max(0.0, first * first - 4 * second * zeroth)) - first) / (2 * second);
 }
 
-// The same to rounding, with A at `near`, a friction not far away, and one step of Newton's method.
+// Finds the same to rounding, with A at `near`, a friction not far away, and one step of Newton's method.
 [[gnu::always_inline]] inline Root friction_at(const Row& r, double eta, double log_eta, double level, double near) {
   const double more = 1 + eta, a = (1 - eta) * more, b = more * more;
   const double c = r.kappa * more * std::sqrt(pi2 + log_eta * log_eta);
@@ -104,7 +104,7 @@ struct Root {
   return {mu, normal * normal / slope(normal, product, bc)};
 }
 
-// eta with g(eta, mu) = level up to the change of s, for mu < mu_c; ratio = mu B/A.
+// Finds eta with g(eta, mu) = level up to the change of s, for mu < mu_c; ratio = mu B/A.
 [[gnu::always_inline]] inline double rough_restitution(const Row& r, double ratio, double normal, double level) {
   const double e = r.kappa * ratio * normal * r.s_usual, half = 0.5 * (2 * ratio + e), first = 1 - ratio;
   return (half + std::sqrt(std::max(0.0, half * half + first * (1 + ratio + e - level * normal)))) / first;
@@ -131,7 +131,7 @@ struct Root {
   return 0.5 * square((eta - r.restitution) * r.restitution_rate);
 }
 
-// Where, below mu_c, the curve comes out of eta = 0, on this side of the least loss (-1, +1); `least` if it does not.
+// Finds where, below mu_c, the curve leaves eta = 0, on this side of the least loss (-1, +1); `least` if it does not.
 [[gnu::always_inline]] inline double reaching_zero(const Row& r, double level, double side) {
   const double c = r.potential_zero, b = 1 + c * (r.a0 - r.a1 * r.least);
   const double second = b * r.t1 - level * r.a1 * r.a1;
@@ -146,152 +146,204 @@ struct Root {
   return level > r.level_least ? mu : r.least;
 }
 
-// Integral of exp(-z_eta^2/2 - z_mu^2/2) / |grad g| along the curves g = level, lane by lane. Conditions are joined by
-// & because a branch would keep the compiler from vector instructions.
-METASTABLE_WIDE
-void along_curves(const Row& r, const double* levels, const Rules& rules, double* sums) {
-  using Lanes = std::array<double, lanes>;
-  alignas(64) Lanes level, low, from, to, limit, near, last, deepest, total;
-  alignas(64) std::array<Lanes, most_points> h;
-  const double lower = r.tail_points > 0 ? split : r.lower, at_sticking = friction_exponent(r, r.sticking);
-  for (std::size_t l = 0; l < lanes; ++l) {
-    level[l] = levels[l];
-    low[l] = std::sqrt(std::max(0.0, 1 - level[l] * r.normal_sticking));
-    limit[l] = 1e300;
-    total[l] = 0;
-  }
+using Lanes = std::array<double, lanes>;
 
-  // Above mu_c and above split: a grid tells where the integrand matters.
+// Holds what the steps below know of the curves g = level of `lanes` landings. Each step goes through all lanes;
+// conditions are joined by & because a branch would keep the compiler from vector instructions.
+struct Curves {
+  alignas(64) Lanes level;
+  alignas(64) Lanes low;                                // eta where the curve passes mu_c, or 0
+  alignas(64) Lanes from, to;                           // the window in which the integrand matters
+  alignas(64) Lanes near, last;                         // where the next root is expected, and the last one
+  alignas(64) Lanes deepest;                            // the exponent's least value so far
+  alignas(64) Lanes total;                              // the integral so far
+  alignas(64) std::array<Lanes, most_points> exponent;  // on the grid of the step
+};
+
+[[gnu::always_inline]] inline void begin(const Row& r, const double* levels, Curves& c) {
+  for (std::size_t l = 0; l < lanes; ++l) {
+    c.level[l] = levels[l];
+    c.low[l] = std::sqrt(std::max(0.0, 1 - c.level[l] * r.normal_sticking));
+    c.deepest[l] = 1e300;
+    c.total[l] = 0;
+  }
+}
+
+[[gnu::always_inline]] inline void expect_usual_friction(const Row& r, Curves& c) {
+  for (std::size_t l = 0; l < lanes; ++l) c.near[l] = c.last[l] = r.friction_middle;
+}
+
+// Finds the window above mu_c and above split from a grid over eta.
+[[gnu::always_inline]] inline void window_above(const Row& r, Curves& c) {
+  alignas(64) Lanes limit;
+  const double lower = r.tail_points > 0 ? split : r.lower, at_sticking = friction_exponent(r, r.sticking);
   for (std::size_t q = 0; q < r.points; ++q)
     for (std::size_t l = 0; l < lanes; ++l) {
-      const double inside = friction_exponent(r, rough_friction(r, r.a[q], r.b_middle[q], level[l])) + r.exponent[q];
-      const double edge = restitution_exponent(r, low[l]) + at_sticking;
-      const double here = r.eta[q] >= low[l] ? inside : edge;
-      h[q][l] = here;
-      limit[l] = std::min(limit[l], here);
+      const double inside = friction_exponent(r, rough_friction(r, r.a[q], r.b_middle[q], c.level[l])) + r.exponent[q];
+      const double edge = restitution_exponent(r, c.low[l]) + at_sticking;
+      const double here = r.eta[q] >= c.low[l] ? inside : edge;
+      c.exponent[q][l] = here;
+      c.deepest[l] = std::min(c.deepest[l], here);
     }
   for (std::size_t l = 0; l < lanes; ++l) {
-    deepest[l] = limit[l];
-    limit[l] += depth;
-    from[l] = std::min(std::max(low[l], lower), r.upper);
-    to[l] = r.upper;
-    near[l] = last[l] = r.friction_middle;
+    limit[l] = c.deepest[l] + depth;
+    c.from[l] = std::min(std::max(c.low[l], lower), r.upper);
+    c.to[l] = r.upper;
   }
   for (std::size_t q = 1; q < r.points; ++q)
     for (std::size_t l = 0; l < lanes; ++l) {
-      const double left = std::max(r.eta[q - 1], low[l]), right = std::max(r.eta[q], low[l]);
-      const double before = h[q - 1][l], after = h[q][l];
+      const double left = std::max(r.eta[q - 1], c.low[l]), right = std::max(r.eta[q], c.low[l]);
+      const double before = c.exponent[q - 1][l], after = c.exponent[q][l];
       const double crossing = left + (right - left) * (limit[l] - before) / (after - before);
-      from[l] = (before > limit[l]) & (after <= limit[l]) ? crossing : from[l];
-      to[l] = (before <= limit[l]) & (after > limit[l]) ? crossing : to[l];
+      c.from[l] = (before > limit[l]) & (after <= limit[l]) ? crossing : c.from[l];
+      c.to[l] = (before <= limit[l]) & (after > limit[l]) ? crossing : c.to[l];
     }
-  for (std::size_t k = 0; k < rules.main->at.size(); ++k) {
-    const double at = rules.main->at[k], weight = rules.main->weight[k];
-    for (std::size_t l = 0; l < lanes; ++l) {
-      const double width = to[l] - from[l], eta = from[l] + width * at;
-      const Root root = friction_at(r, eta, vector_log(std::max(eta, 1e-300)), level[l], near[l]);
-      near[l] = 2 * root.at - last[l];
-      last[l] = root.at;
-      const double exponent = restitution_exponent(r, eta) + friction_exponent(r, root.at);
-      const double value = weight * width * root.weight * vector_exp(-std::min(exponent, 700.0));
-      total[l] += (exponent < 700) & (value > 0) ? value : 0;  // not a number where no curve is
-    }
-  }
-
-  // Above mu_c and below split, over y = -ln eta: long contacts are rare, but they lose much.
-  if (r.tail_points > 0) {
-    double nearest = 1e300;
-    for (std::size_t q = 0; q < r.tail_points; ++q)
-      for (std::size_t l = 0; l < lanes; ++l)
-        h[q][l] = friction_exponent(r, rough_friction(r, r.y_a[q], r.y_b_middle[q], level[l])) + r.y_exponent[q];
-    for (std::size_t l = 0; l < lanes; ++l) {
-      const double end = low[l] > 0 ? -vector_log(std::max(low[l], 1e-300)) : longest;
-      from[l] = r.y[0];
-      to[l] = low[l] >= split ? r.y[0] : std::min(end, longest);
-      limit[l] = low[l] >= split ? 1e300 : h[0][l];
-    }
-    for (std::size_t q = 1; q < r.tail_points; ++q)
-      for (std::size_t l = 0; l < lanes; ++l) limit[l] = r.y[q] < to[l] ? std::min(limit[l], h[q][l]) : limit[l];
-    for (std::size_t l = 0; l < lanes; ++l) {
-      nearest = std::min(nearest, limit[l] - deepest[l]);
-      deepest[l] = std::min(deepest[l], limit[l]);
-      limit[l] = std::max(deepest[l] + depth, limit[l] + 1);
-    }
-    for (std::size_t q = 1; q < r.tail_points; ++q)
-      for (std::size_t l = 0; l < lanes; ++l) {
-        const double before = h[q - 1][l], after = h[q][l];
-        const double crossing = r.y[q - 1] + (r.y[q] - r.y[q - 1]) * (limit[l] - before) / (after - before);
-        const bool inside = r.y[q - 1] < to[l];
-        from[l] = inside & (before > limit[l]) & (after <= limit[l]) ? crossing : from[l];
-        to[l] = inside & (before <= limit[l]) & (after > limit[l]) ? std::min(to[l], crossing) : to[l];
-      }
-    if (nearest < depth + 2) {
-      const Nodes& rule = nearest > 5 ? *rules.tail_minor : *rules.tail;
-      for (std::size_t l = 0; l < lanes; ++l) near[l] = last[l] = r.friction_middle;
-      for (std::size_t k = 0; k < rule.at.size(); ++k) {
-        const double at = rule.at[k], weight = rule.weight[k];
-        for (std::size_t l = 0; l < lanes; ++l) {
-          const double width = to[l] - from[l], y = from[l] + width * at, eta = vector_exp(-std::min(y, longest));
-          const Root root = friction_at(r, eta, -y, level[l], near[l]);
-          near[l] = 2 * root.at - last[l];
-          last[l] = root.at;
-          const double exponent = y + restitution_exponent(r, eta) + friction_exponent(r, root.at);
-          const double value = weight * width * root.weight * vector_exp(-std::min(exponent, 700.0));
-          total[l] += (exponent < 700) & (value > 0) ? value : 0;
-        }
-      }
-    }
-  }
-
-  // Below mu_c: [0, mu1] and [mu2, mu_c].
-  for (std::size_t l = 0; l < lanes; ++l) limit[l] = deepest[l] + depth + 8;  // the exponent is not convex here
-  for (int part = 0; part < 2 && r.sticking > 0; ++part) {
-    constexpr std::size_t steps = 6;
-    for (std::size_t l = 0; l < lanes; ++l) {
-      const double zero = reaching_zero(r, level[l], part == 0 ? -1 : 1);
-      from[l] = part == 0 ? 0 : std::min(std::max(zero, r.least), r.sticking);
-      to[l] = part == 0 ? std::min(std::max(zero, 0.0), r.least) : r.sticking;
-      near[l] = 1e300;
-    }
-    for (std::size_t q = 0; q <= steps; ++q)
-      for (std::size_t l = 0; l < lanes; ++l) {
-        const double mu = from[l] + (to[l] - from[l]) * (static_cast<double>(q) / steps);
-        const double normal = r.a0 - r.a1 * mu, ratio = mu * (r.t1 * mu - r.t0) / normal;
-        h[q][l] = friction_exponent(r, mu) + restitution_exponent(r, rough_restitution(r, ratio, normal, level[l]));
-        near[l] = std::min(near[l], h[q][l]);
-      }
-    double nearest = 1e300;
-    for (std::size_t l = 0; l < lanes; ++l) {
-      nearest = std::min(nearest, near[l] - limit[l]);
-      near[l] = std::max(limit[l], near[l] + 1);
-      low[l] = from[l];
-      h[steps + 1][l] = to[l] - from[l];
-    }
-    if (nearest > 2) continue;
-    for (std::size_t q = 1; q <= steps; ++q)
-      for (std::size_t l = 0; l < lanes; ++l) {
-        const double before = h[q - 1][l], after = h[q][l], share = (near[l] - before) / (after - before);
-        const double crossing = low[l] + h[steps + 1][l] / steps * (static_cast<double>(q - 1) + share);
-        from[l] = (before > near[l]) & (after <= near[l]) ? crossing : from[l];
-        to[l] = (before <= near[l]) & (after > near[l]) ? crossing : to[l];
-      }
-    const Nodes& rule = part == 0 ? *rules.least : *rules.lower;
-    for (std::size_t k = 0; k < rule.at.size(); ++k) {
-      const double at = rule.at[k], weight = rule.weight[k];
-      for (std::size_t l = 0; l < lanes; ++l) {
-        const double width = to[l] - from[l], mu = from[l] + width * at;
-        const Root root = restitution_at(r, mu, level[l]);
-        const double exponent = friction_exponent(r, mu) + restitution_exponent(r, root.at);
-        const double value = weight * width * root.weight * vector_exp(-std::min(exponent, 700.0));
-        const bool counts = (exponent < 700) & (value > 0) & (root.at >= r.lower) & (root.at <= r.upper);
-        total[l] += counts ? value : 0;
-      }
-    }
-  }
-  for (std::size_t l = 0; l < lanes; ++l) sums[l] = total[l];
 }
 
-// The window of [lower, upper] outside of which exp(-h) is below e^-(depth + 6) of its largest value.
+// Returns a node's share of the integral: 0 where no curve is and the value is not a number.
+[[gnu::always_inline]] inline double share_of(double weight, double exponent) {
+  const double value = weight * vector_exp(-std::min(exponent, 700.0));
+  return (exponent < 700) & (value > 0) ? value : 0;
+}
+
+[[gnu::always_inline]] inline void add_above(const Row& r, const Nodes& rule, Curves& c) {
+  expect_usual_friction(r, c);
+  for (std::size_t k = 0; k < rule.at.size(); ++k) {
+    const double at = rule.at[k], weight = rule.weight[k];
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double width = c.to[l] - c.from[l], eta = c.from[l] + width * at;
+      const Root root = friction_at(r, eta, vector_log(std::max(eta, 1e-300)), c.level[l], c.near[l]);
+      c.near[l] = 2 * root.at - c.last[l];
+      c.last[l] = root.at;
+      const double exponent = restitution_exponent(r, eta) + friction_exponent(r, root.at);
+      c.total[l] += share_of(weight * width * root.weight, exponent);
+    }
+  }
+}
+
+// Finds the window above mu_c and below split, over y = -ln eta: long contacts are rare, but they lose much.
+// @return by how much the least exponent there exceeds that above split, in the lane where it does so least
+[[gnu::always_inline]] inline double window_tail(const Row& r, Curves& c) {
+  alignas(64) Lanes limit;
+  for (std::size_t q = 0; q < r.tail_points; ++q)
+    for (std::size_t l = 0; l < lanes; ++l)
+      c.exponent[q][l] =
+          friction_exponent(r, rough_friction(r, r.y_a[q], r.y_b_middle[q], c.level[l])) + r.y_exponent[q];
+  for (std::size_t l = 0; l < lanes; ++l) {
+    const double end = c.low[l] > 0 ? -vector_log(std::max(c.low[l], 1e-300)) : longest;
+    c.from[l] = r.y[0];
+    c.to[l] = c.low[l] >= split ? r.y[0] : std::min(end, longest);
+    limit[l] = c.low[l] >= split ? 1e300 : c.exponent[0][l];
+  }
+  for (std::size_t q = 1; q < r.tail_points; ++q)
+    for (std::size_t l = 0; l < lanes; ++l)
+      limit[l] = r.y[q] < c.to[l] ? std::min(limit[l], c.exponent[q][l]) : limit[l];
+  double nearest = 1e300;
+  for (std::size_t l = 0; l < lanes; ++l) {
+    nearest = std::min(nearest, limit[l] - c.deepest[l]);
+    c.deepest[l] = std::min(c.deepest[l], limit[l]);
+    limit[l] = std::max(c.deepest[l] + depth, limit[l] + 1);
+  }
+  for (std::size_t q = 1; q < r.tail_points; ++q)
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double before = c.exponent[q - 1][l], after = c.exponent[q][l];
+      const double crossing = r.y[q - 1] + (r.y[q] - r.y[q - 1]) * (limit[l] - before) / (after - before);
+      const bool inside = r.y[q - 1] < c.to[l];
+      c.from[l] = inside & (before > limit[l]) & (after <= limit[l]) ? crossing : c.from[l];
+      c.to[l] = inside & (before <= limit[l]) & (after > limit[l]) ? std::min(c.to[l], crossing) : c.to[l];
+    }
+  return nearest;
+}
+
+[[gnu::always_inline]] inline void add_tail(const Row& r, const Nodes& rule, Curves& c) {
+  expect_usual_friction(r, c);
+  for (std::size_t k = 0; k < rule.at.size(); ++k) {
+    const double at = rule.at[k], weight = rule.weight[k];
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double width = c.to[l] - c.from[l], y = c.from[l] + width * at, eta = vector_exp(-std::min(y, longest));
+      const Root root = friction_at(r, eta, -y, c.level[l], c.near[l]);
+      c.near[l] = 2 * root.at - c.last[l];
+      c.last[l] = root.at;
+      const double exponent = y + restitution_exponent(r, eta) + friction_exponent(r, root.at);
+      c.total[l] += share_of(weight * width * root.weight, exponent);
+    }
+  }
+}
+
+// Names the parts of the curve below mu_c: mu lies in [0, mu1], before the least loss, or in [mu2, mu_c], after it.
+enum class Lower { before_least, after_least };
+
+// Finds the window of a part below mu_c from a grid over mu.
+// @return whether the integrand matters in any lane
+[[gnu::always_inline]] inline bool window_below(const Row& r, Lower part, Curves& c) {
+  constexpr std::size_t steps = 6;
+  alignas(64) Lanes least, limit, start, width;
+  for (std::size_t l = 0; l < lanes; ++l) {
+    const double zero = reaching_zero(r, c.level[l], part == Lower::before_least ? -1 : 1);
+    c.from[l] = part == Lower::before_least ? 0 : std::min(std::max(zero, r.least), r.sticking);
+    c.to[l] = part == Lower::before_least ? std::min(std::max(zero, 0.0), r.least) : r.sticking;
+    least[l] = 1e300;
+  }
+  for (std::size_t q = 0; q <= steps; ++q)
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double mu = c.from[l] + (c.to[l] - c.from[l]) * (static_cast<double>(q) / steps);
+      const double normal = r.a0 - r.a1 * mu, ratio = mu * (r.t1 * mu - r.t0) / normal;
+      c.exponent[q][l] =
+          friction_exponent(r, mu) + restitution_exponent(r, rough_restitution(r, ratio, normal, c.level[l]));
+      least[l] = std::min(least[l], c.exponent[q][l]);
+    }
+  double nearest = 1e300;
+  for (std::size_t l = 0; l < lanes; ++l) {
+    const double bound = c.deepest[l] + depth + 8;  // the exponent is not convex here
+    nearest = std::min(nearest, least[l] - bound);
+    limit[l] = std::max(bound, least[l] + 1);
+    start[l] = c.from[l];
+    width[l] = c.to[l] - c.from[l];
+  }
+  if (nearest > 2) return false;
+  for (std::size_t q = 1; q <= steps; ++q)
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double before = c.exponent[q - 1][l], after = c.exponent[q][l];
+      const double share = (limit[l] - before) / (after - before);
+      const double crossing = start[l] + width[l] / steps * (static_cast<double>(q - 1) + share);
+      c.from[l] = (before > limit[l]) & (after <= limit[l]) ? crossing : c.from[l];
+      c.to[l] = (before <= limit[l]) & (after > limit[l]) ? crossing : c.to[l];
+    }
+  return true;
+}
+
+[[gnu::always_inline]] inline void add_below(const Row& r, const Nodes& rule, Curves& c) {
+  for (std::size_t k = 0; k < rule.at.size(); ++k) {
+    const double at = rule.at[k], weight = rule.weight[k];
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const double width = c.to[l] - c.from[l], mu = c.from[l] + width * at;
+      const Root root = restitution_at(r, mu, c.level[l]);
+      const double exponent = friction_exponent(r, mu) + restitution_exponent(r, root.at);
+      const double share = share_of(weight * width * root.weight, exponent);
+      c.total[l] += (root.at >= r.lower) & (root.at <= r.upper) ? share : 0;
+    }
+  }
+}
+
+// Integrates exp(-z_eta^2/2 - z_mu^2/2) / |grad g| along the curves g = level, lane by lane.
+METASTABLE_WIDE
+void along_curves(const Row& r, const double* levels, const Rules& rules, double* sums) {
+  Curves c;
+  begin(r, levels, c);
+  window_above(r, c);
+  add_above(r, *rules.main, c);
+  if (r.tail_points > 0) {
+    const double nearest = window_tail(r, c);
+    if (nearest < depth + 2) add_tail(r, nearest > 5 ? *rules.tail_minor : *rules.tail, c);
+  }
+  if (r.sticking > 0) {
+    if (window_below(r, Lower::before_least, c)) add_below(r, *rules.least, c);
+    if (window_below(r, Lower::after_least, c)) add_below(r, *rules.lower, c);
+  }
+  for (std::size_t l = 0; l < lanes; ++l) sums[l] = c.total[l];
+}
+
+// Finds the window of [lower, upper] outside of which exp(-h) is below e^-(depth + 6) of its largest value.
 template <class Exponent>
 std::pair<double, double> window(double lower, double upper, std::size_t steps, const Exponent& exponent) {
   std::array<double, most_points> at, h;
@@ -319,7 +371,7 @@ double integrate(std::pair<double, double> range, const F& f) {
   return width * sum;
 }
 
-// P(g > level): beyond the upper part of the curve, and below the lower one.
+// Returns P(g > level): what lies beyond the upper part of the curve, and below the lower one.
 double rest(const Row& r, const TruncatedNormal& restitution, const TruncatedNormal& friction, double level) {
   const double open = 1 - level * r.normal_sticking, low = std::sqrt(std::max(0.0, open));
   const double lower = r.tail_points > 0 ? split : r.lower;
@@ -419,7 +471,7 @@ PublishedDensity::PublishedDensity(const WheelMap& map, int phase)
     duration_.push_back(stretched(grid_.back(), 0));
   }
 
-  // The least rounding with which g falls with eta for every mu below mu_c, with room to spare; the slower, the more.
+  // Each form takes the least rounding with which g falls with eta for every mu below mu_c, with room to spare.
   sticking_ = std::max(0.0, t0_ / t1_);
   if (sticking_ == 0) return;
   const auto falls = [&](double rounding, double kappa) {
@@ -510,7 +562,7 @@ double PublishedDensity::operator()(double state, std::span<const double> next, 
   const double energy = energy_ * state;
   const auto level = [&](double landing) { return (before_ * state - inertia_ * (landing - gain_)) / (2 * energy); };
   const double per_loss = 0.5 * inertia_ / energy * normalisation(restitution_) * normalisation(friction_);
-  // By how many sds the curve bends over one sd of eta: d^2 mu/d eta^2 is about 0.6 on it.
+  // The curve bends by so many sds over one sd of eta: d^2 mu/d eta^2 is about 0.6 on it.
   const double bend = 0.6 * restitution_.sd() * restitution_.sd() / friction_.sd();
   // Where eta = 0 meets the least loss, below mu_c, |grad g| is small and the curve turns sharply.
   const double corner = restitution_exponent(r, r.lower) + friction_exponent(r, r.least);

@@ -1,5 +1,5 @@
 #pragma once
-// Where the published law leaves the wheel: densities of the landing for many next states at once.
+// Says where the published law leaves the wheel: densities of the landing for many next states at once.
 
 #include <span>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// Density of the landing x' under `published` for independent eta and mu, both with spreads.
+/// Gives the density of the landing x' under `published` for independent eta and mu, both with spreads.
 ///
 /// The loss is v0^2/2 g(eta, mu), g = (1 - eta^2)/A + (1 + eta)^2 mu B/A^2 + kappa (1 + eta) s(eta) mu B/A
 /// (the paper's (19), (21), (33), (34)), A = 1/m_- and B = mu/n_- linear in mu, s = sqrt(pi^2 + ln^2 eta). The density
@@ -24,17 +24,17 @@ class PublishedDensity {
  public:
   PublishedDensity(const WheelMap& map, int phase);
 
-  /// density[k] [1/(rad^2/s^2)] at next[k], for the collision at `phase` with x = state [rad^2/s^2], > 0.
+  /// Sets density[k] [1/(rad^2/s^2)] at next[k], for the collision at `phase` with x = state [rad^2/s^2], > 0.
   /// Below slowest() g may rise with eta, and a curve have a fold.
   /// @return the probability of rest, from the distribution functions with relative accuracy in their tails
   /// @throws std::invalid_argument for spans of different sizes
   double operator()(double state, std::span<const double> next, std::span<double> density) const;
 
   double rounding() const { return forms_.empty() ? 0 : forms_.front().rounding; }  ///< for survivors
-  /// The least state this form holds for. Infinite if it holds for none.
+  /// Returns the least state this form holds for, infinite if it holds for none.
   double slowest() const;
 
-  /// Whether `map` has this form of the density.
+  /// Says whether `map` has this form of the density.
   static bool covers(const WheelMap& map);
 
  private:

@@ -45,7 +45,7 @@ class RestProbability {
     bool operator<(const Panel& other) const { return error < other.error; }
   };
 
-  // Sign of omega+^2 - barrier, squeezed into [-1, 1) to keep root finding tame next to a jam.
+  // It returns the sign of omega+^2 - barrier, squeezed into [-1, 1) to keep root finding tame next to a jam.
   double margin(const Contact& contact) const {
     const double excess = map_.after_collision(state_, phase_, contact) - map_.stance(phase_).barrier;
     return std::isfinite(excess) ? excess / (state_ + std::abs(excess)) : -1;
@@ -69,7 +69,7 @@ class RestProbability {
   }
 
   double given_friction() const {
-    // Finer towards eta = 0, where the duration of `published` grows like |ln eta|.
+    // The grid is finer towards eta = 0, where the duration of `published` grows like |ln eta|.
     std::vector<double> edges{restitution_.lower()};
     for (double edge : {1e-12, 1e-9, 1e-6, 1e-3, 0.05})
       if (edge > restitution_.lower() && edge < restitution_.upper()) edges.push_back(edge);
@@ -81,7 +81,7 @@ class RestProbability {
     return std::min(1.0, sum);
   }
 
-  // Edges of eta: a grid of one sd within reach, and wherever rest starts or stops being possible at all.
+  // Edges of eta are a grid of one sd within reach, and wherever rest starts or stops being possible at all.
   std::vector<double> restitution_edges() const {
     const double sd = restitution_.sd();
     const double lower = std::max(restitution_.lower(), restitution_.mean() - far_tail * sd);
@@ -119,7 +119,7 @@ class RestProbability {
   }
 
   double integrate() const {
-    // Panels in the order of the mass of eta they hold, until what is left cannot matter.
+    // Panels are taken in the order of the mass of eta they hold, until what is left cannot matter.
     const std::vector<double> edges = restitution_edges();
     std::vector<NegativeInterval> ordered;
     for (std::size_t i = 0; i + 1 < edges.size(); ++i) ordered.push_back({edges[i], edges[i + 1]});

@@ -1,14 +1,14 @@
 #pragma once
-// Probability that one collision brings the wheel to rest, tails included.
+// Finds the probability that one collision brings the wheel to rest, tails included.
 
 #include "dynamics/return_map/wheel_map.h"
 
 namespace metastable::dynamics {
 
-/// P(rest) of a wheel that meets the collision at `phase` with x = omega^2 [rad^2/s^2] = state, > 0.
+/// Returns P(rest) of a wheel that meets the collision at `phase` with x = omega^2 [rad^2/s^2] = state, > 0.
 ///
-/// List of contacts: counted. Independent (eta, mu): for each eta the set of mu that rests, from the roots of
-/// omega+^2 - barrier, with the distribution function of mu in closed form; over eta by adaptive Gauss-Kronrod
+/// A list of contacts is counted. Independent (eta, mu): for each eta the set of mu that rests is found from the roots
+/// of omega+^2 - barrier, with the distribution function of mu in closed form; over eta by adaptive Gauss-Kronrod
 /// quadrature to about 1e-10 of the result, however small that is (down to about 1e-290). A constant mu makes it a set
 /// of eta.
 /// @throws std::logic_error for correlated (eta, mu), for which there is no closed form.

@@ -76,7 +76,7 @@ std::optional<double> RoughTerrainWheel::landing(double state, int, std::span<co
 std::optional<double> RoughTerrainWheel::rest_probability(double state, int) const {
   const Joined joined(options_);
   if (options_.sd_slope == 0) return next(state, options_.mean_slope) <= 0 ? 1 : 0;
-  // Rest where cos(gamma - best) <= threshold: slopes too flat, and slopes too steep.
+  // It rests where cos(gamma - best) <= threshold: on slopes too flat, and on slopes too steep.
   const double threshold = -joined.extreme(state, 0) / (joined.gain * joined.amplitude);
   if (threshold >= 1) return 1;
   if (threshold < -1) return 0;

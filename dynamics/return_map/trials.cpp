@@ -12,19 +12,19 @@
 namespace metastable::dynamics {
 namespace {
 
-// Standard normal scores of one event of one trial: Philox4x64 at counter (index, event), key (seed).
+// Returns standard normal scores of one event of one trial: Philox4x64 at counter (index, event), key (seed).
 std::array<double, 2> scores(std::uint64_t seed, std::uint64_t index, std::uint64_t event) {
   const r123::Philox4x64::ctr_type counter{{index, event, 0, 0}};
   const r123::Philox4x64::key_type key{{seed, 0}};
   const auto bits = r123::Philox4x64()(counter, key);
-  // (n + 1/2) / 2^52 with n < 2^52: 53 significant bits, strictly inside (0, 1).
+  // (n + 1/2) / 2^52 with n < 2^52 has 53 significant bits and lies strictly inside (0, 1).
   const auto score = [](std::uint64_t word) {
     return normal_quantile((static_cast<double>(word >> 12) + 0.5) * 0x1p-52);
   };
   return {score(bits[0]), score(bits[1])};
 }
 
-// One trial as it unfolds. Event 0 of a trial is the launch, event n its collision n.
+// Follows one trial as it unfolds. Event 0 of a trial is the launch, event n its collision n.
 class Roll {
  public:
   Roll(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg, std::uint64_t seed,

@@ -1,5 +1,5 @@
 #pragma once
-// Whole trials by direct simulation: the independent check of the chain, and made-up experiments.
+// Simulates whole trials directly: the independent check of the chain, and made-up experiments.
 
 #include <cstdint>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace metastable::dynamics {
 
-/// One collision of a trial.
+/// Holds one collision of a trial.
 struct TrialCollision {
   int number = 0;          ///< from 1
   int leg = 0;             ///< that lands
@@ -36,17 +36,17 @@ struct TrialOptions {
   std::uint64_t seed = 1;
 };
 
-/// Trial number `index` of a run: launch speed omega_0 ~ launch (truncated at 0) and (eta, mu) of each collision from
-/// Philox at counter (index, collision): the same bits whatever ran before and on however many threads.
+/// Simulates trial `index` of a run: launch speed omega_0 ~ launch (truncated at 0) and (eta, mu) of each collision
+/// from Philox at counter (index, collision): the same bits whatever ran before and on however many threads.
 /// @throws std::invalid_argument for options out of range
 Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
                      std::uint64_t index);
 
-/// Number of steps before failure of trial `index` without storing it, at most `limit` (returned when reached).
+/// Counts the steps before failure of trial `index` without storing it, at most `limit` (returned when reached).
 std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,
                             std::uint64_t seed, std::uint64_t index, std::uint64_t limit);
 
-/// Index of the last collision on a ramp of that length (foot 1 at 0 m): surviving it means the end is reached.
+/// Returns the number of the last collision on a ramp of that length (foot 1 at 0 m): who survives it reaches the end.
 int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ramp_length);
 
 }  // namespace metastable::dynamics

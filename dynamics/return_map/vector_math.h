@@ -1,12 +1,12 @@
 #pragma once
-// Elementary functions without branches, for loops that the compiler turns into vector instructions.
+// Provides elementary functions without branches, for loops that the compiler turns into vector instructions.
 
 #include <bit>
 #include <cstdint>
 
 namespace metastable::dynamics {
 
-/// e^x for x in [-700, 0], within 2 units in the last place.
+/// Returns e^x for x in [-700, 0], within 2 units in the last place.
 [[gnu::always_inline]] inline double vector_exp(double x) {
   constexpr double magic = 0x1.8p52;  // adding it leaves the rounded integer in the low bits
   const double shifted = x * 1.4426950408889634 + magic, count = shifted - magic;
@@ -28,7 +28,7 @@ namespace metastable::dynamics {
   return p * std::bit_cast<double>((std::bit_cast<std::int64_t>(shifted) + 1023) << 52);
 }
 
-/// ln x for normal x > 0, within 2 units in the last place of max(1, |ln x|).
+/// Returns ln x for normal x > 0, within 2 units in the last place of max(1, |ln x|).
 [[gnu::always_inline]] inline double vector_log(double x) {
   const auto bits = std::bit_cast<std::int64_t>(x);
   const std::int64_t offset = bits - std::bit_cast<std::int64_t>(0.70710678118654752);

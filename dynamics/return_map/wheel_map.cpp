@@ -59,7 +59,7 @@ METASTABLE_WIDE void land_all(const Landing& of, const double* offset, const dou
   }
 }
 
-// Integral of d phi / sqrt(a + b sin^2 phi) over sin^2 phi in [from, to], phi in [0, pi/2] (DLMF 19.29.4).
+// Integrates d phi / sqrt(a + b sin^2 phi) over sin^2 phi in [from, to], phi in [0, pi/2] (DLMF 19.29.4).
 double pendulum_integral(double a, double b, double from, double to) {
   const double x1 = std::sqrt(to), x2 = std::sqrt(1 - to), x3 = std::sqrt(a + b * to);
   const double y1 = std::sqrt(from), y2 = std::sqrt(1 - from), y3 = std::sqrt(a + b * from);
@@ -71,7 +71,7 @@ double pendulum_integral(double a, double b, double from, double to) {
 
 }  // namespace
 
-// Made when first asked for: they take a thousand times as long as the rest of a map, and few maps are asked.
+// They are made when first asked for: they take a thousand times as long as the rest of a map, and few maps are asked.
 struct WheelMap::FastDensities {
   std::once_flag made;
   std::vector<PublishedDensity> by_phase;
@@ -181,7 +181,7 @@ std::pair<double, double> WheelMap::landing_range(double state, int phase) const
 }
 
 double WheelMap::duration(double next_state, int phase) const {
-  // With theta = pi/2 + 2 phi: omega^2 = apex + 2 pendulum sin^2(phi).
+  // With theta = pi/2 + 2 phi, omega^2 is apex + 2 pendulum sin^2(phi).
   const Stance& s = stance(phase);
   const double lift = 2 * s.pendulum;
   const double start = std::sin((s.start_angle - std::numbers::pi / 2) / 2);
@@ -224,7 +224,7 @@ void WheelMap::Table::land(double origin, double width, std::span<const double> 
   land_all({origin, width, barrier_, gain_}, offset.data(), scale_.data() + first, drag_.data() + first, next);
 }
 
-// The root of scale x - drag sqrt(x) = barrier; a loss of more than all energy may leave survivors at low speeds, by
+// Solves scale x - drag sqrt(x) = barrier; a loss of more than all energy may leave survivors at low speeds, by
 // the potential energy gained.
 double WheelMap::Table::lowest_survivor(std::size_t k) const {
   const double scale = scale_[k], drag = drag_[k];

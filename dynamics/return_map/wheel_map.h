@@ -1,5 +1,5 @@
 #pragma once
-// The wheel's stochastic return map on x = omega^2 just before a collision.
+// Makes the wheel's stochastic return map on x = omega^2 just before a collision.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace metastable::dynamics {
 
 class PublishedDensity;
 
-/// The stance on one leg, from the collision in which it lands to the next.
+/// Describes the stance on one leg, from the collision in which it lands to the next.
 struct Stance {
   double inertia = 0;  ///< I about this foot [kg m^2]
   double barrier =
@@ -31,14 +31,14 @@ struct Stance {
   double length = 0;       ///< L [m]
 };
 
-/// One collision followed by one stance. Losses that the return map needs, for u0 = 0, proportional to omega^2
-/// and omega: omega+^2 = scale * x - drag * sqrt(x) (one draw of eta and mu serves every speed).
+/// One collision is followed by one stance. For u0 = 0 the losses that the return map needs are proportional to
+/// omega^2 and omega: omega+^2 = scale * x - drag * sqrt(x) (one draw of eta and mu serves every speed).
 struct StepCoefficients {
   double scale = 0;  ///< -infinity when the foot jams
   double drag = 0;   ///< [rad/s]
 };
 
-/// Return map of the wheel on one ramp. Phases are the legs in landing order; a wheel with equal legs has one phase.
+/// Maps the wheel on one ramp. Phases are the legs in landing order; a wheel with equal legs has one phase.
 /// At phase p leg p lands and leg p-1 (mod legs) is the stance leg. Satisfies markov::ReturnMap.
 class WheelMap {
  public:
@@ -54,46 +54,46 @@ class WheelMap {
   const Stance& stance(int phase) const { return stance_[static_cast<std::size_t>(phase)]; }
   const Triangle& triangle(int phase) const { return triangle_[static_cast<std::size_t>(phase)]; }
 
-  /// The collision at `phase` with speed omega [rad/s].
+  /// Returns the collision at `phase` with speed omega [rad/s].
   Collision collision(int phase, double omega) const;
-  /// Losses of that collision [J].
+  /// Returns the losses of that collision [J].
   Loss loss(int phase, double omega, const Contact& contact) const;
-  /// The same as coefficients of omega+^2, for u0 = 0.
+  /// Returns the same as coefficients of omega+^2, for u0 = 0.
   StepCoefficients coefficients(int phase, const Contact& contact) const;
-  /// omega+^2 [rad^2/s^2], just after the collision (may be negative: then the wheel has stopped; -infinity: jammed).
+  /// Returns omega+^2 [rad^2/s^2] just after the collision (negative: the wheel has stopped; -infinity: it jammed).
   double after_collision(double state, int phase, const Contact& contact) const;
 
-  // The return-map concept.
+  // These make up the return-map concept.
   std::pair<double, double> state_interval(int phase) const;  ///< {lowest state a survivor can have, +infinity}
   int phases() const { return static_cast<int>(stance_.size()); }
   int noise_dimension() const { return noise_.dimension(); }
   std::optional<double> landing(double state, int phase, std::span<const double> score) const;
-  /// Exact, by quadrature over eta and the distribution function of mu in closed form (independent eta, mu, or a list);
-  /// nothing for a correlated pair.
+  /// Is exact, by quadrature over eta and the distribution function of mu in closed form (independent eta, mu, or a
+  /// list); returns nothing for a correlated pair.
   std::optional<double> rest_probability(double state, int phase) const;
-  /// Density of the landing at each of the next states [1/(rad^2/s^2)]: density[k] belongs to next[k]
+  /// Gives the density of the landing at each of the next states [1/(rad^2/s^2)]: density[k] belongs to next[k]
   /// (PublishedDensity, and LandingDensity for states slower than any survivor); returns the probability of rest.
-  /// Nothing where PublishedDensity does not cover the map.
+  /// Returns nothing where PublishedDensity does not cover the map.
   std::optional<double> landing_density(double state, int phase, std::span<const double> next,
                                         std::span<double> density) const;
-  /// Points with weights for expectations over the landing; where those are not smooth
+  /// Gives points with weights for expectations over the landing; states where those are not smooth follow
   /// (dynamics/return_map/landing_quadrature.h).
   double landing_points(double state, int phase, std::span<const double> breaks,
                         std::vector<std::pair<double, double>>& points) const;
   std::vector<double> states_of_extremes(int phase, std::span<const double> next) const;
-  /// Infimum and supremum of the landing over the support of (eta, mu); -infinity stands for rest.
+  /// Returns infimum and supremum of the landing over the support of (eta, mu); -infinity stands for rest.
   std::pair<double, double> landing_range(double state, int phase) const;
-  /// Time of the stance that begins at `phase` and ends at next_state [s], closed form (Carlson's R_F, the elliptic
-  /// integral of the first kind). Infinity for a state that no wheel coming over the foot can have.
+  /// Returns the time of the stance from `phase` to next_state [s], in closed form (Carlson's R_F, the elliptic
+  /// integral of the first kind). It is infinite for a state that no wheel coming over the foot can have.
   double duration(double next_state, int phase) const;
-  /// Chord from this foot to the next [m].
+  /// Returns the chord from this foot to the next [m].
   double advance(int phase) const;
   /// "foot lifts" (leg force would pull, just before this collision or just after it), "negative loss" (any
   /// of the law's losses is negative), "energy gain" (the total loss is negative).
   std::vector<std::string> assumptions() const;
   bool violates(int which, double state, int phase, std::span<const double> score) const;
 
-  /// Many draws of one phase as arrays of coefficients.
+  /// Holds many draws of one phase as arrays of coefficients.
   class Table {
    public:
     explicit Table(const Stance& landed) : barrier_(landed.barrier), gain_(landed.gain) {}
@@ -122,8 +122,8 @@ class WheelMap {
   std::shared_ptr<FastDensities> fast_densities_;  // shared by copies
 };
 
-/// Angular speed above which the foot lifts just before the collision at `phase` [rad/s]: omega^2 L1 = g sin(beta1 -
-/// gamma).
+/// Returns the speed above which the foot lifts just before the collision at `phase` [rad/s]: omega^2 L1 = g sin(beta1
+/// - gamma).
 double lift_speed(const WheelMap& map, int phase);
 
 }  // namespace metastable::dynamics

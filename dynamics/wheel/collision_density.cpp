@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 #include "dynamics/wheel/coulomb_law.h"
 #include "dynamics/wheel/truncated_normal.h"
@@ -19,7 +20,7 @@ constexpr double reach = 4.6;  // scores beyond it weigh 4e-6
 
 constexpr double finest = 0.05, widest = 0.8;  // spacing of nodes
 
-// Nodes in the standard score between `from` and `to`, with the normal's probabilities: equally spaced where the normal
+// Adds nodes in the standard score between `from` and `to`, with the normal's probabilities: equally spaced where it
 // fades out at both ends (then the rule converges exponentially), panels of Gauss-Legendre nodes where it is cut.
 template <class Add>
 void score_nodes(double from, double to, double spacing, Add add) {
@@ -44,15 +45,15 @@ void score_nodes(double from, double to, double spacing, Add add) {
   }
 }
 
-// The spacing of nodes in one variable's score where the other's density is known in closed form: along the line of
-// equal loss the product of both densities is narrower than that variable's by what it contributes to the loss.
+// Returns the spacing of nodes in one variable's score where the other's density is known in closed form: along the
+// line of equal loss the product of both densities is narrower than that variable's by what it contributes to the loss.
 // @param own, other  change of the loss with a standard deviation of either
 double node_spacing(double own, double other) {
   const double ratio = own / std::max(1e-12, other);
   return std::clamp(1.25 / std::sqrt(1 + ratio * ratio), finest, widest);
 }
 
-// Density and upper tail of mu = ratio N(mean, sd^2), mu >= 0.
+// Knows density and tails of mu = ratio N(mean, sd^2), mu >= 0.
 class Friction {
  public:
   Friction(const ContactSpread& contact, const CollisionChange& change)
@@ -67,6 +68,190 @@ class Friction {
 
  private:
   double mean_, scale_, inverse_mass_;
+};
+
+// Knows density and distribution function of eta = N(mean, sd^2) in [0, 1].
+class Restitution {
+ public:
+  Restitution(const ContactSpread& contact, const CollisionChange& change, double mass)
+      : mean_(contact.restitution_mean * change.restitution_ratio),
+        sd_(contact.restitution_sd * change.restitution_ratio),
+        mass_(mass) {}
+  double density(double eta) const {
+    return eta > 0 && eta < 1 ? normal_density((eta - mean_) / sd_) / (sd_ * mass_) : 0.0;
+  }
+  double below(double eta) const {
+    if (eta >= 1) return 1.0;
+    if (eta <= 0) return 0.0;
+    const double low = normal_cdf(-mean_ / sd_);
+    return std::clamp((normal_cdf((eta - mean_) / sd_) - low) / mass_, 0.0, 1.0);
+  }
+  double mean() const { return mean_; }
+  double sd() const { return sd_; }
+
+ private:
+  double mean_, sd_, mass_;
+};
+
+// Returns how long the contact lasts, in units of the half period sqrt(m_c/K_r) (26), (27).
+double contact_duration(double restitution) {
+  const double log_eta = std::log(std::max(restitution, std::numeric_limits<double>::min()));
+  return std::sqrt(std::numbers::pi * std::numbers::pi + log_eta * log_eta);
+}
+
+// Describes one collision under `published` that ends at one omega+. In units of M v0^2 r^2 / 2 its loss is
+// [alpha D + (beta + delta D) mu (c mu - b)] / D^2 with D = a - b mu.
+class PublishedCollision {
+ public:
+  PublishedCollision(const ContactModel& model, const ContactSpread& contact, const Collision& c, double before,
+                     double after, const CollisionChange& change, double speed)
+      : contact_(contact), change_(change), friction_(contact, change) {
+    const double r2 = c.landing_length * c.landing_length;
+    a_ = r2 + c.contact_x * c.contact_x;
+    b_ = c.contact_x * c.contact_y;
+    c_ = r2 + c.contact_y * c.contact_y;
+    const double v0 = c.normal_speed, omega = v0 / c.chord;
+    const double unit = model.mass * v0 * v0 * r2 * change.loss_ratio;
+    loss_ = (before * omega * omega - after * speed * speed) / unit;
+    loss_rate_ = 2 * after * speed / unit;
+    time_ = std::sqrt(model.contact_mass / model.ramp_stiffness);
+    pull_ = model.gravity * std::sin(c.slope) / (v0 * r2);
+  }
+
+  // Describes the loss at one restitution as a function of mu.
+  struct Curve {
+    double alpha, beta, delta;
+    double steady, q2, q1, q0;  // of the quadratic that is left when the small term with delta is put into beta
+    double discriminant;        // not positive: every friction loses more
+  };
+  // @param duration  contact_duration(restitution)
+  Curve curve(double restitution, double duration) const {
+    const bool usual = change_.restitution_ratio == 1;
+    const double eta = usual ? restitution : std::min(1.0, restitution * change_.restitution_ratio);
+    Curve k;
+    k.alpha = 1 - eta * eta * (1 - change_.rebound_lost), k.beta = (1 + eta) * (1 + eta);
+    k.delta = pull_ * (1 + eta) * time_ * (usual ? duration : contact_duration(eta));
+    k.steady = k.beta + k.delta * (a_ - b_ * friction_.mean());
+    k.q2 = k.steady * c_ - loss_ * b_ * b_, k.q1 = b_ * (2 * loss_ * a_ - k.alpha - k.steady);
+    k.q0 = a_ * (k.alpha - loss_ * a_);
+    k.discriminant = k.q1 * k.q1 - 4 * k.q2 * k.q0;
+    return k;
+  }
+
+  // Adds what the frictions of one curve with a positive discriminant contribute: those above its upper root lose more,
+  // and so do those below its lower root, if it has one.
+  SpeedDensity along(const Curve& k) const {
+    SpeedDensity one;
+    const double root = std::sqrt(k.discriminant);
+    const auto [upper, upper_rate] =
+        refine(k, root, k.q1 <= 0 ? (root - k.q1) / (2 * k.q2) : -2 * k.q0 / (k.q1 + root), 1);
+    one.below = friction_.above(upper);
+    if (upper > 0) one.density = friction_.density(upper) * upper_rate * loss_rate_;
+    if (k.q2 <= 0) return one;
+    const double start = k.q1 <= 0 ? 2 * k.q0 / (root - k.q1) : -(k.q1 + root) / (2 * k.q2);
+    if (start <= 0) return one;
+    const auto [lower, lower_rate] = refine(k, root, start, -1);
+    if (!(lower > 0 && lower < upper)) return one;
+    one.below += friction_.below(lower);
+    one.density += friction_.density(lower) * lower_rate * loss_rate_;
+    return one;
+  }
+
+  // Returns the spacing of nodes in eta's score, from the loss's slopes at the means.
+  double spacing() const {
+    const double eta = std::min(1.0, contact_.restitution_mean * change_.restitution_ratio), mu = friction_.mean();
+    const double d = a_ - b_ * mu, squared = (1 + eta) * (1 + eta), rubbing = mu * (c_ * mu - b_);
+    const double kept = 1 - change_.rebound_lost, alpha = 1 - eta * eta * kept;
+    const double by_eta = (-2 * eta * kept * d + 2 * (1 + eta) * rubbing) / (d * d);
+    const double by_mu =
+        (squared * (2 * c_ * mu - b_) - alpha * b_ + 2 * b_ * (alpha + squared * rubbing / d)) / (d * d);
+    return node_spacing(contact_.restitution_sd * change_.restitution_ratio * std::abs(by_eta),
+                        friction_.sd() * (std::abs(by_mu) + friction_.sd() * squared * c_ / (d * d)));
+  }
+
+ private:
+  // Finds the loss's root near mu, by one Newton step for what the quadratic leaves out, no further than the
+  // quadratic's other side; and how much mu changes there with the loss.
+  // @param root  the slope of the quadratic at its roots
+  std::pair<double, double> refine(const Curve& k, double root, double mu, double side) const {
+    const auto slope = [&](double d) {
+      return -k.alpha * b_ + (k.beta + k.delta * d) * (2 * c_ * mu - b_) - k.delta * b_ * mu * (c_ * mu - b_) +
+             2 * loss_ * b_ * d;
+    };
+    const double d = a_ - b_ * mu;
+    const double left = (k.alpha * d + (k.beta + k.delta * d) * mu * (c_ * mu - b_) - loss_ * d * d) / slope(d);
+    if (std::abs(left) < root / std::abs(4 * k.q2)) mu -= left;
+    const double there = a_ - b_ * mu, steep = std::max(side * slope(there), 0.5 * root);
+    return std::pair{mu, there * there / steep};
+  }
+
+  const ContactSpread& contact_;
+  const CollisionChange& change_;
+  Friction friction_;
+  double a_, b_, c_;
+  double loss_, loss_rate_;  // and -d loss/d omega+
+  double time_, pull_;
+};
+
+// Sums over eta from the least restitution that can lose so little: near it the density grows like an inverse square
+// root, and t with eta = least + t^2 is the variable.
+// @param edge, next  restitutions on either side of the least one
+SpeedDensity sum_from_least_restitution(const PublishedCollision& collision, const ContactSpread& contact, double mass,
+                                        double edge, double next) {
+  std::uintmax_t iterations = 40;
+  const double low = boost::math::tools::toms748_solve(
+                         [&](double eta) { return collision.curve(eta, contact_duration(eta)).discriminant; }, edge,
+                         next, boost::math::tools::eps_tolerance<double>(40), iterations)
+                         .second;
+  const double high = std::max(next, std::min(1.0, contact.restitution_mean + reach * contact.restitution_sd));
+  using Rule = boost::math::quadrature::gauss<double, 30>;
+  const auto score = [&](double eta) { return (eta - contact.restitution_mean) / contact.restitution_sd; };
+  const double half = std::sqrt(high - low) / 2;
+  const double scale = 2 * half / (contact.restitution_sd * mass);
+  SpeedDensity result{0, (normal_cdf(score(low)) - normal_cdf(score(0))) / mass};
+  for (std::size_t i = 0; i < Rule::abscissa().size(); ++i)
+    for (const double side : {1.0, -1.0}) {
+      const double t = half * (1 + side * Rule::abscissa()[i]), eta = low + t * t;
+      const PublishedCollision::Curve k = collision.curve(eta, contact_duration(eta));
+      if (!(k.discriminant > 0)) continue;
+      const double weight = Rule::weights()[i] * t * scale * normal_density(score(eta));
+      const SpeedDensity one = collision.along(k);
+      result.below += weight * one.below;
+      result.density += weight * one.density;
+    }
+  result.below = std::clamp(result.below, 0.0, 1.0);
+  return result;
+}
+
+// Describes one collision under `coulomb`. Its loss is mass (1 - eta^2) + rubbing (1 + eta)^2, in J per v0^2/2.
+struct CoulombParts {
+  double mass, rubbing;
+};
+class CoulombCollision {
+ public:
+  CoulombCollision(const ContactModel& model, const Collision& c)
+      : m_(model.mass), rg2_(coulomb_squared_gyration(model, c)), x_(c.contact_x), y_(c.contact_y) {}
+
+  CoulombParts sticking() const { return {m_ * (rg2_ + y_ * y_) / (rg2_ + x_ * x_ + y_ * y_), 0}; }
+  CoulombParts slipping(double mu) const {
+    const double normal = (rg2_ + x_ * x_ - mu * x_ * y_) / (m_ * rg2_);
+    const double tangential = (x_ * y_ - mu * (rg2_ + y_ * y_)) / (m_ * rg2_);
+    return {1 / normal, mu * std::abs(tangential) / (normal * normal)};
+  }
+  // Returns the spacing of nodes in mu's score, from the slipping loss's slopes at mu and at the mean of eta.
+  double spacing(const Restitution& restitution, double mu, double friction_sd) const {
+    constexpr double step = 1e-4;
+    const auto [mass, rubbing] = slipping(mu);
+    const auto [mass_less, rubbing_less] = slipping(mu - step);
+    const double eta = restitution.mean(), squared = (1 + eta) * (1 + eta);
+    const double by_mu = ((mass - mass_less) * (1 - eta * eta) + (rubbing - rubbing_less) * squared) / step;
+    const double by_eta = -2 * eta * mass + 2 * (1 + eta) * rubbing;
+    return std::min(0.5, node_spacing(friction_sd * std::abs(by_mu),
+                                      restitution.sd() * (std::abs(by_eta) + restitution.sd() * mass)));
+  }
+
+ private:
+  double m_, rg2_, x_, y_;
 };
 
 }  // namespace
@@ -90,11 +275,6 @@ CollisionDensity::CollisionDensity(const ContactModel& model, const ContactSprea
   }
 }
 
-double CollisionDensity::contact_duration(double restitution) {
-  const double log_eta = std::log(std::max(restitution, std::numeric_limits<double>::min()));
-  return std::sqrt(std::numbers::pi * std::numbers::pi + log_eta * log_eta);
-}
-
 SpeedDensity CollisionDensity::at(const Collision& collision, double before, double after,
                                   const CollisionChange& change, double speed) const {
   return model_.law == Law::published ? published(collision, before, after, change, speed)
@@ -103,72 +283,8 @@ SpeedDensity CollisionDensity::at(const Collision& collision, double before, dou
 
 SpeedDensity CollisionDensity::published(const Collision& c, double before, double after, const CollisionChange& change,
                                          double speed) const {
-  // In units of M v0^2 r^2 / 2 the loss is [alpha D + (beta + delta D) mu (c mu - b)] / D^2 with D = a - b mu.
-  const double r2 = c.landing_length * c.landing_length;
-  const double a = r2 + c.contact_x * c.contact_x, b = c.contact_x * c.contact_y, cc = r2 + c.contact_y * c.contact_y;
-  const double v0 = c.normal_speed, omega = v0 / c.chord;
-  const double unit = model_.mass * v0 * v0 * r2 * change.loss_ratio;
-  const double loss = (before * omega * omega - after * speed * speed) / unit;
-  const double loss_rate = 2 * after * speed / unit;  // -d loss / d omega+
-  const double time = std::sqrt(model_.contact_mass / model_.ramp_stiffness);
-  const double pull = model_.gravity * std::sin(c.slope) / (v0 * r2);
-  const Friction friction(contact_, change);
-  const bool usual = change.restitution_ratio == 1;
-
-  // The loss as a function of mu at one restitution.
-  struct Curve {
-    double alpha, beta, delta, steady, q2, q1, q0, discriminant;
-  };
-  const auto curve = [&](double restitution, double duration) {
-    const double eta = usual ? restitution : std::min(1.0, restitution * change.restitution_ratio);
-    Curve k;
-    k.alpha = 1 - eta * eta * (1 - change.rebound_lost), k.beta = (1 + eta) * (1 + eta);
-    k.delta = pull * (1 + eta) * time * (usual ? duration : contact_duration(eta));
-    // The term with delta is small and nearly constant: put into beta, it leaves a quadratic in mu.
-    k.steady = k.beta + k.delta * (a - b * friction.mean());
-    k.q2 = k.steady * cc - loss * b * b, k.q1 = b * (2 * loss * a - k.alpha - k.steady);
-    k.q0 = a * (k.alpha - loss * a);
-    k.discriminant = k.q1 * k.q1 - 4 * k.q2 * k.q0;  // not positive: every friction loses more
-    return k;
-  };
-  const auto at_restitution = [&](const Curve& k) {
-    SpeedDensity one;
-    const double root = std::sqrt(k.discriminant);  // the slope of the quadratic at its roots
-    const auto refine = [&](double mu, double side) {
-      const auto slope = [&](double d) {
-        return -k.alpha * b + (k.beta + k.delta * d) * (2 * cc * mu - b) - k.delta * b * mu * (cc * mu - b) +
-               2 * loss * b * d;
-      };
-      // One Newton step for what is left, no further than the quadratic's other side.
-      const double d = a - b * mu;
-      const double left = (k.alpha * d + (k.beta + k.delta * d) * mu * (cc * mu - b) - loss * d * d) / slope(d);
-      if (std::abs(left) < root / std::abs(4 * k.q2)) mu -= left;
-      const double there = a - b * mu, steep = std::max(side * slope(there), 0.5 * root);
-      return std::pair{mu, there * there / steep};
-    };
-    const auto [upper, upper_rate] = refine(k.q1 <= 0 ? (root - k.q1) / (2 * k.q2) : -2 * k.q0 / (k.q1 + root), 1);
-    one.below = friction.above(upper);
-    if (upper > 0) one.density = friction.density(upper) * upper_rate * loss_rate;
-    if (k.q2 <= 0) return one;
-    const double start = k.q1 <= 0 ? 2 * k.q0 / (root - k.q1) : -(k.q1 + root) / (2 * k.q2);
-    if (start <= 0) return one;  // there is no lower branch: friction below which the loss rises again
-    const auto [lower, lower_rate] = refine(start, -1);
-    if (!(lower > 0 && lower < upper)) return one;
-    one.below += friction.below(lower);
-    one.density += friction.density(lower) * lower_rate * loss_rate;
-    return one;
-  };
-
-  // Nodes as close as the loss's slopes at the means ask for.
-  const double spacing = [&] {
-    const double eta = std::min(1.0, contact_.restitution_mean * change.restitution_ratio), mu = friction.mean();
-    const double d = a - b * mu, squared = (1 + eta) * (1 + eta), rubbing = mu * (cc * mu - b);
-    const double kept = 1 - change.rebound_lost, alpha = 1 - eta * eta * kept;
-    const double by_eta = (-2 * eta * kept * d + 2 * (1 + eta) * rubbing) / (d * d);
-    const double by_mu = (squared * (2 * cc * mu - b) - alpha * b + 2 * b * (alpha + squared * rubbing / d)) / (d * d);
-    return node_spacing(contact_.restitution_sd * change.restitution_ratio * std::abs(by_eta),
-                        friction.sd() * (std::abs(by_mu) + friction.sd() * squared * cc / (d * d)));
-  }();
+  const PublishedCollision collision(model_, contact_, c, before, after, change, speed);
+  const double spacing = collision.spacing();
   std::size_t level = 0;
   for (double s = widest; level + 1 < nodes_.size() && s > 1.01 * spacing; s /= 2) ++level;
   const std::vector<Node>& nodes = nodes_[level];
@@ -176,13 +292,13 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
   SpeedDensity result;
   double edge = -1;  // the largest restitution of a node that cannot lose so little
   for (const Node& node : nodes) {
-    const Curve k = curve(node.restitution, node.duration);
+    const PublishedCollision::Curve k = collision.curve(node.restitution, node.duration);
     if (!(k.discriminant > 0)) {
       result.below += node.weight;
       edge = std::max(edge, node.restitution);
       continue;
     }
-    const SpeedDensity one = at_restitution(k);
+    const SpeedDensity one = collision.along(k);
     result.below += node.weight * one.below;
     result.density += node.weight * one.density;
   }
@@ -191,33 +307,10 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
   const Node* next = nullptr;  // after the edge
   for (const Node& node : nodes)
     if (node.restitution > edge && (!next || node.restitution < next->restitution)) next = &node;
-  if (!next || next->weight * at_restitution(curve(next->restitution, next->duration)).density < 1e-4 * result.density)
+  if (!next || next->weight * collision.along(collision.curve(next->restitution, next->duration)).density <
+                   1e-4 * result.density)
     return result;
-  // Near the least restitution that can lose so little the density grows like an inverse square root.
-  std::uintmax_t iterations = 40;
-  const double low = boost::math::tools::toms748_solve(
-                         [&](double eta) { return curve(eta, contact_duration(eta)).discriminant; }, edge,
-                         next->restitution, boost::math::tools::eps_tolerance<double>(40), iterations)
-                         .second;
-  const double high =
-      std::max(next->restitution, std::min(1.0, contact_.restitution_mean + reach * contact_.restitution_sd));
-  using Rule = boost::math::quadrature::gauss<double, 30>;
-  const auto score = [&](double eta) { return (eta - contact_.restitution_mean) / contact_.restitution_sd; };
-  const double half = std::sqrt(high - low) / 2;
-  const double scale = 2 * half / (contact_.restitution_sd * restitution_mass_);
-  result = {0, (normal_cdf(score(low)) - normal_cdf(score(0))) / restitution_mass_};
-  for (std::size_t i = 0; i < Rule::abscissa().size(); ++i)
-    for (const double side : {1.0, -1.0}) {
-      const double t = half * (1 + side * Rule::abscissa()[i]), eta = low + t * t;
-      const Curve k = curve(eta, contact_duration(eta));
-      if (!(k.discriminant > 0)) continue;
-      const double weight = Rule::weights()[i] * t * scale * normal_density(score(eta));
-      const SpeedDensity one = at_restitution(k);
-      result.below += weight * one.below;
-      result.density += weight * one.density;
-    }
-  result.below = std::clamp(result.below, 0.0, 1.0);
-  return result;
+  return sum_from_least_restitution(collision, contact_, restitution_mass_, edge, next->restitution);
 }
 
 SpeedDensity CollisionDensity::coulomb(const Collision& c, double before, double after, const CollisionChange& change,
@@ -226,54 +319,29 @@ SpeedDensity CollisionDensity::coulomb(const Collision& c, double before, double
   const double unit = c.normal_speed * c.normal_speed / 2 * change.loss_ratio;
   const double loss = (before * omega * omega - after * speed * speed) / (2 * unit);
   const double loss_rate = after * speed / unit;
-  const double rg2 = std::max(model_.radius_of_gyration * model_.radius_of_gyration, 1e-16);
-  const double x = c.contact_x, y = c.contact_y;
-  const double sticking = std::abs(x * y) / (rg2 + y * y);
   const Friction friction(contact_, change);
-  const double eta_mean = contact_.restitution_mean * change.restitution_ratio;
-  const double eta_sd = contact_.restitution_sd * change.restitution_ratio;
-  const auto eta_below = [&](double eta) {
-    if (eta >= 1) return 1.0;
-    if (eta <= 0) return 0.0;
-    const double low = normal_cdf(-eta_mean / eta_sd);
-    return std::clamp((normal_cdf((eta - eta_mean) / eta_sd) - low) / restitution_mass_, 0.0, 1.0);
-  };
-  const auto eta_density = [&](double eta) {
-    return eta > 0 && eta < 1 ? normal_density((eta - eta_mean) / eta_sd) / (eta_sd * restitution_mass_) : 0.0;
-  };
+  const Restitution restitution(contact_, change, restitution_mass_);
+  const CoulombCollision collision(model_, c);
 
   SpeedDensity result;
-  // The loss at given mu: mass (1 - (1 - lost) eta^2) + rubbing (1 + eta)^2, in J per v0^2/2.
-  const auto add = [&](double weight, double mass, double rubbing) {
+  const auto add = [&](double weight, const CoulombParts& parts) {
+    const auto [mass, rubbing] = parts;
     const double curvature = mass * (1 - change.rebound_lost) - rubbing;
     if (!(curvature > 1e-9 * mass)) return;  // rubbing takes more than any restitution gives back
     const double discriminant = rubbing * rubbing + curvature * (mass + rubbing - loss);
     if (!(discriminant > 0)) return;  // every restitution loses less
     const double root = std::sqrt(discriminant);
     const double high = (rubbing + root) / curvature, low = (rubbing - root) / curvature;
-    result.below += weight * (eta_below(high) - eta_below(low));
-    result.density += weight * (eta_density(high) + eta_density(low)) * loss_rate / (2 * root);
+    result.below += weight * (restitution.below(high) - restitution.below(low));
+    result.density += weight * (restitution.density(high) + restitution.density(low)) * loss_rate / (2 * root);
   };
-  add(friction.above(sticking), model_.mass * (rg2 + y * y) / (rg2 + x * x + y * y), 0);
-  const double from = -friction.mean() / friction.sd(), to = (sticking - friction.mean()) / friction.sd();
+  const double critical = coulomb_sticking_friction(model_, c);
+  add(friction.above(critical), collision.sticking());
+  const double from = -friction.mean() / friction.sd(), to = (critical - friction.mean()) / friction.sd();
   const double mass_above_zero = normal_cdf(-from);
-  // The slopes of the loss below, mass (1 - eta^2) + rubbing (1 + eta)^2, at the means.
-  const auto parts = [&](double mu) {
-    const double normal = (rg2 + x * x - mu * x * y) / (model_.mass * rg2);
-    const double tangential = (x * y - mu * (rg2 + y * y)) / (model_.mass * rg2);
-    return std::pair{1 / normal, mu * std::abs(tangential) / (normal * normal)};
-  };
-  const double middle = std::min(friction.mean(), sticking), step = 1e-4;
-  const auto [mass, rubbing] = parts(middle);
-  const auto [mass_less, rubbing_less] = parts(middle - step);
-  const double squared = (1 + eta_mean) * (1 + eta_mean);
-  const double by_mu = ((mass - mass_less) * (1 - eta_mean * eta_mean) + (rubbing - rubbing_less) * squared) / step;
-  const double by_eta = -2 * eta_mean * mass + 2 * (1 + eta_mean) * rubbing;
-  const double spacing =
-      std::min(0.5, node_spacing(friction.sd() * std::abs(by_mu), eta_sd * (std::abs(by_eta) + eta_sd * mass)));
+  const double spacing = collision.spacing(restitution, std::min(friction.mean(), critical), friction.sd());
   score_nodes(from, to, spacing, [&](double score, double weight) {
-    const auto [mass_at, rubbing_at] = parts(friction.mean() + friction.sd() * score);
-    add(weight / mass_above_zero, mass_at, rubbing_at);
+    add(weight / mass_above_zero, collision.slipping(friction.mean() + friction.sd() * score));
   });
   result.below = std::clamp(result.below, 0.0, 1.0);
   return result;

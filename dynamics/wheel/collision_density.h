@@ -1,5 +1,5 @@
 #pragma once
-// The density of the speed just after one collision, fast enough for likelihoods of whole experiments.
+// Gives the density of the speed just after one collision, fast enough for likelihoods of whole experiments.
 
 #include <array>
 #include <vector>
@@ -25,7 +25,7 @@ struct CollisionChange {
   double rebound_lost = 0;       ///< share of the energy given back by restitution that is lost as well, in [0, 1]
 };
 
-/// Density and distribution function of omega+ at one value.
+/// Holds density and distribution function of omega+ at one value.
 struct SpeedDensity {
   double density = 0;  ///< [s/rad]
   double below = 0;    ///< P(omega+ <= that value), rest included
@@ -54,7 +54,6 @@ class CollisionDensity {
     double restitution, weight;
     double duration;  // of the contact, in units of the half period sqrt(m_c/K_r) (26), (27)
   };
-  static double contact_duration(double restitution);
   SpeedDensity published(const Collision& collision, double before, double after, const CollisionChange& change,
                          double speed) const;
   SpeedDensity coulomb(const Collision& collision, double before, double after, const CollisionChange& change,

@@ -17,7 +17,7 @@ Law law_from_name(std::string_view name);
 std::string_view law_name(Law law);
 std::vector<std::string> law_names();
 
-/// Everything a law needs to know about one collision's geometry. SI units, speeds just before the collision.
+/// Holds what a law needs to know of one collision's geometry, in SI units; speeds are those just before the collision.
 struct Collision {
   double stance_length = 0;   ///< L1 [m]
   double landing_length = 0;  ///< L2 [m]

@@ -9,13 +9,13 @@
 
 namespace metastable::dynamics {
 
-/// One collision's contact parameters.
+/// Holds one collision's contact parameters.
 struct Contact {
   double restitution = 0;  ///< eta, energetic, in [0, 1]
   double friction = 0;     ///< mu, >= 0
 };
 
-/// Distribution of (eta, mu), drawn afresh and independently at every collision.
+/// Distributes (eta, mu), drawn afresh and independently at every collision.
 ///
 /// Either truncated normals (eta on [0, 1], mu on [0, inf)), joined by a Gaussian copula of the given correlation, or
 /// an empirical list of pairs, each equally likely.

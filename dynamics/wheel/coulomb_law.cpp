@@ -7,12 +7,7 @@
 namespace metastable::dynamics {
 namespace {
 
-double squared_gyration(const ContactModel& model, const Collision& c) {
-  const double floor = 1e-16 * (c.contact_x * c.contact_x + c.contact_y * c.contact_y);
-  return std::max(model.radius_of_gyration * model.radius_of_gyration, floor);
-}
-
-// How the contact speeds respond to the normal impulse in one mode (stick, or slip in a fixed direction).
+// Says how the contact speeds respond to the normal impulse in one mode (stick, or slip in a fixed direction).
 struct Mode {
   double normal;      // dv_n/dP [1/kg]
   double tangential;  // dv_t/dP [1/kg], downhill; 0 when sticking
@@ -21,7 +16,11 @@ struct Mode {
 class Contactor {
  public:
   Contactor(const ContactModel& model, const Collision& c, double friction)
-      : friction_(friction), x_(c.contact_x), y_(c.contact_y), r2_(squared_gyration(model, c)), mass_(model.mass) {}
+      : friction_(friction),
+        x_(c.contact_x),
+        y_(c.contact_y),
+        r2_(coulomb_squared_gyration(model, c)),
+        mass_(model.mass) {}
 
   // downhill = +1: the foot slips downhill, friction pushes uphill; -1: the reverse
   Mode slip(double downhill) const {
@@ -88,8 +87,13 @@ Loss coulomb_loss(const ContactModel& model, const Collision& c, const Contact& 
   return loss;
 }
 
+double coulomb_squared_gyration(const ContactModel& model, const Collision& c) {
+  const double floor = 1e-16 * (c.contact_x * c.contact_x + c.contact_y * c.contact_y);
+  return std::max(model.radius_of_gyration * model.radius_of_gyration, floor);
+}
+
 double coulomb_sticking_friction(const ContactModel& model, const Collision& c) {
-  return std::abs(c.contact_x * c.contact_y) / (squared_gyration(model, c) + c.contact_y * c.contact_y);
+  return std::abs(c.contact_x * c.contact_y) / (coulomb_squared_gyration(model, c) + c.contact_y * c.contact_y);
 }
 
 }  // namespace metastable::dynamics

@@ -10,7 +10,7 @@
 
 namespace metastable::dynamics {
 
-/// One parameter of an effect.
+/// Describes one parameter of an effect.
 struct EffectParameter {
   std::string name;
   std::string unit;               ///< "" for a ratio
@@ -33,13 +33,13 @@ const std::vector<EffectInfo>& effect_catalogue();
 /// @throws std::invalid_argument naming the id and all known ones
 const EffectInfo& effect_info(std::string_view id);
 
-/// An effect of given size. `values` follow the order of the parameters; a list takes as many places as it has values.
+/// Names an effect and its size. `values` follow the parameters' order; a list takes as many places as it has values.
 struct Effect {
   std::string id;
   std::vector<double> values;
 };
 
-/// What the model states, for parameters without a neutral value of their own.
+/// Holds what the model states, for parameters without a neutral value of their own.
 struct NominalValues {
   double restitution_mean = 0, restitution_sd = 0, friction_mean = 0, friction_sd = 0;
   std::vector<double> leg_lengths;  ///< [m]

@@ -39,7 +39,7 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
     leg.eccentric_phase = -static_cast<double>(k) * wheel.leg_angle();
     const double offset2 = extension.hub_forward * extension.hub_forward + extension.hub_aside * extension.hub_aside;
     if (offset2 > 0) {
-      // A centre of mass nearer to the foot or farther from it: parallel axes.
+      // A centre of mass nearer to the foot or farther from it changes the inertia by parallel axes.
       const auto along = [&](double phase) {  // of the offset, towards the leg
         return extension.hub_forward * std::cos(phase) - extension.hub_aside * std::sin(phase);
       };
@@ -50,7 +50,6 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
   }
   drag_ = extension.viscous != 0 || extension.rolling != 0 || extension.air != 0;
   profile_ = extension.sag != 0;
-  for (const double c : extension.slope_change) profile_ = profile_ || c != 0;
 }
 
 double ExtendedWheel::local_slope(double position) const {
@@ -72,10 +71,6 @@ double ExtendedWheel::local_slope(double position) const {
         break;
     }
   }
-  const double u = std::clamp(t, -1.0, 1.0);
-  const auto& c = e.slope_change;
-  change += c[0] * u + c[1] * (1.5 * u * u - 0.5) + c[2] * u * (2.5 * u * u - 1.5) +
-            c[3] * ((35 * u * u - 30) * u * u + 3) / 8;
   return slope_ + change;
 }
 
@@ -90,7 +85,7 @@ ExtendedWheel::Path ExtendedWheel::path(const StepContext& context) const {
   p.pendulum = weight * leg.length;
   p.gain = p.pendulum * (std::sin(p.start) - std::sin(p.end));
   if (extension_.hub_forward != 0 || extension_.hub_aside != 0) {
-    // Height of the centre of mass over the foot: L sin(theta) - e sin(theta - phase of the offset from this leg).
+    // The centre of mass is L sin(theta) - e sin(theta - phase of the offset from this leg) over the foot.
     const auto height = [&](double theta) {
       const double at = theta - leg.eccentric_phase;
       return extension_.hub_aside * std::cos(at) - extension_.hub_forward * std::sin(at);
@@ -100,7 +95,7 @@ ExtendedWheel::Path ExtendedWheel::path(const StepContext& context) const {
   return p;
 }
 
-// omega^2 that the resisting torques take off over the stance.
+// Returns the omega^2 that the resisting torques take off over the stance.
 double ExtendedWheel::work(const Path& p, double omega_plus_squared) const {
   if (!drag_) return 0;
   using Rule = boost::math::quadrature::gauss<double, 7>;

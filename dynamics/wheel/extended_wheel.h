@@ -1,7 +1,6 @@
 #pragma once
 // The wheel's step with physical extensions: what each effect of the catalogue does inside the return map.
 
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -10,7 +9,8 @@
 
 namespace metastable::dynamics {
 
-/// Everything that may be added to the model; the defaults add nothing. One field or two an effect, physical units.
+/// Holds all that may be added to the model; the defaults add nothing. An effect has one field or two, in physical
+/// units.
 struct Extension {
   std::vector<double> leg_change;         ///< added to each leg's length [m]; empty: none
   double hub_forward = 0, hub_aside = 0;  ///< centre of mass off the hub [m]: towards leg 0, and a right angle further
@@ -20,7 +20,6 @@ struct Extension {
   Shape sag_shape = Shape::parabola;             ///< of the surface between sag_from and sag_to
   double sag = 0;                                ///< depth in the middle of that stretch [m]
   double sag_from = 0, sag_to = 1;               ///< [m] down the ramp from foot 1
-  std::array<double, 4> slope_change{};          ///< local slope as Legendre polynomials 1..4 over that stretch [rad]
   double viscous = 0;                            ///< resisting torque by omega [N m s]
   double rolling = 0;                            ///< constant resisting torque [N m]
   double air = 0;                                ///< resisting torque by omega^2 [N m s^2]
@@ -46,7 +45,7 @@ struct Extension {
   std::optional<Law> law;                        ///< another contact law
 };
 
-/// What one collision's place in the experiment tells.
+/// Holds what one collision's place in the experiment tells.
 struct StepContext {
   int leg = 0;                                ///< that lands
   double position = 0;                        ///< of its foot, down the ramp from foot 1 [m]
@@ -55,7 +54,7 @@ struct StepContext {
   double friction_shift = 0;                  ///< of this trial, added to mu's mean
 };
 
-/// One wheel on one ramp, extended. The stance conserves energy but for the resisting torques, whose work is integrated
+/// Extends one wheel on one ramp. The stance conserves energy but for the resisting torques, whose work is integrated
 /// along the motion slowed by the torque of its start (third order in the torque is neglected).
 class ExtendedWheel {
  public:
@@ -63,20 +62,22 @@ class ExtendedWheel {
   /// @throws std::invalid_argument for `plastic`, and for sds, lengths or slopes out of range
   ExtendedWheel(const Wheel& wheel, double slope, Law law, const ContactSpread& contact, const Extension& extension);
 
-  /// Density of omega+ and probability of less, for a collision at speed omega [rad/s].
+  /// Gives density of omega+ and probability of less, for a collision at speed omega [rad/s].
   SpeedDensity after_collision(const StepContext& context, double omega, double omega_plus) const;
-  /// omega+ of that collision with a drawn contact (before the extension's changes) [rad/s]; nothing: no energy left.
+  /// Returns omega+ of that collision with a drawn contact (before the extension's changes) [rad/s]; nothing: no energy
+  /// left.
   std::optional<double> omega_plus(const StepContext& context, double omega, const Contact& drawn, bool outlier) const;
-  /// Least omega+ that carries the hub over the foot [rad/s].
+  /// Returns the least omega+ that carries the hub over the foot [rad/s].
   double barrier(const StepContext& context) const;
-  /// omega just before the next collision [rad/s], by energy; nothing: there is none left. Whether the hub comes over
-  /// the foot is barrier()'s to say.
+  /// Returns omega just before the next collision [rad/s], by energy; nothing: there is none left. Whether the hub
+  /// comes over the foot is barrier()'s to say.
   std::optional<double> next(const StepContext& context, double omega_plus) const;
-  /// omega+ from which the wheel arrives at the next collision with omega_next [rad/s]; nothing: there is none.
+  /// Returns the omega+ from which the wheel arrives at the next collision with omega_next [rad/s]; nothing: there is
+  /// none.
   std::optional<double> back(const StepContext& context, double omega_next) const;
-  /// Time of the stance [s], from its speeds.
+  /// Returns the time of the stance [s], from its speeds.
   double duration(const StepContext& context, double omega_plus) const;
-  /// Distance between the landing foot and the next [m].
+  /// Returns the distance between the landing foot and the next [m].
   double advance(int leg) const { return geometry_[index(leg + 1)].triangle.chord; }
   int legs() const { return static_cast<int>(geometry_.size()); }
 

@@ -8,7 +8,7 @@
 namespace metastable::dynamics {
 namespace {
 
-// Inverse masses of the contact point slipping in direction j = +1 (uphill) or -1 (5).
+// Returns inverse masses of the contact point slipping in direction j = +1 (uphill) or -1 (5).
 struct InverseMass {
   double normal;      // 1/m_j [1/kg]
   double tangential;  // mu/n_j [1/kg]: finite also at mu = 0
@@ -21,7 +21,7 @@ InverseMass inverse_mass(const ContactModel& model, const Collision& c, double f
           (friction * (r2 + y * y) + j * x * y) / (model.mass * r2)};
 }
 
-// T_r (26), (27), with xi eliminated: sqrt(1 - xi^2) = pi / sqrt(pi^2 + ln^2 eta).
+// Returns T_r (26), (27), with xi eliminated: sqrt(1 - xi^2) = pi / sqrt(pi^2 + ln^2 eta).
 double contact_duration(const ContactModel& model, double restitution) {
   const double log_restitution = std::log(std::max(restitution, std::numeric_limits<double>::min()));
   const double stretched = std::sqrt(std::numbers::pi * std::numbers::pi + log_restitution * log_restitution);

@@ -12,7 +12,7 @@
 
 namespace metastable::dynamics {
 
-/// Losses of one collision [J]; any sign of u0 (u0 < 0 mirrors the signs of the paper's j).
+/// Returns the losses of one collision [J], any sign of u0 (u0 < 0 mirrors the signs of the paper's j).
 ///
 /// `jammed` when a normal mass that the collision needs is not positive: mu >= (r^2 + x^2)/(x y), about 3.2, for a
 /// rolling wheel. Below mu_c = x y/(r^2 + y^2) the law returns a small negative tangential loss, as printed.

@@ -16,7 +16,7 @@ namespace {
 
 using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
 
-// E f(Z) of a standard normal score: the trapezoidal rule converges exponentially for analytic f.
+// Returns E f(Z) of a standard normal score: the trapezoidal rule converges exponentially for analytic f.
 template <class F>
 double expectation(F f) {
   constexpr double step = 1.0 / 16;
@@ -61,7 +61,7 @@ TruncatedNormal::TruncatedNormal(double mean, double sd, double lower, double up
         "empty truncation: N({}, {}^2) has less than 1e-290 of its mass in [{}, {}]", mean, sd, lower, upper));
 }
 
-// Mass of the untruncated normal between two points of [lower, upper]; short intervals are integrated, because the
+// Returns the untruncated mass between two points of [lower, upper]; short intervals are integrated, because the
 // difference of two tails would cancel.
 double TruncatedNormal::untruncated(double from, double to) const {
   const double a = (from - mean_) / sd_, b = (to - mean_) / sd_;
@@ -91,7 +91,7 @@ double TruncatedNormal::density(double x) const {
   return normal_density((x - mean_) / sd_) / (sd_ * mass_);
 }
 
-// Distance from a bound that holds the share `probability`, where it is so short that lower + sd * score would keep no
+// Returns the distance from a bound that holds the share `probability`, where lower + sd * score would keep no
 // digits of it: the series of the inverse distribution function there. `a` is the bound's score, negated if it is the
 // upper one.
 std::optional<double> TruncatedNormal::beyond_bound(double a, double probability) const {

@@ -11,7 +11,7 @@ namespace metastable::dynamics {
 /// Leg lengths of the paper's wheel [m], in the order they land (caption of Fig. 1).
 std::vector<double> paper_leg_lengths();
 
-/// A rimless wheel. Defaults are the paper's, SI units.
+/// Describes a rimless wheel. Defaults are the paper's, in SI units.
 struct Wheel {
   std::vector<double> leg_length = paper_leg_lengths();  ///< L_i [m], in the order they land; 3 or more, each > 0
   double hub_mass = 1.39;                                ///< M [kg], > 0
@@ -24,7 +24,7 @@ struct Wheel {
   double gravity = 9.81;               ///< g [m/s^2], > 0
 
   int legs() const { return static_cast<int>(leg_length.size()); }
-  /// Angle between neighbouring legs, alpha = 2 pi / legs [rad].
+  /// Returns the angle between neighbouring legs, alpha = 2 pi / legs [rad].
   double leg_angle() const;
   double mean_leg_length() const;
   bool equal_legs() const;
@@ -32,7 +32,7 @@ struct Wheel {
   void validate() const;
 };
 
-/// Both feet on the ramp: stance leg `first`, landing leg `second`: a collision's geometry.
+/// Describes a collision's geometry: both feet are on the ramp, stance leg `first`, landing leg `second`.
 struct Triangle {
   double chord = 0;        ///< c [m], distance between the feet
   double hub_height = 0;   ///< h [m], of the hub over the ramp = y_cp

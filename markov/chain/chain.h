@@ -1,5 +1,5 @@
 #pragma once
-// An absorbing Markov chain, stored so that nothing small is ever obtained by subtraction.
+// Stores an absorbing Markov chain so that nothing small is ever obtained by subtraction.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace metastable::markov {
 
-/// A solver that did not reach its accuracy. The command line turns it into exit code 3.
+/// A solver throws it where it did not reach its accuracy. The command line turns it into exit code 3.
 class ConvergenceError : public std::runtime_error {
  public:
   ConvergenceError(std::string solver, double residual, const std::string& detail);
@@ -22,7 +22,7 @@ class ConvergenceError : public std::runtime_error {
   double residual_;
 };
 
-/// Discrete-time absorbing chain on states 0 .. size()-1 plus one absorbing state, rest.
+/// Represents a discrete-time absorbing chain on states 0 .. size()-1 plus one absorbing state, rest.
 ///
 /// Row convention: row i holds the probabilities of going FROM i. Compressed sparse rows; columns ascend
 /// within a row, the diagonal entry is never stored, and every stored value is > 0. The probability of
@@ -49,7 +49,7 @@ class Chain {
   static Chain interpolated(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column,
                             std::vector<double> value, std::vector<double> kill);
 
-  /// From a dense row-major n x n matrix (its diagonal is ignored) and kill rates. Zeros are dropped.
+  /// Takes a dense row-major n x n matrix (its diagonal is ignored) and kill rates. Zeros are dropped.
   /// @throws std::invalid_argument as the constructor does, and when the sizes are not n * n and n.
   static Chain from_dense(std::size_t n, std::span<const double> matrix, std::span<const double> kill);
 
@@ -60,11 +60,11 @@ class Chain {
   std::span<const double> values(std::size_t row) const;
   double kill(std::size_t row) const { return kill_[row]; }
   std::span<const double> kill() const { return kill_; }
-  /// Probability of staying in `row` [1], max(0, 1 - row sum - kill) (of any sign if interpolated): rounded, for
-  /// solvers that need it.
+  /// Returns the probability of staying in `row`, max(0, 1 - row sum - kill) (of any sign if interpolated): rounded,
+  /// for solvers that need it.
   double stay(std::size_t row) const;
 
-  /// The chain on `states` (strictly ascending) only; what leaves them is added to the kill rates. O(entries).
+  /// Restricts the chain to `states` (strictly ascending); what leaves them is added to the kill rates. O(entries).
   /// @throws std::invalid_argument when the states are not ascending or out of range.
   Chain restricted_to(std::span<const std::uint32_t> states) const;
 
@@ -79,24 +79,24 @@ class Chain {
   std::vector<double> kill_;
 };
 
-/// The transposed pattern of a chain: the states that lead to state j are
+/// Holds the transposed pattern of a chain: the states that lead to state j are
 /// row[start[j]] .. row[start[j + 1] - 1], ascending.
 struct Incoming {
   std::vector<std::size_t> start;
   std::vector<std::uint32_t> row;
 };
-/// O(entries).
+/// Transposes the pattern, O(entries).
 Incoming incoming(const Chain& chain);
 
-/// Which states matter for coming to rest.
+/// Says which states matter for coming to rest.
 struct Reachability {
   std::vector<std::uint8_t> can_rest;   ///< 1: rest can be reached from the state
   std::vector<std::uint8_t> must_rest;  ///< 1: rest is reached with probability one (expected time finite)
 };
-/// O(entries). Purely structural: an entry counts however small it is.
+/// Looks at the structure only: an entry counts however small it is. O(entries).
 Reachability classify(const Chain& chain);
 
-/// 1 for every state that can be reached from the states with start[i] > 0 (themselves included). O(entries).
+/// Marks with 1 every state that can be reached from those with start[i] > 0 (themselves included). O(entries).
 /// @throws std::invalid_argument when `start` has not one entry per state.
 std::vector<std::uint8_t> reachable_from(const Chain& chain, std::span<const double> start);
 

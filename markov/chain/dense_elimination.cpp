@@ -24,14 +24,14 @@ std::size_t tiles(std::size_t count, std::size_t size) { return (count + size - 
 
 using Two = double __attribute__((vector_size(16)));
 using Four = double __attribute__((vector_size(32)));
-/// A vector wherever a double may lie.
+/// May lie wherever a double may.
 template <class Vector>
 struct __attribute__((packed, may_alias)) Loose {
   Vector vector;
 };
 
-// Tiles of the product below one another, each in registers over all pivots, two vectors of a row at a time. Visits are
-// packed tile after tile, tile_rows a pivot.
+// Takes tiles of the product below one another, each in registers over all pivots, two vectors of a row at a time.
+// Visits are packed tile after tile, tile_rows a pivot.
 template <class Vector>
 [[gnu::always_inline]] inline void add_tiles_by(Part target, const double* visits, const TileRow* onward,
                                                 std::size_t count, std::size_t pivots) {
@@ -123,7 +123,7 @@ METASTABLE_WIDE void visit_few_pivots(Part visits, std::size_t count, Part squar
   }
 }
 
-// As eliminate_square, with `left` columns before the pivots' own.
+// Does what eliminate_square does, with `left` columns before the pivots' own.
 void eliminate_pivots(Part rows, std::size_t left, double* exit, std::size_t pivots) {
   const Part own = rows.from(0, left);
   if (pivots > kFewPivots) {

@@ -1,5 +1,5 @@
 #pragma once
-// Leading eigenvalues of the transient block with Spectra (Arnoldi, shift-invert).
+// Finds leading eigenvalues of the transient block with Spectra (Arnoldi, shift-invert).
 
 #include <complex>
 #include <vector>
@@ -14,11 +14,11 @@ struct Eigenpairs {
   double residual = 0;                       ///< max |left Q - lambda_1 left|
 };
 
-/// The `count` eigenvalues of Q nearest to the shift, sorted by falling modulus, and lambda_1's left eigenvector.
+/// Finds the `count` eigenvalues of Q nearest to the shift, by falling modulus, and lambda_1's left eigenvector.
 ///
 /// Shift-invert at sigma = 1.05 (just outside the spectrum, so that lambda_2 is resolved even when
 /// 1 - lambda_1 is below rounding), solves by KLU. lambda_1 has an absolute error near 1e-15: its distance
-/// to one must come from quasi_stationary(). Meant for aperiodic chains (for cyclic ones: the revolution
+/// to one must come from quasi_stationary(). It is meant for aperiodic chains (for cyclic ones: the revolution
 /// chain). Chains of fewer than 16 states, or of fewer than count + 2, are solved densely with Eigen, O(n^3).
 /// @param count number of eigenvalues wanted, >= 1; fewer are returned when the chain is smaller, and one more when
 ///        the last would be half of a conjugate pair

@@ -1,6 +1,6 @@
 #pragma once
-// Subtraction-free elimination (Grassmann, Taksar, Heyman 1985) on an absorbing chain in triplet form
-// (Alfa, Xue, Ye 2002): full relative accuracy of every entry of the answer, however rare rest is.
+// Eliminates an absorbing chain in triplet form without subtraction (Grassmann, Taksar, Heyman 1985);
+// every entry of the answer has full relative accuracy (Alfa, Xue, Ye 2002), however rare rest is.
 
 #include <cstddef>
 #include <memory>
@@ -11,9 +11,9 @@
 
 namespace metastable::markov {
 
-/// Factorization I - Q = (I - U) D (I - L) with U, L >= 0 and D > 0, computed without a subtraction.
+/// Factorizes I - Q = (I - U) D (I - L) with U, L >= 0 and D > 0 without a subtraction.
 ///
-/// Only for chains in which every state can reach rest. Cost: O(n^3 / 3) multiply-adds for a full chain,
+/// Takes chains in which every state can reach rest. Costs O(n^3 / 3) multiply-adds for a full chain,
 /// O(n b^2) for bandwidth b (row envelopes are stored, not the whole square); memory is the envelope. States are
 /// eliminated from the last to the first, in the order given: number them so that transitions stay near the diagonal.
 /// The relative error of every entry of a solution is a small multiple of n times rounding, whatever the chain.

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kStays = 1e-12;
 
-/// Breadth-first levels over the chain taken as an undirected graph: one up along a transition, one down against it.
+/// Finds breadth-first levels of the chain as an undirected graph: one up along a transition, one down against it.
 std::vector<std::int64_t> levels(const Chain& chain) {
   const std::size_t n = chain.size();
   const Incoming into = incoming(chain);

@@ -35,7 +35,7 @@ void check_right_side(const Chain& chain, std::span<const double> rhs) {
   }
 }
 
-/// x_i = rhs_i + sum_j q_ij x_j for the states of one class, from the class that follows it.
+/// Sets x_i = rhs_i + sum_j q_ij x_j for the states of one class, from the class that follows it.
 void substitute(const Chain& chain, const States& states, std::span<const double> rhs, std::vector<double>& x) {
   for (const std::uint32_t i : states) {
     const auto to = chain.columns(i);
@@ -46,7 +46,7 @@ void substitute(const Chain& chain, const States& states, std::span<const double
   }
 }
 
-/// y_j += y_i q_ij from the states of one class to the class that follows it.
+/// Does y_j += y_i q_ij from the states of one class to the class that follows it.
 void push_forward(const Chain& chain, const States& states, std::vector<double>& y) {
   for (const std::uint32_t i : states) {
     const auto to = chain.columns(i);
@@ -55,7 +55,7 @@ void push_forward(const Chain& chain, const States& states, std::vector<double>&
   }
 }
 
-/// Position of every state within its class.
+/// Returns the position of every state within its class.
 States positions(const Period& period) {
   States position(period.state_class.size());
   for (const States& states : period.classes) {
@@ -97,7 +97,7 @@ Matrix class_block(const Chain& chain, const Period& period, const States& posit
   return block;
 }
 
-/// Q_0 Q_1 ... Q_{d-1}.
+/// Multiplies Q_0 Q_1 ... Q_{d-1}.
 template <typename Matrix>
 Matrix revolution_product(const Chain& chain, const Period& period) {
   const States position = positions(period);
@@ -108,7 +108,7 @@ Matrix revolution_product(const Chain& chain, const Period& period) {
   return product;
 }
 
-/// Kill rates over one revolution: k_0 + Q_0 (k_1 + Q_1 (k_2 + ...)), for the states of class 0.
+/// Returns the kill rates of one revolution, k_0 + Q_0 (k_1 + Q_1 (k_2 + ...)), for the states of class 0.
 std::vector<double> revolution_kill(const Chain& chain, const Period& period) {
   std::vector<double> killed(chain.kill().begin(), chain.kill().end());
   for (std::size_t c = period.classes.size() - 1; c-- > 0;) {
@@ -173,7 +173,7 @@ std::vector<double> ChainSolver::solve(std::span<const double> rhs) const {
   if (period_.period == 1) return elimination_.solve(rhs);
   check_right_side(chain_, rhs);
   const auto& classes = period_.classes;
-  // What is gathered in one revolution, then all revolutions at once, then the other classes from class 0.
+  // First comes what one revolution gathers, then all revolutions at once, then the other classes from class 0.
   std::vector<double> x(rhs.begin(), rhs.end());
   for (std::size_t c = classes.size() - 1; c-- > 0;) substitute(chain_, classes[c], rhs, x);
   std::vector<double> gathered;

@@ -1,5 +1,5 @@
 #pragma once
-// Non-negative solves on any absorbing chain, cyclic ones included.
+// Solves any absorbing chain, cyclic ones included, with non-negative right sides.
 
 #include <span>
 #include <vector>
@@ -10,11 +10,11 @@
 
 namespace metastable::markov {
 
-/// The chain watched once a revolution, on the states of class 0 (in ascending order): the product Q_0 Q_1 ... Q_{d-1}
-/// with kill rates k_0 + Q_0 k_1 + Q_0 Q_1 k_2 + ...; the chain itself for period 1.
+/// Watches the chain once a revolution, on the states of class 0 (ascending): it has the product Q_0 Q_1 ... Q_{d-1}
+/// and kill rates k_0 + Q_0 k_1 + Q_0 Q_1 k_2 + ...; for period 1 it is the chain itself.
 Chain revolution_chain(const Chain& chain, const Period& period);
 
-/// Subtraction-free solver for (I - Q) x = b and y (I - Q) = b.
+/// Solves (I - Q) x = b and y (I - Q) = b without a subtraction.
 ///
 /// A chain of period d > 1 is reduced to the product over one revolution, R = Q_0 Q_1 ... Q_{d-1} on the
 /// states of class 0, whose off-diagonals and kill rates are sums of products of non-negative numbers;
@@ -30,15 +30,15 @@ class ChainSolver {
 
   const Chain& chain() const { return chain_; }
   const Period& period() const { return period_; }
-  /// The chain on class 0 watched once a revolution; the chain itself when the period is 1.
+  /// Returns the chain on class 0 watched once a revolution, which is the chain itself when the period is 1.
   const Chain& revolution() const { return revolution_; }
 
   /// Solves (I - Q) x = rhs. @param rhs size n, finite entries >= 0 (otherwise std::invalid_argument). O(n^2) (dense
   /// rows).
   std::vector<double> solve(std::span<const double> rhs) const;
-  /// Solves y (I - Q) = rhs (row vectors): the expected visits to every state. The same conditions.
+  /// Solves y (I - Q) = rhs (row vectors), the expected visits to every state, on the same conditions.
   std::vector<double> solve_left(std::span<const double> rhs) const;
-  /// The same on the revolution chain (size of class 0).
+  /// Does the same on the revolution chain (size of class 0).
   const Elimination& revolution_elimination() const { return elimination_; }
 
  private:
@@ -48,8 +48,8 @@ class ChainSolver {
   Elimination elimination_;
 };
 
-/// x -> Q x (column vectors: expectations) and y -> y Q (row vectors: distributions), the implied
-/// probabilities of staying included. O(entries). @throws std::invalid_argument when the size is not that of the chain.
+/// They map x to Q x (column vectors: expectations) and y to y Q (row vectors: distributions), with the
+/// implied probabilities of staying. O(entries). @throws std::invalid_argument when the size is not that of the chain.
 /// Call the first as markov::apply: with a std::vector at hand the bare name finds std::apply as well.
 std::vector<double> apply(const Chain& chain, std::span<const double> x);
 std::vector<double> apply_left(const Chain& chain, std::span<const double> y);

@@ -1,5 +1,5 @@
 #pragma once
-// Sparse direct solves with SuiteSparse's KLU (LGPL; chosen over UMFPACK and SPQR, which are GPL).
+// Solves sparse systems directly with SuiteSparse's KLU (LGPL; chosen over UMFPACK and SPQR, which are GPL).
 
 #include <memory>
 #include <span>
@@ -9,8 +9,8 @@
 
 namespace metastable::markov {
 
-/// LU factorization of sigma I - Q. At sigma = 1 it loses digits as rest becomes rare (about
-/// eps / (1 - lambda_1)): an independent check, never the primary answer.
+/// Factorizes sigma I - Q as LU. At sigma = 1 it loses digits as rest becomes rare (about
+/// eps / (1 - lambda_1)): it is an independent check, never the primary answer.
 class SparseSolver {
  public:
   /// @param sigma  the shift [1]; 1 gives I - Q
@@ -25,7 +25,7 @@ class SparseSolver {
   /// Not safe to call from two threads at once: KLU works in the factors.
   /// @throws ConvergenceError("KLU", ...) if the solution is not finite.
   std::vector<double> solve(std::span<const double> rhs) const;
-  /// Solves y (sigma I - Q) = rhs (row vectors). The same conditions.
+  /// Solves y (sigma I - Q) = rhs (row vectors) on the same conditions.
   std::vector<double> solve_left(std::span<const double> rhs) const;
 
  private:

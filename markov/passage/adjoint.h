@@ -21,12 +21,12 @@ struct Adjoint {
   std::vector<double> excess;
 };
 
-/// Two solves on the chain, and an elimination with two solves on the chain without its reference.
+/// Costs two solves on the chain, and an elimination with two solves on the chain without its reference.
 /// @throws as ChainSolver
 Adjoint adjoint(const ChainSolver& solver, const Launch& launch);
 
-/// y (Q_to - Q_from) m + (l_to - l_from) m [steps] for two chains (and launches) near that of `at`, with row sums of
-/// the changes taken from the kill rates. The diagonals, which are not stored, drop out. O(entries).
+/// Returns y (Q_to - Q_from) m + (l_to - l_from) m [steps] for two chains (and launches) near that of `at`; row sums of
+/// the changes come from the kill rates. The diagonals, which are not stored, drop out. O(entries).
 /// @throws std::invalid_argument for chains of other sizes
 double steps_change(const Adjoint& at, const Chain& from, const Launch& launch_from, const Chain& to,
                     const Launch& launch_to);

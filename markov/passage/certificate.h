@@ -1,5 +1,5 @@
 #pragma once
-// Guaranteed bounds on the expected number of steps of a map with a continuous state.
+// Bounds the expected number of steps of a map with a continuous state, with a guarantee.
 
 #include <optional>
 #include <string>
@@ -7,31 +7,31 @@
 
 namespace metastable::markov {
 
-/// Proven bounds on the landings of a return map, phase by phase: C(x, e) = P(rest, or landing below e, from state x).
+/// Bounds the landings of a return map, proven, phase by phase: C(x, e) = P(rest, or landing below e, from state x).
 /// C must fall as x rises (the landing rises with the state).
 class LandingSource {
  public:
   struct Range {
     double lower = 0, upper = 0;
   };
-  /// Of C over a rectangle of x and e: ranges of its second derivatives, and by how much it may deviate from its chord
-  /// across the rectangle beyond what they say (where it has none).
+  /// Bounds C over a rectangle of x and e: ranges of its second derivatives, and by how much it may deviate from its
+  /// chord across the rectangle beyond what they say (where it has none).
   struct Bend {
     Range state, edge;
     double loose_state = 0, loose_edge = 0;
   };
   virtual ~LandingSource() = default;
   virtual int phases() const = 0;
-  /// C(x, e); at e = the lowest node of the next phase it is the probability of rest.
+  /// Encloses C(x, e); at e = the lowest node of the next phase it is the probability of rest.
   virtual Range below(int phase, double state, double edge) const = 0;
   virtual std::optional<Bend> bend(int phase, Range state, Range edge) const = 0;
-  /// Upper bound of E max(0, landing - edge) from a state.
+  /// Bounds E max(0, landing - edge) from a state from above.
   virtual double overshoot(int phase, double state, double edge) const = 0;
-  /// Upper bound of the growth of overshoot() with the state, from `state` on.
+  /// Bounds the growth of overshoot() with the state from above, from `state` on.
   virtual double growth(int phase, double state) const = 0;
 };
 
-/// Bounds on m(x), the expected steps before rest from state x, at the nodes. Between nodes both bounds are linear;
+/// Bounds m(x), the expected steps before rest from state x, at the nodes. Between nodes both bounds are linear;
 /// above the last node m lies between its lower bound there and upper + top_jump + top_slope (x - last node).
 struct Certificate {
   std::vector<std::vector<double>> nodes;  ///< per phase
@@ -43,8 +43,9 @@ struct Certificate {
   std::string no_upper;                    ///< why there is no upper bound; empty if there is one
 };
 
-/// Proof. If v >= 0 is bounded and v(x) <= 1 + E v(x') for all x, then v <= m; if v >= 0 and v(x) >= 1 + E v(x'), then
-/// v >= m (rest counts as v = 0; iterate n times and let n grow). Take v linear between nodes and not falling. Then
+/// The proof: if v >= 0 is bounded and v(x) <= 1 + E v(x') for all x, then v <= m; if v >= 0 and v(x) >= 1 + E v(x'),
+/// then v >= m (rest counts as v = 0; iterate n times and let n grow). Take v linear between nodes and not falling.
+/// Then
 ///     E v(x') = v_0 (1 - C(x, e_0)) + sum_j (v_{j+1} - v_j) (1 - mean of C(x, e) over e in [e_j, e_{j+1}]),
 /// so that upper bounds of C give lower bounds of E v, and the other way round. The means are the trapezoidal values
 /// less width^2/12 times the second derivative. Along x, with t the place in a cell [x_i, x_{i+1}], C(x) lies below (1

@@ -24,7 +24,7 @@ double dot(std::span<const double> a, std::span<const double> b) {
 
 double total(std::span<const double> v) { return std::accumulate(v.begin(), v.end(), 0.0); }
 
-/// log of the probability of surviving a step; whichever of the two is small keeps its digits.
+/// Returns the log of the probability of surviving a step; whichever of the two is small keeps its digits.
 double log_survival(double surviving, double failing) {
   return failing < 0.5 ? std::log1p(-failing) : std::log(surviving);
 }
@@ -85,7 +85,7 @@ std::vector<double> second_moment(const ChainSolver& solver, std::span<const dou
 Moments steps_from_launch(const Launch& launch, std::span<const double> mean, std::span<const double> second) {
   check_launch(launch, mean.size());
   if (second.size() != mean.size()) throw std::invalid_argument("launch: moments of different size");
-  // T = 1 + S with S = 0 at rest; E[S^2] = 2 E[S (S + 1) / 2] - E[S].
+  // T is 1 + S with S = 0 at rest, and E[S^2] is 2 E[S (S + 1) / 2] - E[S].
   const double after_mean = dot(launch.after, mean);
   const double after_square = 2 * dot(launch.after, second) - after_mean;
   return {1 + after_mean, moments(after_mean, after_square).sd};
@@ -94,7 +94,7 @@ Moments steps_from_launch(const Launch& launch, std::span<const double> mean, st
 Moments reward_from_launch(const ChainSolver& solver, const Launch& launch, std::span<const double> reward) {
   check_launch(launch, solver.chain().size());
   check_reward(solver, reward);
-  // g: expected reward still to come, h: expected square of it, both from a state whose own reward has been paid.
+  // g is the expected reward still to come, h its expected square, both from a state whose own reward has been paid.
   const std::vector<double> g = solver.solve(markov::apply(solver.chain(), reward));
   std::vector<double> square(reward.size());
   for (std::size_t i = 0; i < square.size(); ++i) square[i] = reward[i] * (reward[i] + 2 * g[i]);
@@ -183,7 +183,7 @@ struct Component {
   double distribution(double t) const;
 };
 
-/// Integral of the normal distribution function with the given sd from -infinity to x.
+/// Integrates the normal distribution function with the given sd from -infinity to x.
 double normal_ramp(double x, double sd) {
   if (std::abs(x) >= kNormalReach * sd) return std::max(0.0, x);
   const double z = x / sd;
@@ -200,8 +200,8 @@ double Component::distribution(double t) const {
   return (normal_ramp(distance + 0.5 * width, sd) - normal_ramp(distance - 0.5 * width, sd)) / width;
 }
 
-/// Law of the accumulated reward as a mixture of normals, one for every step at which rest may come; steps far out in
-/// the geometric tail are put together in blocks whose length is a small fraction of the steps before them.
+/// Holds the accumulated reward's law as a mixture of normals, one for every step at which rest may come; steps far out
+/// in the geometric tail are put together in blocks whose length is a small fraction of the steps before them.
 class RewardMixture {
  public:
   RewardMixture(const ChainSolver& solver, const QuasiStationary& quasi, const Launch& launch,
@@ -235,12 +235,12 @@ constexpr double kSettledIncrement = 1e-9;  // of mean and variance over a perio
 constexpr double kBlockShare = 2e-3;        // length of a tail block over the periods before it
 constexpr std::size_t kRewardSteps = 200000;
 
-/// Mean and variance of a whole number from 0 to length - 1 with weights exp(log_factor * k).
+/// Returns mean and variance of a whole number from 0 to length - 1 with weights exp(log_factor * k).
 struct Block {
   double mean, variance;
 };
 
-/// By the cumulants of the even law and their first corrections, for length * |log_factor| << 1.
+/// Takes the cumulants of the even law and their first corrections, for length * |log_factor| << 1.
 Block tilted_block(double length, double log_factor) {
   const double square = length * length;
   const double second = (square - 1) / 12;
@@ -355,7 +355,7 @@ void RewardMixture::add_tail() {
   }
 }
 
-/// P(total reward <= t), t >= 0, up to the mass let go.
+/// Returns P(total reward <= t), t >= 0, up to the mass let go.
 double RewardMixture::distribution(double t) const {
   double below = rest_at_launch_;
   double all = rest_at_launch_;

@@ -26,7 +26,7 @@ void divide(std::vector<double>& v, double by) {
   for (double& entry : v) entry /= by;
 }
 
-/// Largest relative change of an entry above kSmallEntry of the largest.
+/// Returns the largest relative change of an entry above kSmallEntry of the largest.
 double relative_change(const std::vector<double>& before, const std::vector<double>& after) {
   const double floor = kSmallEntry * *std::max_element(after.begin(), after.end());
   double change = 0;
@@ -82,8 +82,8 @@ bool never_returns(const Chain& chain) {
   return queue.size() == n;
 }
 
-/// The eigenvectors of a chain that never returns (eigenvalue 0): the last survivors of an even start, and the states
-/// survival from which lasts longest.
+/// Returns the eigenvectors of a chain that never returns (eigenvalue 0): the last survivors of an even start, and the
+/// states survival from which lasts longest.
 LeadingPair last_survivors(const Chain& chain) {
   const std::size_t n = chain.size();
   LeadingPair pair;
@@ -177,7 +177,7 @@ std::vector<std::uint32_t> marked_states(const std::vector<std::uint8_t>& marked
   return states;
 }
 
-/// States of the chain from which `target` can be reached.
+/// Finds the states from which `target` can be reached.
 std::vector<std::uint8_t> leading_to(const Incoming& into, std::uint32_t target) {
   std::vector<std::uint8_t> marked(into.start.size() - 1, 0);
   std::vector<std::uint32_t> queue{target};
@@ -194,7 +194,7 @@ std::vector<std::uint8_t> leading_to(const Incoming& into, std::uint32_t target)
   return marked;
 }
 
-/// The only closed class among the `reachable` states of a chain without rest.
+/// Finds the only closed class among the `reachable` states of a chain without rest.
 std::vector<std::uint32_t> closed_class(const Chain& chain, const std::vector<std::uint8_t>& reachable) {
   const Incoming into = incoming(chain);
   std::uint32_t candidate = marked_states(reachable).front();
@@ -259,7 +259,7 @@ std::vector<double> stationary(const Chain& chain, std::span<const double> start
     throw std::invalid_argument("stationary distribution: the start has no mass");
   }
   const std::vector<std::uint32_t> states = closed_class(chain, reachable);
-  // Visits to the other states between two visits to the first one.
+  // This solves for the visits to the other states between two visits to the first one.
   const std::span<const std::uint32_t> others(states.begin() + 1, states.end());
   std::vector<double> departures(chain.size(), 0.0);
   for (std::size_t e = 0; e < chain.columns(states[0]).size(); ++e) {

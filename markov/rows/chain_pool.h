@@ -1,5 +1,5 @@
 #pragma once
-// The mean of several sampled chains.
+// Averages several sampled chains.
 
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace metastable::markov {
 
-/// Mean of several chains over the same states (each given in turn), row by row: the chain of all their draws.
+/// Averages chains over the same states, given one by one, row by row: the result is the chain of all their draws.
 class ChainPool {
  public:
   /// @throws std::invalid_argument if the number of states differs from that of earlier chains

@@ -34,7 +34,7 @@ struct WeightedScore {
   double score, weight;
 };
 
-// z = a v + b v^3 with v uniform on (-1, 1); weight phi(z) dz/du.
+// Maps v, uniform on (-1, 1), to z = a v + b v^3 and weighs it by phi(z) dz/du.
 WeightedScore weighted_score(double uniform, double a, double b) {
   const double v = 2.0 * uniform - 1.0;
   const double z = v * (a + b * v * v);

@@ -1,5 +1,5 @@
 #pragma once
-// Draws of the noise: weighted so that the tails are covered, or plain.
+// Draws the noise: weighted so that the tails are covered, or plain.
 
 #include <cstddef>
 #include <cstdint>
@@ -20,7 +20,7 @@ struct DrawOptions {
   double tail = 1e-30;
 };
 
-/// A weighted sample of the noise. Sum over draws of weight * f(scores) estimates E f.
+/// Holds a weighted sample of the noise: the sum over draws of weight * f(scores) estimates E f.
 struct Draws {
   int dimension = 0;           ///< scores a draw
   std::vector<double> offset;  ///< size count, uniform in (0,1): where in its cell a start lies
@@ -29,10 +29,10 @@ struct Draws {
   std::size_t count() const { return weight.size(); }
 };
 
-/// Standard normal score of a uniform number in (0, 1).
+/// Returns the standard normal score of a uniform number in (0, 1).
 double normal_score(double uniform);
 
-/// Draws number 0 .. count-1 of one randomisation. Sobol points (Boost; the zero point is skipped) get a digital
+/// Makes draws 0 .. count-1 of one randomisation. Sobol points (Boost; the zero point is skipped) get a digital
 /// shift from Philox keyed by (seed, replicate); `random` takes its uniforms from Philox at counter = draw number.
 ///
 /// Weighted: each score is z = a v + b v^3, v = 2u - 1, with a = 2.5 and a + b the score whose tail probability is

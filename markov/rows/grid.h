@@ -1,5 +1,5 @@
 #pragma once
-// Cells on the state axis.
+// Cuts the state axis into cells.
 
 #include <cstddef>
 #include <cstdint>
@@ -8,13 +8,13 @@
 
 namespace metastable::markov {
 
-/// Cells [edge_i, edge_{i+1}) for one phase. States above the last edge count into the last cell, states below the
-/// first (rounding only: survivors lie above it) into the first.
+/// Holds the cells [edge_i, edge_{i+1}) of one phase. States above the last edge count into the last cell, states below
+/// the first (rounding only: survivors lie above it) into the first.
 class Grid {
  public:
   /// @param edges strictly ascending, at least 2. @throws std::invalid_argument otherwise.
   explicit Grid(std::vector<double> edges);
-  /// n equal cells.
+  /// Makes n equal cells.
   static Grid uniform(double lower, double upper, std::size_t cells);
 
   std::size_t cells() const { return edges_.size() - 1; }
@@ -22,14 +22,14 @@ class Grid {
   double width(std::size_t cell) const { return edges_[cell + 1] - edges_[cell]; }
   double midpoint(std::size_t cell) const { return 0.5 * (edges_[cell] + edges_[cell + 1]); }
   std::span<const double> edges() const { return edges_; }
-  /// Cell of a state: a table look-up and a short scan, O(1).
+  /// Finds the cell of a state by a table look-up and a short scan, O(1).
   std::uint32_t cell(double state) const;
 
-  /// sums[1 + cell(state[k])] += weight[k] for all k in order; where state[k] is -infinity, sums[0] += weight[k].
+  /// Does sums[1 + cell(state[k])] += weight[k] for all k in order; a state of -infinity counts in sums[0].
   /// @param sums  size cells() + 1
   void tally(std::span<const double> state, std::span<const double> weight, std::span<double> sums) const;
 
-  /// Every cell split in two at its midpoint.
+  /// Splits every cell in two at its midpoint.
   Grid halved() const;
 
  private:
@@ -37,7 +37,7 @@ class Grid {
   std::vector<double> upper_;         // edges above the cells, +infinity above the last
   std::vector<std::uint32_t> table_;  // bucket of the axis to the cell that its start lies in
   double table_scale_ = 0;
-  // For tally(), where no bucket holds two edges; bucket 0 stands for rest, the others follow.
+  // tally() uses these where no bucket holds two edges; bucket 0 stands for rest, the others follow.
   std::vector<std::int32_t> start_;  // 1 + cell
   std::vector<double> edge_;         // above that cell
 };

@@ -1,5 +1,5 @@
 #pragma once
-// From a return map's exact kernel to a chain on Gauss-Legendre nodes (Nystroem).
+// Turns a return map's exact kernel into a chain on Gauss-Legendre nodes (Nystroem).
 
 #include <utility>
 #include <vector>
@@ -8,20 +8,20 @@
 
 namespace metastable::markov {
 
-/// Row i: weight_j * density(x_i -> x_j), kill rate: the map's rest_probability, nothing by subtraction. For a kernel
+/// Row i holds weight_j * density(x_i -> x_j), its kill rate is the map's rest_probability. For a kernel
 /// that is smooth on the panels all results converge faster than any power of their number; points of lesser smoothness
 /// that move with the state (LandingDensity) leave an error of their own size times a power of the distance of the
 /// nodes. Rows are scaled to sum to the probability of surviving: that removes the quadrature's error of the total,
-/// keeps the period of a cyclic chain, and folds what lands beyond the upper edge back in proportion. Cost: size() *
-/// nodes() densities. Deterministic for any number of threads.
+/// keeps the period of a cyclic chain, and folds what lands beyond the upper edge back in proportion. Costs size() *
+/// nodes() densities; threads change no bit.
 /// @throws std::invalid_argument if the map tells no density or no rest probability (names the sampled method)
 IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads = 1);
 
-/// Where one event from `state` at `phase` leads, as a launch.
+/// Returns where one event from `state` at `phase` leads, as a launch.
 Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase);
 
-/// Ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings, found
-/// on a coarse chain of exact rows; nothing if no state comes to rest with a probability that a double can hold.
+/// Finds ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings,
+/// found on a coarse chain of exact rows; nothing if no state comes to rest with a probability that a double can hold.
 /// @throws std::invalid_argument as integrate()
 std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads);
 

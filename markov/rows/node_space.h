@@ -1,5 +1,5 @@
 #pragma once
-// States of a continuous phase as the nodes of quadrature and interpolation.
+// Takes states of a continuous phase as nodes of quadrature and interpolation.
 
 #include <array>
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace metastable::markov {
 
-/// Gauss-Legendre nodes on panels of an interval per phase; states are numbered phase by phase, ascending. Panel edges
-/// lie at the squares of equal steps: close together near the lower edge, where survivors and rest meet.
+/// Places Gauss-Legendre nodes on panels of an interval per phase; states are numbered phase by phase, ascending. Panel
+/// edges lie at the squares of equal steps: close together near the lower edge, where survivors and rest meet.
 class NodeSpace {
  public:
   static constexpr std::size_t order = 16;  ///< nodes a panel
@@ -22,7 +22,7 @@ class NodeSpace {
   /// @throws std::invalid_argument otherwise
   NodeSpace(std::vector<std::pair<double, double>> range, std::size_t panels);
 
-  /// Panels for functions with square roots or kinks at `edges`: `panels` of them between every two edges, where
+  /// Suits functions with square roots or kinks at `edges`: there are `panels` panels between every two edges, where
   /// x = a + (b - a) sin^2(pi t / 2) and t is what is divided.
   /// @param edges  per phase, as many for each, ascending
   /// @throws std::invalid_argument otherwise
@@ -34,17 +34,17 @@ class NodeSpace {
   std::size_t size() const { return node_.size(); }
   double node(std::size_t state) const { return node_[state]; }
   double weight(std::size_t state) const { return weight_[state]; }
-  /// Nodes of one phase.
+  /// Returns the nodes of one phase.
   std::span<const double> nodes(int phase) const;
   std::span<const double> weights(int phase) const;
   int phase(std::size_t state) const { return static_cast<int>(state / nodes()); }
-  /// The same ranges, without edges, with another number of panels.
+  /// Divides the same ranges, without edges, into another number of panels.
   NodeSpace with_panels(std::size_t panels) const { return NodeSpace(range_, panels); }
   std::span<const double> edges(int phase) const;  ///< as given
-  /// Where `edges` were given: the panel of a phase that holds a state, and the place there in [-1, 1]. States outside
+  /// Finds, where `edges` were given, the panel that holds a state, and the place there in [-1, 1]. States outside
   /// are moved to the nearest edge.
   std::pair<std::size_t, double> locate(int phase, double state) const;
-  /// Cells as wide as the nodes' weights, one a node, in the same order (each node lies in its cell).
+  /// Makes cells as wide as the nodes' weights, one a node, in the same order (each node lies in its cell).
   StateSpace cells() const;
 
  private:
@@ -56,10 +56,10 @@ class NodeSpace {
   std::vector<double> node_, weight_;
 };
 
-/// Legendre polynomials P_0 .. P_15 at t in [-1, 1].
+/// Evaluates the Legendre polynomials P_0 .. P_15 at t in [-1, 1].
 using Legendre = std::array<double, NodeSpace::order>;
 Legendre legendre(double t);
-/// The same at `lanes` places side by side.
+/// Does the same at `lanes` places side by side.
 template <std::size_t lanes>
 void legendre(const double* t, Legendre* values) {
   double before[lanes], here[lanes];
@@ -77,7 +77,7 @@ void legendre(const double* t, Legendre* values) {
     }
   }
 }
-/// Gauss-Legendre on [-1, 1], ascending; k < NodeSpace::order.
+/// Returns the Gauss-Legendre rule on [-1, 1], ascending; k < NodeSpace::order.
 double gauss_abscissa(std::size_t k);
 double gauss_weight(std::size_t k);
 

@@ -14,10 +14,10 @@
 
 namespace metastable::markov {
 
-/// Landing value that stands for "came to rest" wherever landings are written into arrays.
+/// This landing stands for "came to rest" wherever landings are written into arrays.
 inline constexpr double rest_landing = -std::numeric_limits<double>::infinity();
 
-/// A stochastic return map: from the state just before one event to the state just before the next.
+/// A stochastic return map leads from the state just before one event to the state just before the next.
 ///
 /// States are real numbers (for a wheel: omega^2 [rad^2/s^2] just before a collision).
 /// Phases count 0 .. phases()-1; the event at phase p is followed by the event at phase (p + 1) % phases().
@@ -38,12 +38,12 @@ concept ReturnMap = requires(const M& map, double state, int phase, std::span<co
   { map.landing(state, phase, noise) } -> std::convertible_to<std::optional<double>>;
 };
 
-/// Many draws of the noise at one phase, ready to be applied to any state.
+/// Holds many draws of the noise at one phase, ready to be applied to any state.
 class NoiseTable {
  public:
   virtual ~NoiseTable() = default;
-  /// next[k] = landing of state origin + width * offset[k] under draw first + k, for k < next.size();
-  /// rest_landing where the system comes to rest. offset.size() == next.size().
+  /// Sets next[k] to the landing of state origin + width * offset[k] under draw first + k, for k < next.size(), and to
+  /// rest_landing where the system comes to rest. offset has the size of next.
   virtual void land(double origin, double width, std::span<const double> offset, std::size_t first,
                     std::span<double> next) const = 0;
   /// No state below this one survives draw k: where landings rise with the state, the state that just does. -infinity
@@ -53,7 +53,7 @@ class NoiseTable {
   virtual void reorder(std::span<const std::uint32_t>) {}
 };
 
-/// Any return map, held by shared pointer; cheap to copy, immutable, safe to share between threads.
+/// Wraps any return map by shared pointer: it is cheap to copy, immutable and safe to share between threads.
 class AnyReturnMap {
  public:
   template <ReturnMap M>
@@ -65,46 +65,46 @@ class AnyReturnMap {
   std::optional<double> landing(double state, int phase, std::span<const double> noise) const {
     return self_->landing(state, phase, noise);
   }
-  /// Exact probability of coming to rest from `state` (relative accuracy, tails included); nothing if unknown.
+  /// Returns the exact probability of rest from `state` (relative accuracy, tails included), nothing if unknown.
   std::optional<double> rest_probability(double state, int phase) const {
     return self_->rest_probability(state, phase);
   }
-  /// {infimum, supremum} of the landing over the whole support of the noise; the infimum is rest_landing
-  /// when rest is possible, the supremum is rest_landing when it is certain. Nothing if unknown.
+  /// Returns {infimum, supremum} of the landing over the whole support of the noise; the infimum is rest_landing
+  /// when rest is possible, the supremum is rest_landing when it is certain. Returns nothing if unknown.
   std::optional<std::pair<double, double>> landing_range(double state, int phase) const {
     return self_->landing_range(state, phase);
   }
-  /// Density of the landing from `state` at each of the next states: density[k] belongs to next[k] (equal sizes), with
-  /// relative accuracy, tails included; over all next states it integrates to 1 - rest probability, which is returned.
-  /// Nothing, and nothing written, if the map does not tell. May throw std::invalid_argument where this map's noise has
-  /// no density.
+  /// Gives the landing's density from `state` at each of the next states: density[k] belongs to next[k] (equal sizes),
+  /// with relative accuracy, tails included; over all next states it integrates to 1 - rest probability, which is
+  /// returned. Writes and returns nothing if the map does not tell. May throw std::invalid_argument where this map's
+  /// noise has no density.
   std::optional<double> landing_density(double state, int phase, std::span<const double> next,
                                         std::span<double> density) const {
     return self_->landing_density(state, phase, next, density);
   }
-  /// Points {next state, weight} such that the sum of weight * f(next) is E[f(landing)] over the survivors, for f that
-  /// is smooth between `breaks` (ascending); returns the probability of rest. Nothing if the map does not tell. May
+  /// Gives points {next state, weight} whose sum of weight * f(next) is E[f(landing)] over the survivors, for f that
+  /// is smooth between `breaks` (ascending); returns the probability of rest, nothing if the map does not tell. May
   /// throw std::invalid_argument where this map's noise has no such points.
   std::optional<double> landing_points(double state, int phase, std::span<const double> breaks,
                                        std::vector<std::pair<double, double>>& points) const {
     return self_->landing_points(state, phase, breaks, points);
   }
-  /// States at `phase`, ascending, from which an extreme landing is one of `next`: expectations of a function that is
-  /// not smooth at `next` are not smooth there. Empty if the map does not tell.
+  /// Lists states at `phase`, ascending, with an extreme landing among `next`: expectations of a function that is
+  /// not smooth at `next` are not smooth there. The list is empty if the map does not tell.
   std::vector<double> states_of_extremes(int phase, std::span<const double> next) const {
     return self_->states_of_extremes(phase, next);
   }
-  /// Draws prepared for repeated use; noise is row-major, one row of noise_dimension() scores a draw.
+  /// Prepares draws for repeated use; noise is row-major, one row of noise_dimension() scores a draw.
   std::unique_ptr<NoiseTable> tabulate(int phase, std::span<const double> noise) const {
     return self_->tabulate(phase, noise);
   }
-  /// Time [s] between the event at `phase` and the next one, given the next event's state; nothing if unknown.
+  /// Returns the time [s] between the event at `phase` and the next one, given that one's state; nothing if unknown.
   std::optional<double> duration(double next_state, int phase) const { return self_->duration(next_state, phase); }
-  /// Distance [m] from the event at `phase` to the next one; nothing if unknown.
+  /// Returns the distance [m] from the event at `phase` to the next one; nothing if unknown.
   std::optional<double> advance(int phase) const { return self_->advance(phase); }
-  /// Names of the modelling assumptions that single events may violate.
+  /// Names the modelling assumptions that single events may violate.
   std::vector<std::string> assumptions() const { return self_->assumptions(); }
-  /// Whether assumption number `which` is violated by the event in which `state` meets `noise` at `phase`.
+  /// Says whether the event in which `state` meets `noise` at `phase` violates assumption number `which`.
   bool violates(int which, double state, int phase, std::span<const double> noise) const {
     return self_->violates(which, state, phase, noise);
   }
@@ -129,7 +129,7 @@ class AnyReturnMap {
     virtual bool violates(int, double, int, std::span<const double>) const = 0;
   };
 
-  // Draw by draw through landing(): serves every map that has no faster way.
+  // Goes draw by draw through landing(): serves every map that has no faster way.
   template <class M>
   struct PlainTable final : NoiseTable {
     PlainTable(const M& m, int p, std::span<const double> n) : map(m), phase(p), noise(n.begin(), n.end()) {}

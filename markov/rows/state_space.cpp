@@ -16,7 +16,7 @@ constexpr double probe_level = 0.02;       // noise exceeded once in 50 events
 constexpr double sparse = 0.15;            // cells per factor of e beyond the bulk, relative to the bulk's
 constexpr double grading_ratio = 4.0;      // widest over narrowest cell, in pilot cells
 
-// State below which all but probe_level of the landings from `state` fall; rest counts as lowest.
+// Returns the state below which all but probe_level of the landings from `state` fall; rest counts as lowest.
 double high_landing(const NoiseTable& table, std::span<const double> weight, double state) {
   std::vector<double> landing(weight.size());
   const std::vector<double> offset(weight.size(), 0.0);
@@ -32,8 +32,8 @@ double high_landing(const NoiseTable& table, std::span<const double> weight, dou
   return rest_landing;
 }
 
-// Width of the bulk over the lowest state: the launch's own landings, then its top edge mapped until it no longer
-// rises.
+// Finds the bulk's width over the lowest state: it holds the launch's own landings, then its top edge is mapped until
+// it no longer rises.
 double bulk_width(const AnyReturnMap& map, const LaunchState& launch, double lowest, std::uint64_t seed) {
   const int phases = map.phases();
   const Draws draws = make_draws(map.noise_dimension(), {.count = probe_draws, .seed = seed});
@@ -109,7 +109,7 @@ StateSpace graded_space(const StateSpace& pilot, std::span<const double> nu, std
       visits_above += at(visits, used - 1);
       if (nu_above > 1e-13 || visits_above > 1e-9) break;
     }
-    // Monitor per pilot cell, centred differences of the density and of h, smoothed over neighbours.
+    // The monitor of a pilot cell takes centred differences of the density and of h, smoothed over neighbours.
     std::vector<double> monitor(used, 0.0);
     for (std::size_t c = 0; c < used; ++c) {
       const std::size_t a = c == 0 ? 0 : c - 1, b = std::min(c + 1, n - 1);

@@ -1,5 +1,5 @@
 #pragma once
-// Cells for all phases of a return map, and where to put them.
+// Puts cells for all phases of a return map where they matter.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace metastable::markov {
 
-/// Cells of every phase; states are numbered phase by phase.
+/// Holds the cells of every phase; states are numbered phase by phase.
 class StateSpace {
  public:
   /// @param grids one per phase, all with the same number of cells
@@ -30,13 +30,13 @@ class StateSpace {
   std::vector<Grid> grids_;
 };
 
-/// The state just before event number 1.
+/// Tells the state just before event number 1.
 struct LaunchState {
   std::function<double(double score)> state;  ///< state at a standard normal score; ascending
   int phase = 0;                              ///< phase of event number 1
 };
 
-/// Cells over the map's own reach. Lower edges: lowest state a survivor can have at each phase. The bulk, cut into
+/// Lays cells over the map's own reach, from the lowest state a survivor can have at each phase. The bulk, cut into
 /// equal cells, ends where landings from its top edge under noise exceeded once in 50 events no longer lead higher, and
 /// holds the landings after the launch. Beyond it cells widen in proportion to the distance from the lower edge, up to
 /// `reach` times the bulk (a map that can gain energy spreads survivors over decades); a finite upper end of the map's
@@ -44,7 +44,7 @@ struct LaunchState {
 StateSpace covering_space(const AnyReturnMap& map, const LaunchState& launch, std::size_t cells, std::uint64_t seed,
                           double reach = 1.5);
 
-/// The same range cut so that cells are small where they matter. By Galerkin's argument the relative error of the
+/// Cuts the same range so that cells are small where they matter. By Galerkin's argument the relative error of the
 /// failure rate is the sum over cells of width^3 nu'(x) h'(x) / 12 (nu quasi-stationary density, h relative survival),
 /// so widths follow |nu' h'|^(-1/3), taken from a solve on `pilot`, and no cell is wider than four times the narrowest
 /// in units of the pilot's cells there. Measured at 64 cells, error of ln(expected steps) with equal cells -> graded:
@@ -56,7 +56,7 @@ StateSpace covering_space(const AnyReturnMap& map, const LaunchState& launch, st
 StateSpace graded_space(const StateSpace& pilot, std::span<const double> nu, std::span<const double> h,
                         std::span<const double> visits, std::size_t cells);
 
-/// Largest share of nu in the top cell of any phase: how much the upper edge cuts off.
+/// Returns the largest share of nu in the top cell of any phase, which says how much the upper edge cuts off.
 double top_share(const StateSpace& space, std::span<const double> nu);
 
 }  // namespace metastable::markov
