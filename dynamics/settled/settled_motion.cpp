@@ -54,6 +54,10 @@ Landing SettledMotion::land(int leg, double omega_minus, const Contact& landed, 
   return SettledRoll(*this, leg, omega_minus, landed, old).land();
 }
 
+double SettledMotion::slip_after(int leg, double omega_minus, const Contact& contact, int strikes) const {
+  return SettledRoll(*this, leg, omega_minus, contact, contact).slip_after(strikes);
+}
+
 Step SettledMotion::step(int leg, double omega_minus, const Contact& landed, const Contact& old) const {
   return SettledRoll(*this, leg, omega_minus, landed, old).step();
 }
@@ -168,7 +172,7 @@ bool SettledRoll::stands_on(int leg, double angle, double energy) const {
 void SettledRoll::note_stand(int leg, double angle, double spin) {
   const StandingFoot& foot = motion_->foot(leg);
   const double radius = motion_->wheel().tip_radius;
-  landing_.omega_eq_squared = landing_.carried_squared =
+  landing_.omega_eq_squared = landing_.carried_squared = landing_.settled_squared =
       foot.spin_squared(foot.landing_angle(), foot.energy(angle, spin));
   landing_.displacement = tip_along(leg) - touch_along_ - radius * (angle - foot.landing_angle());
   landing_.duration = time_ - touch_time_;
@@ -196,6 +200,21 @@ Landing SettledRoll::land() {
   const Event event = run(true);
   if (event == Event::rests) landing_.end = LandingEnd::rest;
   return landing_;
+}
+
+double SettledRoll::slip_after(int strikes) {
+  landing_ = {};
+  events_ = 0;
+  double slip = 0;
+  for (Event event = Event::strikes; landing_.strikes < strikes; event = fly()) {
+    if (event != Event::strikes || foot_ != leg_) return slip;
+    event = resolve();
+    slip = lever(leg_).slip(velocity_);
+    if (slip < 1e-12) return 0;
+    if (landing_.strikes == strikes) break;
+    if (event != Event::flies) return slip;
+  }
+  return slip;
 }
 
 Step SettledRoll::step() {

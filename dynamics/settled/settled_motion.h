@@ -29,6 +29,9 @@ struct Landing {
   /// moving one to 2e-5 rad/s (median; omega_eq_squared: 1e-3).
   double carried_squared = 0;
   bool slips_late = false;
+  /// omega_eq^2 when the foot began to stand, before any late slip; 0 if it never did [rad^2/s^2]. Continuous across
+  /// the friction below which the wheel rests, where it is the barrier's.
+  double settled_squared = 0;
   double displacement =
       0;                  ///< of the foot from where it touched to where it stands, down the plane, without rolling [m]
   double omega_plus = 0;  ///< spin after the first impact [rad/s]
@@ -63,6 +66,9 @@ class SettledMotion {
   Landing land(int leg, double omega_minus, const Contact& contact) const {
     return land(leg, omega_minus, contact, contact);
   }
+  /// Speed at which the landed foot slips down the plane after its first `strikes` impacts [m/s]; 0 once it has stuck,
+  /// and if fewer follow. The landing is not smooth in mu where this becomes 0.
+  double slip_after(int leg, double omega_minus, const Contact& contact, int strikes) const;
   /// The same and on to the next touch, the stance integrated in time.
   Step step(int leg, double omega_minus, const Contact& landed, const Contact& old) const;
   Step step(int leg, double omega_minus, const Contact& contact) const {
@@ -85,6 +91,8 @@ class SettledRoll {
   Step step();
   /// The landing alone, until its foot has settled. Ends the roll unless it is `settled`.
   Landing land();
+  /// As SettledMotion::slip_after. Ends the roll.
+  double slip_after(int strikes);
 
   int leg() const { return leg_; }                ///< that touches, counted on without end
   double position() const;                        ///< of its tip, down the plane from the first touch [m]

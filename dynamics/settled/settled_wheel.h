@@ -24,6 +24,7 @@ struct SettledWheel {
   double tolerance = 1e-12;  ///< of one integration step [rad, rad/s, m/s, m], > 0
   int max_events = 20000;    ///< strikes, lifts, steps of integration; a landing that needs more is given up
 
+  bool operator==(const SettledWheel&) const = default;
   int legs() const { return static_cast<int>(leg_length.size()); }
   double leg_angle() const;
   double length(int leg) const;  ///< of any whole number, counted around the wheel [m]

@@ -1,0 +1,124 @@
+#include "dynamics/settled/settled_map.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <thread>
+#include <vector>
+
+#include "tests/dynamics/support.h"
+
+namespace metastable::dynamics::test {
+namespace {
+
+SettledWheel paper(double slope_deg) {
+  SettledWheel wheel;
+  wheel.radius_of_gyration = std::sqrt(0.0025 / 1.39);
+  wheel.slope = slope_deg * degree;
+  return wheel;
+}
+
+void two_threads(std::size_t count, const std::function<void(std::size_t)>& work) {
+  const auto every_second = [&](std::size_t first) {
+    for (std::size_t i = first; i < count; i += 2) work(i);
+  };
+  std::thread other([&] { every_second(1); });
+  every_second(0);
+  other.join();
+}
+
+SettledMapOptions narrow() {
+  SettledMapOptions options;
+  options.range = {6, 0.3, 0.5};
+  options.speeds = 14;
+  options.restitutions = 5;
+  options.frictions = 16;
+  options.checks = 100;
+  options.executor = two_threads;
+  return options;
+}
+
+TEST(SettledMap, ReadsWhatDirectLandingsGive) {
+  const auto map = SettledMap::of(paper(7.02), narrow());
+  const SettledMapError& error = map->error();
+  EXPECT_EQ(error.landings, 800U);
+  EXPECT_LE(error.misjudged_rests, 2U);
+  EXPECT_LT(error.settled_rms, 2e-4);
+  EXPECT_LT(error.settled_max, 2e-3);
+  EXPECT_LT(error.resting_friction_max, 1e-3);  // where the wheel barely passes at all
+  EXPECT_LT(error.displacement_max, 3e-4);
+}
+
+TEST(SettledMap, AtomKinkAndThresholdAreKept) {
+  const auto map = SettledMap::of(paper(7.02), narrow());
+  for (int leg = 0; leg < 8; ++leg) {
+    const double omega = 5.1, eta = 0.43, sticking = map->sticking_friction(leg);
+    ASSERT_TRUE(map->tabulated(leg, omega, eta));
+    // Above mu_c one value, met from below.
+    const double atom = map->land(leg, omega, {eta, sticking}).carried_squared;
+    EXPECT_EQ(map->land(leg, omega, {eta, sticking + 0.1}).carried_squared, atom);
+    EXPECT_EQ(map->land(leg, omega, {eta, 5.0}).carried_squared, atom);
+    EXPECT_NEAR(map->land(leg, omega, {eta, sticking - 1e-9}).carried_squared, atom, 1e-6);
+    EXPECT_NEAR(map->motion().land(leg, omega, {eta, sticking + 0.03}).carried_squared, atom, 1e-4 * omega * omega);
+    // One threshold of rest.
+    const double resting = map->resting_friction(leg, omega, eta);
+    EXPECT_TRUE(map->land(leg, omega, {eta, resting - 1e-12}).rest);
+    EXPECT_FALSE(map->land(leg, omega, {eta, resting + 1e-12}).rest);
+    EXPECT_EQ(map->motion().land(leg, omega, {eta, resting - 1e-5}).end, LandingEnd::rest);
+    EXPECT_NE(map->motion().land(leg, omega, {eta, resting + 1e-5}).end, LandingEnd::rest);
+  }
+}
+
+TEST(SettledMap, ManyFrictionsAtOnceAreTheSame) {
+  const auto map = SettledMap::of(paper(7.02), narrow());
+  const std::vector<double> friction{0.1, 0.33, 0.345, 0.37, 0.4, 0.9};
+  std::vector<MappedLanding> landed(friction.size());
+  for (const double omega : {4.9, 7.0}) {  // in the table, beyond it
+    map->land(2, omega, 0.4, friction, landed);
+    for (std::size_t i = 0; i < friction.size(); ++i) {
+      const MappedLanding one = map->land(2, omega, {0.4, friction[i]});
+      EXPECT_EQ(landed[i].carried_squared, one.carried_squared);
+      EXPECT_EQ(landed[i].displacement, one.displacement);
+      EXPECT_EQ(landed[i].rest, one.rest);
+    }
+  }
+}
+
+TEST(SettledMap, WithoutATableLandingsAreFollowed) {
+  SettledMapOptions options;
+  options.direct = true;
+  const auto map = SettledMap::of(paper(7.02), options);
+  EXPECT_FALSE(map->tabulated(1, 4.8, 0.4));
+  const Landing direct = map->motion().land(1, 4.8, {0.4, 0.36});
+  EXPECT_EQ(map->land(1, 4.8, {0.4, 0.36}).carried_squared, direct.carried_squared);
+  // Four digits from the prototype (settled.md); too slow to pass the barrier at any friction.
+  EXPECT_NEAR(map->resting_friction(1, 5, 0.4), 0.3291, 1e-4);
+  EXPECT_EQ(map->resting_friction(1, 2.5, 0.4), std::numeric_limits<double>::infinity());
+}
+
+TEST(SettledMap, IsKeptForTheLifeOfTheProcess) {
+  const auto first = SettledMap::of(paper(7.02), narrow());
+  SettledMapOptions again = narrow();
+  again.executor = nullptr;
+  EXPECT_EQ(SettledMap::of(paper(7.02), again), first);
+  SettledMapOptions direct = narrow();
+  direct.direct = true;
+  EXPECT_NE(SettledMap::of(paper(7.02), direct), first);
+  EXPECT_NE(SettledMap::of(paper(9.59), direct), SettledMap::of(paper(7.02), direct));
+}
+
+TEST(SettledMap, IllegalRangesAreNamed) {
+  SettledMapOptions options;
+  options.range.eta_high = 0.97;
+  EXPECT_EQ(message_of([&] { SettledMap::of(paper(7.02), options); }),
+            "settled map: eta_high: 0.97 is outside [eta_low, 0.95]");
+  options.range = {};
+  options.range.omega_high = 30;
+  EXPECT_EQ(message_of([&] { SettledMap::of(paper(7.02), options); }),
+            "settled map: omega_high: 30 is outside (0, 20] rad/s");
+}
+
+}  // namespace
+}  // namespace metastable::dynamics::test
