@@ -16,7 +16,7 @@ namespace {
 SettledWheel paper(double slope_deg) {
   SettledWheel wheel;
   wheel.radius_of_gyration = std::sqrt(0.0025 / 1.39);
-  wheel.slope = slope_deg * degree;
+  wheel.slope_rad = slope_deg * degree;
   return wheel;
 }
 
