@@ -15,7 +15,9 @@
 //       std::printf("%s: %.2f\n", cause.name().c_str(), cause.probability);
 //   }
 // prints
-//   @@DIAGNOSE@@
+//   recalibrate
+//   leg_contact: 0.13
+//   slope_offset: 0.07
 
 #include <filesystem>
 

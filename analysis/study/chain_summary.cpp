@@ -118,7 +118,7 @@ double log_survival_of_a_revolution(const markov::ChainSolver& solver, const mar
   for (const std::vector<std::uint32_t>& of_class : solver.period().classes) {
     double rest = 0;
     for (const std::uint32_t i : of_class) rest += quasi.distribution[i] * solver.chain().kill(i);
-    log_survival += std::log1p(-rest);
+    log_survival += std::log1p(-std::min(1.0, rest));
   }
   return log_survival;
 }

