@@ -321,12 +321,15 @@ Transition best_transition(const Experiment& experiment) {
   return Transition::collision;
 }
 
+bool has_contact_fit(dynamics::Law law) { return law == dynamics::Law::published || law == dynamics::Law::coulomb; }
+
 ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size_t>& conditions,
                        const ContactFitOptions& options) {
   ContactFit fit;
-  if (options.law == dynamics::Law::plastic) {
+  if (!has_contact_fit(options.law)) {
     fit.status = ContactFit::Status::no_parameters;
-    fit.message = "plastic has neither restitution nor friction";
+    fit.message = options.law == dynamics::Law::plastic ? "plastic has neither restitution nor friction"
+                                                        : "restitution and friction of settled are not fitted";
     return fit;
   }
   const std::vector<dynamics::WheelMap> maps = maps_of(experiment, options.law, wide);

@@ -60,6 +60,10 @@ struct ContactFit {
 /// Tells what the fit cannot tell apart, in plain sentences, from its correlations and directions.
 std::vector<std::string> ambiguities(const ContactFit& fit);
 
+/// Whether the law has contact parameters that a fit can find: not `plastic`, which has none, and not `settled`, whose
+/// landing has no density in closed form.
+bool has_contact_fit(dynamics::Law law);
+
 /// Fits all trials of the named conditions together, under the wheel of the experiment.
 ///
 /// It multiplies the likelihood of every landing and, after a trial's last collision, of rest or of survival

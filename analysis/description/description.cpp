@@ -1,5 +1,7 @@
 #include "analysis/description/description.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
 
@@ -94,8 +96,10 @@ Description describe(const Experiment& experiment, const DescriptionOptions& opt
     description.notes.push_back("Without legs the contact fit takes all of them at their mean length.");
   if (!experiment.columns.outcomes)
     description.notes.push_back("Outcomes are not known: no survival, and no rest enters the contact fit.");
-  if (!options.fit || experiment.contact.law == dynamics::Law::plastic) {
-    if (options.fit) description.notes.push_back("The nominal law, plastic, has no contact parameters to fit.");
+  if (!options.fit || !has_contact_fit(experiment.contact.law)) {
+    if (options.fit)
+      description.notes.push_back(fmt::format("Of the nominal law, {}, no contact parameters are fitted.",
+                                              dynamics::law_name(experiment.contact.law)));
     return description;
   }
   description.transition = options.transition.value_or(best_transition(experiment));

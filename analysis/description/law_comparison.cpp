@@ -27,7 +27,7 @@ LawComparison compare_laws(const Experiment& experiment, const std::vector<dynam
   for (std::size_t i = 0; i < experiment.conditions.size(); ++i)
     if (!speeds(experiment, i).empty()) all.push_back(i);
   for (const dynamics::Law law : laws)
-    if (law != dynamics::Law::plastic)
+    if (has_contact_fit(law))
       result.fits.emplace_back(law, fit_contact(experiment, all, {law, Transition::step, threads, false, progress}));
   for (const std::size_t i : all) {
     const TrialSpeeds measured = speeds(experiment, i);
@@ -71,6 +71,7 @@ LawComparison compare_laws(const Experiment& experiment, const std::vector<dynam
         continue;
       }
       if (experiment.contact.law != dynamics::Law::plastic) predict(setting, name + ", as given");
+      if (!has_contact_fit(law)) continue;
       const auto fit =
           std::find_if(result.fits.begin(), result.fits.end(), [&](const auto& f) { return f.first == law; });
       if (fit->second.status == ContactFit::Status::impossible) {

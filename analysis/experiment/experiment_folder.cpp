@@ -56,8 +56,11 @@ std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const Simul
                                      .rest_rule = options.rest_rule,
                                      .seed = options.seed};
   std::vector<dynamics::Trial> trials(static_cast<std::size_t>(options.trials));
+  const std::optional<dynamics::SettledMotion> motion =
+      setting.law == dynamics::Law::settled ? std::optional(setting.motion()) : std::nullopt;
   markov::parallel_for(trials.size(), options.threads, [&](std::size_t t) {
-    trials[t] = dynamics::simulate_trial(map, launch, trial, options.first + t);
+    trials[t] = motion ? dynamics::simulate_trial(*motion, map.noise(), launch, trial, options.first + t)
+                       : dynamics::simulate_trial(map, launch, trial, options.first + t);
   });
   return trials;
 }
@@ -98,6 +101,7 @@ std::string wheel_description(const Setting& setting, Spread restitution, Spread
                         dynamics::contact_model(setting.wheel, setting.law).radius_of_gyration);
   else if (setting.wheel.radius_of_gyration)
     toml += fmt::format("radius_of_gyration_m = {}\n", *setting.wheel.radius_of_gyration);
+  if (setting.wheel.tip_radius > 0) toml += fmt::format("tip_radius_m = {}\n", setting.wheel.tip_radius);
   toml += fmt::format("\n[contact]\nlaw = \"{}\"\nrestitution = {}\nfriction = {}\n", dynamics::law_name(setting.law),
                       toml_spread(restitution), toml_spread(friction));
   return toml;

@@ -151,6 +151,7 @@ void read_wheel(Keys& root, dynamics::Wheel& wheel, const Defects& defects) {
   }
   wheel.inertia = keys->number("inertia_kg_m2", false, range::inertia);
   wheel.radius_of_gyration = keys->number("radius_of_gyration_m", false, range::radius_of_gyration);
+  wheel.tip_radius = keys->number("tip_radius_m", false, range::tip_radius).value_or(0);
   const auto object = [&](std::string_view key, const std::string& objection) {
     if (!objection.empty()) keys->report(*keys->find(key, true), fmt::format("wheel.{}: {}", key, objection));
   };
@@ -170,7 +171,7 @@ void read_contact(Keys& root, NominalContact& contact) {
       if (name == nullptr) throw std::invalid_argument("a text in quotes is expected");
       contact.law = dynamics::law_from_name(name->get());
     } catch (const std::invalid_argument&) {
-      keys->report(*node, "contact.law: \"published\", \"coulomb\" or \"plastic\" is expected");
+      keys->report(*node, fmt::format("contact.law: one of {} is expected", fmt::join(dynamics::law_names(), ", ")));
     }
   }
   const bool required = contact.law != dynamics::Law::plastic;

@@ -152,6 +152,10 @@ WheelRuns wheel_runs(const Experiment& experiment) {
     throw std::invalid_argument(
         "contact.law: plastic has no restitution and no friction, hence no spread to compare trials with "
         "(published or coulomb is needed)");
+  if (experiment.contact.law == dynamics::Law::settled)
+    throw std::invalid_argument(
+        "contact.law: settled has no likelihood here; published or coulomb can be diagnosed, and "
+        "`metastable describe --against settled` puts its predictions beside the trials");
   WheelRuns measured;
   measured.wheel = experiment.wheel;
   measured.law = experiment.contact.law;

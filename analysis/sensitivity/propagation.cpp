@@ -18,12 +18,12 @@ double derivative(const Sensitivities& of, Parameter parameter) {
       fmt::format("{}: a standard error was given, but there is no sensitivity", parameter_name(parameter)));
 }
 
-Propagated from_variances(double value, std::vector<Propagated::Share> variances) {
+Propagated from_variances(double value, std::vector<Propagated::VarianceShare> variances) {
   Propagated result;
   double variance = 0;
-  for (const Propagated::Share& one : variances) variance += one.share;
+  for (const Propagated::VarianceShare& one : variances) variance += one.share;
   if (variance > 0)
-    for (Propagated::Share& one : variances) one.share /= variance;
+    for (Propagated::VarianceShare& one : variances) one.share /= variance;
   result.log_sd = std::sqrt(variance);
   const double half = boost::math::quantile(boost::math::normal(), 0.975) * result.log_sd;
   result.interval = {value, value * std::exp(-half), value * std::exp(half)};
@@ -51,7 +51,7 @@ void check_standard_errors(const Setting& setting, const std::vector<StandardErr
 }
 
 Propagated propagate(double steps, const Sensitivities& sensitivities, const std::vector<StandardError>& errors) {
-  std::vector<Propagated::Share> variances;
+  std::vector<Propagated::VarianceShare> variances;
   for (const StandardError& error : errors) {
     const double part = derivative(sensitivities, error.parameter) * error.value;
     variances.push_back({error.parameter, part * part});
@@ -61,7 +61,7 @@ Propagated propagate(double steps, const Sensitivities& sensitivities, const std
 
 Propagated propagate_ratio(double ratio, const Sensitivities& of, const Sensitivities& against,
                            const std::vector<StandardError>& errors) {
-  std::vector<Propagated::Share> variances;
+  std::vector<Propagated::VarianceShare> variances;
   for (const StandardError& error : errors) {
     const double a = derivative(against, error.parameter) * error.value,
                  b = derivative(of, error.parameter) * error.value;

@@ -23,11 +23,11 @@ void check_standard_errors(const Setting& setting, const std::vector<StandardErr
 struct Propagated {
   double log_sd = 0;  ///< standard error of ln(expected steps)
   Estimate interval;  ///< the value with its 95 % interval, numerical error left out
-  struct Share {
+  struct VarianceShare {
     Parameter parameter;
     double share;  ///< of the variance of ln(expected steps)
   };
-  std::vector<Share> shares;  ///< falling
+  std::vector<VarianceShare> shares;  ///< falling
 };
 
 /// Delta method in ln(steps): variance = sum of (derivative * standard error)^2. First order: trust it while the

@@ -32,9 +32,9 @@ std::vector<double> axis_values(double first, double last, double step) {
   return values;
 }
 
-std::size_t sweep_size(const std::vector<Axis>& axes) {
+std::size_t sweep_size(const std::vector<SweepAxis>& axes) {
   std::size_t size = 1;
-  for (const Axis& axis : axes) {
+  for (const SweepAxis& axis : axes) {
     size *= axis.values.size();
     if (size > most_points)
       throw std::invalid_argument(fmt::format("sweep: more than {} points; take coarser steps", most_points));
@@ -42,7 +42,8 @@ std::size_t sweep_size(const std::vector<Axis>& axes) {
   return size;
 }
 
-Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::size_t index, std::vector<double>* at) {
+Setting sweep_setting(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t index,
+                      std::vector<double>* at) {
   Setting setting = base;
   std::vector<double> place(axes.size());
   for (std::size_t a = axes.size(); a-- > 0;) {
@@ -54,11 +55,11 @@ Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::s
   return setting;
 }
 
-std::string sweep_description(const Setting& base, const std::vector<Axis>& axes) {
+std::string sweep_description(const Setting& base, const std::vector<SweepAxis>& axes) {
   // A number that varies is none: it is described as "nan".
   constexpr std::string_view none = "nan", slope = "nan deg";
   Setting setting = base;
-  for (const Axis& axis : axes) set_parameter(setting, axis.parameter, std::numeric_limits<double>::quiet_NaN());
+  for (const SweepAxis& axis : axes) set_parameter(setting, axis.parameter, std::numeric_limits<double>::quiet_NaN());
   std::string text = setting.describe();
   if (text.starts_with(slope)) text.replace(0, slope.size(), "slope varies");
   for (std::size_t at = text.find(none); at != std::string::npos; at = text.find(none, at))
@@ -66,7 +67,7 @@ std::string sweep_description(const Setting& base, const std::vector<Axis>& axes
   return text;
 }
 
-void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
+void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t begin, const StudyOptions& options,
            const std::function<void(std::size_t, const SweepPoint&)>& done) {
   const std::size_t size = sweep_size(axes);
   if (begin >= size) return;

@@ -12,7 +12,7 @@
 
 namespace metastable::analysis {
 
-struct Axis {
+struct SweepAxis {
   Parameter parameter = Parameter::slope;
   std::vector<double> values;  ///< ascending, not empty
 };
@@ -29,22 +29,22 @@ struct SweepPoint {
 };
 
 /// Number of points of the product of the axes. @throws std::invalid_argument if they are more than 1000000
-std::size_t sweep_size(const std::vector<Axis>& axes);
+std::size_t sweep_size(const std::vector<SweepAxis>& axes);
 
 /// The setting of point `index` (last axis fastest) and its coordinates.
 /// A launch that depends on the slope comes from `base`: sweeps keep base.initial_speed.
-Setting sweep_setting(const Setting& base, const std::vector<Axis>& axes, std::size_t index,
+Setting sweep_setting(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t index,
                       std::vector<double>* at = nullptr);
 
 /// Setting::describe() with the word "varies" in place of what the axes vary.
-std::string sweep_description(const Setting& base, const std::vector<Axis>& axes);
+std::string sweep_description(const Setting& base, const std::vector<SweepAxis>& axes);
 
 /// Studies points begin .. end-1 in brief (StudyOptions::brief), calling done(index, point) for each in this order, one
 /// call at a time (from whichever thread finished it); done may throw to stop. A point whose solver does not converge
 /// has the status solver_failed and its message, and no numbers. Points run side by side on the options' threads, each
 /// single-threaded: the numbers do not depend on that. options.progress is called within the points, always with 0; it
 /// may throw to stop.
-void sweep(const Setting& base, const std::vector<Axis>& axes, std::size_t begin, const StudyOptions& options,
+void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t begin, const StudyOptions& options,
            const std::function<void(std::size_t, const SweepPoint&)>& done);
 
 }  // namespace metastable::analysis

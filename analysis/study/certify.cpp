@@ -187,7 +187,7 @@ std::vector<Size> sizes(int phases, std::size_t largest) {
 CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
   if (!(options.tolerance > 0))
     throw std::invalid_argument(fmt::format("tolerance: {} is not above 0", options.tolerance));
-  setting.problem();  // validates
+  setting.validate();
   const dynamics::WheelMap map = setting.map();
   const dynamics::TruncatedNormal launch = setting.launch();
   const auto phase = static_cast<std::size_t>(setting.first_landing_leg % map.phases());

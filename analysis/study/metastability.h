@@ -89,7 +89,7 @@ struct PhaseDistribution {
   double mean = 0, sd = 0;    ///< of the observable
 };
 
-struct Share {
+struct ViolationShare {
   std::string name;
   double quasi_stationary = 0;  ///< of collisions in the metastable regime
   double until_rest =
@@ -127,7 +127,7 @@ struct Spectrum {
 struct Survivors {
   std::vector<PhaseDistribution> by_phase;
   double mean = 0, sd = 0;  ///< of the observable over all phases (equal shares)
-  /// Stationary, with a new launch after each rest; NaN where every launch rests at once.
+  /// These are stationary, with a new launch after each rest; NaN where every launch rests at its first collision.
   double restart_mean = 0, restart_sd = 0;
 };
 
@@ -150,8 +150,8 @@ struct Metastability {
   StepsToRest steps;
   Spectrum spectrum;
   Survivors survivors;
-  std::vector<Share> violations;      ///< of the return map's assumptions
-  std::vector<Agreement> agreements;  ///< of the finest chain, checked before the study is given (consistency.h)
+  std::vector<ViolationShare> violations;  ///< of the return map's assumptions
+  std::vector<Agreement> agreements;       ///< of the finest chain, checked before the study is given (consistency.h)
 };
 
 /// Pilot grid, graded cells, replicated draws, three cell sizes, refinement until the tolerance is met.

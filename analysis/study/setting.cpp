@@ -12,7 +12,13 @@ namespace metastable::analysis {
 
 dynamics::ContactNoise Setting::noise() const {
   if (!pairs.empty()) return dynamics::ContactNoise::empirical(pairs);
-  return dynamics::ContactNoise::normal(restitution.mean, restitution.sd, friction.mean, friction.sd, correlation);
+  return dynamics::ContactNoise::normal(restitution.mean, restitution.sd, friction.mean, friction.sd, correlation,
+                                        law == dynamics::Law::settled ? dynamics::most_settled_restitution : 1);
+}
+
+dynamics::SettledMotion Setting::motion() const {
+  return dynamics::SettledMotion(
+      dynamics::settled_wheel(wheel, slope_deg * std::numbers::pi / 180.0, wheel.tip_radius));
 }
 
 dynamics::TruncatedNormal Setting::launch() const {
@@ -29,12 +35,33 @@ dynamics::WheelMap Setting::map() const {
   return dynamics::WheelMap(wheel, slope_deg * std::numbers::pi / 180.0, law, noise(), rebound_lost);
 }
 
-Problem Setting::problem() const {
+void Setting::validate() const {
   const dynamics::WheelMap wheel_map = map();
+  if (law == dynamics::Law::settled) {
+    motion();
+    if (pairs.empty() && restitution.mean > dynamics::most_settled_restitution)
+      throw std::invalid_argument(fmt::format("restitution: mean {} is outside [0, {}], the range of law settled",
+                                              restitution.mean, dynamics::most_settled_restitution));
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      if (pairs[i].restitution > dynamics::most_settled_restitution)
+        throw std::invalid_argument(
+            fmt::format("pairs[{}]: restitution {} is outside [0, {}], the range of law settled", i,
+                        pairs[i].restitution, dynamics::most_settled_restitution));
+  }
+  launch();
   if (!(ramp_length > 0)) throw std::invalid_argument(fmt::format("ramp length: {} m is not above 0", ramp_length));
   if (first_landing_leg < 0 || first_landing_leg >= wheel.legs())
     throw std::invalid_argument(
         fmt::format("first landing leg: {} is outside 0..{}", first_landing_leg, wheel.legs() - 1));
+}
+
+Problem Setting::problem() const {
+  validate();
+  if (law == dynamics::Law::settled)
+    throw std::invalid_argument(
+        "law: no chain stands on settled; `metastable simulate` rolls it, and `metastable describe --against settled` "
+        "holds it against trials");
+  const dynamics::WheelMap wheel_map = map();
   const dynamics::TruncatedNormal speed = launch();
   const auto state = [speed](double score) {
     const double omega = speed.at_score(score);
@@ -68,6 +95,7 @@ std::string Setting::describe() const {
   const Setting paper;
   if (wheel.hub_mass != paper.wheel.hub_mass) text += fmt::format(", M = {} kg", wheel.hub_mass);
   if (wheel.inertia) text += fmt::format(", I = {} kg m^2", *wheel.inertia);
+  if (wheel.tip_radius != 0) text += fmt::format(", tips of {} m", wheel.tip_radius);
   if (wheel.ramp_stiffness != paper.wheel.ramp_stiffness) text += fmt::format(", K_r = {} N/m", wheel.ramp_stiffness);
   if (wheel.contact_mass) text += fmt::format(", m_c = {} kg", *wheel.contact_mass);
   if (wheel.gravity != paper.wheel.gravity) text += fmt::format(", g = {} m/s^2", wheel.gravity);

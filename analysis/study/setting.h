@@ -7,6 +7,7 @@
 
 #include "analysis/study/problem.h"
 #include "dynamics/return_map/wheel_map.h"
+#include "dynamics/settled/settled_motion.h"
 
 namespace metastable::analysis {
 
@@ -23,7 +24,7 @@ struct Setting {
   double ramp_length = 3.66;  ///< [m], > 0
   dynamics::Law law = dynamics::Law::published;
   double rebound_lost = 0;               ///< share of the rebound's energy lost in hops, `coulomb` only
-  Spread restitution{0.4, 0.1};          ///< eta, truncated to [0, 1]
+  Spread restitution{0.4, 0.1};          ///< eta, truncated to [0, 1] ([0, 0.95] under `settled`)
   Spread friction{0.4, 0.1};             ///< mu, truncated to [0, inf)
   double correlation = 0;                ///< of the normal scores of eta and mu
   std::vector<dynamics::Contact> pairs;  ///< not empty: an empirical list instead of the normals
@@ -32,8 +33,13 @@ struct Setting {
 
   dynamics::ContactNoise noise() const;
   dynamics::TruncatedNormal launch() const;
+  /// Wheel, ramp and stances; under `settled` nothing about collisions.
   /// @throws std::invalid_argument, one line naming the quantity, its value and its range
   dynamics::WheelMap map() const;
+  /// The wheel of the law `settled`, whatever `law` is. @throws as map()
+  dynamics::SettledMotion motion() const;
+  /// @throws std::invalid_argument, one line naming the quantity, its value and its range
+  void validate() const;
   /// The generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on the
   /// ramp.
   Problem problem() const;

@@ -24,6 +24,12 @@ std::array<double, 2> scores(std::uint64_t seed, std::uint64_t index, std::uint6
   return {score(bits[0]), score(bits[1])};
 }
 
+// Contact of collision `number` of a trial.
+Contact contact_at(const ContactNoise& noise, std::uint64_t seed, std::uint64_t index, std::uint64_t number) {
+  const auto both = scores(seed, index, number);
+  return noise.draw(std::span(both).first(static_cast<std::size_t>(noise.dimension())));
+}
+
 // Follows one trial as it unfolds. Event 0 of a trial is the launch, event n its collision n.
 class Roll {
  public:
@@ -38,10 +44,7 @@ class Roll {
   int phase() const { return leg() % map_.phases(); }
   std::uint64_t number() const { return number_; }
   double state() const { return state_; }
-  Contact contact() const {
-    const auto both = scores(seed_, index_, number_);
-    return map_.noise().draw(std::span(both).first(static_cast<std::size_t>(map_.noise_dimension())));
-  }
+  Contact contact() const { return contact_at(map_.noise(), seed_, index_, number_); }
   void go_on(double state) {
     state_ = state;
     ++number_;
@@ -61,25 +64,69 @@ TruncatedNormal forwards(const TruncatedNormal& launch) {
   return launch.lower() >= 0 ? launch : TruncatedNormal(launch.mean(), launch.sd(), 0, launch.upper());
 }
 
-void check_leg(const WheelMap& map, int leg) {
-  if (leg < 0 || leg >= map.wheel().legs())
-    throw std::invalid_argument(fmt::format("first_landing_leg: {} is outside [0, {}]", leg, map.wheel().legs() - 1));
+void check_leg(int legs, int leg) {
+  if (leg < 0 || leg >= legs)
+    throw std::invalid_argument(fmt::format("first_landing_leg: {} is outside [0, {}]", leg, legs - 1));
 }
+
+void check_collisions(const TrialOptions& options) {
+  if (options.max_collisions < 1)
+    throw std::invalid_argument(fmt::format("max_collisions: {} is outside [1, inf)", options.max_collisions));
+}
+
+void check_ramp(double ramp_length) {
+  if (!(ramp_length >= 0))
+    throw std::invalid_argument(fmt::format("ramp_length: {} m is outside [0, inf]", ramp_length));
+}
+
+// A trial under `settled` as it unfolds.
+class SettledTrial {
+ public:
+  SettledTrial(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+               int first_landing_leg, std::uint64_t seed, std::uint64_t index)
+      : noise_(noise),
+        seed_(seed),
+        index_(index),
+        contact_(contact_at(noise, seed, index, 1)),
+        roll_(motion, first_landing_leg, forwards(launch).at_score(scores(seed, index, 0)[0]), contact_, contact_) {}
+
+  const SettledRoll& roll() const { return roll_; }
+  const Contact& contact() const { return contact_; }  // of the collision that comes
+  Step step() {
+    const Step step = roll_.step();
+    contact_ = contact_at(noise_, seed_, index_, ++number_);
+    if (step.touched) roll_.set_contact(contact_);
+    return step;
+  }
+
+ private:
+  const ContactNoise& noise_;
+  std::uint64_t seed_, index_, number_ = 1;
+  Contact contact_;
+  SettledRoll roll_;
+};
 
 }  // namespace
 
 int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ramp_length) {
-  check_leg(map, first_landing_leg);
-  if (!(ramp_length >= 0))
-    throw std::invalid_argument(fmt::format("ramp_length: {} m is outside [0, inf]", ramp_length));
+  check_leg(map.wheel().legs(), first_landing_leg);
+  std::vector<double> advance;
+  for (int p = 0; p < map.phases(); ++p) advance.push_back(map.advance(p));
+  return last_collision_on_ramp(advance, first_landing_leg % map.phases(), ramp_length);
+}
+
+int last_collision_on_ramp(std::span<const double> advance, int first_phase, double ramp_length) {
+  check_ramp(ramp_length);
+  const int phases = static_cast<int>(advance.size());
+  const auto from = [&](int phase) { return advance[static_cast<std::size_t>(phase)]; };
   double revolution = 0;
-  for (int p = 0; p < map.phases(); ++p) revolution += map.advance(p);
+  for (const double one : advance) revolution += one;
   const double whole = std::floor(ramp_length / revolution);
-  if (whole * map.phases() > std::numeric_limits<int>::max() / 2) return std::numeric_limits<int>::max();
-  int number = 1 + static_cast<int>(whole) * map.phases();
+  if (whole * phases > std::numeric_limits<int>::max() / 2) return std::numeric_limits<int>::max();
+  int number = 1 + static_cast<int>(whole) * phases;
   double position = whole * revolution;
-  for (int p = first_landing_leg % map.phases(); position + map.advance(p) <= ramp_length; p = (p + 1) % map.phases()) {
-    position += map.advance(p);
+  for (int p = first_phase; position + from(p) <= ramp_length; p = (p + 1) % phases) {
+    position += from(p);
     ++number;
   }
   return number;
@@ -87,8 +134,7 @@ int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ra
 
 Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
                      std::uint64_t index) {
-  if (options.max_collisions < 1)
-    throw std::invalid_argument(fmt::format("max_collisions: {} is outside [1, inf)", options.max_collisions));
+  check_collisions(options);
   const int last = last_collision_on_ramp(map, options.first_landing_leg, options.ramp_length);
   Roll roll(map, forwards(launch), options.first_landing_leg, options.seed, index);
   Trial trial;
@@ -126,9 +172,43 @@ Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const T
   }
 }
 
+Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+                     const TrialOptions& options, std::uint64_t index) {
+  check_collisions(options);
+  check_ramp(options.ramp_length);
+  check_leg(motion.wheel().legs(), options.first_landing_leg);
+  if (!options.rest_rule) throw std::invalid_argument("rest_rule: under `settled` a wheel that stops has stopped");
+  SettledTrial of(motion, noise, launch, options.first_landing_leg, options.seed, index);
+  Trial trial;
+  for (;;) {
+    TrialCollision c;
+    c.number = static_cast<int>(trial.collisions.size()) + 1;
+    c.leg = of.roll().leg() % motion.wheel().legs();
+    c.time = of.roll().time();
+    c.position = of.roll().position();
+    c.omega_minus = of.roll().spin();
+    c.contact = of.contact();
+    const Step step = of.step();
+    c.omega_plus = std::max(0.0, step.landing.omega_plus);
+    trial.collisions.push_back(c);
+    trial.outcome = !step.touched                                ? Outcome::rest
+                    : of.roll().position() > options.ramp_length ? Outcome::end_of_ramp
+                                                                 : Outcome::max_collisions;
+    if (trial.outcome != Outcome::max_collisions || c.number == options.max_collisions) return trial;
+  }
+}
+
+std::uint64_t steps_to_rest(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+                            int first_landing_leg, std::uint64_t seed, std::uint64_t index, std::uint64_t limit) {
+  check_leg(motion.wheel().legs(), first_landing_leg);
+  SettledTrial of(motion, noise, launch, first_landing_leg, seed, index);
+  for (std::uint64_t number = 1;; ++number)
+    if (!of.step().touched || number >= limit) return number;
+}
+
 std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,
                             std::uint64_t seed, std::uint64_t index, std::uint64_t limit) {
-  check_leg(map, first_landing_leg);
+  check_leg(map.wheel().legs(), first_landing_leg);
   for (Roll roll(map, forwards(launch), first_landing_leg, seed, index);;) {
     const Stance& stance = map.stance(roll.phase());
     const double after = map.after_collision(roll.state(), roll.phase(), roll.contact());

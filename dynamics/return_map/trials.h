@@ -2,9 +2,11 @@
 // Simulates whole trials directly: the independent check of the chain, and made-up experiments.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "dynamics/return_map/wheel_map.h"
+#include "dynamics/settled/settled_motion.h"
 #include "dynamics/wheel/outcome.h"
 #include "dynamics/wheel/truncated_normal.h"
 
@@ -42,11 +44,24 @@ struct TrialOptions {
 Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
                      std::uint64_t index);
 
+/// The same under `settled`: the wheel is rolled event by event, with whatever motion its feet still have when the next
+/// leg touches. Before the first collision it stands on a foot with that collision's contact. `loss` is left empty,
+/// omega_plus is the speed after the first impact; a wheel that chatters on two feet without end counts as one at rest,
+/// and the end of the ramp is reached when the next foot touches beyond it.
+/// @throws std::invalid_argument for options out of range, and without the rest rule
+Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+                     const TrialOptions& options, std::uint64_t index);
+
 /// Counts the steps before failure of trial `index` without storing it, at most `limit` (returned when reached).
 std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,
                             std::uint64_t seed, std::uint64_t index, std::uint64_t limit);
 
+std::uint64_t steps_to_rest(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+                            int first_landing_leg, std::uint64_t seed, std::uint64_t index, std::uint64_t limit);
+
 /// Returns the number of the last collision on a ramp of that length (foot 1 at 0 m): who survives it reaches the end.
 int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ramp_length);
+/// The same from the distances [m] from the foot of each phase to the next one's.
+int last_collision_on_ramp(std::span<const double> advance, int first_phase, double ramp_length);
 
 }  // namespace metastable::dynamics

@@ -302,7 +302,7 @@ void SettledMap::build() {
   });
 }
 
-bool SettledMap::place(int leg, double omega, double eta, Place& place) const {
+bool SettledMap::place(int leg, double omega, double eta, TablePlace& place) const {
   if (table_.empty()) return false;
   const Table& table = table_[static_cast<std::size_t>(leg)];
   const SettledRange& range = options_.range;
@@ -325,7 +325,7 @@ bool SettledMap::place(int leg, double omega, double eta, Place& place) const {
   return true;
 }
 
-MappedLanding SettledMap::read(int leg, double omega, double eta, double friction, const Place& place) const {
+MappedLanding SettledMap::read(int leg, double omega, double eta, double friction, const TablePlace& place) const {
   const Table& table = table_[static_cast<std::size_t>(leg)];
   const double sticking = sticking_[static_cast<std::size_t>(leg)];
   MappedLanding landed;
@@ -363,12 +363,12 @@ MappedLanding SettledMap::read(int leg, double omega, double eta, double frictio
 }
 
 bool SettledMap::tabulated(int leg, double omega, double eta) const {
-  Place at;
+  TablePlace at;
   return place(leg, omega, eta, at);
 }
 
 double SettledMap::resting_friction(int leg, double omega, double eta) const {
-  Place at;
+  TablePlace at;
   if (place(leg, omega, eta, at)) return at.edge[stops];
   return solve_resting(leg, omega, eta, 0);
 }
@@ -380,14 +380,14 @@ MappedLanding SettledMap::follow(int leg, double omega, const Contact& contact) 
 }
 
 MappedLanding SettledMap::land(int leg, double omega, const Contact& contact) const {
-  Place at;
+  TablePlace at;
   return place(leg, omega, contact.restitution, at) ? read(leg, omega, contact.restitution, contact.friction, at)
                                                     : follow(leg, omega, contact);
 }
 
 void SettledMap::land(int leg, double omega, double eta, std::span<const double> friction,
                       std::span<MappedLanding> landed) const {
-  Place at;
+  TablePlace at;
   const bool known = place(leg, omega, eta, at);
   for (std::size_t i = 0; i < friction.size(); ++i)
     landed[i] = known ? read(leg, omega, eta, friction[i], at) : follow(leg, omega, {eta, friction[i]});

@@ -103,7 +103,7 @@ class SettledMap {
     std::array<double, width> weight{};
   };
   // Everything that does not depend on mu.
-  struct Place {
+  struct TablePlace {
     Stencil eta, omega;
     std::array<double, stops + 1> edge{};  // mu_2, mu_3, ..., mu_r
     double bend = 0, scale = 0;
@@ -121,9 +121,9 @@ class SettledMap {
   double speed(double standstill, double share) const;
   double share(double standstill, double omega) const;
   int places() const { return stops * piece + options_.frictions; }
-  bool place(int leg, double omega, double eta, Place& place) const;
+  bool place(int leg, double omega, double eta, TablePlace& place) const;
   // From the table, or followed where some of its nodes there are unsettled.
-  MappedLanding read(int leg, double omega, double eta, double friction, const Place& place) const;
+  MappedLanding read(int leg, double omega, double eta, double friction, const TablePlace& place) const;
   MappedLanding follow(int leg, double omega, const Contact& contact) const;
 
   SettledMotion motion_;

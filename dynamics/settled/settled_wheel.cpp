@@ -27,7 +27,7 @@ double SettledWheel::leg_angle() const { return 2 * std::numbers::pi / legs(); }
 
 double SettledWheel::length(int leg) const {
   const int index = leg % legs();
-  return leg_length[static_cast<std::size_t>(index < 0 ? index + legs() : index)];
+  return leg_length[static_cast<std::size_t>(index < 0 ? index + legs() : index)] - tip_radius;
 }
 
 double SettledWheel::drag(double spin) const {

@@ -8,8 +8,9 @@
 
 namespace metastable::dynamics {
 
-/// A planar rigid wheel on a plane of constant slope, SI units. The tips of the legs are discs of radius r about the
-/// legs' ends (at l_i from the hub), so a standing foot rolls on its disc.
+/// A planar rigid wheel on a plane of constant slope, SI units. The legs end in discs of radius r that reach to l_i
+/// from the hub, so a standing foot rolls on its disc. (Of a rigid-body engine with tips of 0.5 mm this gives mean
+/// speeds and paces inside their errors; discs about the points at l_i are 0.003 rad/s and 0.5 mm off.)
 struct SettledWheel {
   std::vector<double> leg_length = paper_leg_lengths();  ///< l_i [m], in the order they land
   double mass = 1.39;                                    ///< M [kg], > 0
@@ -27,7 +28,8 @@ struct SettledWheel {
   bool operator==(const SettledWheel&) const = default;
   int legs() const { return static_cast<int>(leg_length.size()); }
   double leg_angle() const;
-  double length(int leg) const;  ///< of any whole number, counted around the wheel [m]
+  /// From the hub to the centre of a leg's tip, l_i - r [m]. @param leg any whole number, counted around the wheel
+  double length(int leg) const;
   double gyration_sq() const { return radius_of_gyration * radius_of_gyration; }
   bool drags() const { return constant_drag > 0 || linear_drag > 0 || quadratic_drag > 0; }
   /// Torque / M [m^2/s^2], against the spin.
@@ -67,6 +69,9 @@ class StandingFoot {
   double length_, radius_, gravity_, gyration_sq_, sine_, cosine_;
   double landing_, next_, apex_, pace_;
 };
+
+/// Restitutions above it make feet hop for longer than a step.
+inline constexpr double most_settled_restitution = 0.95;
 
 /// Friction from which a rolling wheel's landing on `leg` does not slip, mu_c = d h / (J/M + h^2).
 double sticking_friction(const SettledWheel& wheel, int leg);

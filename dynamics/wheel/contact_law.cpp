@@ -14,10 +14,10 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr double coulomb_gyration = 0.05;  // [m]: not in the paper, an assumption of this project
+constexpr double assumed_gyration = 0.05;  // [m]: not in the paper, an assumption of this project
 
-constexpr std::array<std::pair<std::string_view, Law>, 3> names{
-    {{"published", Law::published}, {"coulomb", Law::coulomb}, {"plastic", Law::plastic}}};
+constexpr std::array<std::pair<std::string_view, Law>, 4> names{
+    {{"published", Law::published}, {"coulomb", Law::coulomb}, {"plastic", Law::plastic}, {"settled", Law::settled}}};
 
 double radius_of_gyration(const Wheel& wheel, Law law) {
   if (wheel.radius_of_gyration) return *wheel.radius_of_gyration;
@@ -31,7 +31,7 @@ double radius_of_gyration(const Wheel& wheel, Law law) {
                       *wheel.inertia, about_foot));
     return std::sqrt(std::max(0.0, (*wheel.inertia - about_foot) / wheel.hub_mass));
   }
-  return law == Law::coulomb ? coulomb_gyration : 0;
+  return law == Law::plastic ? 0 : assumed_gyration;
 }
 
 }  // namespace
@@ -72,8 +72,10 @@ Loss collide(const ContactModel& model, const Collision& collision, const Contac
       return coulomb_loss(model, collision, contact);
     case Law::plastic:
       return plastic_loss(model, collision);
+    case Law::settled:
+      break;
   }
-  throw std::logic_error("collide: unknown law");
+  throw std::logic_error("collide: not a law of one impact");
 }
 
 std::vector<double> friction_breaks(const ContactModel& model, const Collision& collision) {
@@ -84,8 +86,10 @@ std::vector<double> friction_breaks(const ContactModel& model, const Collision& 
       return {coulomb_sticking_friction(model, collision)};
     case Law::plastic:
       return {};
+    case Law::settled:
+      break;
   }
-  throw std::logic_error("friction_breaks: unknown law");
+  throw std::logic_error("friction_breaks: not a law of one impact");
 }
 
 double stance_inertia(const Wheel& wheel, Law law, double length) {

@@ -10,9 +10,9 @@
 
 namespace metastable::dynamics {
 
-enum class Law { published, coulomb, plastic };
+enum class Law { published, coulomb, plastic, settled };
 
-/// "published", "coulomb", "plastic". @throws std::invalid_argument naming the three.
+/// "published", "coulomb", "plastic", "settled". @throws std::invalid_argument naming the four.
 Law law_from_name(std::string_view name);
 std::string_view law_name(Law law);
 std::vector<std::string> law_names();
@@ -49,14 +49,14 @@ struct ContactModel {
   Law law = Law::published;
   double mass = 0;  ///< M [kg]
   double radius_of_gyration =
-      0;  ///< r_g [m] about the hub: coulomb default 0.05, plastic default 0; published uses r = L2 instead
+      0;  ///< r_g [m] about the hub: coulomb and settled default 0.05, plastic default 0; published uses r = L2 instead
   double ramp_stiffness = 0;  ///< K_r [N/m], published
   double contact_mass = 0;    ///< m_c [kg], published
   double gravity = 0;         ///< g [m/s^2]
   double rebound_lost = 0;    ///< in [0, 1], coulomb
 };
-/// A wheel whose inertia is given but not its radius of gyration gets the r_g that belongs to it in `coulomb` and
-/// `plastic`: r_g^2 = I/M - (mean L)^2.
+/// A wheel whose inertia is given but not its radius of gyration gets the r_g that belongs to it in every law but
+/// `published`: r_g^2 = I/M - (mean L)^2.
 /// @throws std::invalid_argument for rebound_lost outside [0, 1], or an inertia below M (mean L)^2 in that case
 ContactModel contact_model(const Wheel& wheel, Law law, double rebound_lost = 0);
 
@@ -65,6 +65,7 @@ ContactModel contact_model(const Wheel& wheel, Law law, double rebound_lost = 0)
 ///   coulomb:   planar stick-slip with energetic restitution (Stronge 1990), any sign of u0, slip stop and reversal
 ///   plastic:   no slip, no rebound (McGeer 1990); the loss is that of the angular momentum balance about the foot
 /// O(1).
+/// @throws std::logic_error under `settled`, whose landing is a motion of its own (dynamics/settled)
 Loss collide(const ContactModel& model, const Collision& collision, const Contact& contact);
 
 /// Frictions at which the loss of a rolling wheel's collision (u0 = 0) changes its form as a function of mu, ascending.
@@ -73,7 +74,7 @@ std::vector<double> friction_breaks(const ContactModel& model, const Collision& 
 
 /// Inertia about the stance foot of leg length L [kg m^2].
 ///   published: wheel.inertia, default M (mean L)^2, the same for every leg
-///   coulomb, plastic: M (r_g^2 + L^2); a given wheel.inertia is read as that of the mean leg and shifted by M (L^2 -
+///   others: M (r_g^2 + L^2); a given wheel.inertia is read as that of the mean leg and shifted by M (L^2 -
 ///   mean L^2)
 double stance_inertia(const Wheel& wheel, Law law, double length);
 

@@ -28,10 +28,10 @@ ContactNoise::ContactNoise(TruncatedNormal restitution, TruncatedNormal friction
     : restitution_(restitution), friction_(friction), correlation_(correlation), pairs_(std::move(pairs)) {}
 
 ContactNoise ContactNoise::normal(double restitution_mean, double restitution_sd, double friction_mean,
-                                  double friction_sd, double correlation) {
+                                  double friction_sd, double correlation, double most_restitution) {
   if (!(correlation > -1 && correlation < 1))
     throw std::invalid_argument(fmt::format("correlation: {} is outside (-1, 1)", correlation));
-  return {named("restitution", restitution_mean, restitution_sd, 0, 1),
+  return {named("restitution", restitution_mean, restitution_sd, 0, most_restitution),
           named("friction", friction_mean, friction_sd, 0, infinity),
           correlation,
           {}};

@@ -17,14 +17,15 @@ struct Contact {
 
 /// Distributes (eta, mu), drawn afresh and independently at every collision.
 ///
-/// Either truncated normals (eta on [0, 1], mu on [0, inf)), joined by a Gaussian copula of the given correlation, or
-/// an empirical list of pairs, each equally likely.
+/// Either truncated normals (eta on [0, 1] or less, mu on [0, inf)), joined by a Gaussian copula of the given
+/// correlation, or an empirical list of pairs, each equally likely.
 class ContactNoise {
  public:
   /// @param correlation of the normal scores of eta and mu, in (-1, 1)
   /// @throws std::invalid_argument as TruncatedNormal, and for a correlation out of range
+  /// @param most_restitution upper bound of eta, in (0, 1]
   static ContactNoise normal(double restitution_mean, double restitution_sd, double friction_mean, double friction_sd,
-                             double correlation = 0);
+                             double correlation = 0, double most_restitution = 1);
   /// @throws std::invalid_argument for an empty list, eta outside [0, 1] or mu < 0 (with the index)
   static ContactNoise empirical(std::vector<Contact> pairs);
 

@@ -6,10 +6,11 @@
 namespace metastable::dynamics {
 
 std::span<const Law> laws_with(LawQuantity quantity) {
-  static constexpr Law with_contacts[] = {Law::published, Law::coulomb};
-  static constexpr Law rigid[] = {Law::coulomb, Law::plastic};
+  static constexpr Law with_contacts[] = {Law::published, Law::coulomb, Law::settled};
+  static constexpr Law rigid[] = {Law::coulomb, Law::plastic, Law::settled};
   static constexpr Law compliant[] = {Law::published};
   static constexpr Law hopping[] = {Law::coulomb};
+  static constexpr Law followed[] = {Law::settled};
   switch (quantity) {
     case LawQuantity::restitution:
     case LawQuantity::friction:
@@ -18,6 +19,8 @@ std::span<const Law> laws_with(LawQuantity quantity) {
       return hopping;
     case LawQuantity::radius_of_gyration:
       return rigid;
+    case LawQuantity::tip_radius:
+      return followed;
     case LawQuantity::ramp_stiffness:
     case LawQuantity::contact_mass:
       return compliant;

@@ -13,6 +13,7 @@ enum class LawQuantity {
   friction,            ///< mu
   rebound_lost,        ///< share of the rebound's energy lost in hops
   radius_of_gyration,  ///< r_g
+  tip_radius,          ///< r
   ramp_stiffness,      ///< K_r
   contact_mass         ///< m_c
 };

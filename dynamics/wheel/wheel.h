@@ -19,6 +19,7 @@ struct Wheel {
   std::optional<double> inertia;
   /// Radius of gyration about the hub, r_g [m], >= 0. Not given: each law has its own default.
   std::optional<double> radius_of_gyration;
+  double tip_radius = 0;               ///< r of the legs' round tips [m], in [0, shortest leg / 20]; `settled` only
   std::optional<double> contact_mass;  ///< m_c [kg] of the Kelvin-Voigt contact (25); default M
   double ramp_stiffness = 9000.0;      ///< K_r [N/m], > 0
   double gravity = 9.81;               ///< g [m/s^2], > 0

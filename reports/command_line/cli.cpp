@@ -75,54 +75,53 @@ Command compare() {
 }
 
 Command sweep() {
-  return {"sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
-          [](Options& o) {
-            o.add("slope", "RANGE", "7.02",
-                  "[deg] first:last:step, a comma list or one value; likewise the other axes");
-            o.add("restitution-mean", "RANGE", "", "Mean of eta", dynamics::range::restitution);
-            o.add("restitution-sd", "RANGE", "", "Sd of eta", dynamics::range::restitution);
-            o.add("friction-mean", "RANGE", "", "Mean of mu", dynamics::range::friction);
-            o.add("friction-sd", "RANGE", "", "Sd of mu", dynamics::range::friction);
-            o.add("initial-speed", "MEAN,SD", "",
-                  "Of all points (default: the paper's if the one slope is 7.02 or 9.59)", dynamics::range::speed);
-            add_wheel(o), add_contact(o), add_course(o), add_study(o);
-            o.add("out", "FILE", "sweep.csv",
-                  "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
-          },
-          [](const Options& o, const std::string& line) {
-            SweepRequest request;
-            request.setting = common_setting(o);
-            for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
-              if (o.text(name).empty()) continue;
-              analysis::Axis axis{analysis::parameter_from_name(name), range_value(name, o.text(name), o.range(name))};
-              if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
-                request.setting.slope_deg = axis.values.front();
-              else
-                request.axes.push_back(std::move(axis));
-            }
-            if (request.axes.empty())
-              throw std::invalid_argument(
-                  "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
-                  "--friction-mean or --friction-sd as first:last:step)");
-            for (const analysis::Axis& axis : request.axes)
-              if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
-                throw std::invalid_argument(
-                    fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
-            for (const analysis::Axis& axis : request.axes)
-              if (request.setting.law == dynamics::Law::plastic && axis.parameter != analysis::Parameter::slope)
-                throw std::invalid_argument(
-                    fmt::format("--{}: has no meaning under --law plastic", analysis::parameter_name(axis.parameter)));
-            const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
-            std::optional<std::string> launch;
-            if (o.given("initial-speed")) launch = o.text("initial-speed");
-            if (!launch && !one_slope)
-              throw std::invalid_argument("--initial-speed: must be given when the slope varies");
-            request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
-            request.study = study_options(o);
-            request.out = o.text("out");
-            request.command = line;
-            run_sweep(request);
-          }};
+  return {
+      "sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
+      [](Options& o) {
+        o.add("slope", "RANGE", "7.02", "[deg] first:last:step, a comma list or one value; likewise the other axes");
+        o.add("restitution-mean", "RANGE", "", "Mean of eta", dynamics::range::restitution);
+        o.add("restitution-sd", "RANGE", "", "Sd of eta", dynamics::range::restitution);
+        o.add("friction-mean", "RANGE", "", "Mean of mu", dynamics::range::friction);
+        o.add("friction-sd", "RANGE", "", "Sd of mu", dynamics::range::friction);
+        o.add("initial-speed", "MEAN,SD", "", "Of all points (default: the paper's if the one slope is 7.02 or 9.59)",
+              dynamics::range::speed);
+        add_wheel(o), add_contact(o), add_course(o), add_study(o);
+        o.add("out", "FILE", "sweep.csv",
+              "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
+      },
+      [](const Options& o, const std::string& line) {
+        SweepRequest request;
+        request.setting = common_setting(o);
+        for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
+          if (o.text(name).empty()) continue;
+          analysis::SweepAxis axis{analysis::parameter_from_name(name), range_value(name, o.text(name), o.range(name))};
+          if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
+            request.setting.slope_deg = axis.values.front();
+          else
+            request.axes.push_back(std::move(axis));
+        }
+        if (request.axes.empty())
+          throw std::invalid_argument(
+              "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
+              "--friction-mean or --friction-sd as first:last:step)");
+        for (const analysis::SweepAxis& axis : request.axes)
+          if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
+            throw std::invalid_argument(
+                fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
+        for (const analysis::SweepAxis& axis : request.axes)
+          if (request.setting.law == dynamics::Law::plastic && axis.parameter != analysis::Parameter::slope)
+            throw std::invalid_argument(
+                fmt::format("--{}: has no meaning under --law plastic", analysis::parameter_name(axis.parameter)));
+        const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
+        std::optional<std::string> launch;
+        if (o.given("initial-speed")) launch = o.text("initial-speed");
+        if (!launch && !one_slope) throw std::invalid_argument("--initial-speed: must be given when the slope varies");
+        request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
+        request.study = study_options(o);
+        request.out = o.text("out");
+        request.command = line;
+        run_sweep(request);
+      }};
 }
 
 Command report() {

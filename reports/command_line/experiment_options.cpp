@@ -216,7 +216,8 @@ Command describe() {
             o.add_place("DIR", "Experiment folder");
             o.add("transition", "auto|collision|step", "auto",
                   "Restitution and friction from omega_minus to omega_plus, or to the next omega_minus");
-            o.add("against", "LAW,LAW,...", "", "Compare with simulated trials under published, coulomb, plastic");
+            o.add("against", "LAW,LAW,...", "",
+                  "Compare with simulated trials under published, coulomb, plastic, settled");
             o.add("trials", "N", "2000", "Simulated trials of that comparison, 2..1000000");
             o.add_seed();
             o.add_threads();

@@ -24,6 +24,7 @@ dynamics::Wheel wheel(const Options& options) {
   wheel.hub_mass = options.number("mass");
   if (options.given("inertia")) wheel.inertia = options.number("inertia");
   if (options.given("radius-of-gyration")) wheel.radius_of_gyration = options.number("radius-of-gyration");
+  wheel.tip_radius = options.number("tip-radius");
   wheel.ramp_stiffness = options.number("ramp-stiffness");
   if (options.given("contact-mass")) wheel.contact_mass = options.number("contact-mass");
   wheel.gravity = options.number("gravity");
@@ -42,6 +43,7 @@ constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
     {"contact-list", dynamics::LawQuantity::friction},
     {"rebound-lost", dynamics::LawQuantity::rebound_lost},
     {"radius-of-gyration", dynamics::LawQuantity::radius_of_gyration},
+    {"tip-radius", dynamics::LawQuantity::tip_radius},
     {"ramp-stiffness", dynamics::LawQuantity::ramp_stiffness},
     {"contact-mass", dynamics::LawQuantity::contact_mass}};
 
@@ -52,7 +54,7 @@ void check_law(const Options& options, dynamics::Law law) {
     if (quantity == dynamics::LawQuantity::radius_of_gyration && options.has("reality")) continue;
     throw std::invalid_argument(
         fmt::format("--{}: has a meaning under --law {} only", name,
-                    fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), " and ")));
+                    fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
   }
 }
 
@@ -66,7 +68,7 @@ void check_slope(const analysis::Setting& setting) {
 
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
 analysis::Setting checked(analysis::Setting setting) {
-  setting.problem();
+  setting.validate();
   return setting;
 }
 
@@ -79,10 +81,12 @@ void add_wheel(Options& options) {
   options.add("mass", "KG", "1.39", "Hub mass M [kg]", range::mass);
   options.add("inertia", "KGM2", "",
               "About the stance foot [kg m^2], from M (mean L)^2 to ten times that (default: M (mean L)^2; under "
-              "coulomb and plastic plus M r_g^2)");
+              "the other laws plus M r_g^2)");
   options.add("radius-of-gyration", "M", "",
-              "About the hub [m], at most three mean legs (default: 0.05 under coulomb, 0 under plastic)",
+              "About the hub [m], at most three mean legs (default: 0.05 under coulomb and settled, 0 under plastic)",
               range::radius_of_gyration);
+  options.add("tip-radius", "M", "0", "Of the legs' round tips [m], at most a twentieth of the shortest leg (settled)",
+              range::tip_radius);
   options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m] (published)", range::ramp_stiffness);
   options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (published; default: the hub mass)",
               range::mass);
@@ -90,7 +94,7 @@ void add_wheel(Options& options) {
 }
 
 void add_contact(Options& options) {
-  options.add("law", "published|coulomb|plastic", "published", "Contact law");
+  options.add("law", "published|coulomb|plastic|settled", "published", "Contact law");
   options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops, 0..1 (coulomb)");
   options.add("restitution", "MEAN,SD", "0.4,0.1", "eta, normal truncated to [0, 1]; SD 0 or MEAN alone: constant",
               range::restitution);

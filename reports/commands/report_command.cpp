@@ -99,7 +99,7 @@ class Report {
 
   // One table and one map of expected steps over two axes.
   void grid(const std::string& id, const std::string& heading, const std::string& title, const std::string& reading,
-            const analysis::Setting& base, const analysis::Axis& down, const analysis::Axis& across) {
+            const analysis::Setting& base, const analysis::SweepAxis& down, const analysis::SweepAxis& across) {
     std::vector<analysis::Metastability> studies;
     analysis::sweep(base, {down, across}, 0, request_.study, [&](std::size_t, const analysis::SweepPoint& point) {
       if (point.failure) std::rethrow_exception(point.failure);

@@ -45,7 +45,7 @@ struct CompareRequest {
 /// metastable sweep
 struct SweepRequest {
   analysis::Setting setting;
-  std::vector<analysis::Axis> axes;
+  std::vector<analysis::SweepAxis> axes;
   analysis::StudyOptions study;
   std::string out = "sweep.csv";  ///< the figure goes beside it, with the ending .svg
   std::string command;

@@ -30,7 +30,7 @@ constexpr std::size_t most_map_rows = 16;
 std::string head(const SweepRequest& request) {
   const analysis::StudyOptions& study = request.study;
   std::string text = fmt::format("# sweep: {}\n# axes:", analysis::sweep_description(request.setting, request.axes));
-  for (const analysis::Axis& axis : request.axes) {
+  for (const analysis::SweepAxis& axis : request.axes) {
     text += fmt::format(" {} =", analysis::parameter_name(axis.parameter));
     for (const double value : axis.values) text += fmt::format(" {}", value);
     text += ';';
@@ -47,7 +47,7 @@ std::string head(const SweepRequest& request) {
       study.replicates, study.sequence == markov::Sequence::sobol ? "sobol" : "random",
       study.weighting == markov::Weighting::weighted ? "weighted" : "plain", study.tail);
   text += fmt::format("# version: {}\n", version());
-  for (const analysis::Axis& axis : request.axes)
+  for (const analysis::SweepAxis& axis : request.axes)
     text += fmt::format("{} [{}],", analysis::parameter_name(axis.parameter), analysis::parameter_unit(axis.parameter));
   text +=
       "expected_steps,expected_steps_low95,expected_steps_high95,expected_steps_quasi_stationary,failure_rate_per_step,"
@@ -106,14 +106,14 @@ std::string axis_unit(analysis::Parameter parameter) { return parameter == analy
 
 // Nothing if no point has a finite number of steps.
 std::optional<Figure> figure(const SweepRequest& request, const std::vector<std::string>& rows) {
-  const std::vector<analysis::Axis>& axes = request.axes;
+  const std::vector<analysis::SweepAxis>& axes = request.axes;
   Figure figure;
   figure.id = "sweep";
   figure.title = "Expected steps before failure";
   figure.provenance = {request.command, analysis::sweep_description(request.setting, request.axes), request.study.seed,
                        version()};
   // The two axes shown; further ones stay at their first value.
-  const analysis::Axis& across = axes.front();
+  const analysis::SweepAxis& across = axes.front();
   const std::size_t second = axes.size() > 1 ? 1 : 0;
   std::size_t stride = 1, stride_second = 1;
   for (std::size_t a = 1; a < axes.size(); ++a) stride *= axes[a].values.size();
@@ -168,7 +168,7 @@ void run_sweep(const SweepRequest& request) {
   const std::string first_lines = head(request);
   const std::size_t size = analysis::sweep_size(request.axes);
   for (std::size_t i = 0; i < size; ++i)  // wrong settings are found before the first is computed
-    analysis::sweep_setting(request.setting, request.axes, i).problem();
+    analysis::sweep_setting(request.setting, request.axes, i).validate();
 
   std::filesystem::path picture = out;
   picture.replace_extension(".svg");

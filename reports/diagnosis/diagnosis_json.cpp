@@ -34,12 +34,13 @@ bool is_whole(const std::string& effect, const std::string& parameter) {
 
 bool is_list(const std::string& parameter) { return parameter == "leg_lengths_m"; }
 
-struct Named {
+struct NamedParameters {
   Json values = Json::object(), intervals = Json::object();
 };
 
-Named named(const std::string& effect, const std::vector<analysis::EstimatedParameter>& parameters) {
-  Named json;
+NamedParameters named_parameters(const std::string& effect,
+                                 const std::vector<analysis::EstimatedParameter>& parameters) {
+  NamedParameters json;
   for (const analysis::EstimatedParameter& p : parameters) {
     const Json value = is_whole(effect, p.name) ? Json(static_cast<int>(std::lround(p.value))) : number(p.value);
     const Json interval = {number(p.lower), number(p.upper)};
@@ -56,9 +57,9 @@ Named named(const std::string& effect, const std::vector<analysis::EstimatedPara
 
 Json cause_json(const analysis::Cause& cause) {
   Json json = {{"effect", cause.name()}, {"probability", number(cause.probability)}};
-  Named all;
+  NamedParameters all;
   for (std::size_t e = 0; e < cause.effects.size() && e < cause.parameters.size(); ++e) {
-    Named one = named(cause.effects[e], cause.parameters[e]);
+    NamedParameters one = named_parameters(cause.effects[e], cause.parameters[e]);
     if (cause.effects.size() == 1) {
       all = std::move(one);
     } else {
@@ -77,8 +78,8 @@ Json cause_json(const analysis::Cause& cause) {
 Json causes_json(const analysis::Diagnosis& d) {
   std::vector<Json> all;
   for (const analysis::Cause& cause : d.causes.ranked) all.push_back(cause_json(cause));
-  const Named contact = named("contact_distribution", d.gap.contact);
-  const auto other = [&](const char* name, double probability, const Named& parameters) {
+  const NamedParameters contact = named_parameters("contact_distribution", d.gap.contact);
+  const auto other = [&](const char* name, double probability, const NamedParameters& parameters) {
     all.push_back({{"effect", name},
                    {"probability", number(probability)},
                    {"parameters", parameters.values},
@@ -180,7 +181,7 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   json["not_decided"] = list_json(d.causes.not_decided, [](const auto& cause) {
     return Json{{"effect", cause.name()}, {"reason", cause.not_decided}};
   });
-  const Named contact = named("contact_distribution", d.gap.contact);
+  const NamedParameters contact = named_parameters("contact_distribution", d.gap.contact);
   json["contact"] = {{"parameters", contact.values}, {"interval_90", contact.intervals}};
   json["shrinkage"] = shrinkage_json(d.shrinkage.measures.empty() ? unknown_shrinkage() : d.shrinkage.measures.front());
   json["shrinkage_by_measure"] = list_json(d.shrinkage.measures, shrinkage_json);

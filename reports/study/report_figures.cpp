@@ -147,8 +147,8 @@ Figure return_map_figure(const analysis::Setting& setting, const Provenance& pro
   return figure;
 }
 
-Figure grid_figure(const std::string& id, const std::string& title, const analysis::Axis& down,
-                   const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+Figure grid_figure(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
+                   const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,
                    const Provenance& provenance) {
   Figure figure;
   figure.id = id;

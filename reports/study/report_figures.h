@@ -21,8 +21,8 @@ Figure survival_figure(const std::vector<Studied>& settings, const Provenance& p
 Figure return_map_figure(const analysis::Setting& setting, const Provenance& provenance);
 
 /// Expected steps over two parameters as a labelled map. Arguments as grid_table().
-Figure grid_figure(const std::string& id, const std::string& title, const analysis::Axis& down,
-                   const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+Figure grid_figure(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
+                   const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,
                    const Provenance& provenance);
 
 }  // namespace metastable::reports

@@ -65,7 +65,7 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   });
   add("rest is unreachable for launches from", "rad/s", [](S s) { return cell(s.thresholds.safe_speed); });
   add("slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); });
-  const std::vector<analysis::Share>& shares = columns.front().study.violations;
+  const std::vector<analysis::ViolationShare>& shares = columns.front().study.violations;
   for (std::size_t a = 0; a < shares.size(); ++a) {
     add(fmt::format("“{}”, share of collisions, long run", shares[a].name), "1",
         [a](S s) { return s.study.violations.size() > a ? Cell(s.study.violations[a].quasi_stationary) : Cell(""); });
@@ -86,8 +86,8 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   return table;
 }
 
-Table grid_table(const std::string& id, const std::string& title, const analysis::Axis& down,
-                 const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+Table grid_table(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
+                 const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,
                  const Provenance& provenance) {
   Table table;
   table.id = id;

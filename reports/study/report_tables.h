@@ -22,8 +22,8 @@ struct Studied {
 Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance);
 
 /// Expected steps over two parameters; `studies` row by row (`down` slow, `across` fast).
-Table grid_table(const std::string& id, const std::string& title, const analysis::Axis& down,
-                 const analysis::Axis& across, const std::vector<analysis::Metastability>& studies,
+Table grid_table(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
+                 const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,
                  const Provenance& provenance);
 
 /// Energy losses at equal spreads 0.05 k of eta and mu, k = 1 .. 4, beside the figures printed with the paper's Fig. 8.

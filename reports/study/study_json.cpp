@@ -61,7 +61,7 @@ Json sensitivities_json(const analysis::Sensitivities& sensitivities) {
 
 Json propagated_json(const analysis::Propagated& propagated) {
   Json shares = Json::object();
-  for (const analysis::Propagated::Share& one : propagated.shares)
+  for (const analysis::Propagated::VarianceShare& one : propagated.shares)
     shares[std::string(analysis::parameter_name(one.parameter))] = one.share;
   return {{"interval_95", interval(propagated.interval)},
           {"log_standard_error", propagated.log_sd},
@@ -114,7 +114,7 @@ Json study_json(const analysis::Metastability& study, const analysis::RestThresh
                                      {"sd_rad_s", study.survivors.restart_sd}};
   json["reach_ramp_end"] = optional_number(study.steps.reach_end);
   Json shares = Json::object();
-  for (const analysis::Share& share : study.violations)
+  for (const analysis::ViolationShare& share : study.violations)
     shares[share.name] = {{"quasi_stationary", share.quasi_stationary}, {"until_rest", share.until_rest}};
   json["outside_assumptions"] = shares;
   json["rest_unreachable_above"] = {{"speed_rad_s", optional_number(thresholds.safe_speed)},

@@ -59,7 +59,7 @@ std::string words_text(const analysis::Metastability& study, bool more, std::siz
   for (const Word& word : always) say(word);
   if (study.status != analysis::Status::rest_unreachable)
     for (const Word& word : until_failure) say(word);
-  for (const analysis::Share& share : study.violations)
+  for (const analysis::ViolationShare& share : study.violations)
     for (const Word& word : assumptions)
       if (share.name == word.name) say(word);
   if (!more) text += "  --explain says more\n";
@@ -91,7 +91,7 @@ std::string sensitivities_text(const analysis::Sensitivities& sensitivities) {
 std::string propagated_text(const analysis::Propagated& propagated) {
   const DecimalEstimate e = to_decimal(propagated.interval, NumberFormat::general, 6);
   std::string shares;
-  for (const analysis::Propagated::Share& one : propagated.shares)
+  for (const analysis::Propagated::VarianceShare& one : propagated.shares)
     shares += fmt::format("{}{} {:.0f} %", shares.empty() ? "" : ", ", analysis::parameter_name(one.parameter),
                           100 * one.share);
   return fmt::format("{} to {} (variance: {})", plain_text(e.lower), plain_text(e.upper), shares);
@@ -140,7 +140,7 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
   text += line("mixing", mixing);
   text += "\n";
   text += line("rest", thresholds_text(thresholds));
-  for (const analysis::Share& share : study.violations)
+  for (const analysis::ViolationShare& share : study.violations)
     text += line(fmt::format("collisions with '{}'", share.name),
                  fmt::format("{:.3f} % in the {} regime, {:.3f} % {}", 100 * share.quasi_stationary,
                              endless ? "stationary" : "metastable", 100 * share.until_rest,

@@ -138,7 +138,7 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
   EXPECT_EQ(of("[0.15, 0.151, 0.15, 0.15]", "[0.15]"),
             "experiment.toml:3:17: wheel.leg_lengths_m: a list of 3 to 1000 numbers [m] is expected");
   EXPECT_EQ(of("coulomb", "sticky"),
-            "experiment.toml:5:7: contact.law: \"published\", \"coulomb\" or \"plastic\" is expected");
+            "experiment.toml:5:7: contact.law: one of published, coulomb, plastic, settled is expected");
   EXPECT_EQ(of("mean = 0.4", "mean = 1.4"), "experiment.toml:6:24: contact.restitution.mean: 1.4 is outside [0, 1]");
   EXPECT_EQ(of("{ mean = 0.4, sd = 0.1 }", "0.4"),
             "experiment.toml:6:15: contact.restitution: { mean = ..., sd = ... } is expected");
@@ -149,7 +149,7 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
   EXPECT_EQ(of("id = \"b\"", "id = \"a\""), "experiment.toml:13:6: id: a condition 'a' was there before");
   EXPECT_EQ(of("[wheel]\n", "[wheel]\nhub_mas = 1\n"),
             "experiment.toml:2:1: unknown key 'hub_mas' in wheel (known: hub_mass_kg, inertia_kg_m2, leg_lengths_m, "
-            "radius_of_gyration_m)");
+            "radius_of_gyration_m, tip_radius_m)");
   EXPECT_EQ(of("[wheel]\n", "[wheel\n").substr(0, 20), "experiment.toml:1:7:");
 }
 

@@ -22,7 +22,7 @@ TEST(Sweep, RangesHoldTheDecimalsThatWereTyped) {
 }
 
 TEST(Sweep, LastAxisRunsFastest) {
-  const std::vector<Axis> axes{{Parameter::slope, {7, 8}}, {Parameter::friction_mean, {0.2, 0.3, 0.4}}};
+  const std::vector<SweepAxis> axes{{Parameter::slope, {7, 8}}, {Parameter::friction_mean, {0.2, 0.3, 0.4}}};
   EXPECT_EQ(sweep_size(axes), 6u);
   std::vector<double> at;
   const Setting setting = sweep_setting(paper_setting(7.02, true), axes, 4, &at);
@@ -33,7 +33,7 @@ TEST(Sweep, LastAxisRunsFastest) {
 
 TEST(Sweep, PointsComeInOrderAndEqualSingleStudies) {
   const Setting base = paper_setting(7.02, true);
-  const std::vector<Axis> axes{{Parameter::friction_sd, {0.05, 0.1, 0.15, 0.2, 0.25}}};
+  const std::vector<SweepAxis> axes{{Parameter::friction_sd, {0.05, 0.1, 0.15, 0.2, 0.25}}};
   StudyOptions options;
   options.cells = 32;
   options.samples = 512;

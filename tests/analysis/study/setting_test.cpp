@@ -44,5 +44,17 @@ TEST(Setting, ErrorsNameTheQuantityAndItsRange) {
   expect_message([](Setting& s) { s.correlation = 1; }, "correlation");
 }
 
+TEST(Setting, SettledIsSimulatedAndHasNoChain) {
+  Setting setting;
+  setting.law = dynamics::Law::settled;
+  EXPECT_NO_THROW(setting.validate());
+  EXPECT_THROW(setting.problem(), std::invalid_argument);
+  setting.restitution.mean = 0.96;
+  EXPECT_THROW(setting.validate(), std::invalid_argument);
+  setting.restitution.mean = 0.4;
+  setting.wheel.tip_radius = 0.01;  // more than a twentieth of the shortest leg
+  EXPECT_THROW(setting.validate(), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace metastable::analysis

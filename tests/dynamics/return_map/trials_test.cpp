@@ -170,5 +170,30 @@ TEST(Trials, IllegalInputIsNamed) {
   EXPECT_EQ(message_of([&] { steps_to_rest(map, launch_7, -1, 1, 0, 10); }), "first_landing_leg: -1 is outside [0, 7]");
 }
 
+// settled.md: 28.9 (27.7 to 30.1) % of the trials rest before 3.66 m, at steady speeds about 4.8 rad/s.
+TEST(Trials, SettledRestsAsItsOwnDirectSimulationSays) {
+  Wheel wheel;
+  wheel.radius_of_gyration = std::sqrt(0.0025 / wheel.hub_mass);
+  const SettledMotion motion(settled_wheel(wheel, 7.02 * test::degree));
+  const ContactNoise noise = ContactNoise::normal(0.4, 0.05, 0.4, 0.03, 0, most_settled_restitution);
+  const TruncatedNormal launch(7.35, 0.19, 0);
+  constexpr int trials = 400;
+  int rests = 0, late = 0;
+  double speed = 0;
+  for (int k = 0; k < trials; ++k) {
+    const Trial trial = simulate_trial(motion, noise, launch, {.max_collisions = 100, .ramp_length = 3.66}, k);
+    ASSERT_NE(trial.outcome, Outcome::max_collisions);
+    rests += trial.outcome == Outcome::rest;
+    for (std::size_t c = 1; c < trial.collisions.size(); ++c)
+      EXPECT_GT(trial.collisions[c].position, trial.collisions[c - 1].position + 0.1);
+    for (std::size_t c = 12; c < trial.collisions.size(); ++c, ++late) speed += trial.collisions[c].omega_minus;
+    if (k == 0) {
+      EXPECT_EQ(steps_to_rest(motion, noise, launch, 0, 1, 0, trial.collisions.size()), trial.collisions.size());
+    }
+  }
+  EXPECT_NEAR(rests, 0.289 * trials, 4.5 * std::sqrt(0.289 * 0.711 * trials));
+  EXPECT_NEAR(speed / late, 4.8, 0.1);
+}
+
 }  // namespace
 }  // namespace metastable::dynamics::test

@@ -4,6 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "dynamics/wheel/plastic_law.h"
@@ -186,6 +187,25 @@ TEST(SettledMotion, TheFootThatCarriesTheSameMomentumLandsTheSame) {
   const double by_spin = motion.land(2, late.omega_minus, next).omega_eq_squared;
   EXPECT_NEAR(standing, moving, 2e-3);
   EXPECT_LT(10 * std::abs(standing - moving), std::abs(by_spin - moving));
+}
+
+TEST(SettledMotion, ATipRollsAsItStands) {
+  // A foot that sticks without rebound: from touch to touch the chord of the tips' centres and what the disc rolls; the
+  // energy about the rolling foot is kept.
+  SettledWheel wheel = paper(7.02);
+  wheel.leg_length.assign(8, 0.1519);
+  wheel.tip_radius = 0.005;
+  const SettledMotion motion(wheel);
+  const Step step = motion.step(0, 4.8, {0, 0.6});
+  ASSERT_EQ(step.landing.end, LandingEnd::settled);
+  const double alpha = std::numbers::pi / 4;
+  EXPECT_NEAR(step.between_feet, 2 * (0.1519 - 0.005) * std::sin(alpha / 2) + 0.005 * alpha, 1e-12);
+  EXPECT_NEAR(step.landing.displacement, 0, 1e-12);
+  // The hub comes down by the pace times the sine of the slope, at the same inertia about the foot.
+  const double centre = 0.1519 - 0.005, upright = centre * std::cos(alpha / 2) + 0.005;
+  const double about = 0.0025 / 1.39 + upright * upright + std::pow(centre * std::sin(alpha / 2), 2);
+  const double gained = 2 * 9.81 * step.between_feet * std::sin(7.02 * degree) / about;
+  EXPECT_NEAR(step.omega_minus * step.omega_minus - std::pow(step.landing.omega_plus, 2), gained, 1e-9);
 }
 
 TEST(SettledMotion, DragSlowsInFlightAndOnTheFoot) {

@@ -9,7 +9,8 @@ namespace {
 
 TEST(ContactLaw, NamesGoBothWays) {
   for (const std::string& name : law_names()) EXPECT_EQ(law_name(law_from_name(name)), name);
-  EXPECT_EQ(message_of([] { law_from_name("hertz"); }), "law: \"hertz\" is none of published, coulomb, plastic");
+  EXPECT_EQ(message_of([] { law_from_name("hertz"); }),
+            "law: \"hertz\" is none of published, coulomb, plastic, settled");
 }
 
 TEST(ContactModel, DefaultsAreThoseOfEachLaw) {
