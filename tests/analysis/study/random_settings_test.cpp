@@ -1,6 +1,6 @@
 // Random settings within range under every law and method: each gets an answer that holds together, and every fiftieth
-// is judged by direct simulation. Run by hand, METASTABLE_SETTINGS=10000 METASTABLE_FIRST_SETTING=0 being the long run:
-// it has not been through yet, so the suite passes it over.
+// is judged by direct simulation. The suite takes the first 40; METASTABLE_SETTINGS=10000 METASTABLE_FIRST_SETTING=0 is the
+// long run. One in twenty may be refused by a solver with its sentence; a contradiction or a wrong number may not be.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -9,17 +9,19 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <iterator>
 #include <random>
 #include <stdexcept>
 #include <string>
 
+#include "analysis/study/consistency.h"
 #include "analysis/study/metastability.h"
 #include "dynamics/return_map/trials.h"
 
 namespace metastable::analysis {
 namespace {
 
-constexpr std::uint64_t usual_count = 0;
+constexpr std::uint64_t usual_count = 40;
 constexpr std::uint64_t judged = 50;
 constexpr int trials = 4000;
 
@@ -44,7 +46,8 @@ Drawn draw(std::uint64_t index) {
   };
   Drawn drawn;
   Setting& setting = drawn.setting;
-  setting.law = dynamics::law_from_name(dynamics::law_names()[index % dynamics::law_names().size()]);
+  constexpr dynamics::Law laws[] = {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::plastic};
+  setting.law = laws[index % std::size(laws)];  // those on which a chain stands
   setting.slope_deg = uniform(0.1, 20);
   setting.restitution = spread(0.05, 0.95, 0.3);
   setting.friction = spread(0, 1, 0.3);
@@ -82,7 +85,7 @@ void judge(const Setting& setting, const Metastability& study, double tolerance)
 TEST(RandomSettings, AreAllAnsweredAndAgreeWithSimulation) {
   const std::uint64_t first = from_environment("METASTABLE_FIRST_SETTING", 0),
                       count = from_environment("METASTABLE_SETTINGS", usual_count);
-  if (count == 0) GTEST_SKIP() << "METASTABLE_SETTINGS says how many";
+  std::uint64_t refused = 0;  // with a sentence and exit code 3, instead of a number
   for (std::uint64_t index = first; index < first + count; ++index) {
     const Drawn drawn = draw(index);
     SCOPED_TRACE(name(index, drawn));
@@ -91,10 +94,15 @@ TEST(RandomSettings, AreAllAnsweredAndAgreeWithSimulation) {
       EXPECT_GE(result.steps.from_start.value, 1 - 1e-9);
       if (index % judged == 0 && result.status != Status::rest_unresolved)
         judge(drawn.setting, result, 2 * drawn.options.tolerance);
+    } catch (const Contradiction& contradiction) {
+      ADD_FAILURE() << contradiction.what();
+    } catch (const markov::ConvergenceError&) {
+      ++refused;
     } catch (const std::exception& error) {
       ADD_FAILURE() << error.what();
     }
   }
+  EXPECT_LE(refused, count / 20);
 }
 
 }  // namespace
