@@ -1,6 +1,7 @@
 // Random settings within range under every law and method: each gets an answer that holds together, and every fiftieth
-// is judged by direct simulation. The suite takes the first 40; METASTABLE_SETTINGS=10000 METASTABLE_FIRST_SETTING=0 is the
-// long run. One in twenty may be refused by a solver with its sentence; a contradiction or a wrong number may not be.
+// is judged by direct simulation. The suite takes the first 40; METASTABLE_SETTINGS=10000 METASTABLE_FIRST_SETTING=0 is
+// the long run. One in twenty may be refused by a solver with its sentence; a contradiction or a wrong number may not
+// be.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
