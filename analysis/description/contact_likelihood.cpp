@@ -12,7 +12,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t columns = 161;           // eta = 0 .. 1
 constexpr double gauss = 0.28867513459481288;  // 1 / (2 sqrt(3)): two-point rule on [0, 1]
 
@@ -73,7 +72,8 @@ std::vector<ContactLikelihood::Piece> ContactLikelihood::region_of_rest(const Su
       else
         pieces.push_back({restitution_at(j), from, 0, to, j});
     }
-    if (column[rows - 1] < barrier && !pieces.empty()) pieces.back().friction_to = infinity;
+    if (column[rows - 1] < barrier && !pieces.empty())
+      pieces.back().friction_to = std::numeric_limits<double>::infinity();
   }
   return pieces;
 }
@@ -290,7 +290,7 @@ double ContactLikelihood::operator()(const ContactParameters& p, ContactParamete
     for (std::size_t k = 0; k < 4; ++k) sum.slope[k] += one.slope[k];
   }
   if (gradient) *gradient = sum.slope;
-  return std::isnan(sum.value) ? -infinity : sum.value;
+  return std::isnan(sum.value) ? -std::numeric_limits<double>::infinity() : sum.value;
 }
 
 }  // namespace metastable::analysis

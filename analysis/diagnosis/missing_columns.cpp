@@ -10,7 +10,7 @@ namespace {
 
 constexpr double much_harder = 1.5;                // smallest size over smallest size
 constexpr double not_told = 0.9, well_told = 0.8;  // share of an effect's information that another imitates
-constexpr std::size_t most_variants = 6;           // of an effect, to stand for all of its own
+constexpr std::size_t most_stand_ins = 6;          // of an effect, to stand for all of its own
 
 // Every effect's visibility in data drawn from the model, by its id.
 std::map<std::string, Visibility> look(const TransitionModel& model, const std::vector<double>& nuisance,
@@ -19,7 +19,7 @@ std::map<std::string, Visibility> look(const TransitionModel& model, const std::
   for (const Candidate& candidate : model.candidates()) {
     if (std::none_of(wanted.begin(), wanted.end(), [&](const Candidate* w) { return w->id == candidate.id; })) continue;
     few.push_back(candidate);
-    const std::size_t all = candidate.variants.size(), kept = std::min(most_variants, all);
+    const std::size_t all = candidate.variants.size(), kept = std::min(most_stand_ins, all);
     few.back().variants.clear();
     for (std::size_t v = 0; v < kept; ++v) few.back().variants.push_back(candidate.variants[v * all / kept]);
   }

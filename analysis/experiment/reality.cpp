@@ -17,7 +17,7 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double tail = 0.3;  // [s] recorded of a wheel that has come to rest
+constexpr double recorded_after_rest = 0.3;  // [s] recorded of a wheel that has come to rest
 
 // Returns the number that a reader finds where the files hold this one.
 double as_written(double value) {
@@ -51,7 +51,7 @@ std::string angles(const std::string& id, const dynamics::LaboratoryTrial& trial
                    const CameraOptions& camera) {
   const bool rested = trial.outcome == dynamics::Outcome::rest;
   const double last = trial.collisions.back().time, turned = trial.motion.back().time;
-  const double begin = trial.motion.front().time, end = rested ? 2 * turned - last + tail : turned;
+  const double begin = trial.motion.front().time, end = rested ? 2 * turned - last + recorded_after_rest : turned;
   const double offset = uniform(camera.seed, index, 0, 201);
   std::string rows;
   for (std::uint64_t k = 0;; ++k) {

@@ -22,7 +22,7 @@ namespace {
 
 using Values = std::vector<double>;
 constexpr double pi = std::numbers::pi;
-constexpr double log_sqrt_two_pi = 0.91893853320467274178;
+constexpr double half_log_two_pi = 0.91893853320467274178;
 constexpr double outlier_size = 6;  // losses of contact_outliers, in noises
 constexpr double glitch_size = 10;  // spread of a revolution that the counter garbled, in noises
 
@@ -364,13 +364,13 @@ Seen LossFilter::see(double omega) {
   }
   const double sd = std::sqrt(total);
   double z = residual / sd;
-  double log_density = -0.5 * z * z - log_sqrt_two_pi - std::log(sd);
+  double log_density = -0.5 * z * z - half_log_two_pi - std::log(sd);
   // Mixes in a rare kind of revolution; returns its share given what was seen.
   const auto mix = [&](double share, double centre, double extra) {
     const double wide = std::sqrt(total + extra * extra), far = (residual - centre) / wide;
     const double below = (1 - share) * dynamics::normal_cdf(z) + share * dynamics::normal_cdf(far);
     const double usual = std::log1p(-share) + log_density;
-    const double other = std::log(share) - 0.5 * far * far - log_sqrt_two_pi - std::log(wide);
+    const double other = std::log(share) - 0.5 * far * far - half_log_two_pi - std::log(wide);
     log_density = std::max(usual, other) + std::log1p(std::exp(-std::abs(usual - other)));
     z = dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15));
     return std::exp(other - log_density);

@@ -11,14 +11,14 @@ namespace {
 
 using dynamics::StepContext;
 
-struct Node {  // of Gauss-Hermite's rules for the standard normal
+struct ScoreNode {  // of Gauss-Hermite's rules for the standard normal
   double score, weight;
 };
-constexpr std::array<Node, 5> five_nodes{{{-2.856970013872806, 0.01125741132772069},
-                                          {-1.355626179974266, 0.2220759220056126},
-                                          {0, 0.5333333333333333},
-                                          {1.355626179974266, 0.2220759220056126},
-                                          {2.856970013872806, 0.01125741132772069}}};
+constexpr std::array<ScoreNode, 5> five_nodes{{{-2.856970013872806, 0.01125741132772069},
+                                               {-1.355626179974266, 0.2220759220056126},
+                                               {0, 0.5333333333333333},
+                                               {1.355626179974266, 0.2220759220056126},
+                                               {2.856970013872806, 0.01125741132772069}}};
 
 std::size_t collision_of(const Event& event) { return static_cast<std::size_t>(event.number) - 1; }
 

@@ -18,8 +18,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
 struct Moments {
   double count = 0, mean = 0, variance = 0;
 };
@@ -37,7 +35,7 @@ Moments moments(std::span<const double> values) {
 TTest t_test(double difference, double standard_error, double degrees_of_freedom) {
   TTest test{{difference, difference, difference}, 0, degrees_of_freedom, 1};
   if (standard_error == 0) {
-    if (difference != 0) test.t = std::copysign(infinity, difference), test.p = 0;
+    if (difference != 0) test.t = std::copysign(std::numeric_limits<double>::infinity(), difference), test.p = 0;
     return test;
   }
   const boost::math::students_t law(degrees_of_freedom);
@@ -59,9 +57,11 @@ Pooled pooled(std::span<const double> a, std::span<const double> b) {
           std::sqrt(1 / ma.count + 1 / mb.count)};
 }
 
-// Noncentrality whose t distribution has `t` at probability `level`.
-double noncentrality(double t, double df, double level) {
-  const auto excess = [&](double delta) { return boost::math::cdf(boost::math::non_central_t(df, delta), t) - level; };
+// Noncentrality whose t distribution has `t` at that probability.
+double noncentrality(double t, double df, double probability) {
+  const auto excess = [&](double delta) {
+    return boost::math::cdf(boost::math::non_central_t(df, delta), t) - probability;
+  };
   const double reach = 4 + std::abs(t) * 5 / std::sqrt(std::min(df, 50.0));
   double low = t - reach, high = t + reach;  // falls with delta
   for (int i = 0; i < 60 && high - low > 1e-9 * (1 + std::abs(t)); ++i) {
@@ -112,7 +112,7 @@ TTest pooled_t_test(std::span<const double> a, std::span<const double> b) {
 EffectSize hedges_g(std::span<const double> a, std::span<const double> b) {
   const Pooled p = pooled(a, b);
   if (p.sd == 0) {
-    const double g = p.difference == 0 ? 0 : std::copysign(infinity, p.difference);
+    const double g = p.difference == 0 ? 0 : std::copysign(std::numeric_limits<double>::infinity(), p.difference);
     return {g, g, g};
   }
   const double unbiased = 1 - 3 / (4 * p.degrees_of_freedom - 1);

@@ -171,7 +171,7 @@ struct Size {
   dynamics::BoundsResolution resolution;
 };
 
-std::vector<Size> sizes(int phases, std::size_t largest) {
+std::vector<Size> ladder_sizes(int phases, std::size_t largest) {
   if (largest == 0) largest = phases == 1 ? 1600 : 640;
   std::vector<Size> all;
   for (std::size_t cells = phases == 1 ? 400 : 320; cells <= largest; cells *= 2) {
@@ -199,7 +199,7 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
     const double top = top_state(map, launch, *std::max_element(lowest.begin(), lowest.end()));
     const double beyond = beyond_top * top;
     lowest[phase] = lowest_of_launch(launch, lowest[phase]);
-    const std::vector<Size> ladder = sizes(map.phases(), options.largest_cells);
+    const std::vector<Size> ladder = ladder_sizes(map.phases(), options.largest_cells);
     for (std::size_t s = 0; s < ladder.size(); ++s) {
       if (options.progress)
         options.progress(static_cast<double>(s) / static_cast<double>(ladder.size()),

@@ -11,7 +11,7 @@ namespace {
 constexpr double density_error = 1e-5, density_tolerance = 2 * density_error;
 constexpr double bulk_over_regime = 2;  // rare survivors are faster than the usual ones
 constexpr std::uint64_t pilot_seed = 1;
-constexpr double rounding = 1e-13;                        // of the solvers
+constexpr double solver_rounding = 1e-13;                 // of the solvers
 constexpr int few_generations = 2, many_generations = 8;  // of edges
 
 // One value tells.
@@ -33,7 +33,8 @@ ExactRows::ExactRows(const Problem& problem, double tolerance, int threads)
   bulk_ = bulk_over_regime * markov::bulk_below_launch(problem.map, problem.launch, pilot_seed);
   ranges_ = collocated_ ? markov::collocation_ranges(problem.map, problem.launch, threads, bulk_)
                         : markov::node_ranges(problem.map, problem.launch, threads, bulk_);
-  error_ = collocated_ || !has_points(problem) ? rounding : density_error;  // without points, densities are exact
+  error_ =
+      collocated_ || !has_points(problem) ? solver_rounding : density_error;  // without points, densities are exact
   if (collocated_ && !ranges_.empty())
     edges_ = markov::collocation_edges(problem.map, ranges_,
                                        tolerance < density_tolerance ? many_generations : few_generations, bulk_);

@@ -30,7 +30,7 @@ struct Level {
   double failure_rate() const { return solved.quasi.failure_rate; }
 };
 
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
+double inner(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
@@ -49,7 +49,7 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
       if (mean[static_cast<std::size_t>(p) * space.nodes()] < mean[static_cast<std::size_t>(worst) * space.nodes()])
         worst = p;
     const double lowest = problem.map.state_interval(worst).first;
-    level.worst_start = 1 + dot(rows.row(problem, space, lowest, worst).after, mean);
+    level.worst_start = 1 + inner(rows.row(problem, space, lowest, worst).after, mean);
     if (level.from_start() >= 1 && level.worst_start >= 1 && level.failure_rate() > 0) return level;
   } catch (const markov::ConvergenceError&) {
     if (!rows.collocated()) throw;

@@ -21,7 +21,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr std::size_t first_panels = 4;
+constexpr std::size_t first_verified_panels = 4;
 
 Benchmark rough_terrain(double sd_deg) {
   const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = sd_deg * degree});
@@ -107,7 +107,7 @@ Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes)
   const auto ranges = markov::node_ranges(benchmark.problem.map, benchmark.problem.launch, threads);
   if (ranges.empty()) throw std::invalid_argument(benchmark.name + ": rest is out of reach");
   Verified result;
-  for (std::size_t panels = first_panels;; panels *= 2) {
+  for (std::size_t panels = first_verified_panels;; panels *= 2) {
     const markov::NodeSpace space(ranges, panels);
     Verified next;
     next.nodes = space.nodes();

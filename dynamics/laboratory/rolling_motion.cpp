@@ -13,8 +13,8 @@ namespace metastable::dynamics {
 namespace {
 
 namespace odeint = boost::numeric::odeint;
-using State = std::array<double, 3>;  // angle, speed, fluid's speed
-using Stepper = odeint::runge_kutta_fehlberg78<State>;
+using RollingState = std::array<double, 3>;  // angle, speed, fluid's speed
+using Stepper = odeint::runge_kutta_fehlberg78<RollingState>;
 
 constexpr double patience = 60;  // [s]: a wheel balancing this long on one leg is at rest
 
@@ -33,7 +33,7 @@ class Stance {
   Stance(const RollingBody& body, const RampSurface& surface, const Pose& start, double inertia)
       : body_(body), surface_(surface), start_(start), inertia_(inertia_about_foot(body, start, inertia)) {}
 
-  void operator()(const State& s, State& rate, double) const {
+  void operator()(const RollingState& s, RollingState& rate, double) const {
     const Point arm = arm_at(s[0]);
     const double coupling = body_.fluid_coupling * (s[1] - s[2]);
     const double drag = body_.constant_drag + body_.linear_drag * s[1] + body_.quadratic_drag * s[1] * s[1];
@@ -43,15 +43,15 @@ class Stance {
     rate = {s[1], (weight - drag - coupling) / inertia_, body_.fluid_inertia > 0 ? coupling / body_.fluid_inertia : 0};
   }
 
-  Pose pose(const State& s) const { return {start_.foot, start_.leg, s[0], s[1], s[2]}; }
+  Pose pose(const RollingState& s) const { return {start_.foot, start_.leg, s[0], s[1], s[2]}; }
   // How high the next leg's tip is over the surface.
-  double clearance(const State& s) const {
+  double clearance(const RollingState& s) const {
     const Point at = tip(body_, pose(s), (start_.leg + 1) % body_.legs());
     return at.z - surface_.height(at.x);
   }
   // What the ground's reaction normal to the surface is, over the mass [m/s^2].
-  double reaction(const State& s) const {
-    State rate{};
+  double reaction(const RollingState& s) const {
+    RollingState rate{};
     (*this)(s, rate, 0);
     const Point arm = arm_at(s[0]);
     // The centre of mass accelerates as it turns at speed s[1] down the ramp about the foot.
@@ -173,7 +173,7 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
     if (moments) moments->push_back({time, turn, speed});
   };
   const Stance stance(body, surface, start, inertia);
-  State state{start.angle_rad, start.speed, start.fluid_speed};
+  RollingState state{start.angle_rad, start.speed, start.fluid_speed};
   double time = 0;
   // Small against the pendulum's time and against a radian: the method is of order 8.
   const double length = body.leg_length[static_cast<std::size_t>(start.leg)];
@@ -188,11 +188,11 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
   };
   if (!(start.speed > 0)) return rest_at(start, 0);
   while (time < patience) {
-    const State from = state;
+    const RollingState from = state;
     const double began = time;
     const double step = std::min(0.08 * pendulum_time, 0.1 / std::max(1e-3, std::abs(from[1])));
     const auto moved = [&](double part) {
-      State s{};
+      RollingState s{};
       Stepper().do_step(std::cref(stance), from, began, s, part);
       return part > 0 ? s : from;
     };
@@ -206,15 +206,15 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
       const double at = root([&](double part) { return value(moved(part)); }, value(from), step, value(state));
       if (event == none || at < first) first = at, event = kind;
     };
-    look([](const State& s) { return s[1]; }, turned);
-    look([&](const State& s) { return stance.clearance(s); }, touched);
-    if (body.flight) look([&](const State& s) { return stance.reaction(s); }, lifted);
+    look([](const RollingState& s) { return s[1]; }, turned);
+    look([&](const RollingState& s) { return stance.clearance(s); }, touched);
+    if (body.flight) look([&](const RollingState& s) { return stance.reaction(s); }, lifted);
     if (body.flight && began == 0 && stance.reaction(from) <= 0) first = 0, event = lifted;
     if (event == none) {
       note(time, state[0] - start.angle_rad, state[1]);
       continue;
     }
-    const State at = moved(first);
+    const RollingState at = moved(first);
     const double when = began + first;
     note(when, at[0] - start.angle_rad, at[1]);
     if (event == touched) {
@@ -238,11 +238,11 @@ std::vector<Moment> run_up(const RollingBody& body, const RampSurface& surface, 
                            double seconds) {
   const Stance stance(body, surface, end, inertia);
   std::vector<Moment> moments{{0, 0, end.speed}};
-  State state{end.angle_rad, end.speed, end.fluid_speed};
+  RollingState state{end.angle_rad, end.speed, end.fluid_speed};
   constexpr double step = 0.005;
   for (double time = 0; time > -seconds;) {
     const double length = std::min(step, seconds + time);
-    State earlier{};
+    RollingState earlier{};
     Stepper().do_step(std::cref(stance), state, time, earlier, -length);
     time -= length;
     if (earlier[1] <= 0 || earlier[0] < end.angle_rad - body.leg_angle()) break;

@@ -12,7 +12,7 @@
 namespace metastable::dynamics {
 namespace {
 
-using Rule = boost::math::quadrature::gauss_kronrod<double, 21>;
+using LandingRule = boost::math::quadrature::gauss_kronrod<double, 21>;
 
 constexpr double far_tail = 38;  // [sd]: beyond it probabilities underflow
 constexpr double tolerance = 3e-12;
@@ -202,7 +202,7 @@ double LandingDensity::integrate(const std::vector<Piece>& all, double level) co
   }
   if (largest == 0) return 0;
   const auto evaluate = [&](Panel& p) {
-    p.value = Rule::integrate([&](double t) { return integrand(*p.piece, t); }, p.from, p.to, 0, 0.0, &p.error);
+    p.value = LandingRule::integrate([&](double t) { return integrand(*p.piece, t); }, p.from, p.to, 0, 0.0, &p.error);
     // As in rest_probability.cpp, Boost's estimate is that of the Gauss rule on [-1, 1].
     const double difference = p.error * (p.to - p.from) / 2;
     p.error = p.value > 0 ? p.value * std::min(1.0, std::pow(200 * difference / p.value, 1.5)) : 0;

@@ -21,7 +21,7 @@ constexpr double deepest = 300;       // where only one of eta and mu is random
 constexpr double logarithmic = 0.02;  // eta below which ln eta is the variable: the contact lasts like |ln eta|
 constexpr double unlikely = 12;       // -ln eta
 constexpr double widest = 3;          // panel [sd]
-constexpr std::size_t most_panels = 40;
+constexpr std::size_t most_quadrature_panels = 40;
 
 // Lays Gauss-Legendre panels over t in [0, 1], where a share sin^2(pi t / 2) of an interval is the variable: a square
 // root at either end of the interval is smooth in t.
@@ -32,8 +32,8 @@ const std::vector<QuadraturePoint>& quadrature_points(std::size_t panels) {
   constexpr unsigned order = 16;
   using Rule = boost::math::quadrature::gauss<double, order>;
   static const std::vector<std::vector<QuadraturePoint>> all = [] {
-    std::vector<std::vector<QuadraturePoint>> rules(most_panels);
-    for (std::size_t count = 1; count <= most_panels; ++count)
+    std::vector<std::vector<QuadraturePoint>> rules(most_quadrature_panels);
+    for (std::size_t count = 1; count <= most_quadrature_panels; ++count)
       for (std::size_t p = 0; p < count; ++p)
         for (std::size_t k = 0; k < order; ++k) {
           const std::size_t at = k < order / 2 ? order / 2 - 1 - k : k - order / 2;
@@ -45,7 +45,7 @@ const std::vector<QuadraturePoint>& quadrature_points(std::size_t panels) {
         }
     return rules;
   }();
-  return all[std::clamp<std::size_t>(panels, 1, most_panels) - 1];
+  return all[std::clamp<std::size_t>(panels, 1, most_quadrature_panels) - 1];
 }
 
 // Calls f(place, weight) at the points of an integral over [from, to] of a function that varies over `scale`.

@@ -9,10 +9,9 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr int steps = 16;       // of the grid between two edges
-constexpr int bits = 40;        // of Brent's method
-constexpr double widest = 100;  // friction that stands for "no upper end" where the law has no break
+constexpr int steps = 16;                   // of the grid between two edges
+constexpr int brent_bits = 40;              // of Brent's method
+constexpr double unbounded_friction = 100;  // friction that stands for "no upper end" where the law has no break
 
 std::vector<double> refined(const std::vector<double>& edges) {
   std::vector<double> grid{edges.front()};
@@ -34,7 +33,7 @@ std::vector<double> friction_grid(const ContactNoise::Support& support, const st
   for (double b : breaks)
     if (b > support.friction_lower && b < support.friction_upper) edges.push_back(b);
   if (breaks.empty() || edges.size() == 1)
-    edges.push_back(std::min(support.friction_upper, support.friction_lower + widest));
+    edges.push_back(std::min(support.friction_upper, support.friction_lower + unbounded_friction));
   std::vector<double> grid = refined(edges);
   if (support.friction_upper > grid.back()) grid.push_back(std::min(support.friction_upper, 2 * grid.back()));
   return grid;
@@ -53,7 +52,7 @@ class Extremes {
   // Returns the smallest sign * omega+^2.
   double least(double sign) const {
     std::size_t best_eta = 0, best_mu = 0;
-    double best = infinity;
+    double best = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < restitution_.size(); ++i)
       for (std::size_t k = 0; k < friction_.size(); ++k)
         if (const double value = sign * after(restitution_[i], friction_[k]); value < best) {
@@ -61,7 +60,7 @@ class Extremes {
           best_eta = i;
           best_mu = k;
         }
-    if (best == -infinity) return best;
+    if (best == -std::numeric_limits<double>::infinity()) return best;
     double eta = restitution_[best_eta], mu = friction_[best_mu];
     for (int round = 0; round < 4; ++round) {
       best = improve(restitution_, best_eta, eta, best, [&](double t) { return sign * after(t, mu); });
@@ -79,7 +78,7 @@ class Extremes {
     for (const auto& [a, b] : {std::pair(at > 0 ? at - 1 : at, at), std::pair(at, std::min(at + 1, grid.size() - 1))}) {
       if (a == b) continue;
       std::uintmax_t iterations = 60;
-      const auto [t, value] = boost::math::tools::brent_find_minima(f, grid[a], grid[b], bits, iterations);
+      const auto [t, value] = boost::math::tools::brent_find_minima(f, grid[a], grid[b], brent_bits, iterations);
       if (value < best) {
         best = value;
         x = t;
@@ -98,7 +97,7 @@ class Extremes {
 
 std::pair<double, double> after_collision_range(const WheelMap& map, double state, int phase) {
   if (map.noise().is_empirical()) {
-    std::pair<double, double> range{infinity, -infinity};
+    std::pair<double, double> range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
     for (const Contact& c : map.noise().pairs()) {
       const double after = map.after_collision(state, phase, c);
       range = {std::min(range.first, after), std::max(range.second, after)};

@@ -10,7 +10,7 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr double far_tail = 38;  // [sd]: beyond it probabilities underflow
+constexpr double farthest_drawn = 38;  // [sd]: beyond it probabilities underflow
 
 // Takes Newton's step from mu, halving the bracket where it leaves it; sign * value rises through the root.
 [[gnu::always_inline]] inline double newton_step(double sign, double value, double derivative, double& low,
@@ -50,7 +50,7 @@ LossCurve::LossCurve(const WheelMap& map, double state, int phase) {
     stretch_ = std::sqrt(model.contact_mass / model.ramp_stiffness);
   }
   end_ = friction.constant() ? std::numeric_limits<double>::infinity()
-                             : std::max(friction.lower(), friction.mean()) + far_tail * friction.sd();
+                             : std::max(friction.lower(), friction.mean()) + farthest_drawn * friction.sd();
   if (coulomb_)
     end_ = tangential_0_ / tangential_1_;
   else if (normal_1_ > 0)

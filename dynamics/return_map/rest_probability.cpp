@@ -12,10 +12,9 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double far_tail = 39;      // [sd]: beyond it probabilities underflow
-constexpr double tolerance = 1e-11;  // of the result
-constexpr std::size_t most_panels = 4000;
+constexpr double farthest_rest = 39;      // [sd]: beyond it probabilities underflow
+constexpr double rest_tolerance = 1e-11;  // of the result
+constexpr std::size_t most_rest_panels = 4000;
 
 class RestProbability {
  public:
@@ -57,14 +56,15 @@ class RestProbability {
     const double lower = friction_.lower();
     if (breaks_.empty() || breaks_.back() <= lower) return at(lower) < 0 ? 1 : 0;
     // The last edge stands for everything beyond it: constant, jammed, or out of reach.
-    const double last = std::min(breaks_.back(), std::max(lower, friction_.mean()) + far_tail * friction_.sd());
+    const double last = std::min(breaks_.back(), std::max(lower, friction_.mean()) + farthest_rest * friction_.sd());
     std::vector<double> edges{lower};
     for (double b : breaks_)
       if (b > lower && b < last) edges.push_back(b);
     edges.push_back(last);
     double sum = 0;
     for (const NegativeInterval& i : negative_set(at, edges, samples))
-      sum += friction_.between(i.lower == lower ? -infinity : i.lower, i.upper == last ? infinity : i.upper);
+      sum += friction_.between(i.lower == lower ? -std::numeric_limits<double>::infinity() : i.lower,
+                               i.upper == last ? std::numeric_limits<double>::infinity() : i.upper);
     return std::min(1.0, sum);
   }
 
@@ -77,15 +77,16 @@ class RestProbability {
     double sum = 0;
     const auto at = [&](double eta) { return margin({eta, friction_.mean()}); };
     for (const NegativeInterval& i : negative_set(at, edges, samples))
-      sum += restitution_.between(i.lower == edges.front() ? -infinity : i.lower, i.upper);
+      sum +=
+          restitution_.between(i.lower == edges.front() ? -std::numeric_limits<double>::infinity() : i.lower, i.upper);
     return std::min(1.0, sum);
   }
 
   // Edges of eta are a grid of one sd within reach, and wherever rest starts or stops being possible at all.
   std::vector<double> restitution_edges() const {
     const double sd = restitution_.sd();
-    const double lower = std::max(restitution_.lower(), restitution_.mean() - far_tail * sd);
-    const double upper = std::min(restitution_.upper(), restitution_.mean() + far_tail * sd);
+    const double lower = std::max(restitution_.lower(), restitution_.mean() - farthest_rest * sd);
+    const double upper = std::min(restitution_.upper(), restitution_.mean() + farthest_rest * sd);
     const int count = std::clamp(static_cast<int>(std::ceil((upper - lower) / sd)), 4, 80);
     std::vector<double> edges{lower};
     bool possible = given_restitution(lower) > 0;
@@ -138,10 +139,10 @@ class RestProbability {
       }
     };
     for (std::size_t i = 0; i < ordered.size(); ++i) {
-      if (mass(ordered[i]) * static_cast<double>(ordered.size() - i) < 0.1 * tolerance * sum) break;
+      if (mass(ordered[i]) * static_cast<double>(ordered.size() - i) < 0.1 * rest_tolerance * sum) break;
       add(ordered[i].lower, ordered[i].upper);
     }
-    while (error > tolerance * sum && panels.size() < most_panels) {
+    while (error > rest_tolerance * sum && panels.size() < most_rest_panels) {
       std::pop_heap(panels.begin(), panels.end());
       const Panel worst = panels.back();
       const double middle = worst.lower + (worst.upper - worst.lower) / 2;

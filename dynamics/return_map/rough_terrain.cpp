@@ -12,7 +12,6 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double degree = std::numbers::pi / 180;
 constexpr double widest_sd = 10 * degree;  // beyond it slopes wrap around
 
@@ -105,7 +104,7 @@ double RoughTerrainWheel::landing_density(double state, int phase, std::span<con
 }
 
 std::pair<double, double> RoughTerrainWheel::landing_range(double state, int) const {
-  const auto landed = [](double x) { return x > 0 ? x : -infinity; };
+  const auto landed = [](double x) { return x > 0 ? x : -std::numeric_limits<double>::infinity(); };
   if (options_.sd_slope_rad == 0) {
     const double only = landed(next(state, options_.mean_slope_rad));
     return {only, only};

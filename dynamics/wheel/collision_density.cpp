@@ -16,7 +16,7 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr double reach = 4.6;  // scores beyond it weigh 4e-6
+constexpr double farthest_score = 4.6;  // scores beyond it weigh 4e-6
 
 constexpr double finest = 0.05, widest = 0.8;  // spacing of nodes
 
@@ -24,13 +24,13 @@ constexpr double finest = 0.05, widest = 0.8;  // spacing of nodes
 // fades out at both ends (then the rule converges exponentially), panels of Gauss-Legendre nodes where it is cut.
 template <class Add>
 void score_nodes(double from, double to, double spacing, Add add) {
-  if (from <= -reach && to >= reach) {
-    const int half = static_cast<int>(std::ceil(reach / spacing));
+  if (from <= -farthest_score && to >= farthest_score) {
+    const int half = static_cast<int>(std::ceil(farthest_score / spacing));
     for (int i = -half; i <= half; ++i) add(i * spacing, spacing * normal_density(i * spacing));
     return;
   }
-  from = std::max(from, -reach);
-  to = std::min(to, reach);
+  from = std::max(from, -farthest_score);
+  to = std::min(to, farthest_score);
   if (!(from < to)) return;
   using Rule = boost::math::quadrature::gauss<double, 30>;
   const int panels = std::max(1, static_cast<int>(std::ceil((to - from) / (30 * spacing))));
@@ -203,7 +203,7 @@ SpeedDensity sum_from_least_restitution(const PublishedCollision& collision, con
                          [&](double eta) { return collision.curve(eta, contact_duration(eta)).discriminant; }, edge,
                          next, boost::math::tools::eps_tolerance<double>(40), iterations)
                          .second;
-  const double high = std::max(next, std::min(1.0, contact.restitution_mean + reach * contact.restitution_sd));
+  const double high = std::max(next, std::min(1.0, contact.restitution_mean + farthest_score * contact.restitution_sd));
   using Rule = boost::math::quadrature::gauss<double, 30>;
   const auto score = [&](double eta) { return (eta - contact.restitution_mean) / contact.restitution_sd; };
   const double half = std::sqrt(high - low) / 2;

@@ -11,13 +11,13 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double most_above = 1e-13;    // survivors beyond the upper edge
-constexpr double few_lower = 1.5;       // lowest states that the first try covers above the lowest one
-constexpr double most_launched = 1e-9;  // landings of the launch beyond it
+constexpr double most_above_edge = 1e-13;     // survivors beyond the upper edge
+constexpr double first_reach = 1.5;           // lowest states that the first try covers above the lowest one
+constexpr double most_launched_above = 1e-9;  // landings of the launch beyond it
 constexpr std::size_t most_pilot_panels = 64;
-constexpr double least_scaled = 1e-6;  // survivors of a row whose total is worth correcting
+constexpr double least_corrected = 1e-6;  // survivors of a row whose total is worth correcting
 
-NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
+NodeRow node_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
   const int next = (phase + 1) % space.phases();
   const auto weights = space.weights(next);
   NodeRow row;
@@ -34,23 +34,23 @@ NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, 
                            "a density of the landing from state " + std::to_string(state) + " is not finite");
   const double survivors = 1 - row.rest;
   row.error = std::abs(sum - survivors);
-  if (survivors > least_scaled && sum > 0.1 * survivors)
+  if (survivors > least_corrected && sum > 0.1 * survivors)
     for (double& p : row.landing) p *= survivors / sum;
   return row;
 }
 
-MakeNodeRow rows(const AnyReturnMap& map, const NodeSpace& space) {
-  return [&](double state, int phase) { return make_row(map, space, state, phase); };
+MakeNodeRow panel_rows(const AnyReturnMap& map, const NodeSpace& space) {
+  return [&](double state, int phase) { return node_row(map, space, state, phase); };
 }
 
 }  // namespace
 
 IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads) {
-  return chain_of_rows(map, space, launch, rows(map, space), false, {}, threads);
+  return chain_of_rows(map, space, launch, panel_rows(map, space), false, {}, threads);
 }
 
 Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
-  return launch_of_rows(rows(map, space), space, {[state](double) { return state; }, phase}, {}, 1);
+  return launch_of_rows(panel_rows(map, space), space, {[state](double) { return state; }, phase}, {}, 1);
 }
 
 std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads,
@@ -68,7 +68,7 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     for (int p = 0; p < map.phases(); ++p) all.emplace_back(map.state_interval(p).first, upper);
     return all;
   };
-  const double launched = std::max(launch.state(3), highest_lower + few_lower * std::abs(highest_lower));
+  const double launched = std::max(launch.state(3), highest_lower + first_reach * std::abs(highest_lower));
   const double length = std::max({launched - lower, 0.1 * std::abs(launched), 1e-3});
   double upper = std::min(highest, lower + 1.2 * length);
   for (std::size_t panels = map.phases() > 1 ? 1 : 2;;) {
@@ -89,8 +89,8 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
       const std::size_t base = static_cast<std::size_t>(p) * space.nodes();
       double above = 0, after = 0;
       std::size_t k = space.nodes();
-      while (k > 0 && above + quasi[base + k - 1] <= most_above &&
-             after + pilot.chain.launch.after[base + k - 1] <= most_launched) {
+      while (k > 0 && above + quasi[base + k - 1] <= most_above_edge &&
+             after + pilot.chain.launch.after[base + k - 1] <= most_launched_above) {
         --k;
         above += quasi[base + k];
         after += pilot.chain.launch.after[base + k];

@@ -22,7 +22,7 @@ Json number(double value) {
 Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
 
 // Steps that are not known, and a size of an effect without one, are 0.
-Json positive(double value) { return value > 0 ? number(value) : Json(nullptr); }
+Json positive_or_null(double value) { return value > 0 ? number(value) : Json(nullptr); }
 
 bool is_whole(const std::string& effect, const std::string& parameter) {
   for (const dynamics::EffectInfo& info : dynamics::effect_catalogue())
@@ -133,11 +133,11 @@ analysis::Shrinkage unknown_shrinkage() {
 }
 
 Json steps_json(const analysis::StepsBeforeFailure& s) {
-  return {{"observed", positive(s.observed)},
-          {"observed_interval_90", {positive(s.observed_lower), positive(s.observed_upper)}},
-          {"baseline", positive(s.baseline)},
-          {"recalibrated", positive(s.recalibrated)},
-          {"with_effect", positive(s.with_effect)}};
+  return {{"observed", positive_or_null(s.observed)},
+          {"observed_interval_90", {positive_or_null(s.observed_lower), positive_or_null(s.observed_upper)}},
+          {"baseline", positive_or_null(s.baseline)},
+          {"recalibrated", positive_or_null(s.recalibrated)},
+          {"with_effect", positive_or_null(s.with_effect)}};
 }
 
 Json visibility_json(const analysis::Visibility& v) {
@@ -146,7 +146,7 @@ Json visibility_json(const analysis::Visibility& v) {
   return {{"effect", v.effect},
           {"parameter", v.parameter},
           {"unit", effect_unit(v.effect, v.parameter)},
-          {"smallest", v.undecidable.empty() ? positive(v.smallest) : Json(nullptr)},
+          {"smallest", v.undecidable.empty() ? positive_or_null(v.smallest) : Json(nullptr)},
           {"alike", alike},
           {"undecidable", v.undecidable.empty() ? Json(nullptr) : Json(v.undecidable)}};
 }

@@ -15,7 +15,7 @@ namespace metastable::reports {
 namespace {
 
 constexpr std::size_t most_cells = 10, most_causes = 8;
-constexpr double shown_probability = 0.0005;  // causes below are only in the files
+constexpr double worded_probability = 0.0005;  // causes below are only in the files
 
 // One effect a line, with the one that is most like it.
 Table visibility_lines(const analysis::Diagnosis& d) {
@@ -77,7 +77,7 @@ std::string diagnosis_text(const analysis::Diagnosis& d, std::size_t width) {
   Table causes = causes_table(d);
   const std::string nearest = d.causes.ranked.empty() ? "" : d.causes.ranked.front().name();
   std::erase_if(causes.rows, [&](const std::vector<Cell>& row) {
-    return std::get<double>(row[1].value()) < shown_probability && std::get<std::string>(row[0].value()) != nearest;
+    return std::get<double>(row[1].value()) < worded_probability && std::get<std::string>(row[0].value()) != nearest;
   });
   text += part(causes, most_causes);
 

@@ -17,6 +17,7 @@
 #include <string_view>
 
 #include "reports/output/interrupt.h"
+#include "reports/output/text_table.h"
 
 namespace metastable::reports {
 namespace {
@@ -174,11 +175,6 @@ void check_heat_map(const Figure& figure, const HeatMap& map) {
 
 std::string cell_label(double value, NumberFormat format, int digits) {
   return std::isinf(value) ? "∞" : format_number(value, format, digits);
-}
-
-/// Characters, not bytes, of UTF-8.
-std::size_t length(std::string_view text) {
-  return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; }));
 }
 
 struct LabelFit {

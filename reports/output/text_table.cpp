@@ -21,11 +21,6 @@ constexpr std::size_t gap = 2;  // spaces before a column
 
 using Lines = std::vector<std::string>;
 
-// Characters, not bytes, of UTF-8.
-std::size_t length(std::string_view text) {
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
-}
-
 std::string cell_text(const Cell& cell, const Column& column) {
   struct Visitor {
     const Column& column;
@@ -113,6 +108,10 @@ void fit(std::vector<Shown>& columns, std::size_t width) {
 }
 
 }  // namespace
+
+std::size_t length(std::string_view text) {
+  return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; }));
+}
 
 std::size_t terminal_width() {
   if (::isatty(STDOUT_FILENO) != 1) return line_width;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 #include "reports/output/table.h"
 
@@ -14,6 +15,9 @@ inline constexpr std::size_t line_width = 100;
 /// Characters of a line on standard output: the width of its terminal (COLUMNS where that does not tell it, at least
 /// 40), else line_width, so that what is piped is the same everywhere.
 std::size_t terminal_width();
+
+/// Characters, not bytes, of UTF-8.
+std::size_t length(std::string_view text);
 
 /// Title, then aligned columns (text flush left, the rest flush right) and the notes; at most `most` rows, and how many
 /// were left out. Columns that are empty in all rows are not shown. Lines hold at most `width` characters: headings
