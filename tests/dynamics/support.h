@@ -28,7 +28,10 @@ inline Wheel even_wheel() {
   return wheel;
 }
 
-/// Its return map.
+/// The paper's contact: eta and mu ~ N(0.4, 0.1^2).
+inline const ContactNoise paper_noise = ContactNoise::normal(0.4, 0.1, 0.4, 0.1);
+
+/// The return map of eight equal legs.
 inline WheelMap wheel_map(Law law, double slope_deg, const ContactNoise& noise, double rebound_lost = 0) {
   return WheelMap(even_wheel(), slope_deg * degree, law, noise, rebound_lost);
 }

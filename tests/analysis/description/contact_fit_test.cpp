@@ -10,13 +10,12 @@
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/stand_in.h"
 #include "analysis/statistics/minimize.h"
+#include "tests/analysis/folders.h"
 
 namespace metastable::analysis {
 namespace {
 
 using Status = ContactFit::Status;
-
-Experiment stand_in_folder() { return read_experiment(std::filesystem::path(METASTABLE_TEST_DATA) / "stand-in"); }
 
 // Trials as an experiment, through the same text a folder holds.
 Experiment simulated(Setting setting, int trials, std::uint64_t seed) {

@@ -8,11 +8,10 @@
 
 #include "analysis/description/law_comparison.h"
 #include "analysis/experiment/experiment.h"
+#include "tests/analysis/folders.h"
 
 namespace metastable::analysis {
 namespace {
-
-Experiment stand_in_folder() { return read_experiment(std::filesystem::path(METASTABLE_TEST_DATA) / "stand-in"); }
 
 TEST(Description, OfTheStandIn) {
   const Description description = describe(stand_in_folder(), {.fit = false});

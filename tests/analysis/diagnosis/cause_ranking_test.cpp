@@ -16,13 +16,13 @@ namespace {
 using test::Line;
 using test::line;
 
-RankingOptions quick() { return {.threads = 1, .draws = 300, .seed = 1, .progress = {}}; }
+RankingOptions few_draws() { return {.threads = 1, .draws = 300, .seed = 1, .progress = {}}; }
 
 // On a line the gain is least squares' and the evidence that of one parameter: 36/37 of half the gain less log(37)/2.
 TEST(RankCauses, OnALineGainAndEvidenceAreThoseOfLeastSquares) {
   const Line model = line(0.1, 1);
   const Fit plain = fit(model, {0, 0}, {});
-  const CauseRanking ranking = rank_causes(model, plain, {&model.candidates()[0]}, quick());
+  const CauseRanking ranking = rank_causes(model, plain, {&model.candidates()[0]}, few_draws());
   ASSERT_EQ(ranking.singles.size(), 1U);
   const RankedCause& cause = ranking.singles[0];
   const Fit with = fit(model, {0, 0}, {{&model.candidates()[0], {}, {0.0}}});
@@ -40,7 +40,7 @@ TEST(RankCauses, PutsTheTorqueOnARotorFirst) {
   std::vector<const Candidate*> candidates;
   for (const Candidate& candidate : data->candidates()) candidates.push_back(&candidate);
   const Fit recalibrated = fit(*data, nominal_values(*data), {});
-  const CauseRanking ranking = rank_causes(*data, recalibrated, candidates, quick());
+  const CauseRanking ranking = rank_causes(*data, recalibrated, candidates, few_draws());
   ASSERT_EQ(ranking.singles.size(), candidates.size());
   const auto best = std::max_element(ranking.singles.begin(), ranking.singles.end(),
                                      [](const auto& a, const auto& b) { return a.evidence < b.evidence; });

@@ -7,6 +7,7 @@
 
 #include "analysis/experiment/experiment.h"
 #include "dynamics/return_map/trials.h"
+#include "tests/analysis/folders.h"
 
 namespace metastable::analysis {
 namespace {
@@ -25,7 +26,7 @@ TEST(StandIn, HasThePapersConditionsAndNoTrialTwice) {
 
 // tests/data/stand-in is what `metastable simulate --stand-in --out tests/data/stand-in` makes.
 TEST(StandIn, IsTheFolderInTheRepository) {
-  const Experiment folder = read_experiment(std::filesystem::path(METASTABLE_TEST_DATA) / "stand-in");
+  const Experiment folder = stand_in_folder();
   std::size_t trial = 0;
   const auto conditions = stand_in(stand_in_setting(), 1);
   for (std::size_t c = 0; c < conditions.size(); ++c) {

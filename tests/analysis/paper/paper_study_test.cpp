@@ -9,6 +9,7 @@
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/paper/paper_claims.h"
+#include "tests/analysis/folders.h"
 
 namespace metastable::analysis {
 namespace {
@@ -17,7 +18,7 @@ const PaperStudyOptions few = {.trials = 200, .samples = 512, .seed = 3};
 
 // The stand-in in memory is the one in the repository.
 TEST(PaperStudy, TakesItsExperimentsFromAFolder) {
-  const Experiment folder = read_experiment(std::filesystem::path(METASTABLE_TEST_DATA) / "stand-in");
+  const Experiment folder = stand_in_folder();
   const PaperExperiments read = paper_experiments(folder), made = simulated_experiments(1, 0);
   EXPECT_FALSE(read.stand_in);
   EXPECT_TRUE(made.stand_in);

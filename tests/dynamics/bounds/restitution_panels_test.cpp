@@ -11,27 +11,27 @@ namespace metastable::dynamics {
 namespace {
 
 // Second moments of the narrowest panels are 1e-90, left over from terms of 1e-2.
-using Real = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<120>>;
+using LongReal = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<120>>;
 
-bool holds(const Interval& i, const Real& x) { return Real(i.lower) <= x && x <= Real(i.upper); }
-Real below(const Real& z) { return boost::math::erfc(-z / sqrt(Real(2))) / 2; }
-Real bump(const Real& z) { return exp(-z * z / 2) / sqrt(2 * boost::math::constants::pi<Real>()); }
+bool encloses(const Interval& i, const LongReal& x) { return LongReal(i.lower) <= x && x <= LongReal(i.upper); }
+LongReal below(const LongReal& z) { return boost::math::erfc(-z / sqrt(LongReal(2))) / 2; }
+LongReal bump(const LongReal& z) { return exp(-z * z / 2) / sqrt(2 * boost::math::constants::pi<LongReal>()); }
 
 TEST(RestitutionPanels, EncloseMassesAndMoments) {
   for (const auto& [mean, sd] :
        {std::pair(0.4, 0.1), std::pair(0.4, 0.05), std::pair(0.1, 0.2), std::pair(0.95, 0.01)}) {
     const TruncatedNormal normal(mean, sd, 0, 1);
     const PanelCut cut = restitution_panels(normal, 1);
-    const auto z = [m = Real(mean), s = Real(sd)](double x) { return Real((Real(x) - m) / s); };
-    const Real mass = below(z(1)) - below(z(0));
+    const auto z = [m = LongReal(mean), s = LongReal(sd)](double x) { return LongReal((LongReal(x) - m) / s); };
+    const LongReal mass = below(z(1)) - below(z(0));
     Interval total(0);
     for (const MomentPanel& p : cut.panels) {
-      const Real a = z(p.lower), b = z(p.upper), off = Real(p.centre) - mean;
-      const Real zeroth = (below(b) - below(a)) / mass, first = sd * (bump(a) - bump(b)) / mass;
-      const Real second = Real(sd) * sd * (zeroth + (a * bump(a) - b * bump(b)) / mass);
-      EXPECT_TRUE(holds(p.weight, zeroth)) << p.lower;
-      EXPECT_TRUE(holds(p.first, first - off * zeroth)) << p.lower;
-      EXPECT_TRUE(holds(p.second, second - 2 * off * first + off * off * zeroth)) << p.lower;
+      const LongReal a = z(p.lower), b = z(p.upper), off = LongReal(p.centre) - mean;
+      const LongReal zeroth = (below(b) - below(a)) / mass, first = sd * (bump(a) - bump(b)) / mass;
+      const LongReal second = LongReal(sd) * sd * (zeroth + (a * bump(a) - b * bump(b)) / mass);
+      EXPECT_TRUE(encloses(p.weight, zeroth)) << p.lower;
+      EXPECT_TRUE(encloses(p.first, first - off * zeroth)) << p.lower;
+      EXPECT_TRUE(encloses(p.second, second - 2 * off * first + off * off * zeroth)) << p.lower;
       EXPECT_LE(p.weight.lower, p.weight.upper);
       if (zeroth > 1e-200) {
         EXPECT_LT((p.weight.upper - p.weight.lower) / p.weight.upper, p.upper - p.lower > 1e-2 * sd ? 1e-11 : 1e-3)

@@ -12,11 +12,10 @@ namespace metastable::dynamics::test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-const ContactNoise noise = ContactNoise::normal(0.4, 0.1, 0.4, 0.1);
 
 // Slowest state a survivor can have: if rest is unreachable from there it is unreachable.
 bool rest_reachable(double slope) {
-  const WheelMap map(even_wheel(), slope, Law::coulomb, noise);
+  const WheelMap map(even_wheel(), slope, Law::coulomb, paper_noise);
   return map.landing_range(map.state_interval(0).first, 0).first == -infinity;
 }
 
@@ -28,13 +27,13 @@ TEST(LandingRange, CoulombRestIsUnreachableOnThePapersRamps) {
 }
 
 TEST(LandingRange, PublishedFootCanAlwaysJam) {
-  const WheelMap map(even_wheel(), 9.59 * degree, Law::published, noise);
+  const WheelMap map(even_wheel(), 9.59 * degree, Law::published, paper_noise);
   EXPECT_EQ(map.landing_range(200, 0).first, -infinity);
   EXPECT_GT(map.landing_range(200, 0).second, 200);
 }
 
 TEST(LandingRange, LosslessCollisionIsTheSupremumOfCoulomb) {
-  const WheelMap map(Wheel(), 7.02 * degree, Law::coulomb, noise);
+  const WheelMap map(Wheel(), 7.02 * degree, Law::coulomb, paper_noise);
   for (int p = 0; p < 8; ++p) {
     const double lossless = map.stance((p + 7) % 8).inertia / map.stance(p).inertia * 30;
     EXPECT_NEAR(map.landing_range(30, p).second, lossless + map.stance(p).gain, 1e-9);
@@ -43,7 +42,7 @@ TEST(LandingRange, LosslessCollisionIsTheSupremumOfCoulomb) {
 
 RC_GTEST_PROP(LandingRange, HoldsEveryLanding, ()) {
   const Law law = *rc::gen::element(Law::published, Law::coulomb, Law::plastic);
-  const WheelMap map(even_wheel(), uniform(3, 12) * degree, law, noise);
+  const WheelMap map(even_wheel(), uniform(3, 12) * degree, law, paper_noise);
   const double state = uniform(5, 60), eta = uniform(0, 1), mu = uniform(0, 4);
   const auto [least, most] = after_collision_range(map, state, 0);
   const double after = map.after_collision(state, 0, {eta, mu});

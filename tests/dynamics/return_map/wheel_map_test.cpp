@@ -15,11 +15,9 @@
 namespace metastable::dynamics::test {
 namespace {
 
-const ContactNoise noise = ContactNoise::normal(0.4, 0.1, 0.4, 0.1);
-
 TEST(WheelMap, EqualLegsHaveOnePhaseAndEquation35) {
   const double slope = 7.02 * degree, length = 0.1519;
-  const WheelMap map(even_wheel(), slope, Law::published, noise);
+  const WheelMap map(even_wheel(), slope, Law::published, paper_noise);
   EXPECT_EQ(map.phases(), 1);
   const double beta = std::numbers::pi / 2 - std::numbers::pi / 8;
   EXPECT_NEAR(map.stance(0).gain, 2 * 9.81 / length * 2 * std::sin(slope) * std::cos(beta), 1e-11);
@@ -31,7 +29,7 @@ TEST(WheelMap, EqualLegsHaveOnePhaseAndEquation35) {
 TEST(WheelMap, RevolutionOfUnevenLegsDropsByTheChords) {
   const double slope = 9.59 * degree;
   for (Law law : {Law::published, Law::coulomb, Law::plastic}) {
-    const WheelMap map(Wheel(), slope, law, noise);
+    const WheelMap map(Wheel(), slope, law, paper_noise);
     ASSERT_EQ(map.phases(), 8);
     double gained = 0, chords = 0;
     for (int p = 0; p < 8; ++p) {
@@ -47,7 +45,7 @@ TEST(WheelMap, RevolutionOfUnevenLegsDropsByTheChords) {
 
 RC_GTEST_PROP(WheelMap, CoefficientsAreTheLosses, ()) {
   const Law law = *rc::gen::element(Law::published, Law::coulomb, Law::plastic);
-  const WheelMap map(Wheel(), uniform(1, 20) * degree, law, noise, uniform(0, 1));
+  const WheelMap map(Wheel(), uniform(1, 20) * degree, law, paper_noise, uniform(0, 1));
   const int phase = *rc::gen::inRange(0, 8);
   const Contact contact{uniform(0, 1), uniform(0, 3)};
   const double state = uniform(0.5, 90);
@@ -58,7 +56,7 @@ RC_GTEST_PROP(WheelMap, CoefficientsAreTheLosses, ()) {
 
 RC_GTEST_PROP(WheelMap, LandingRisesWithTheState, ()) {
   const Law law = *rc::gen::element(Law::published, Law::coulomb, Law::plastic);
-  const WheelMap map(Wheel(), uniform(1, 20) * degree, law, noise);
+  const WheelMap map(Wheel(), uniform(1, 20) * degree, law, paper_noise);
   const std::array score{uniform(-6, 6), uniform(-6, 6)};
   const int phase = *rc::gen::inRange(0, 8);
   const double state = uniform(2, 60);
@@ -68,7 +66,7 @@ RC_GTEST_PROP(WheelMap, LandingRisesWithTheState, ()) {
 
 RC_GTEST_PROP(WheelMap, TableLandsLikeTheMap, ()) {
   const Law law = *rc::gen::element(Law::published, Law::coulomb, Law::plastic);
-  const WheelMap map(Wheel(), 7.02 * degree, law, noise);
+  const WheelMap map(Wheel(), 7.02 * degree, law, paper_noise);
   const int phase = *rc::gen::inRange(0, 8);
   std::vector<double> score, offset;
   for (int k = 0; k < 20; ++k) {
@@ -99,7 +97,7 @@ double duration_by_quadrature(const Stance& s, double next_state) {
 }
 
 TEST(WheelMap, DurationAgreesWithQuadrature) {
-  const WheelMap map(Wheel(), 7.02 * degree, Law::coulomb, noise);
+  const WheelMap map(Wheel(), 7.02 * degree, Law::coulomb, paper_noise);
   for (int p : {0, 3}) {
     const double lowest = map.state_interval((p + 1) % 8).first;
     for (double above : {1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0, 60.0}) {
@@ -114,7 +112,7 @@ TEST(WheelMap, DurationWithoutABarrier) {
   // A long leg lands after a short one on a steep ramp: the hub is past the foot already.
   Wheel wheel;
   wheel.leg_length = {0.16, 0.14, 0.16, 0.14, 0.16, 0.14, 0.16, 0.14};
-  const WheelMap map(wheel, 22 * degree, Law::plastic, noise);
+  const WheelMap map(wheel, 22 * degree, Law::plastic, paper_noise);
   int without = 0;
   for (int p = 0; p < 2; ++p) {
     const Stance& s = map.stance(p);
@@ -132,7 +130,7 @@ TEST(WheelMap, DurationWithoutABarrier) {
 }
 
 TEST(WheelMap, AssumptionsAreFlagged) {
-  const WheelMap map(even_wheel(), 7.02 * degree, Law::published, noise);
+  const WheelMap map(even_wheel(), 7.02 * degree, Law::published, paper_noise);
   ASSERT_EQ(map.assumptions().size(), 3U);
   const std::array<double, 2> typical{0, 0};
   const std::array<double, 2> slippery{0, -3};  // mu = 0.1 < mu_c
@@ -153,11 +151,11 @@ TEST(WheelMap, EnergyGainAtHighRestitutionBelowMuC) {
 }
 
 TEST(WheelMap, IllegalInputIsNamed) {
-  EXPECT_EQ(message_of([] { WheelMap(Wheel(), 25 * degree, Law::plastic, noise); }),
+  EXPECT_EQ(message_of([] { WheelMap(Wheel(), 25 * degree, Law::plastic, paper_noise); }),
             "slope: 25 deg is outside (0, 22.5) deg (half the angle between legs)");
-  EXPECT_EQ(message_of([] { WheelMap(Wheel(), 0, Law::plastic, noise); }),
+  EXPECT_EQ(message_of([] { WheelMap(Wheel(), 0, Law::plastic, paper_noise); }),
             "slope: 0 deg is outside (0, 22.5) deg (half the angle between legs)");
-  const WheelMap map(Wheel(), 7.02 * degree, Law::plastic, noise);
+  const WheelMap map(Wheel(), 7.02 * degree, Law::plastic, paper_noise);
   EXPECT_EQ(message_of([&] {
               map.tabulate(0, std::array{1.0, 2.0, 3.0});
             }),

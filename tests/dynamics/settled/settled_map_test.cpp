@@ -13,7 +13,7 @@
 namespace metastable::dynamics::test {
 namespace {
 
-SettledWheel paper(double slope_deg) {
+SettledWheel paper_wheel(double slope_deg) {
   SettledWheel wheel;
   wheel.radius_of_gyration = std::sqrt(0.0025 / 1.39);
   wheel.slope_rad = slope_deg * degree;
@@ -41,7 +41,7 @@ SettledMapOptions narrow() {
 }
 
 TEST(SettledMap, ReadsWhatDirectLandingsGive) {
-  const auto map = SettledMap::of(paper(7.02), narrow());
+  const auto map = SettledMap::of(paper_wheel(7.02), narrow());
   const SettledMapError& error = map->error();
   EXPECT_EQ(error.landings, 800U);
   EXPECT_LE(error.misjudged_rests, 2U);
@@ -52,7 +52,7 @@ TEST(SettledMap, ReadsWhatDirectLandingsGive) {
 }
 
 TEST(SettledMap, AtomKinkAndThresholdAreKept) {
-  const auto map = SettledMap::of(paper(7.02), narrow());
+  const auto map = SettledMap::of(paper_wheel(7.02), narrow());
   for (int leg = 0; leg < 8; ++leg) {
     const double omega = 5.1, eta = 0.43, sticking = map->sticking_friction(leg);
     ASSERT_TRUE(map->tabulated(leg, omega, eta));
@@ -72,7 +72,7 @@ TEST(SettledMap, AtomKinkAndThresholdAreKept) {
 }
 
 TEST(SettledMap, ManyFrictionsAtOnceAreTheSame) {
-  const auto map = SettledMap::of(paper(7.02), narrow());
+  const auto map = SettledMap::of(paper_wheel(7.02), narrow());
   const std::vector<double> friction{0.1, 0.33, 0.345, 0.37, 0.4, 0.9};
   std::vector<MappedLanding> landed(friction.size());
   for (const double omega : {4.9, 7.0}) {  // in the table, beyond it
@@ -89,7 +89,7 @@ TEST(SettledMap, ManyFrictionsAtOnceAreTheSame) {
 TEST(SettledMap, WithoutATableLandingsAreFollowed) {
   SettledMapOptions options;
   options.direct = true;
-  const auto map = SettledMap::of(paper(7.02), options);
+  const auto map = SettledMap::of(paper_wheel(7.02), options);
   EXPECT_FALSE(map->tabulated(1, 4.8, 0.4));
   const Landing direct = map->motion().land(1, 4.8, {0.4, 0.36});
   EXPECT_EQ(map->land(1, 4.8, {0.4, 0.36}).carried_squared, direct.carried_squared);
@@ -99,24 +99,24 @@ TEST(SettledMap, WithoutATableLandingsAreFollowed) {
 }
 
 TEST(SettledMap, IsKeptForTheLifeOfTheProcess) {
-  const auto first = SettledMap::of(paper(7.02), narrow());
+  const auto first = SettledMap::of(paper_wheel(7.02), narrow());
   SettledMapOptions again = narrow();
   again.executor = nullptr;
-  EXPECT_EQ(SettledMap::of(paper(7.02), again), first);
+  EXPECT_EQ(SettledMap::of(paper_wheel(7.02), again), first);
   SettledMapOptions direct = narrow();
   direct.direct = true;
-  EXPECT_NE(SettledMap::of(paper(7.02), direct), first);
-  EXPECT_NE(SettledMap::of(paper(9.59), direct), SettledMap::of(paper(7.02), direct));
+  EXPECT_NE(SettledMap::of(paper_wheel(7.02), direct), first);
+  EXPECT_NE(SettledMap::of(paper_wheel(9.59), direct), SettledMap::of(paper_wheel(7.02), direct));
 }
 
 TEST(SettledMap, IllegalRangesAreNamed) {
   SettledMapOptions options;
   options.range.eta_high = 0.97;
-  EXPECT_EQ(message_of([&] { SettledMap::of(paper(7.02), options); }),
+  EXPECT_EQ(message_of([&] { SettledMap::of(paper_wheel(7.02), options); }),
             "settled map: eta_high: 0.97 is outside [eta_low, 0.95]");
   options.range = {};
   options.range.omega_high = 30;
-  EXPECT_EQ(message_of([&] { SettledMap::of(paper(7.02), options); }),
+  EXPECT_EQ(message_of([&] { SettledMap::of(paper_wheel(7.02), options); }),
             "settled map: omega_high: 30 is outside (0, 20] rad/s");
 }
 

@@ -10,10 +10,7 @@
 namespace metastable::reports {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-
-Figure sample() {
+Figure sample_figure() {
   return {
       .id = "map",
       .title = "It's <a> \"map\" `date` $x_1^2$",
@@ -27,7 +24,7 @@ Figure sample() {
 HeatMap sample_map() {
   return {.x = {0.05, 0.1},
           .y = {0.2, 0.3},
-          .value = {{10, 1e9}, {infinity, nan_value}},
+          .value = {{10, 1e9}, {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}},
           .label = "steps",
           .logarithmic = true};
 }
@@ -48,7 +45,7 @@ std::string error_of(const Figure& figure) {
 }
 
 TEST(Figure, SvgIsWholeAndCarriesTitleAndProvenance) {
-  const std::string svg = render_svg(sample());
+  const std::string svg = render_svg(sample_figure());
   EXPECT_TRUE(svg.starts_with("<?xml"));
   EXPECT_TRUE(svg.ends_with("</svg>\n\n") || svg.ends_with("</svg>\n"));
   EXPECT_NE(svg.find("<title>It&#39;s &lt;a&gt; &quot;map&quot; `date` $x_1^2$</title>"), std::string::npos);
@@ -65,7 +62,7 @@ TEST(Figure, AnyTextIsALabel) {
     Figure map{.id = "map", .title = text, .x = {text}, .y = {text}, .heat_map = sample_map()};
     map.heat_map->label = text;
     map.heat_map->x_names = map.heat_map->y_names = {text, text + "2"};
-    Figure lines = sample();
+    Figure lines = sample_figure();
     lines.title = lines.series[0].label = lines.x.label = text;
     lines.reference_lines = {{.vertical = true, .at = 1, .label = text}};
     for (const Figure& figure : {bars, map, lines}) {
@@ -76,10 +73,10 @@ TEST(Figure, AnyTextIsALabel) {
 }
 
 TEST(Figure, TheSameFigureGivesTheSameBytes) {
-  const std::string once = render_svg(sample());
+  const std::string once = render_svg(sample_figure());
   setenv("GNUTERM", "dumb", 1);
   setenv("LC_ALL", "de_DE.UTF-8", 1);
-  EXPECT_EQ(render_svg(sample()), once);
+  EXPECT_EQ(render_svg(sample_figure()), once);
   unsetenv("GNUTERM");
   unsetenv("LC_ALL");
 }
@@ -87,7 +84,7 @@ TEST(Figure, TheSameFigureGivesTheSameBytes) {
 TEST(Figure, EveryStyleDraws) {
   for (const Style style : {Style::line, Style::dashed, Style::points, Style::dots, Style::steps, Style::impulses,
                             Style::area, Style::band}) {
-    Figure figure = sample();
+    Figure figure = sample_figure();
     figure.series = {{.label = "only", .style = style, .x = {1, 2, 3}, .y = {1, 4, 2}, .lower = {}, .upper = {}}};
     if (style == Style::band) {
       figure.series[0].lower = {1, 2, 1};
@@ -105,15 +102,16 @@ TEST(Figure, EveryStyleDraws) {
 }
 
 TEST(Figure, PointsMayHaveBars) {
-  Figure figure = sample();
+  Figure figure = sample_figure();
   figure.series = {{.style = Style::points, .x = {1, 2}, .y = {1, 2}, .lower = {0, 1}, .upper = {3, 3}}};
   EXPECT_NE(gnuplot_script(figure).find("yerrorbars"), std::string::npos);
   EXPECT_FALSE(render_svg(figure).empty());
 }
 
 TEST(Figure, ValuesThatAreNotFiniteLeaveAGap) {
-  Figure figure = sample();
-  figure.series = {{.x = {0, 1, 2, 3, 4}, .y = {1, 2, nan_value, infinity, 1}}};
+  Figure figure = sample_figure();
+  figure.series = {{.x = {0, 1, 2, 3, 4},
+                    .y = {1, 2, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1}}};
   EXPECT_EQ(count(gnuplot_script(figure), "NaN"), 2u);
   EXPECT_FALSE(render_svg(figure).empty());
 }
@@ -125,7 +123,8 @@ TEST(Figure, HeatMapLabelsCells) {
     EXPECT_NE(svg.find(label), std::string::npos) << label;
   figure.heat_map->value = {{5, 5}, {5, 5}};
   EXPECT_EQ(count(render_svg(figure), ">5.00<"), 4u);
-  figure.heat_map->value = {{infinity, infinity}, {infinity, infinity}};
+  figure.heat_map->value = {{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()},
+                            {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()}};
   EXPECT_EQ(count(render_svg(figure), "∞"), 4u);
 }
 
@@ -142,7 +141,7 @@ TEST(Figure, HeatMapLabelsShrinkAndThenGo) {
 }
 
 TEST(Figure, BadDataIsNamed) {
-  Figure figure = sample();
+  Figure figure = sample_figure();
   figure.series[0].y.pop_back();
   EXPECT_EQ(error_of(figure), "figure 'map', series 1 ('mean'): x, y, lower and upper have 3, 2, 0 and 0 values");
   figure.series.clear();
@@ -159,7 +158,7 @@ TEST(Figure, MissingGnuplotIsSaid) {
   setenv("PATH", "/nonexistent", 1);
   std::string message;
   try {
-    render_svg(sample());
+    render_svg(sample_figure());
   } catch (const std::runtime_error& error) {
     message = error.what();
   }

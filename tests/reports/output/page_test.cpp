@@ -11,7 +11,7 @@
 namespace metastable::reports {
 namespace {
 
-Page sample() {
+Page sample_page() {
   const Figure figure{.id = "a", .title = "", .x = {"x"}, .y = {"y"}, .series = {{.x = {0, 1}, .y = {0, 1}}}};
   const std::string svg = render_svg(figure);
   const Table table{.id = "t", .title = "Numbers {{title}}", .columns = {{"x"}}, .rows = {{1}}};
@@ -27,7 +27,7 @@ Page sample() {
 }
 
 TEST(Page, HoldsEverything) {
-  const std::string html = render_page(sample());
+  const std::string html = render_page(sample_page());
   for (const char* part :
        {"<!DOCTYPE html>", "<title>Report &lt;1&gt; &amp; {{more}}</title>", "<p>Second.</p>",
         "<a href=\"#two\">No figures</a>", "<section id=\"one\">", "A &quot;heading&quot;",
@@ -38,7 +38,7 @@ TEST(Page, HoldsEverything) {
 }
 
 TEST(Page, IdsAreUniqueAndLinksInsideResolve) {
-  const std::string html = render_page(sample());
+  const std::string html = render_page(sample_page());
   std::set<std::string> ids;
   const std::regex id(R"( id=['"]([^'"]*)['"])");
   for (std::sregex_iterator match(html.begin(), html.end(), id), end; match != end; ++match) {
@@ -51,13 +51,13 @@ TEST(Page, IdsAreUniqueAndLinksInsideResolve) {
 }
 
 TEST(Page, LoadsNothing) {
-  const std::string html = render_page(sample());
+  const std::string html = render_page(sample_page());
   for (const char* part : {"<script", "src=", "@import", "<link"})
     EXPECT_EQ(html.find(part), std::string::npos) << part;
 }
 
 TEST(Page, RefusesWhatIsNoSvg) {
-  Page page = sample();
+  Page page = sample_page();
   page.sections[0].figures[0].svg = "gnuplot: error";
   EXPECT_THROW(render_page(page), std::invalid_argument);
 }

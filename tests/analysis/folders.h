@@ -1,0 +1,15 @@
+#pragma once
+// Experiment folders that several tests read.
+
+#include <filesystem>
+
+#include "analysis/experiment/experiment.h"
+
+namespace metastable::analysis {
+
+/// The simulated stand-in of the paper's three experiments.
+inline Experiment stand_in_folder() {
+  return read_experiment(std::filesystem::path(METASTABLE_TEST_DATA) / "stand-in");
+}
+
+}  // namespace metastable::analysis
