@@ -8,11 +8,10 @@
 #include <vector>
 
 #include "dynamics/walkers/gait.h"
+#include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 struct Simulated {
   double mean, error;
