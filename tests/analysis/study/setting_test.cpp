@@ -44,11 +44,10 @@ TEST(Setting, ErrorsNameTheQuantityAndItsRange) {
   expect_message([](Setting& s) { s.correlation = 1; }, "correlation");
 }
 
-TEST(Setting, SettledIsSimulatedAndHasNoChain) {
+TEST(Setting, SettledHasItsRanges) {
   Setting setting;
   setting.law = dynamics::Law::settled;
   EXPECT_NO_THROW(setting.validate());
-  EXPECT_THROW(setting.problem(), std::invalid_argument);
   setting.restitution.mean = 0.96;
   EXPECT_THROW(setting.validate(), std::invalid_argument);
   setting.restitution.mean = 0.4;
