@@ -14,6 +14,7 @@ set(ROOMS
   "dynamics/settled: dynamics/wheel"
   "dynamics/return_map: dynamics/wheel dynamics/settled"
   "dynamics/bounds: dynamics/wheel dynamics/return_map"
+  "dynamics/walkers:"
   "analysis/statistics: markov dynamics/wheel"
   "analysis/diagnosis: markov dynamics/wheel analysis/statistics"
   "analysis/study: markov markov/chain markov/passage markov/rows dynamics/settled dynamics/return_map dynamics/bounds analysis/statistics"
