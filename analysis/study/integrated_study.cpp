@@ -83,18 +83,6 @@ std::size_t more(std::size_t panels) {
 
 Estimate estimate(double value, double error) { return {value, value * std::exp(-error), value * std::exp(error)}; }
 
-Metastability unresolved(const Problem& problem) {
-  constexpr double infinite = std::numeric_limits<double>::infinity();
-  Metastability result;
-  result.method = Method::integrated;
-  result.status = Status::rest_unresolved;
-  result.phases = problem.map.phases();
-  result.message = "rest is possible, but only by noise beyond probabilities of 1e-300";
-  result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, 1.0, infinite};
-  result.spectrum.failure_rate = {0, 0, 1};
-  return result;
-}
-
 }  // namespace
 
 Metastability integrated_study(const Problem& problem, const StudyOptions& options) {
@@ -109,7 +97,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   }
   tell(0, "pilot");
   const ExactRows rows(problem, options.tolerance, options.threads);
-  if (rows.unresolved()) return unresolved(problem);
+  if (rows.unresolved()) return rest_unresolved(problem, options, "only by noise beyond probabilities of 1e-300");
 
   const bool free = options.cells == 0;
   const std::size_t most =
@@ -148,6 +136,9 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   result.spectrum.failure_rate = estimate(fine->failure_rate(), rate_error.error());
   result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate(), rate_error.error());
   result.steps.worst_start = estimate(fine->worst_start, worst_error.error());
+  for (Estimate* steps : {&result.steps.from_start, &result.steps.from_quasi_stationary, &result.steps.worst_start})
+    steps->lower = std::max(1.0, steps->lower);
+  result.spectrum.failure_rate.upper = std::min(1.0, result.spectrum.failure_rate.upper);
   result.steps.discretization_error = error;
   result.steps.safe_state = reach.safe_state;
   if (result.steps.discretization_error > options.tolerance) {

@@ -40,6 +40,7 @@ struct Setting {
   dynamics::WheelMap map() const;
   /// The wheel of the law `settled`, whatever `law` is. @throws as map()
   dynamics::SettledMotion motion() const;
+  /// Ranges are those of dynamics/wheel/ranges.h; a ramp may also be infinitely long.
   /// @throws std::invalid_argument, one line naming the quantity, its value and its range
   void validate() const;
   /// The generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on the

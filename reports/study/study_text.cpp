@@ -137,10 +137,12 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
                  ? "none: every launch rests at its first collision"
                  : fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.restart_mean, study.survivors.restart_sd));
   text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.spectrum.moduli, ", ")));
-  std::string mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);
+  std::string mixing;
+  if (study.spectrum.moduli.size() > 1) mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);
   if (study.spectrum.total_variation_steps)
-    mixing += fmt::format(", {} from the launch (total variation)", *study.spectrum.total_variation_steps);
-  text += line("mixing", mixing);
+    mixing += fmt::format("{}{} {}from the launch (total variation)", mixing.empty() ? "" : ", ",
+                          *study.spectrum.total_variation_steps, mixing.empty() ? "steps " : "");
+  if (!mixing.empty()) text += line("mixing", mixing);
   text += "\n";
   text += line("rest", thresholds_text(thresholds));
   for (const analysis::ViolationShare& share : study.violations)
