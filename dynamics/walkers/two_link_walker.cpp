@@ -96,7 +96,7 @@ METASTABLE_WIDE void advance(const Motion& m, double time, Motion& end) {
 
 void start(Motion& m, std::size_t lane, const Stride& stride, const Ground& ground) {
   const double slope = ground.slope, turn = ground.slope - ground.last_slope;
-  const double theta = stride.half_angle + turn, psi = -stride.half_angle + turn;
+  const double theta = stride.half_angle_rad + turn, psi = -stride.half_angle_rad + turn;
   m.theta[0][lane] = theta;
   m.psi[0][lane] = psi;
   m.omega[0][lane] = stride.stance_rate;
@@ -166,12 +166,12 @@ void require_positive(double value, const char* name, const char* unit) {
 }
 
 void require_walkable(const Stride& s) {
-  if (!(s.half_angle > 0 && s.half_angle < std::numbers::pi / 2 && std::isfinite(s.stance_rate) &&
+  if (!(s.half_angle_rad > 0 && s.half_angle_rad < std::numbers::pi / 2 && std::isfinite(s.stance_rate) &&
         std::isfinite(s.swing_rate)))
     throw std::invalid_argument(
         fmt::format("walker: the state (half angle {} rad, stance rate {}, swing rate {}) is not finite with a half "
                     "angle between 0 and pi/2",
-                    s.half_angle, s.stance_rate, s.swing_rate));
+                    s.half_angle_rad, s.stance_rate, s.swing_rate));
 }
 
 }  // namespace
@@ -217,7 +217,7 @@ Stride TwoLinkWalker::strike(const LegMotion& before) const {
   const double carried = (l * apart - b) * a * stance;
   const double inertia = hip * l * l + m * a * a + m * l * (l - b * apart) - m * (l * apart - b) * l * apart;
   Stride after;
-  after.half_angle = before.swing_angle;
+  after.half_angle_rad = before.swing_angle;
   after.stance_rate = (momentum - m * carried) / inertia;
   after.swing_rate = (l * apart * after.stance_rate - a * stance) / b;
   return after;
@@ -297,7 +297,7 @@ void TwoLinkWalker::step(std::span<const double> states, std::span<const Ground>
       fell[i] = struck[k] ? 0 : 1;
       if (!struck[k]) continue;
       const Stride after = strike(*struck[k]);
-      const std::array<double, 3> all{after.half_angle, after.stance_rate, after.swing_rate};
+      const std::array<double, 3> all{after.half_angle_rad, after.stance_rate, after.swing_rate};
       std::copy_n(all.begin(), dimension, next.begin() + static_cast<std::ptrdiff_t>(i * dimension));
     }
   }

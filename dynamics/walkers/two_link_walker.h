@@ -18,12 +18,12 @@ struct CompassOptions {
   double gravity = 9.81;      ///< g [m/s^2], > 0
 };
 
-/// Both legs just after a strike. The stance leg stands `half_angle` behind the slope's normal, the swing leg as far
-/// before it; rates are those of the angles to the normal, negative when the hip moves downhill.
+/// Both legs just after a strike. The stance leg stands `half_angle_rad` behind the slope's normal, the swing leg as
+/// far before it; rates are those of the angles to the normal, negative when the hip moves downhill.
 struct Stride {
-  double half_angle = 0;   ///< half the angle between the legs [rad]
-  double stance_rate = 0;  ///< [rad/s]
-  double swing_rate = 0;   ///< [rad/s]
+  double half_angle_rad = 0;  ///< half the angle between the legs [rad]
+  double stance_rate = 0;     ///< [rad/s]
+  double swing_rate = 0;      ///< [rad/s]
 };
 
 /// Both legs during a step, by their angles to the slope's normal [rad], rates [rad/s]. The hip is over the stance foot

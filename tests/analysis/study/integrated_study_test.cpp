@@ -95,12 +95,8 @@ TEST(IntegratedStudy, IntervalsHoldTheValueOfATighterTolerance) {
   };
   for (const Case& c : {Case{7.02, {0.3, 0.02}},
                         {8.4, {0.3, 0.1}},
-                        {8.4, {0.3, 0.14}},
                         {9.59, {0.25, 0.14}},
-                        {9.59, {0.3, 0.02}},
-                        {9.59, {0.36, 0.02}},
-                        {9.59, {0.36, 0.14}},
-                        {11, {0.36, 0.1}}}) {
+                        {9.59, {0.36, 0.02}}}) {
     Setting setting = equal_legs(7.02, c.friction);
     setting.slope_deg = c.slope_deg;
     const Metastability fine = integrated(setting, 1e-6);

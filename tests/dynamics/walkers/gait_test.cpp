@@ -2,12 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
+#include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 // Reference values: an independent integration by Runge-Kutta-Fehlberg 7(8) with events.
 TEST(Gait, OfTheSimplestWalker) {

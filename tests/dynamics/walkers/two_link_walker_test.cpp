@@ -59,7 +59,7 @@ TEST(TwoLinkWalker, StrikesKeepAngularMomenta) {
   const TwoLinkWalker walker = TwoLinkWalker::compass({m, hip, a, b, 9.81});
   const LegMotion before{0, -0.25, 0.25, -1.4, 0.6};
   const Stride stride = walker.strike(before);
-  const LegMotion after{0, stride.half_angle, -stride.half_angle, stride.stance_rate, stride.swing_rate};
+  const LegMotion after{0, stride.half_angle_rad, -stride.half_angle_rad, stride.stance_rate, stride.swing_rate};
   const auto old_points = points(m, hip, a, b, before), new_points = points(m, hip, a, b, after);
   const double foot = 2 * l * std::sin(0.25);  // from the old stance foot
   double whole_before = 0, whole_after = 0;
