@@ -193,6 +193,10 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
   const auto phase = static_cast<std::size_t>(setting.first_landing_leg % map.phases());
   CertifiedSteps result;
   result.upper = std::numeric_limits<double>::infinity();
+  if (setting.law == dynamics::Law::settled) {
+    result.reason = "landings under settled are followed event by event, and of that there are no proven bounds";
+    return result;
+  }
   try {
     std::vector<double> lowest;
     for (int p = 0; p < map.phases(); ++p) lowest.push_back(map.state_interval(p).first * (1 - 0x1p-44));

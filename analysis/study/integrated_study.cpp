@@ -12,6 +12,7 @@
 
 #include "analysis/study/chain_summary.h"
 #include "analysis/study/exact_rows.h"
+#include "analysis/study/landing_error.h"
 #include "analysis/study/rest_reachability.h"
 #include "markov/chain/solver.h"
 
@@ -150,7 +151,10 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
                                    result.steps.discretization_error, result.cells);
   }
   tell(0.96, "summary");
-  summarize(problem, fine->space.cells(), fine->space.states(), fine->chain, fine->solved, options, result);
+  const std::span<const double> states = fine->space.states();
+  summarize(problem, fine->space.cells(), states, fine->chain, fine->solved, options, result);
+  add_landing_error(result, landing_error(problem, result.phases, states, fine->chain, fine->solved, options),
+                    options.tolerance);
   return result;
 }
 

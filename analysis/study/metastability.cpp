@@ -12,6 +12,7 @@
 #include "analysis/study/chain_summary.h"
 #include "analysis/study/consistency.h"
 #include "analysis/study/integrated_study.h"
+#include "analysis/study/landing_error.h"
 #include "analysis/study/pilot.h"
 #include "analysis/study/rest_reachability.h"
 #include "markov/parallel.h"
@@ -165,7 +166,11 @@ class Study {
       }
       tell(0.96, "summary");
       const markov::StateSpace& space = ladder.spaces.back();
-      summarize(problem_, space, midpoints(space), ladder.pooled.back(), assessed.finest, options_, result);
+      const std::vector<double> states = midpoints(space);
+      summarize(problem_, space, states, ladder.pooled.back(), assessed.finest, options_, result);
+      add_landing_error(
+          result, landing_error(problem_, space.phases(), states, ladder.pooled.back(), assessed.finest, options_),
+          options_.tolerance);
       return std::move(result);
     }
   }
@@ -324,7 +329,18 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
             fmt::format("{}: sd {} is too narrow for method integrated, which takes 0 and {} or more; method sampled "
                         "takes any",
                         name, sd, narrowest_integrated));
-  Metastability result = study(setting.problem(), options);
+  // A table of landings takes part of the time.
+  const bool by_table = setting.law == dynamics::Law::settled && !setting.direct && options.progress;
+  constexpr double of_table = 0.3;
+  StudyOptions own = options;
+  std::function<void(double)> table_progress;
+  if (by_table) {
+    table_progress = [&](double share) { options.progress(of_table * share, "table of landings"); };
+    own.progress = [&](double share, const std::string& what) {
+      options.progress(of_table + (1 - of_table) * share, what);
+    };
+  }
+  Metastability result = study(setting.problem(options.threads, table_progress), own);
   result.setting = setting;
   return result;
 }
