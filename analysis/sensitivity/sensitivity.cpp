@@ -27,7 +27,7 @@ constexpr double integrated_step = 2e-3;
 // Of the wheel and the slope under `settled`: each has a table of its own, whose error is divided by the step.
 constexpr double table_step = 0.1, leg_table_step = 0.02;
 constexpr double tip_width = 0.01;       // [m]
-constexpr std::size_t table_panels = 2;  // times the coarsest nodes
+constexpr std::size_t table_panels = 4;  // times the coarsest nodes
 
 double width(const Setting& setting, Parameter parameter) {
   const bool eta = parameter == Parameter::restitution_mean || parameter == Parameter::restitution_sd;

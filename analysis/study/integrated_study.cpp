@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "analysis/study/chain_summary.h"
@@ -54,6 +55,7 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
     if (level.from_start() >= 1 && level.worst_start >= 1 && level.failure_rate() > 0) return level;
   } catch (const markov::ConvergenceError&) {
     if (!rows.collocated()) throw;
+  } catch (const std::domain_error&) {  // from some node no entry leads to rest
   }
   return std::nullopt;
 }
@@ -126,8 +128,9 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
     panels = free ? more(panels) : std::max(given, panels + 1);
   }
   if (!fine || !coarse)
-    throw markov::ConvergenceError("integrated rows", 1,
-                                   fmt::format("{} nodes are too few to lead to rest", panels * rows.coarsest()));
+    throw markov::ConvergenceError(
+        "integrated rows", 1,
+        fmt::format("{} nodes are too few to lead to rest; method sampled may tell", panels * rows.coarsest()));
 
   Metastability result;
   result.method = Method::integrated;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/statistics/t_interval.h"
 #include "analysis/study/chain_summary.h"
@@ -24,8 +25,9 @@ namespace {
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t first_cells = 128;
 constexpr std::size_t first_samples = 4096;
-constexpr std::size_t most_endless = 2048;  // cells a phase
-constexpr int sizes = 3;                    // cell sizes a ladder holds: cells, cells / 2, cells / 4
+constexpr std::size_t most_endless = 2048;     // cells a phase
+constexpr double narrowest_integrated = 1e-4;  // sd of eta or mu: between its nodes rest is lost
+constexpr int sizes = 3;                       // cell sizes a ladder holds: cells, cells / 2, cells / 4
 // The extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
 constexpr double change_over_error = 3;
 
@@ -319,6 +321,14 @@ Metastability study(const Problem& problem, const StudyOptions& options) {
 }
 
 Metastability study(const Setting& setting, const StudyOptions& options) {
+  if (options.method == Method::integrated && setting.pairs.empty())
+    for (const auto& [name, sd] :
+         {std::pair("restitution", setting.restitution.sd), std::pair("friction", setting.friction.sd)})
+      if (sd > 0 && sd < narrowest_integrated)
+        throw std::invalid_argument(
+            fmt::format("{}: sd {} is too narrow for method integrated, which takes 0 and {} or more; method sampled "
+                        "takes any",
+                        name, sd, narrowest_integrated));
   // A table of landings takes part of the time.
   const bool by_table = setting.law == dynamics::Law::settled && !setting.direct && options.progress;
   constexpr double of_table = 0.3;

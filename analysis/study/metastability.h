@@ -167,7 +167,8 @@ struct Metastability {
 Metastability study(const Problem& problem, const StudyOptions& options = {});
 
 /// The same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.
-/// @throws std::invalid_argument also for a setting out of range
+/// @throws std::invalid_argument also for a setting out of range, and for Method::integrated with an sd of restitution
+/// or friction below 1e-4 that is not 0
 Metastability study(const Setting& setting, const StudyOptions& options = {});
 
 /// "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.
