@@ -14,8 +14,8 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double rests = -std::numeric_limits<double>::infinity();  // as markov::rest_landing
-constexpr double far_tail = 39;                                     // [sd]: beyond it probabilities underflow
-constexpr double depth = 40;             // integrands are followed down to e^-depth of their largest
+constexpr double farthest_contact = 39;                             // [sd]: beyond it probabilities underflow
+constexpr double followed_depth = 40;    // integrands are followed down to e^-followed_depth of their largest
 constexpr double eta_panel = 1.5;        // [sd]
 constexpr double mu_panel = 3;           // [sd]
 constexpr std::size_t curve_nodes = 20;  // of a draw's landing as a function of the state
@@ -25,7 +25,7 @@ constexpr double most_speed = 20;        // of a table [rad/s]
 
 // f(place, weight) at the points of an integral over [from, to]; a square root at either end is smooth to them.
 template <class F>
-void integrate(double from, double to, double panel, const F& f) {
+void over_panels(double from, double to, double panel, const F& f) {
   using Rule = boost::math::quadrature::gauss<double, 16>;
   if (!(to > from)) return;
   const auto panels = static_cast<std::size_t>(std::ceil(std::numbers::pi / 2 * (to - from) / panel));
@@ -96,8 +96,8 @@ std::vector<SettledReturnMap::EtaPoint> SettledReturnMap::restitutions(double om
   const auto resting = [&](double eta) { return resting_friction(phase, omega, eta); };
   if (restitution.constant()) return {{restitution.mean(), 1, resting(restitution.mean())}};
   const double sd = restitution.sd();
-  const double low = std::max(restitution.lower(), restitution.mean() - far_tail * sd);
-  const double high = std::min(restitution.upper(), restitution.mean() + far_tail * sd);
+  const double low = std::max(restitution.lower(), restitution.mean() - farthest_contact * sd);
+  const double high = std::min(restitution.upper(), restitution.mean() + farthest_contact * sd);
   const auto count = static_cast<std::size_t>(std::clamp(std::ceil((high - low) / sd), 8.0, 80.0));
   std::vector<double> eta(count + 1), limit(count + 1), landing(count + 1), resting_log(count + 1);
   double most_landing = -std::numeric_limits<double>::infinity(),
@@ -113,7 +113,7 @@ std::vector<SettledReturnMap::EtaPoint> SettledReturnMap::restitutions(double om
     most_resting = std::max(most_resting, resting_log[i]);
   }
   const auto counts = [&](std::size_t i) {
-    return landing[i] > most_landing - depth || resting_log[i] > most_resting - depth;
+    return landing[i] > most_landing - followed_depth || resting_log[i] > most_resting - followed_depth;
   };
   // Where the foot begins to rest although it sticks (or at the one mu there is), the landing jumps: panels end there.
   const double sticks = landings_->sticking_friction(phase);
@@ -134,7 +134,7 @@ std::vector<SettledReturnMap::EtaPoint> SettledReturnMap::restitutions(double om
   }
   std::vector<EtaPoint> points;
   for (std::size_t c = 0; c + 1 < cuts.size(); ++c)
-    integrate(cuts[c], cuts[c + 1], eta_panel * sd, [&](double at, double weight) {
+    over_panels(cuts[c], cuts[c + 1], eta_panel * sd, [&](double at, double weight) {
       points.push_back({at, weight * restitution.density(at), resting(at)});
     });
   return points;
@@ -196,8 +196,9 @@ double SettledReturnMap::landing_points(double state, int phase, std::span<const
     rest += p.weight * friction.cdf(p.resting_friction);
     if (p.resting_friction == std::numeric_limits<double>::infinity()) continue;
     if (p.resting_friction < sticks) {
-      const double low = std::max({p.resting_friction, friction.lower(), friction.mean() - far_tail * friction.sd()});
-      const double high = std::min(sticks, friction.mean() + far_tail * friction.sd());
+      const double low =
+          std::max({p.resting_friction, friction.lower(), friction.mean() - farthest_contact * friction.sd()});
+      const double high = std::min(sticks, friction.mean() + farthest_contact * friction.sd());
       if (low < high) {
         const double from = next(std::nextafter(low, high)), to = next(high);
         cuts.assign({low, high});
@@ -211,7 +212,7 @@ double SettledReturnMap::landing_points(double state, int phase, std::span<const
         }
         std::sort(cuts.begin(), cuts.end());
         for (std::size_t c = 0; c + 1 < cuts.size(); ++c)
-          integrate(cuts[c], cuts[c + 1], mu_panel * friction.sd(), [&](double mu, double weight) {
+          over_panels(cuts[c], cuts[c + 1], mu_panel * friction.sd(), [&](double mu, double weight) {
             points.emplace_back(std::max(from, next(mu)), p.weight * weight * friction.density(mu));
           });
       }
