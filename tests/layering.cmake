@@ -19,7 +19,7 @@ set(ROOMS
   "analysis/statistics: markov dynamics/wheel"
   "analysis/walkers: markov/mesh dynamics/walkers analysis/statistics"
   "analysis/diagnosis: markov dynamics/wheel analysis/statistics"
-  "analysis/study: markov markov/chain markov/passage markov/rows dynamics/settled dynamics/return_map dynamics/bounds analysis/statistics"
+  "analysis/study: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/settled dynamics/return_map dynamics/bounds analysis/statistics"
   "analysis/experiment: markov dynamics/wheel dynamics/laboratory dynamics/settled dynamics/return_map analysis/statistics analysis/study"
   "analysis/description: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/study analysis/experiment"
   "analysis/likelihood: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment"

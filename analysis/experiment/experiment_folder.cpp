@@ -48,6 +48,7 @@ std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const Simul
     throw std::invalid_argument(fmt::format("trials: {} is outside 1..1000000", options.trials));
   if (options.collisions < 1 || options.collisions > 100000)
     throw std::invalid_argument(fmt::format("collisions: {} is outside 1..100000", options.collisions));
+  setting.validate();
   const dynamics::WheelMap map = setting.map();
   const dynamics::TruncatedNormal launch = setting.launch();
   const dynamics::TrialOptions trial{.first_landing_leg = setting.first_landing_leg,

@@ -21,7 +21,8 @@ struct SimulationOptions {
   bool rest_rule = true;    ///< false: never rest, x' < 0 is set to 0 (dynamics::TrialOptions)
 };
 
-/// Simulates trials first .. first+trials-1 under `setting`. @throws std::invalid_argument naming option and range
+/// Simulates trials first .. first+trials-1 under `setting`. @throws std::invalid_argument naming option and range, and
+/// as Setting::validate()
 std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const SimulationOptions& options);
 
 /// Holds one condition of a simulated experiment.

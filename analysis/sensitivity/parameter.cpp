@@ -17,7 +17,7 @@ struct Known {
   std::string_view name, unit, label;
 };
 
-constexpr std::array<Known, 10> known = {{
+constexpr std::array<Known, 11> known = {{
     {Parameter::slope, "slope", "deg", "slope γ"},
     {Parameter::restitution_mean, "restitution-mean", "1", "mean of restitution η"},
     {Parameter::restitution_sd, "restitution-sd", "1", "sd of restitution η"},
@@ -28,6 +28,7 @@ constexpr std::array<Known, 10> known = {{
     {Parameter::ramp_stiffness, "ramp-stiffness", "N/m", "ramp stiffness K_r"},
     {Parameter::radius_of_gyration, "radius-of-gyration", "m", "radius of gyration r_g"},
     {Parameter::contact_mass, "contact-mass", "kg", "contact mass m_c"},
+    {Parameter::tip_radius, "tip-radius", "m", "tip radius r"},
 }};
 
 const Known& entry(Parameter parameter) {
@@ -73,6 +74,8 @@ double parameter_value(const Setting& setting, Parameter parameter) {
       return model(setting).radius_of_gyration;
     case Parameter::contact_mass:
       return model(setting).contact_mass;
+    case Parameter::tip_radius:
+      return setting.wheel.tip_radius;
   }
   throw std::logic_error("unknown parameter");
 }
@@ -114,6 +117,9 @@ void set_parameter(Setting& setting, Parameter parameter, double value) {
     case Parameter::contact_mass:
       wheel.contact_mass = value;
       return;
+    case Parameter::tip_radius:
+      wheel.tip_radius = value;
+      return;
   }
   throw std::logic_error("unknown parameter");
 }
@@ -137,6 +143,10 @@ bool matters(const Setting& setting, Parameter parameter) {
       return used(LawQuantity::contact_mass);
     case Parameter::radius_of_gyration:
       return used(LawQuantity::radius_of_gyration);
+    case Parameter::tip_radius:
+      return used(LawQuantity::tip_radius);
+    case Parameter::inertia:
+      return setting.law != dynamics::Law::settled;
     default:
       return true;
   }

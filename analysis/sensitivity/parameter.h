@@ -14,10 +14,12 @@ enum class Parameter {
   friction_mean,  ///< of mu, before truncation
   friction_sd,
   leg_length,          ///< mean of the legs [m]; varied, all legs keep their proportions
-  inertia,             ///< about the foot of a leg of mean length [kg m^2]; varied, the contact law keeps its r_g
+  inertia,             ///< about the foot of a leg of mean length [kg m^2]; varied, the contact law keeps its r_g;
+                       ///< not under `settled`, whose r_g is its inertia
   ramp_stiffness,      ///< K_r [N/m], `published` only
   radius_of_gyration,  ///< r_g [m], not under `published`; an inertia that is not given follows it
   contact_mass,        ///< m_c [kg], `published` only
+  tip_radius,          ///< r [m], `settled` only
 };
 
 /// "slope", "restitution-mean", ... @throws std::invalid_argument naming them all

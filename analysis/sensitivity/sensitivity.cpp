@@ -17,19 +17,24 @@ namespace metastable::analysis {
 namespace {
 
 constexpr Parameter all_parameters[] = {
-    Parameter::slope,        Parameter::restitution_mean,  Parameter::restitution_sd, Parameter::friction_mean,
-    Parameter::friction_sd,  Parameter::leg_length,        Parameter::inertia,        Parameter::ramp_stiffness,
-    Parameter::contact_mass, Parameter::radius_of_gyration};
+    Parameter::slope,        Parameter::restitution_mean,   Parameter::restitution_sd, Parameter::friction_mean,
+    Parameter::friction_sd,  Parameter::leg_length,         Parameter::inertia,        Parameter::ramp_stiffness,
+    Parameter::contact_mass, Parameter::radius_of_gyration, Parameter::tip_radius};
 
 // Steps, in parts of the width over which the parameter changes what happens.
 constexpr double pathwise_step = 1e-3;
 constexpr double integrated_step = 2e-3;
+// Of the wheel and the slope under `settled`: each has a table of its own, whose error is divided by the step.
+constexpr double table_step = 0.1, leg_table_step = 0.02;
+constexpr double tip_width = 0.01;       // [m]
+constexpr std::size_t table_panels = 4;  // times the coarsest nodes
 
 double width(const Setting& setting, Parameter parameter) {
   const bool eta = parameter == Parameter::restitution_mean || parameter == Parameter::restitution_sd;
   const bool mu = parameter == Parameter::friction_mean || parameter == Parameter::friction_sd;
   if (eta && setting.restitution.sd > 0) return setting.restitution.sd;
   if (mu && setting.friction.sd > 0) return setting.friction.sd;
+  if (parameter == Parameter::tip_radius) return tip_width;
   return 0.1 * parameter_value(setting, parameter);
 }
 
@@ -95,6 +100,11 @@ std::vector<Sensitivity> by_paths(const Setting& setting, const Metastability& s
   return list;
 }
 
+// A tip's radius ends at 0.
+double room_below(const Sensitivity& one, double step) {
+  return one.parameter == Parameter::tip_radius ? std::min(step, one.value) : step;
+}
+
 // Differences of exact rows on nodes that move with the lowest state of a survivor: the densities begin there, and
 // nodes that stood still would lose what lies between.
 class IntegratedRows {
@@ -105,16 +115,18 @@ class IntegratedRows {
     adjoint_ = markov::adjoint(markov::ChainSolver(here.chain), here.launch);
   }
 
-  // Takes d ln M by the central difference of step `step`.
+  // Takes d ln M by the central difference of step `step`; forward from a value that cannot be lowered so far.
   double difference(const Sensitivity& one, double step) const {
-    const markov::SampledChain low = chain(moved(setting_, one, -step)), high = chain(moved(setting_, one, step));
-    return markov::steps_change(adjoint_, low.chain, low.launch, high.chain, high.launch) / (2 * step * adjoint_.steps);
+    const double back = room_below(one, step);
+    const markov::SampledChain low = chain(moved(setting_, one, -back)), high = chain(moved(setting_, one, step));
+    return markov::steps_change(adjoint_, low.chain, low.launch, high.chain, high.launch) /
+           ((back + step) * adjoint_.steps);
   }
 
  private:
   markov::SampledChain chain(const Setting& near) const {
     const Problem problem = near.problem();
-    const dynamics::WheelMap here = setting_.map();
+    const markov::AnyReturnMap here = setting_.problem().map;
     std::vector<double> shift;
     for (int p = 0; p < problem.map.phases(); ++p)
       shift.push_back(problem.map.state_interval(p).first - here.state_interval(p).first);
@@ -144,6 +156,36 @@ std::vector<Sensitivity> by_rows(const Setting& setting, const Metastability& st
   return list;
 }
 
+bool of_contact(Parameter parameter) {
+  return parameter == Parameter::restitution_mean || parameter == Parameter::restitution_sd ||
+         parameter == Parameter::friction_mean || parameter == Parameter::friction_sd;
+}
+
+// Under `settled`: differences of rows, whatever the study was made with; a table each for a wheel or slope moved to
+// either side. Error: of the nodes, and of two tables where there are two.
+std::vector<Sensitivity> by_tables(const Setting& setting, const Metastability& study, const StudyOptions& options) {
+  const Problem problem = setting.problem(options.threads);
+  const ExactRows rows(problem, options.tolerance, options.threads);
+  const IntegratedRows fine(setting, rows, table_panels), coarse(setting, rows, table_panels / 2);
+  std::vector<Sensitivity> list = candidates(setting, !setting.wheel.equal_legs());
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    Sensitivity& one = list[i];
+    if (options.progress)
+      options.progress(static_cast<double>(i) / static_cast<double>(list.size()), sensitivity_name(one));
+    const bool same_table = of_contact(one.parameter);
+    const double step = width(setting, one.parameter) * (same_table ? 10 * integrated_step
+                                                         : one.leg  ? leg_table_step
+                                                                    : table_step);
+    one.derivative = fine.difference(one, step);
+    one.error = std::abs(one.derivative - coarse.difference(one, step));
+    if (same_table)
+      one.error += std::abs(one.derivative - fine.difference(one, 2 * step)) / 3;
+    else
+      one.error += std::sqrt(2.0) * study.steps.landing_error / (step + room_below(one, step));
+  }
+  return list;
+}
+
 }  // namespace
 
 std::string sensitivity_name(const Sensitivity& one) {
@@ -159,9 +201,14 @@ Sensitivities sensitivities(const Metastability& study, const StudyOptions& opti
       noise.is_empirical() ? noise.pairs().size() == 1 : noise.restitution().constant() && noise.friction().constant();
   if (constant || setting.law == dynamics::Law::plastic)
     return {{}, "without noise the steps are a staircase in every parameter"};
+  if (setting.law == dynamics::Law::settled && setting.direct)
+    return {{}, "landings that are all followed would take hours for them; leave out --direct"};
+  if (setting.law == dynamics::Law::settled && (!setting.pairs.empty() || setting.correlation != 0))
+    return {{}, "under settled they are taken from integrated rows, which need independent normals"};
   Sensitivities result;
-  result.ranked =
-      study.method == Method::integrated ? by_rows(setting, study, options) : by_paths(setting, study, options);
+  result.ranked = setting.law == dynamics::Law::settled ? by_tables(setting, study, options)
+                  : study.method == Method::integrated  ? by_rows(setting, study, options)
+                                                        : by_paths(setting, study, options);
   std::stable_sort(result.ranked.begin(), result.ranked.end(), [](const Sensitivity& a, const Sensitivity& b) {
     return std::abs(a.elasticity()) > std::abs(b.elasticity());
   });

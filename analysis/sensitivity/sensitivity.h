@@ -34,6 +34,9 @@ struct Sensitivities {
 /// sizes; error from the replicates and the extrapolation; legs one by one too when they differ.
 /// Method::integrated: fourth-order differences of exact rows on nodes that move with the lowest state of a survivor;
 /// error from the order and from halving the nodes. Cost: six times the rows of the study for every parameter.
+/// `settled`: second-order differences of such rows whatever the method, over wider steps; slope, radius of gyration,
+/// tips and legs need a table of landings to either side each, and their error holds the tables'. Cost: some seconds a
+/// table.
 /// No sensitivities, and the reason, where the expected steps are infinite or nothing is random.
 /// @throws markov::ConvergenceError when a solver fails; std::invalid_argument as study(),
 /// and for a study of no Setting

@@ -193,6 +193,10 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
   const auto phase = static_cast<std::size_t>(setting.first_landing_leg % map.phases());
   CertifiedSteps result;
   result.upper = std::numeric_limits<double>::infinity();
+  if (setting.law == dynamics::Law::settled) {
+    result.reason = "landings under settled are followed event by event, and of that there are no proven bounds";
+    return result;
+  }
   try {
     std::vector<double> lowest;
     for (int p = 0; p < map.phases(); ++p) lowest.push_back(map.state_interval(p).first * (1 - 0x1p-44));
@@ -214,7 +218,7 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
       result.from_state = std::move(certificate);
       const markov::Certificate& c = result.from_state;
       const LaunchMean mean(launch, c.nodes[phase]);
-      result.lower = mean.lower(c.lower[phase]);
+      result.lower = std::max(1.0, mean.lower(c.lower[phase]));
       if (!c.upper.empty()) result.upper = mean.upper(c.upper[phase], c.top_jump, c.top_slope);
       if (result.width() <= options.tolerance) break;
     }
@@ -228,12 +232,29 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
   return result;
 }
 
+namespace {
+
+// Seven digits, rounded away from what is enclosed.
+std::string outward(double bound, bool up) {
+  constexpr int digits = 7;
+  std::string text = fmt::format("{:.{}e}", bound, digits - 1);
+  const double shown = std::stod(text);
+  if (up ? shown < bound : shown > bound) {
+    const double unit = std::pow(10.0, std::stoi(text.substr(text.find('e') + 1)) - digits + 1);
+    text = fmt::format("{:.{}e}", up ? shown + unit : shown - unit, digits - 1);
+  }
+  return fmt::format("{:.{}g}", std::stod(text), digits);
+}
+
+}  // namespace
+
 std::string certificate_text(const CertifiedSteps& certified) {
   if (!certified.exists) return "no certificate: " + certified.reason;
   if (std::isinf(certified.upper))
-    return fmt::format("at least {:.7g}, guaranteed; no upper bound: {}", certified.lower, certified.reason);
-  return fmt::format("between {:.7g} and {:.7g} (width {:.2g} %), guaranteed", certified.lower, certified.upper,
-                     100 * certified.width());
+    return fmt::format("at least {}, guaranteed; no upper bound: {}", outward(certified.lower, false),
+                       certified.reason);
+  return fmt::format("between {} and {} (width {:.2g} %), guaranteed", outward(certified.lower, false),
+                     outward(certified.upper, true), 100 * certified.width());
 }
 
 }  // namespace metastable::analysis

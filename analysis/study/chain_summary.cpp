@@ -23,6 +23,8 @@ constexpr std::size_t violation_draws = 64;                        // a state
 constexpr std::size_t slowest_draws = 16384;
 constexpr std::size_t most_forward = 100000;  // steps followed where some states never rest
 constexpr double same_chain = 1e-6;           // agreement wanted of two ways to solve it
+constexpr double same_spectrum = 1e-6;        // and of two ways to its lambda_1
+constexpr double frequent_rest = 0.01;        // a step
 constexpr double rarest_launch = 1e-15;       // that counts: beyond 8 sds
 constexpr double rarest_rest = 1e-9;          // worth a word where the others never rest
 
@@ -86,6 +88,15 @@ std::vector<double> moduli_per_step(const Problem& problem, const markov::Chain&
   try {
     for (const std::complex<double>& value : markov::leading_eigenpairs(revolution, count).values)
       if (moduli.empty() || std::abs(value) > rounding) moduli.push_back(std::pow(std::abs(value), 1.0 / period));
+    // Inverse iteration subtracts nothing. Spectra does, and where a launch takes many steps to come down to the others
+    // (Q is nearly nilpotent) its rounding alone looks like eigenvalues larger than lambda_1.
+    const double largest = *std::max_element(moduli.begin(), moduli.end()),
+                 same = same_spectrum * largest + rounding / std::pow(largest, period - 1);
+    if (largest > 0 && !(std::max(largest - first.front(), first.front() - moduli.front()) <= same))
+      throw markov::ConvergenceError(
+          "Spectra", largest - first.front(),
+          fmt::format("rounding hides them (largest {:.4g}, lambda_1 by inverse iteration {:.4g})", largest,
+                      first.front()));
   } catch (const markov::ConvergenceError& error) {
     message += (message.empty() ? "" : "; ") + std::string("eigenvalues beyond lambda_1: ") + error.what();
     return first;
@@ -129,6 +140,25 @@ Accumulated accumulated(const markov::Moments& moments, const std::vector<double
   return total;
 }
 
+// Of the survivors among `states` alone (none: all). Cells that only a fast launch passes are wide enough to lead back
+// into themselves, which no wheel does; they would pass for a regime of their own.
+markov::QuasiStationary regime_of(const markov::ChainSolver& solver, const std::vector<std::uint32_t>& states) {
+  if (states.empty()) return markov::quasi_stationary(solver);
+  const markov::ChainSolver inside(solver.chain().restricted_to(states));
+  if (inside.period().period != solver.period().period) return markov::quasi_stationary(solver);
+  markov::QuasiStationary quasi = markov::quasi_stationary(inside);
+  // Where rest is rare no such cell keeps anything as long, and the few who leave the states would count as failures.
+  if (quasi.failure_rate < frequent_rest) return markov::quasi_stationary(solver);
+  const auto scatter = [&](std::vector<double>& vector) {
+    std::vector<double> all(solver.chain().size(), 0.0);
+    for (std::size_t i = 0; i < states.size(); ++i) all[states[i]] = vector[i];
+    vector = std::move(all);
+  };
+  scatter(quasi.distribution);
+  scatter(quasi.survival_weight);
+  return quasi;
+}
+
 // To the end of the course, where that is not too far.
 std::size_t survival_steps(const Problem& problem) {
   const auto course = static_cast<std::size_t>(problem.last_event.value_or(0)) + 1;
@@ -137,11 +167,23 @@ std::size_t survival_steps(const Problem& problem) {
 
 }  // namespace
 
-SolvedChain::SolvedChain(const markov::SampledChain& sampled)
+SolvedChain::SolvedChain(const markov::SampledChain& sampled, const std::vector<std::uint32_t>& regime)
     : solver(sampled.chain),
       mean(markov::mean_first_passage(solver)),
-      quasi(markov::quasi_stationary(solver)),
+      quasi(regime_of(solver, regime)),
       from_start(1 + dot(sampled.launch.after, mean)) {}
+
+Metastability rest_unresolved(const Problem& problem, const StudyOptions& options, const std::string& message) {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  Metastability result;
+  result.method = options.method;
+  result.status = Status::rest_unresolved;
+  result.phases = problem.map.phases();
+  result.message = "rest is possible, but " + message;
+  result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, 1.0, infinite};
+  result.spectrum.failure_rate = {0, 0, 1};
+  return result;
+}
 
 std::vector<double> midpoints(const markov::StateSpace& space) {
   std::vector<double> states;

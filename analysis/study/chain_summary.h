@@ -1,7 +1,9 @@
 #pragma once
 // What one chain says: the numbers of a study that need no replicates.
 
+#include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "analysis/study/metastability.h"
@@ -14,8 +16,9 @@ namespace metastable::analysis {
 
 /// A chain whose every state reaches rest, solved once for all that is read off it.
 struct SolvedChain {
+  /// @param regime  the states, ascending, among which the metastable regime is sought; none: all
   /// @throws std::domain_error, markov::ConvergenceError as markov::ChainSolver, markov::quasi_stationary
-  explicit SolvedChain(const markov::SampledChain& sampled);
+  explicit SolvedChain(const markov::SampledChain& sampled, const std::vector<std::uint32_t>& regime = {});
 
   markov::ChainSolver solver;
   std::vector<double> mean;  ///< expected steps from every state
@@ -33,6 +36,9 @@ struct ChainSteps {
 /// is worst; its landings are drawn with `draws` (each at most 16384, the first four).
 ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space, const SolvedChain& solved,
                        const std::vector<markov::DrawOptions>& draws);
+
+/// What a study says where rest is too rare for it. @param message  follows "rest is possible, but "
+Metastability rest_unresolved(const Problem& problem, const StudyOptions& options, const std::string& message);
 
 /// The middle of every cell.
 std::vector<double> midpoints(const markov::StateSpace& space);

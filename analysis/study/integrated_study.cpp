@@ -7,10 +7,12 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "analysis/study/chain_summary.h"
 #include "analysis/study/exact_rows.h"
+#include "analysis/study/landing_error.h"
 #include "analysis/study/rest_reachability.h"
 #include "markov/chain/solver.h"
 
@@ -53,6 +55,7 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
     if (level.from_start() >= 1 && level.worst_start >= 1 && level.failure_rate() > 0) return level;
   } catch (const markov::ConvergenceError&) {
     if (!rows.collocated()) throw;
+  } catch (const std::domain_error&) {  // from some node no entry leads to rest
   }
   return std::nullopt;
 }
@@ -82,18 +85,6 @@ std::size_t more(std::size_t panels) {
 
 Estimate estimate(double value, double error) { return {value, value * std::exp(-error), value * std::exp(error)}; }
 
-Metastability unresolved(const Problem& problem) {
-  constexpr double infinite = std::numeric_limits<double>::infinity();
-  Metastability result;
-  result.method = Method::integrated;
-  result.status = Status::rest_unresolved;
-  result.phases = problem.map.phases();
-  result.message = "rest is possible, but only by noise beyond probabilities of 1e-300";
-  result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, 1.0, infinite};
-  result.spectrum.failure_rate = {0, 0, 1};
-  return result;
-}
-
 }  // namespace
 
 Metastability integrated_study(const Problem& problem, const StudyOptions& options) {
@@ -108,7 +99,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   }
   tell(0, "pilot");
   const ExactRows rows(problem, options.tolerance, options.threads);
-  if (rows.unresolved()) return unresolved(problem);
+  if (rows.unresolved()) return rest_unresolved(problem, options, "only by noise beyond probabilities of 1e-300");
 
   const bool free = options.cells == 0;
   const std::size_t most =
@@ -137,8 +128,9 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
     panels = free ? more(panels) : std::max(given, panels + 1);
   }
   if (!fine || !coarse)
-    throw markov::ConvergenceError("integrated rows", 1,
-                                   fmt::format("{} nodes are too few to lead to rest", panels * rows.coarsest()));
+    throw markov::ConvergenceError(
+        "integrated rows", 1,
+        fmt::format("{} nodes are too few to lead to rest; method sampled may tell", panels * rows.coarsest()));
 
   Metastability result;
   result.method = Method::integrated;
@@ -147,6 +139,9 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   result.spectrum.failure_rate = estimate(fine->failure_rate(), rate_error.error());
   result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate(), rate_error.error());
   result.steps.worst_start = estimate(fine->worst_start, worst_error.error());
+  for (Estimate* steps : {&result.steps.from_start, &result.steps.from_quasi_stationary, &result.steps.worst_start})
+    steps->lower = std::max(1.0, steps->lower);
+  result.spectrum.failure_rate.upper = std::min(1.0, result.spectrum.failure_rate.upper);
   result.steps.discretization_error = error;
   result.steps.safe_state = reach.safe_state;
   if (result.steps.discretization_error > options.tolerance) {
@@ -156,7 +151,10 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
                                    result.steps.discretization_error, result.cells);
   }
   tell(0.96, "summary");
-  summarize(problem, fine->space.cells(), fine->space.states(), fine->chain, fine->solved, options, result);
+  const std::span<const double> states = fine->space.states();
+  summarize(problem, fine->space.cells(), states, fine->chain, fine->solved, options, result);
+  add_landing_error(result, landing_error(problem, result.phases, states, fine->chain, fine->solved, options),
+                    options.tolerance);
   return result;
 }
 

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/statistics/t_interval.h"
 #include "analysis/study/chain_summary.h"
 #include "analysis/study/consistency.h"
 #include "analysis/study/integrated_study.h"
+#include "analysis/study/landing_error.h"
 #include "analysis/study/pilot.h"
 #include "analysis/study/rest_reachability.h"
 #include "markov/parallel.h"
@@ -23,8 +25,9 @@ namespace {
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t first_cells = 128;
 constexpr std::size_t first_samples = 4096;
-constexpr std::size_t most_endless = 2048;  // cells a phase
-constexpr int sizes = 3;                    // cell sizes a ladder holds: cells, cells / 2, cells / 4
+constexpr std::size_t most_endless = 2048;     // cells a phase
+constexpr double narrowest_integrated = 1e-4;  // sd of eta or mu: between its nodes rest is lost
+constexpr int sizes = 3;                       // cell sizes a ladder holds: cells, cells / 2, cells / 4
 // The extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
 constexpr double change_over_error = 3;
 
@@ -98,7 +101,8 @@ class Study {
         for (std::size_t s = 0; s < sizes; ++s) {
           if (pilot.beside) chains[k][s] = without_unreached(std::move(chains[k][s]));
           if (rests(chains[k][s]))
-            steps[s][first + k] = chain_steps(problem_.map, ladder.spaces[s], SolvedChain(chains[k][s]), {draws});
+            steps[s][first + k] = chain_steps(problem_.map, ladder.spaces[s],
+                                              SolvedChain(chains[k][s], pilot.regime(ladder.spaces[s])), {draws});
           else
             steps[s][first + k].from_start = infinite;
         }
@@ -126,7 +130,7 @@ class Study {
       const Ladder ladder = climb(pilot, cells, samples, done, next);
       done = next;
       if (!ladder.rest_resolved) return std::nullopt;
-      Assessed assessed = assess(ladder, cells, samples);
+      Assessed assessed = assess(pilot, ladder, cells, samples);
       Metastability& result = assessed.result;
       // A failure this rare may hang on noise rarer than the draws reach.
       if (can_look_deeper() && std::log(result.spectrum.failure_rate.value) < 0.6 * std::log(options_.tail))
@@ -162,7 +166,11 @@ class Study {
       }
       tell(0.96, "summary");
       const markov::StateSpace& space = ladder.spaces.back();
-      summarize(problem_, space, midpoints(space), ladder.pooled.back(), assessed.finest, options_, result);
+      const std::vector<double> states = midpoints(space);
+      summarize(problem_, space, states, ladder.pooled.back(), assessed.finest, options_, result);
+      add_landing_error(
+          result, landing_error(problem_, space.phases(), states, ladder.pooled.back(), assessed.finest, options_),
+          options_.tolerance);
       return std::move(result);
     }
   }
@@ -173,13 +181,13 @@ class Study {
   };
 
   // Expected steps with their errors from the ladder.
-  Assessed assess(const Ladder& ladder, std::size_t cells, std::size_t samples) const {
+  Assessed assess(const Pilot& pilot, const Ladder& ladder, std::size_t cells, std::size_t samples) const {
     std::vector<markov::DrawOptions> draws;
     for (int r = 0; r < options_.replicates; ++r) draws.push_back(draw_options(options_, samples, r));
     std::vector<ChainSteps> pooled;
     std::optional<SolvedChain> finest;
     for (std::size_t s = 0; s < sizes; ++s) {
-      finest.emplace(ladder.pooled[s]);
+      finest.emplace(ladder.pooled[s], pilot.regime(ladder.spaces[s]));
       pooled.push_back(chain_steps(problem_.map, ladder.spaces[s], *finest, draws));
     }
 
@@ -198,7 +206,9 @@ class Study {
       discretization = std::abs(extrapolated - before) / change_over_error;
       sampling = t_interval(log_replicate).half_width;
       const double half = std::hypot(discretization, sampling);
-      return Estimate{std::exp(extrapolated), std::exp(extrapolated - half), std::exp(extrapolated + half)};
+      // One step is the least there is, whatever the extrapolation says.
+      const auto steps = [](double logarithm) { return std::max(1.0, std::exp(logarithm)); };
+      return Estimate{steps(extrapolated), steps(extrapolated - half), steps(extrapolated + half)};
     };
     double unused_d = 0, unused_s = 0;
     result.steps.from_start =
@@ -246,17 +256,13 @@ class Study {
   }
 
   Metastability unresolved() const {
-    Metastability result;
-    result.status = Status::rest_unresolved;
+    Metastability result = rest_unresolved(problem_, options_,
+                                           options_.weighting == markov::Weighting::plain
+                                               ? "no plain draw came to it: use weighted draws"
+                                               : "only by noise beyond probabilities of 1e-300");
     result.samples = options_.samples == 0 ? first_samples : options_.samples;
     result.cells = options_.cells == 0 ? first_cells : options_.cells;
     result.replicates = options_.replicates;
-    result.phases = problem_.map.phases();
-    result.message = options_.weighting == markov::Weighting::plain
-                         ? "rest is possible, but no plain draw came to it: use weighted draws"
-                         : "rest is possible, but only by noise beyond probabilities of 1e-300";
-    result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, 1.0, infinite};
-    result.spectrum.failure_rate = {0, 0, 1};
     result.steps.sampling_error = infinite;
     return result;
   }
@@ -295,14 +301,46 @@ void StudyOptions::validate() const {
 
 Metastability study(const Problem& problem, const StudyOptions& options) {
   options.validate();
-  Metastability result =
-      options.method == Method::integrated ? integrated_study(problem, options) : Study(problem, options).run();
-  require_consistent(result);
-  return result;
+  try {
+    Metastability result =
+        options.method == Method::integrated ? integrated_study(problem, options) : Study(problem, options).run();
+    require_consistent(result);
+    // Interpolated rows keep to that within their error; a curve that rises in its ninth digit is not to be shown.
+    for (std::size_t n = 1; n < result.steps.survival.size(); ++n)
+      result.steps.survival[n] = std::min(result.steps.survival[n], result.steps.survival[n - 1]);
+    return result;
+  } catch (const markov::RestTooRare&) {
+    if (options.method == Method::integrated) {  // or a jump of the density lies between its nodes: draws tell
+      StudyOptions sampled = options;
+      sampled.method = Method::sampled;
+      return study(problem, sampled);
+    }
+    return rest_unresolved(problem, options,
+                           "so rare that the expected steps or their square exceed the range of double precision");
+  }
 }
 
 Metastability study(const Setting& setting, const StudyOptions& options) {
-  Metastability result = study(setting.problem(), options);
+  if (options.method == Method::integrated && setting.pairs.empty())
+    for (const auto& [name, sd] :
+         {std::pair("restitution", setting.restitution.sd), std::pair("friction", setting.friction.sd)})
+      if (sd > 0 && sd < narrowest_integrated)
+        throw std::invalid_argument(
+            fmt::format("{}: sd {} is too narrow for method integrated, which takes 0 and {} or more; method sampled "
+                        "takes any",
+                        name, sd, narrowest_integrated));
+  // A table of landings takes part of the time.
+  const bool by_table = setting.law == dynamics::Law::settled && !setting.direct && options.progress;
+  constexpr double of_table = 0.3;
+  StudyOptions own = options;
+  std::function<void(double)> table_progress;
+  if (by_table) {
+    table_progress = [&](double share) { options.progress(of_table * share, "table of landings"); };
+    own.progress = [&](double share, const std::string& what) {
+      options.progress(of_table + (1 - of_table) * share, what);
+    };
+  }
+  Metastability result = study(setting.problem(options.threads, table_progress), own);
   result.setting = setting;
   return result;
 }

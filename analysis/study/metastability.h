@@ -103,6 +103,7 @@ struct StepsToRest {
   Estimate worst_start;                ///< from the slowest survivor of a step
   double discretization_error = 0;     ///< relative, of from_start: a third of the extrapolation's last change
   double sampling_error = 0;           ///< relative 95 % half-width of from_start over replicates
+  double landing_error = 0;            ///< relative, where landings are read from a table (landing_error.h)
   double solver_disagreement = 0;      ///< relative difference of the launch's expected steps, elimination against KLU
   std::vector<double> replicate_logs;  ///< ln(expected steps from the launch) of each replicate, extrapolated
   Accumulated distribution;            ///< from the launch, the last step counted
@@ -166,7 +167,8 @@ struct Metastability {
 Metastability study(const Problem& problem, const StudyOptions& options = {});
 
 /// The same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.
-/// @throws std::invalid_argument also for a setting out of range
+/// @throws std::invalid_argument also for a setting out of range, and for Method::integrated with an sd of restitution
+/// or friction below 1e-4 that is not 0
 Metastability study(const Setting& setting, const StudyOptions& options = {});
 
 /// "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.

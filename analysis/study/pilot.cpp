@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "markov/chain/solver.h"
@@ -12,6 +13,19 @@ namespace {
 
 constexpr std::size_t pilot_cells = 96;
 constexpr std::size_t pilot_samples = 4096;
+constexpr double beyond_regime = 1e-13;  // share of the survivors
+
+// The lowest state with less than 1e-13 of the survivors above it, at any phase.
+double top_of(const markov::StateSpace& space, const std::vector<double>& nu) {
+  double top = 0;
+  for (int p = 0; p < space.phases(); ++p) {
+    double above = 0;
+    std::size_t cell = space.cells();
+    while (cell > 1 && (above += nu[space.index(p, cell - 1)]) <= beyond_regime) --cell;
+    top = std::max(top, space.grid(p).lower(cell - 1) + space.grid(p).width(cell - 1));
+  }
+  return top;
+}
 
 // Expected visits to each state in the steps after the launch: the transient that the cells must hold in every phase.
 std::vector<double> early_visits(const markov::SampledChain& sampled) {
@@ -25,6 +39,14 @@ std::vector<double> early_visits(const markov::SampledChain& sampled) {
 }
 
 }  // namespace
+
+std::vector<std::uint32_t> Pilot::regime(const markov::StateSpace& cells) const {
+  std::vector<std::uint32_t> states;
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    if (cells.grid(cells.phase(i)).lower(cells.cell(i)) < regime_top) states.push_back(static_cast<std::uint32_t>(i));
+  if (states.size() == cells.size()) states.clear();
+  return states;
+}
 
 std::size_t with_launch(const Problem& problem, std::size_t cells, std::uint64_t seed) {
   return static_cast<std::size_t>(
@@ -46,7 +68,12 @@ std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& opt
     const markov::ChainSolver solver(sampled.chain);
     const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
     if (markov::top_share(space, quasi.distribution) < 1e-10 || reach > 1e6)
-      return Pilot{std::move(space), quasi.distribution, quasi.survival_weight, early_visits(sampled), beside};
+      return Pilot{space,
+                   quasi.distribution,
+                   quasi.survival_weight,
+                   early_visits(sampled),
+                   beside,
+                   cells > pilot_cells ? top_of(space, quasi.distribution) : std::numeric_limits<double>::infinity()};
   }
 }
 

@@ -17,6 +17,10 @@ struct Pilot {
   markov::StateSpace space;
   std::vector<double> nu, h, visits;  ///< as in markov::graded_space()
   bool beside = false;                ///< some states never come to rest, but no launch leads to them
+  double regime_top =
+      0;  ///< state above which all but 1e-13 of nu lies in no phase; infinity if the bulk holds the launch
+  /// The states of `cells` below that; none if all are.
+  std::vector<std::uint32_t> regime(const markov::StateSpace& cells) const;
   /// Cells of one phase, graded.
   markov::StateSpace graded(std::size_t cells) const { return markov::graded_space(space, nu, h, visits, cells); }
 };

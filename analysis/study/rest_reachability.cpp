@@ -58,6 +58,8 @@ RestReachability rest_reachability(const Problem& problem) {
 }
 
 std::optional<double> safe_slope_deg(const Setting& setting) {
+  // Every slope tried would need a table of landings.
+  if (setting.law == dynamics::Law::settled) return std::nullopt;
   const double steepest = dynamics::steepest_slope(setting.wheel.legs()) * 180.0 / std::numbers::pi;
   const auto has_safe_states = [&](double slope_deg) {
     Setting tilted = setting;

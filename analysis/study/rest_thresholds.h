@@ -11,6 +11,7 @@ namespace metastable::analysis {
 struct RestThresholds {
   std::optional<double> safe_speed;      ///< launches at least this fast never come to rest [rad/s]
   std::optional<double> safe_slope_deg;  ///< steeper ramps have such launches [deg]
+  bool slope_sought = true;              ///< false under `settled`: every slope would need a table of landings
 };
 
 /// Takes the speed from the study, the slope from safe_slope_deg(): a bisection.

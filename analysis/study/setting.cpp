@@ -3,12 +3,34 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
+#include "dynamics/return_map/settled_return_map.h"
 #include "dynamics/return_map/trials.h"
+#include "dynamics/wheel/ranges.h"
+#include "markov/parallel.h"
 
 namespace metastable::analysis {
+namespace {
+
+constexpr double launch_reach = 5;  // [sd]: faster launches keep the share of omega^2 that the table's last speed does
+
+void require_range(const std::string& name, double value, const std::string& unit, const dynamics::Range& range) {
+  if (!range.holds(value))
+    throw std::invalid_argument(
+        fmt::format("{} {}{}{} is outside {}", name, value, unit.empty() ? "" : " ", unit, range.text()));
+}
+
+void require_spread(const std::string& name, const Spread& spread, const std::string& unit,
+                    const dynamics::Range& range) {
+  require_range(name + ": mean", spread.mean, unit, range);
+  require_range(name + ": sd", spread.sd, unit, range);
+}
+
+}  // namespace
 
 dynamics::ContactNoise Setting::noise() const {
   if (!pairs.empty()) return dynamics::ContactNoise::empirical(pairs);
@@ -36,7 +58,25 @@ dynamics::WheelMap Setting::map() const {
 }
 
 void Setting::validate() const {
+  namespace range = dynamics::range;
   const dynamics::WheelMap wheel_map = map();
+  for (std::size_t i = 0; i < wheel.leg_length.size(); ++i)
+    require_range(fmt::format("leg_length[{}]:", i), wheel.leg_length[i], "m", range::leg_length);
+  require_range("hub_mass:", wheel.hub_mass, "kg", range::mass);
+  if (wheel.contact_mass) require_range("contact_mass:", *wheel.contact_mass, "kg", range::mass);
+  require_range("ramp_stiffness:", wheel.ramp_stiffness, "N/m", range::ramp_stiffness);
+  require_range("gravity:", wheel.gravity, "m/s^2", range::gravity);
+  for (const auto& [name, objection] : {std::pair("inertia", dynamics::inertia_objection(wheel)),
+                                        std::pair("radius_of_gyration", dynamics::gyration_objection(wheel))})
+    if (!objection.empty()) throw std::invalid_argument(fmt::format("{}: {}", name, objection));
+  require_range("slope:", slope_deg, "deg", dynamics::slope_range(wheel.legs()));
+  if (pairs.empty()) {
+    require_spread("restitution", restitution, "", range::restitution);
+    require_spread("friction", friction, "", range::friction);
+  }
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    require_range(fmt::format("pairs[{}]: friction", i), pairs[i].friction, "", range::friction);
+  require_spread("initial speed", initial_speed, "rad/s", range::speed);
   if (law == dynamics::Law::settled) {
     motion();
     if (pairs.empty() && restitution.mean > dynamics::most_settled_restitution)
@@ -49,29 +89,37 @@ void Setting::validate() const {
                         pairs[i].restitution, dynamics::most_settled_restitution));
   }
   launch();
-  if (!(ramp_length > 0)) throw std::invalid_argument(fmt::format("ramp length: {} m is not above 0", ramp_length));
+  if (ramp_length != std::numeric_limits<double>::infinity())
+    require_range("ramp length:", ramp_length, "m", range::ramp_length);
   if (first_landing_leg < 0 || first_landing_leg >= wheel.legs())
     throw std::invalid_argument(
         fmt::format("first landing leg: {} is outside 0..{}", first_landing_leg, wheel.legs() - 1));
 }
 
-Problem Setting::problem() const {
+Problem Setting::problem(int threads, const std::function<void(double)>& progress) const {
   validate();
-  if (law == dynamics::Law::settled)
-    throw std::invalid_argument(
-        "law: no chain stands on settled; `metastable simulate` rolls it, and `metastable describe --against settled` "
-        "holds it against trials");
-  const dynamics::WheelMap wheel_map = map();
   const dynamics::TruncatedNormal speed = launch();
   const auto state = [speed](double score) {
     const double omega = speed.at_score(score);
     return omega * omega;
   };
-  Problem problem{
-      wheel_map, {state, first_landing_leg % wheel_map.phases()}, [](double x) { return std::sqrt(x); }, {}};
-  if (std::isfinite(ramp_length))
-    problem.last_event = dynamics::last_collision_on_ramp(wheel_map, first_landing_leg, ramp_length);
-  return problem;
+  const auto problem_of = [&](const auto& map) {
+    Problem problem{map, {state, first_landing_leg % map.phases()}, [](double x) { return std::sqrt(x); }, {}};
+    std::vector<double> advance;
+    for (int p = 0; p < map.phases(); ++p) advance.push_back(map.advance(p));
+    if (std::isfinite(ramp_length))
+      problem.last_event = dynamics::last_collision_on_ramp(advance, problem.launch.phase, ramp_length);
+    return problem;
+  };
+  if (law != dynamics::Law::settled) return problem_of(map());
+  dynamics::SettledMapOptions options;
+  options.direct = direct;
+  options.progress = progress;
+  options.executor = [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
+    markov::parallel_for(count, threads, work);
+  };
+  return problem_of(dynamics::SettledReturnMap(wheel, slope_deg * std::numbers::pi / 180.0, noise(),
+                                               speed.at_score(launch_reach), std::move(options)));
 }
 
 std::string Setting::describe() const {
@@ -91,6 +139,7 @@ std::string Setting::describe() const {
   if (law == dynamics::Law::coulomb && rebound_lost != 0) law_text += fmt::format(", rebound lost {}", rebound_lost);
   std::string text = fmt::format("{} deg, {}, {}, {}, omega_0 ~ N({}, {}^2) rad/s", slope_deg, legs, law_text, contact,
                                  initial_speed.mean, initial_speed.sd);
+  if (direct) text += ", every landing followed";
   // The rest where it is not the paper's.
   const Setting paper;
   if (wheel.hub_mass != paper.wheel.hub_mass) text += fmt::format(", M = {} kg", wheel.hub_mass);

@@ -1,6 +1,7 @@
 #pragma once
 // One setting: a wheel, a ramp, a contact law with its noise, a launch. Defaults are the paper's.
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,7 @@ struct Setting {
   std::vector<dynamics::Contact> pairs;  ///< not empty: an empirical list instead of the normals
   Spread initial_speed{7.35, 0.19};      ///< omega_0 just before collision 1 [rad/s], truncated at 0
   int first_landing_leg = 0;
+  bool direct = false;  ///< `settled`: every landing followed instead of read from a table, hundreds of times slower
 
   dynamics::ContactNoise noise() const;
   dynamics::TruncatedNormal launch() const;
@@ -38,11 +40,13 @@ struct Setting {
   dynamics::WheelMap map() const;
   /// The wheel of the law `settled`, whatever `law` is. @throws as map()
   dynamics::SettledMotion motion() const;
+  /// Ranges are those of dynamics/wheel/ranges.h; a ramp may also be infinitely long.
   /// @throws std::invalid_argument, one line naming the quantity, its value and its range
   void validate() const;
   /// The generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on the
-  /// ramp.
-  Problem problem() const;
+  /// ramp. Under `settled` a table of landings is built, at most once for wheel and slope (SettledMap::of).
+  /// @param threads of the table, 0: all cores; @param progress of the table: its share done, from any thread
+  Problem problem(int threads = 0, const std::function<void(double)>& progress = {}) const;
   /// One line that names every quantity, for captions and provenance.
   std::string describe() const;
 };

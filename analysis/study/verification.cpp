@@ -14,6 +14,7 @@
 #include "markov/chain/eigenpairs.h"
 #include "markov/chain/solver.h"
 #include "markov/chain/sparse_solver.h"
+#include "markov/parallel.h"
 #include "markov/passage/quasi_stationary.h"
 #include "markov/rows/integrated.h"
 
@@ -137,6 +138,16 @@ Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes)
   }
   ask_other_solvers(result);
   return result;
+}
+
+VerifiedTable verify_table(double slope_deg, int threads) {
+  dynamics::Wheel wheel;
+  wheel.radius_of_gyration = std::sqrt(0.0025 / wheel.hub_mass);
+  dynamics::SettledMapOptions options;
+  options.executor = [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
+    markov::parallel_for(count, threads, work);
+  };
+  return {slope_deg, dynamics::SettledMap::of(dynamics::settled_wheel(wheel, slope_deg * degree), options)->error()};
 }
 
 Coverage coverage(const Problem& problem, double from_start, int seeds, int threads) {

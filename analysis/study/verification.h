@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/study/problem.h"
+#include "dynamics/settled/settled_map.h"
 #include "markov/rows/discretization.h"
 
 namespace metastable::analysis {
@@ -38,6 +39,14 @@ struct Verified {
 };
 /// @param most_nodes per phase, where doubling stops whatever the change
 Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes = 512);
+
+/// The table that `settled` is read from, held against landings that are followed (SettledMapError).
+struct VerifiedTable {
+  double slope_deg = 0;
+  dynamics::SettledMapError error;
+};
+/// Of the paper's wheel with J = 0.0025 kg m^2 on a slope [deg].
+VerifiedTable verify_table(double slope_deg, int threads);
 
 /// How often the sampled study's 95 % interval holds a value.
 struct Coverage {

@@ -26,6 +26,7 @@ constexpr std::size_t lanes = 16;        // landings worked on together
 constexpr std::size_t most_points = 48;  // of the grid over eta
 constexpr double depth = 22;             // windows end where the integrand is e^-depth of its largest value
 constexpr double far_tail = 37;          // [sd]
+constexpr double least_sd = 0.001;       // of eta and mu: between the points narrower ones are lost
 constexpr double split = 0.02;           // eta below which ln eta is the variable
 constexpr double longest = 690;          // -ln eta
 constexpr std::size_t most_forms = 4;    // speeds down to sqrt(1/8) of the slowest survivor's
@@ -434,7 +435,7 @@ double stretched(double eta, double rounding) {  // s
 bool PublishedDensity::covers(const WheelMap& map) {
   const ContactNoise& noise = map.noise();
   return map.law() == Law::published && !noise.is_empirical() && noise.correlation() == 0 &&
-         !noise.restitution().constant() && !noise.friction().constant();
+         noise.restitution().sd() >= least_sd && noise.friction().sd() >= least_sd;
 }
 
 PublishedDensity::PublishedDensity(const WheelMap& map, int phase)

@@ -34,7 +34,8 @@ class PublishedDensity {
   /// Returns the least state this form holds for, infinite if it holds for none.
   double slowest() const;
 
-  /// Says whether `map` has this form of the density.
+  /// Says whether `map` has this form of the density: law published, independent eta and mu whose sds are 0.001 at
+  /// least.
   static bool covers(const WheelMap& map);
 
  private:

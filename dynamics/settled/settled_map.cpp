@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
+#include <future>
 #include <limits>
 #include <mutex>
 #include <stdexcept>
@@ -16,9 +18,9 @@ namespace {
 constexpr double never = std::numeric_limits<double>::infinity();
 // Far enough above mu_c that the foot sticks under its weight, too, on every slope with a barrier.
 constexpr double sticks_by = 0.02;
-// The table begins this far above the speed at which even a sticking foot rests [rad/s].
-constexpr double clear_of_rest = 0.02;
-constexpr double crowding = 1.5;  // of nodes in speed, towards there
+constexpr double smooth_restitution = 0.6;  // above it feet hop on to the next touch
+constexpr double rough_step = 0.05;         // between rows there
+constexpr std::size_t most_kept = 32;       // maps, of some 8 MB
 
 // How far a landing gets beyond the barrier: omega_eq^2 of the settled foot less the barrier's; its sign says rest.
 double beyond_barrier(const Landing& landing, double barrier) {
@@ -65,37 +67,6 @@ void in_order(std::size_t count, const std::function<void(std::size_t)>& work) {
 
 }  // namespace
 
-SettledMap::Stencil SettledMap::stencil(double place, int count) {
-  Stencil s;
-  const int size = std::min(count, static_cast<int>(width));
-  const int first = std::clamp(static_cast<int>(place) - (size - 1) / 2, 0, count - size);
-  s.first = static_cast<std::size_t>(first), s.size = static_cast<std::size_t>(size);
-  const double t = place - first;
-  for (int k = 0; k < size; ++k) {
-    double weight = 1;
-    for (int j = 0; j < size; ++j)
-      if (j != k) weight *= (t - j) / (k - j);
-    s.weight[static_cast<std::size_t>(k)] = weight;
-  }
-  return s;
-}
-
-// Nodes in speed stand closer where the wheel barely passes.
-double SettledMap::speed(double standstill, double share) const {
-  const double from = standstill + clear_of_rest;
-  return from + (options_.range.omega_high - from) * std::expm1(crowding * share) / std::expm1(crowding);
-}
-
-double SettledMap::share(double standstill, double omega) const {
-  const double from = standstill + clear_of_rest;
-  return std::log1p((omega - from) / (options_.range.omega_high - from) * std::expm1(crowding)) / crowding;
-}
-
-double SettledMap::log_bend(const Table& table, double omega, double eta) const {
-  const auto& b = table.bend;
-  return b[0] + eta * (b[1] + eta * b[2]) + omega * (b[3] + eta * (b[4] + eta * b[5]));
-}
-
 SettledMap::SettledMap(SettledMotion motion, SettledMapOptions options)
     : motion_(std::move(motion)), options_(std::move(options)) {
   const SettledRange& range = options_.range;
@@ -103,8 +74,9 @@ SettledMap::SettledMap(SettledMotion motion, SettledMapOptions options)
     if (!fine) throw std::invalid_argument(fmt::format("settled map: {}: {} is outside {}", name, value, allowed));
   };
   require(range.omega_high > 0 && range.omega_high <= 20, "omega_high", range.omega_high, "(0, 20] rad/s");
-  require(range.eta_low >= 0 && range.eta_low <= range.eta_high, "eta_low", range.eta_low, "[0, eta_high]");
-  require(range.eta_high <= 0.95, "eta_high", range.eta_high, "[eta_low, 0.95]");
+  require(range.eta_low >= 0 && range.eta_low < std::min(range.eta_high, smooth_restitution), "eta_low", range.eta_low,
+          "[0, eta_high), below 0.6");
+  require(range.eta_high <= most_settled_restitution, "eta_high", range.eta_high, "(eta_low, 0.95]");
   require(options_.speeds >= 4, "speeds", options_.speeds, "[4, inf)");
   require(options_.restitutions >= 4, "restitutions", options_.restitutions, "[4, inf)");
   require(options_.frictions >= 4, "frictions", options_.frictions, "[4, inf)");
@@ -114,27 +86,52 @@ SettledMap::SettledMap(SettledMotion motion, SettledMapOptions options)
 }
 
 std::shared_ptr<const SettledMap> SettledMap::of(const SettledWheel& wheel, const SettledMapOptions& options) {
+  using Built = std::shared_future<std::shared_ptr<const SettledMap>>;
+  struct Kept {
+    SettledWheel wheel;
+    SettledMapOptions options;
+    Built built;
+  };
   static std::mutex mutex;
-  static std::vector<std::shared_ptr<const SettledMap>> kept;
-  const std::lock_guard lock(mutex);
-  for (const auto& map : kept) {
-    const SettledMapOptions& o = map->options_;
-    if (map->motion_.wheel() == wheel && o.range == options.range && o.direct == options.direct &&
-        o.speeds == options.speeds && o.restitutions == options.restitutions && o.frictions == options.frictions &&
-        o.checks == options.checks)
-      return map;
+  static std::deque<Kept> kept;  // the last used in front
+  const auto is_it = [&](const Kept& one) {
+    const SettledMapOptions& o = one.options;
+    return one.wheel == wheel && o.range == options.range && o.direct == options.direct && o.speeds == options.speeds &&
+           o.restitutions == options.restitutions && o.frictions == options.frictions && o.checks == options.checks;
+  };
+  std::promise<std::shared_ptr<const SettledMap>> promise;
+  {
+    std::unique_lock lock(mutex);
+    const auto found = std::find_if(kept.begin(), kept.end(), is_it);
+    if (found != kept.end()) {
+      std::rotate(kept.begin(), found, found + 1);
+      const Built built = kept.front().built;
+      lock.unlock();
+      return built.get();  // may still be built by another thread
+    }
+    kept.push_front({wheel, options, promise.get_future().share()});
+    kept.front().options.executor = nullptr;
+    kept.front().options.progress = nullptr;
+    if (kept.size() > most_kept) kept.pop_back();
   }
-  const std::shared_ptr<SettledMap> map(new SettledMap(SettledMotion(wheel), options));
-  if (!options.direct) {
-    const auto began = std::chrono::steady_clock::now();
-    map->build();
-    map->check();
-    map->seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  try {
+    const std::shared_ptr<SettledMap> map(new SettledMap(SettledMotion(wheel), options));
+    if (!options.direct) {
+      const auto began = std::chrono::steady_clock::now();
+      map->build();
+      map->check();
+      map->seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    }
+    map->options_.executor = nullptr;
+    map->options_.progress = nullptr;
+    promise.set_value(map);
+    return map;
+  } catch (...) {
+    promise.set_exception(std::current_exception());
+    const std::lock_guard lock(mutex);
+    std::erase_if(kept, is_it);
+    throw;
   }
-  map->options_.executor = nullptr;
-  map->options_.progress = nullptr;
-  kept.push_back(map);
-  return map;
 }
 
 double SettledMap::standstill(int leg, double eta) const {
@@ -179,17 +176,28 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
 
 double SettledMap::stopping_friction(int leg, double omega, double eta, int strikes, double low, double high) const {
   if (motion_.slip_after(leg, omega, {eta, low}, strikes) <= 0) return low;
-  while (high - low > 1e-11) {
-    const double middle = (low + high) / 2;
-    (motion_.slip_after(leg, omega, {eta, middle}, strikes) > 0 ? low : high) = middle;
+  // The slip falls about straight to 0 and stays there: where the line through the last two meets 0 or a little above.
+  double before = low, before_slip = 0, slip = motion_.slip_after(leg, omega, {eta, low}, strikes);
+  for (int i = 0; high - low > 1e-11; ++i) {
+    double at = (low + high) / 2;
+    if (before_slip > slip && i % 3 != 0) {
+      const double ahead = (low - before) * slip / (before_slip - slip);
+      at = std::clamp(low + ahead * (i % 3 == 1 ? 1 : 1.01) + 5e-12, low, at);
+    }
+    const double slip_at = motion_.slip_after(leg, omega, {eta, at}, strikes);
+    if (slip_at > 0) {
+      before = low, before_slip = slip;
+      low = at, slip = slip_at;
+    } else {
+      high = at;
+    }
   }
   return high;
 }
 
 // The bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
 // mu_c], log(1 + part / bend) shall have, too.
-void SettledMap::find_bend(int leg) {
-  Table& table = table_[static_cast<std::size_t>(leg)];
+void SettledMap::find_bend(SettledTable& table, int leg) const {
   const SettledRange& range = options_.range;
   const double sticking = sticking_[static_cast<std::size_t>(leg)];
   const double high_eta = std::min(0.5, range.eta_high), low_eta = std::min(range.eta_low, high_eta - 0.1);
@@ -237,140 +245,105 @@ void SettledMap::find_bend(int leg) {
   parabola(rate, &table.bend[3]);
 }
 
+// One row of a leg's table: all speeds and frictions at one restitution.
+void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
+  constexpr int stops = SettledTable::stops, piece = SettledTable::piece;
+  const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
+  const bool smooth = row < table.smooth_rows;
+  double before = table.sticking, before_last = 0;
+  for (int i = 0; i < table.speeds; ++i) {
+    const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
+    const auto at = static_cast<std::size_t>(row * table.speeds + i);
+    double resting = solve_resting(leg, omega, eta, i < 2 ? before - 1e-3 : 2 * before - before_last);
+    if (!(resting < table.sticking)) resting = table.sticking - 1e-9;
+    before_last = before, before = resting;
+    double* edge = &table.edges[at * (stops + 1)];
+    edge[stops] = resting;
+    for (int n = 0; n < stops; ++n)
+      edge[n] = smooth ? stopping_friction(leg, omega, eta, n + 2, resting, n == 0 ? table.sticking : edge[n - 1])
+                       : table.sticking;
+    double* kept = &table.kept[at * static_cast<std::size_t>(table.places())];
+    double* displacement = &table.displacement[at * static_cast<std::size_t>(table.places())];
+    const auto note = [&](int n, double mu) {
+      const Landing landing = motion_.land(leg, omega, {eta, mu});
+      *kept++ = landing.carried_squared / (omega * omega);
+      *displacement++ = landing.displacement;
+      if (landing.end != LandingEnd::settled || !smooth) table.unsettled[at] |= static_cast<std::uint16_t>(1 << n);
+    };
+    // A piece begins where the one above ended.
+    const auto repeat = [&](int n, int times) {
+      for (int k = 0; k < times; ++k) {
+        *kept = *(kept - 1), ++kept;
+        *displacement = *(displacement - 1), ++displacement;
+      }
+      table.unsettled[at] |= static_cast<std::uint16_t>((table.unsettled[at] >> (n - 1) & 1) << n);
+    };
+    for (int n = 0; n < stops; ++n) {
+      const double high = n == 0 ? table.sticking : edge[n - 1];
+      if (n == 0) note(n, table.sticking + sticks_by);
+      if (n > 0) repeat(n, edge[n] < high ? 1 : piece);
+      if (n == 0 || edge[n] < high)
+        for (int k = 1; k < piece; ++k) note(n, high + (edge[n] - high) * k / (piece - 1));
+    }
+    const double bend = table.bend_at(omega, eta), whole = std::log1p(1 / bend);
+    const double end_kept = *(kept - 1), end_displacement = *(displacement - 1);
+    for (int k = 0; k < table.frictions - 1; ++k) {
+      const double part = k == 0 ? 1e-9 : bend * std::expm1(whole * k / (table.frictions - 1));
+      note(stops, resting + part * (edge[stops - 1] - resting));
+    }
+    *kept = end_kept, *displacement = end_displacement;
+    table.unsettled[at] |= static_cast<std::uint16_t>((table.unsettled[at] >> (stops - 1) & 1) << stops);
+  }
+}
+
 void SettledMap::build() {
   const SettledRange& range = options_.range;
-  const int speeds = options_.speeds, restitutions = options_.restitutions;
-  const auto count = static_cast<std::size_t>(speeds) * static_cast<std::size_t>(restitutions);
-  table_.resize(static_cast<std::size_t>(legs()));
-  for (Table& table : table_) {
-    table.standstill.resize(static_cast<std::size_t>(restitutions));
-    table.edges.resize(count * (stops + 1));
-    table.unsettled.resize(count);
-    table.kept.resize(count * static_cast<std::size_t>(places()));
-    table.displacement.resize(table.kept.size());
-  }
-  const auto eta_at = [&](int j) { return range.eta_low + (range.eta_high - range.eta_low) * j / (restitutions - 1); };
+  SettledTable empty;
+  empty.eta_low = range.eta_low, empty.eta_high = range.eta_high;
+  empty.smooth_eta = std::min(smooth_restitution, range.eta_high);
+  empty.smooth_rows = options_.restitutions;
+  empty.rows = empty.smooth_rows + static_cast<int>(std::ceil((empty.eta_high - empty.smooth_eta) / rough_step - 1e-9));
+  empty.speeds = options_.speeds, empty.frictions = options_.frictions;
+  empty.omega_high = range.omega_high;
+  empty.resize();
+  const std::vector<double>& length = motion_.wheel().leg_length;
+  const bool alike = std::all_of(length.begin(), length.end(), [&](double one) { return one == length.front(); });
+  table_.assign(alike ? 1 : length.size(), empty);
   options_.executor(table_.size(), [&](std::size_t leg) {
-    Table& table = table_[leg];
-    for (int j = 0; j < restitutions; ++j)
-      table.standstill[static_cast<std::size_t>(j)] = standstill(static_cast<int>(leg), eta_at(j));
+    SettledTable& table = table_[leg];
+    table.sticking = sticking_[leg];
+    for (int j = 0; j < table.rows; ++j)
+      table.standstill[static_cast<std::size_t>(j)] = standstill(static_cast<int>(leg), table.eta(j));
     const double highest = *std::max_element(table.standstill.begin(), table.standstill.end());
-    table.usable = highest + clear_of_rest < range.omega_high;
-    if (table.usable) find_bend(static_cast<int>(leg));
+    table.usable = highest + SettledTable::clear_of_rest < range.omega_high;
+    if (table.usable) find_bend(table, static_cast<int>(leg));
   });
   std::mutex mutex;
   std::size_t rows_done = 0;
-  const std::size_t rows = table_.size() * static_cast<std::size_t>(restitutions);
+  const auto per_leg = static_cast<std::size_t>(empty.rows);
+  const std::size_t rows = table_.size() * per_leg;
   options_.executor(rows, [&](std::size_t row) {
-    const int leg = static_cast<int>(row) / restitutions, j = static_cast<int>(row) % restitutions;
-    Table& table = table_[static_cast<std::size_t>(leg)];
-    const double eta = eta_at(j), sticking = sticking_[static_cast<std::size_t>(leg)];
-    const double still = table.standstill[static_cast<std::size_t>(j)];
-    double before = sticking, before_last = 0;
-    for (int i = 0; i < speeds && table.usable; ++i) {
-      const double omega = speed(still, static_cast<double>(i) / (speeds - 1));
-      const auto at = static_cast<std::size_t>(j * speeds + i);
-      double resting = solve_resting(leg, omega, eta, i < 2 ? before - 1e-3 : 2 * before - before_last);
-      if (!(resting < sticking)) resting = sticking - 1e-9;
-      before_last = before, before = resting;
-      double* edge = &table.edges[at * (stops + 1)];
-      edge[stops] = resting;
-      for (int n = 0; n < stops; ++n)
-        edge[n] = stopping_friction(leg, omega, eta, n + 2, resting, n == 0 ? sticking : edge[n - 1]);
-      double* kept = &table.kept[at * static_cast<std::size_t>(places())];
-      double* displacement = &table.displacement[at * static_cast<std::size_t>(places())];
-      const auto note = [&](int n, double mu) {
-        const Landing landing = motion_.land(leg, omega, {eta, mu});
-        *kept++ = landing.carried_squared / (omega * omega);
-        *displacement++ = landing.displacement;
-        if (landing.end != LandingEnd::settled) table.unsettled[at] |= static_cast<std::uint16_t>(1 << n);
-      };
-      for (int n = 0; n < stops; ++n) {
-        const double high = n == 0 ? sticking : edge[n - 1];
-        for (int k = 0; k < piece; ++k)
-          note(n, n == 0 && k == 0 ? sticking + sticks_by : high + (edge[n] - high) * k / (piece - 1));
-      }
-      const double bend = std::exp(log_bend(table, omega, eta)), whole = std::log1p(1 / bend);
-      for (int k = 0; k < options_.frictions; ++k) {
-        const double part = k == 0 ? 1e-9 : bend * std::expm1(whole * k / (options_.frictions - 1));
-        note(stops, resting + std::min(1.0, part) * (edge[stops - 1] - resting));
-      }
-    }
+    SettledTable& table = table_[row / per_leg];
+    if (table.usable) tabulate(table, static_cast<int>(row / per_leg), static_cast<int>(row % per_leg));
     const std::lock_guard lock(mutex);
     ++rows_done;
     if (options_.progress) options_.progress(static_cast<double>(rows_done) / static_cast<double>(rows));
   });
 }
 
-bool SettledMap::place(int leg, double omega, double eta, TablePlace& place) const {
-  if (table_.empty()) return false;
-  const Table& table = table_[static_cast<std::size_t>(leg)];
-  const SettledRange& range = options_.range;
-  if (!table.usable || omega > range.omega_high || eta < range.eta_low || eta > range.eta_high) return false;
-  const double span = range.eta_high - range.eta_low;
-  place.eta = stencil(span > 0 ? (eta - range.eta_low) / span * (options_.restitutions - 1) : 0, options_.restitutions);
-  double still = 0;
-  for (std::size_t j = 0; j < place.eta.size; ++j) still += place.eta.weight[j] * table.standstill[place.eta.first + j];
-  if (omega < still + clear_of_rest) return false;
-  place.omega = stencil(share(still, omega) * (options_.speeds - 1), options_.speeds);
-  for (std::size_t j = 0; j < place.eta.size; ++j)
-    for (std::size_t i = 0; i < place.omega.size; ++i) {
-      const std::size_t at = (place.eta.first + j) * static_cast<std::size_t>(options_.speeds) + place.omega.first + i;
-      const double weight = place.eta.weight[j] * place.omega.weight[i];
-      place.unsettled |= table.unsettled[at];
-      for (std::size_t n = 0; n <= stops; ++n) place.edge[n] += weight * table.edges[at * (stops + 1) + n];
-    }
-  place.bend = std::exp(log_bend(table, omega, eta));
-  place.scale = (options_.frictions - 1) / std::log1p(1 / place.bend);
-  return true;
-}
-
-MappedLanding SettledMap::read(int leg, double omega, double eta, double friction, const TablePlace& place) const {
-  const Table& table = table_[static_cast<std::size_t>(leg)];
-  const double sticking = sticking_[static_cast<std::size_t>(leg)];
-  MappedLanding landed;
-  if (friction < place.edge[stops] && friction < sticking) {
-    landed.rest = true;
-    return landed;
-  }
-  // The piece, and the place on it.
-  std::size_t n = 0;
-  while (n < stops && friction < place.edge[n]) ++n;
-  if ((place.unsettled >> n & 1) != 0) return follow(leg, omega, {eta, friction});
-  const double high = n == 0 ? sticking : place.edge[n - 1], low = place.edge[n];
-  const double part = high > low ? std::clamp((friction - low) / (high - low), 0.0, 1.0) : 1;
-  const Stencil mu = n < stops ? stencil((1 - part) * (piece - 1), piece)
-                               : stencil(place.scale * std::log1p(part / place.bend), options_.frictions);
-  double kept = 0, displacement = 0;
-  for (std::size_t j = 0; j < place.eta.size; ++j)
-    for (std::size_t i = 0; i < place.omega.size; ++i) {
-      const std::size_t at =
-          ((place.eta.first + j) * static_cast<std::size_t>(options_.speeds) + place.omega.first + i) *
-              static_cast<std::size_t>(places()) +
-          n * piece + mu.first;
-      const double weight = place.eta.weight[j] * place.omega.weight[i];
-      double row_kept = 0, row_displacement = 0;
-      for (std::size_t k = 0; k < mu.size; ++k) {
-        row_kept += mu.weight[k] * table.kept[at + k];
-        row_displacement += mu.weight[k] * table.displacement[at + k];
-      }
-      kept += weight * row_kept;
-      displacement += weight * row_displacement;
-    }
-  landed.carried_squared = std::max(0.0, kept * omega * omega);
-  landed.displacement = displacement;
-  return landed;
-}
-
-bool SettledMap::tabulated(int leg, double omega, double eta) const {
-  TablePlace at;
-  return place(leg, omega, eta, at);
+std::optional<SettledSlice> SettledMap::slice(int leg, double eta) const {
+  if (table_.empty()) return std::nullopt;
+  const SettledTable& table = table_[static_cast<std::size_t>(leg) % table_.size()];
+  return table.holds(eta) ? std::optional(table.slice(eta)) : std::nullopt;
 }
 
 double SettledMap::resting_friction(int leg, double omega, double eta) const {
-  TablePlace at;
-  if (place(leg, omega, eta, at)) return at.edge[stops];
-  return solve_resting(leg, omega, eta, 0);
+  const std::optional<SettledSlice> table = slice(leg, eta);
+  return table && table->holds(omega) ? table->resting_friction(omega) : followed_resting_friction(leg, omega, eta);
+}
+
+double SettledMap::followed_resting_friction(int leg, double omega, double eta, double guess) const {
+  return solve_resting(leg, omega, eta, guess);
 }
 
 MappedLanding SettledMap::follow(int leg, double omega, const Contact& contact) const {
@@ -380,56 +353,55 @@ MappedLanding SettledMap::follow(int leg, double omega, const Contact& contact) 
 }
 
 MappedLanding SettledMap::land(int leg, double omega, const Contact& contact) const {
-  TablePlace at;
-  return place(leg, omega, contact.restitution, at) ? read(leg, omega, contact.restitution, contact.friction, at)
-                                                    : follow(leg, omega, contact);
-}
-
-void SettledMap::land(int leg, double omega, double eta, std::span<const double> friction,
-                      std::span<MappedLanding> landed) const {
-  TablePlace at;
-  const bool known = place(leg, omega, eta, at);
-  for (std::size_t i = 0; i < friction.size(); ++i)
-    landed[i] = known ? read(leg, omega, eta, friction[i], at) : follow(leg, omega, {eta, friction[i]});
+  const std::optional<SettledSlice> table = slice(leg, contact.restitution);
+  return table && table->holds(omega) ? table->at(omega).land(contact.friction) : follow(leg, omega, contact);
 }
 
 void SettledMap::check() {
   const SettledRange& range = options_.range;
   const auto per_leg = static_cast<std::size_t>(options_.checks);
   std::mutex mutex;
-  double settled_sum = 0, unsettled_sum = 0;
-  std::size_t settled = 0;
+  double settled_sum = 0, rough_sum = 0;
+  std::size_t settled = 0, rough = 0;
+  std::vector<double> resting_off;
   options_.executor(table_.size() * per_leg, [&](std::size_t index) {
     const int leg = static_cast<int>(index / per_leg);
-    const Table& table = table_[static_cast<std::size_t>(leg)];
+    const SettledTable& table = table_[static_cast<std::size_t>(leg)];
     if (!table.usable) return;
     const double eta = range.eta_low + (range.eta_high - range.eta_low) * spread(index, 0);
-    const double from = *std::max_element(table.standstill.begin(), table.standstill.end()) + clear_of_rest;
-    const double omega = from + (range.omega_high - from) * spread(index, 1);
-    const double resting = resting_friction(leg, omega, eta), sticking = sticking_[static_cast<std::size_t>(leg)];
-    const double mu = std::max(0.0, resting + (sticking - resting) * (1.3 * spread(index, 2) - 0.1));
-    const MappedLanding read = land(leg, omega, {eta, mu});
+    const SettledSlice read = table.slice(eta);
+    const double omega = read.lowest_speed() + (range.omega_high - read.lowest_speed()) * spread(index, 1);
+    const SettledSlice::Place place = read.at(omega);
+    const double resting = place.resting_friction();
+    const double mu = std::max(0.0, resting + (table.sticking - resting) * (1.3 * spread(index, 2) - 0.1));
+    const MappedLanding by_table = place.land(mu);
     const Landing direct = motion_.land(leg, omega, {eta, mu});
     const bool rests = direct.end == LandingEnd::rest || direct.end == LandingEnd::given_up;
-    const double solved = index % 16 == 0 ? solve_resting(leg, omega, eta, resting) : resting;
-    const double off = (read.carried_squared - direct.carried_squared) / (omega * omega);
+    const bool is_rough = place.rough(std::max(mu, resting)) || direct.end == LandingEnd::unsettled;
+    const bool solves = index % 8 == 0 && !is_rough;
+    const double off_resting = solves ? std::abs(solve_resting(leg, omega, eta, resting) - resting) : 0;
+    const double off = (by_table.carried_squared - direct.carried_squared) / (omega * omega);
     const std::lock_guard lock(mutex);
     ++error_.landings;
-    error_.resting_friction_max = std::max(error_.resting_friction_max, std::abs(solved - resting));
-    if (rests != read.rest) {
-      ++error_.misjudged_rests;
-    } else if (!rests && direct.end == LandingEnd::settled) {
-      ++settled;
-      settled_sum += off * off;
-      error_.settled_max = std::max(error_.settled_max, std::abs(off));
-      error_.displacement_max = std::max(error_.displacement_max, std::abs(read.displacement - direct.displacement));
+    if (solves) resting_off.push_back(off_resting);
+    if (is_rough) ++error_.rough;
+    if (rests != by_table.rest) {
+      ++(is_rough ? error_.rough_misjudged_rests : error_.misjudged_rests);
+    } else if (!rests && is_rough) {
+      ++rough, rough_sum += off * off;
     } else if (!rests) {
-      ++error_.unsettled;
-      unsettled_sum += off * off;
+      ++settled, settled_sum += off * off;
+      error_.settled_max = std::max(error_.settled_max, std::abs(off));
+      error_.displacement_max =
+          std::max(error_.displacement_max, std::abs(by_table.displacement - direct.displacement));
     }
   });
   if (settled > 0) error_.settled_rms = std::sqrt(settled_sum / static_cast<double>(settled));
-  if (error_.unsettled > 0) error_.unsettled_rms = std::sqrt(unsettled_sum / static_cast<double>(error_.unsettled));
+  if (rough > 0) error_.rough_rms = std::sqrt(rough_sum / static_cast<double>(rough));
+  std::sort(resting_off.begin(), resting_off.end());
+  if (resting_off.empty()) return;
+  error_.resting_friction_max = resting_off.back();
+  error_.resting_friction_median = resting_off[resting_off.size() / 2];
 }
 
 }  // namespace metastable::dynamics

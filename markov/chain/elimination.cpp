@@ -131,8 +131,7 @@ Elimination::Factors::Factors(const Chain& chain, int threads) : kill(chain.kill
 
 double Elimination::Factors::checked_rate(std::size_t n, double rate) {
   if (!(rate >= std::numeric_limits<double>::min())) {
-    throw ConvergenceError("elimination", rate,
-                           "state " + std::to_string(n) + " is left too rarely for double precision");
+    throw RestTooRare("elimination", rate, "state " + std::to_string(n) + " is left too rarely for double precision");
   }
   return rate;
 }
@@ -281,7 +280,7 @@ namespace {
 std::vector<double> checked(std::vector<double> solution) {
   for (const double entry : solution) {
     if (!std::isfinite(entry)) {
-      throw ConvergenceError("elimination", entry, "the solution exceeds the range of double precision");
+      throw RestTooRare("elimination", entry, "the solution exceeds the range of double precision");
     }
   }
   return solution;

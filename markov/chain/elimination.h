@@ -11,6 +11,12 @@
 
 namespace metastable::markov {
 
+/// Rest is so rare that probabilities or expected steps leave the range of double precision.
+class RestTooRare : public ConvergenceError {
+ public:
+  using ConvergenceError::ConvergenceError;
+};
+
 /// Factorizes I - Q = (I - U) D (I - L) with U, L >= 0 and D > 0 without a subtraction.
 ///
 /// Takes chains in which every state can reach rest. Costs O(n^3 / 3) multiply-adds for a full chain,
@@ -20,7 +26,7 @@ namespace metastable::markov {
 class Elimination {
  public:
   /// @throws std::domain_error if some state cannot reach rest (names the state).
-  /// @throws ConvergenceError("elimination", ...) if a probability falls below the range of double precision.
+  /// @throws RestTooRare("elimination", ...) if a probability falls below the range of double precision.
   /// @param threads  for full chains; 0: all cores. The bits do not depend on it.
   explicit Elimination(const Chain& chain, int threads = 1);
   ~Elimination();
@@ -29,7 +35,7 @@ class Elimination {
 
   std::size_t size() const;
   /// Solves (I - Q) x = rhs. @param rhs size n, every entry >= 0 (otherwise std::invalid_argument). Cost: the envelope.
-  /// @throws ConvergenceError("elimination", ...) if the answer exceeds the range of double precision.
+  /// @throws RestTooRare("elimination", ...) if the answer exceeds the range of double precision.
   std::vector<double> solve(std::span<const double> rhs) const;
   /// Solves y (I - Q) = rhs (row vector), entries >= 0; y[i] is the expected number of visits to state i of chains
   /// started in rhs. Throws as solve() does.

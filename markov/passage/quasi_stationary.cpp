@@ -10,7 +10,9 @@
 namespace metastable::markov {
 namespace {
 
-constexpr int kIterations = 10000;
+constexpr int kIterations = 10000;     // of interpolated rows
+constexpr int kPatience = 500;         // of all others, before each iteration gets a shift and an elimination
+constexpr int kShifted = 100;          // iterations with a shift
 constexpr double kSmallEntry = 1e-12;  // of the largest: below it an entry's relative change is not watched
 constexpr double kAccuracy = 1e-13;    // wanted of an entry, relative
 constexpr double kRounding = 1e-11;    // a change that has stopped falling below this is rounding
@@ -109,6 +111,49 @@ LeadingPair last_survivors(const Chain& chain) {
   }
 }
 
+/// Goes on with (sigma I - Q)^{-1} where sigma is the largest (Qx)_i / x_i, hardly above lambda_1 (Noda 1971): it tells
+/// neighbouring eigenvalues apart by squaring the error each time. Solved for x_i = 1 (Doob's transform), the matrix is
+/// again a chain, which rests from state i with probability 1 - (Qx)_i / (sigma x_i).
+LeadingPair iterate_shifted(const Chain& chain, LeadingPair pair) {
+  const std::size_t n = chain.size();
+  for (double& entry : pair.right) entry = std::max(entry, std::numeric_limits<double>::min());
+  for (int k = 0; k < kShifted; ++k, ++pair.iterations) {
+    std::vector<double>&x = pair.right, image = markov::apply(chain, x);
+    double shift = 0;
+    for (std::size_t i = 0; i < n; ++i) shift = std::max(shift, image[i] / x[i]);
+    shift *= 1 + 8 * std::numeric_limits<double>::epsilon();
+    std::vector<std::size_t> start{0};
+    std::vector<std::uint32_t> column;
+    std::vector<double> value, kill, left(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto to = chain.columns(i);
+      for (std::size_t e = 0; e < to.size(); ++e) {
+        column.push_back(to[e]);
+        value.push_back(chain.values(i)[e] / shift * (x[to[e]] / x[i]));
+      }
+      start.push_back(column.size());
+      kill.push_back(1 - image[i] / x[i] / shift);
+      left[i] = pair.left[i] * x[i];
+    }
+    const Elimination shifted(Chain(std::move(start), std::move(column), std::move(value), std::move(kill)));
+    left = shifted.solve_left(left);
+    std::vector<double> right = shifted.solve(std::vector<double>(n, 1.0));
+    for (std::size_t i = 0; i < n; ++i) {
+      left[i] /= x[i];
+      right[i] *= x[i];
+    }
+    divide(left, total(left));
+    divide(right, *std::max_element(right.begin(), right.end()));
+    for (double& entry : right) entry = std::max(entry, std::numeric_limits<double>::min());
+    pair.residual = std::max(relative_change(pair.left, left), relative_change(x, right));
+    pair.left = std::move(left);
+    pair.right = std::move(right);
+    if (pair.residual <= kRounding) return pair;
+  }
+  throw ConvergenceError("inverse iteration", pair.residual,
+                         "still changing after " + std::to_string(pair.iterations) + " iterations");
+}
+
 /// Iterates with Q (I - Q)^{-1}, whose eigenvalues are lambda / (1 - lambda): lambda_2 fades at least as fast as under
 /// inverse iteration (rare rest) and as under plain iteration (frequent rest).
 LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
@@ -118,7 +163,7 @@ LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
   pair.right.assign(n, 1.0);
   StoppingRule left_rule, right_rule;
   bool left_done = false, right_done = false;
-  while (pair.iterations < kIterations) {
+  while (pair.iterations < (chain.interpolated() ? kIterations : kPatience)) {
     ++pair.iterations;
     std::vector<double> left = elimination.solve_left(pair.left);
     const double rate = 1 / total(left);
@@ -141,8 +186,12 @@ LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
         (pair.iterations >= kFewLeft && std::abs(1 - rate) <= kHardlyAnybody))
       return pair;
   }
-  throw ConvergenceError("inverse iteration", pair.residual,
-                         "still changing after " + std::to_string(kIterations) + " iterations");
+  if (chain.interpolated())
+    throw ConvergenceError("inverse iteration", pair.residual,
+                           "still changing after " + std::to_string(kIterations) + " iterations");
+  pair = iterate_shifted(chain, std::move(pair));
+  pair.rate = 1 / total(elimination.solve_left(pair.left));
+  return pair;
 }
 
 /// Fills the classes after class 0 of a left eigenvector, each to sum one; classes no survivor reaches stay 0.

@@ -235,7 +235,8 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
     }
     if (first == cells && upper < highest) {
       upper = std::min(highest, lower + 1.5 * (upper - lower));
-      if (!std::isfinite(upper)) throw std::invalid_argument("method integrated: states grow without limit");
+      if (!std::isfinite(upper))
+        throw ConvergenceError("method integrated", upper, "states grow without limit; method sampled takes them");
       continue;
     }
     std::vector<std::pair<double, double>> cut = ranges;

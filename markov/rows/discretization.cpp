@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 
 #include "markov/parallel.h"
 
@@ -56,6 +59,20 @@ std::vector<Block> make_blocks(const AnyReturnMap& map, int phase, const Draws& 
   return blocks;
 }
 
+// Grid::tally(), which does not know where its landings come from.
+template <class Origin>
+void tally(const Grid& grid, std::span<const double> landing, std::span<const double> weight, std::span<double> sums,
+           const Origin& origin) {
+  try {
+    grid.tally(landing, weight, sums);
+  } catch (const std::domain_error&) {
+    const auto wrong = std::find_if(landing.begin(), landing.end(), [](double x) { return std::isnan(x); });
+    throw std::domain_error("return map: the landing from state " +
+                            std::to_string(origin(static_cast<std::size_t>(wrong - landing.begin()))) +
+                            " is not a number");
+  }
+}
+
 // Adds the landings of a block's draws from [origin, origin + width) to `sums` (as Grid::tally()).
 class Lander {
  public:
@@ -67,7 +84,8 @@ class Lander {
         std::upper_bound(block.lowest.begin(), block.lowest.end(), origin + width) - block.lowest.begin());
     const std::span<double> next(next_.data(), count);
     block.table->land(origin, width, std::span(block.offset).first(count), 0, next);
-    target_.tally(next, std::span(block.weight).first(count), sums);
+    tally(target_, next, std::span(block.weight).first(count), sums,
+          [&](std::size_t k) { return origin + width * block.offset[k]; });
     sums[0] += block.rest_after[count];
   }
 
@@ -159,7 +177,10 @@ Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const Launch
       map.tabulate(launch.phase, score)->land(0.0, 1.0, start, 0, std::span(landing).subspan(first, count));
     });
     std::vector<double> sums(space.cells() + 1, 0.0);
-    space.grid(next_phase).tally(landing, draws.weight, sums);
+    tally(space.grid(next_phase), landing, draws.weight, sums, [&](std::size_t k) {
+      return launch.state(tails ? draws.score[(k + 1) * static_cast<std::size_t>(draws.dimension) - 1]
+                                : normal_score(draws.offset[k]));
+    });
     return sums;
   };
   std::vector<double> sums = land(false);

@@ -17,14 +17,19 @@ namespace {
 
 constexpr std::size_t chunk = 256;
 
-// 1 + min(max((state - front) * scale, 0), most), cut to whole numbers; 0 for -infinity.
-METASTABLE_WIDE void find_buckets(std::span<const double> state, double front, double scale, double most,
+// 1 + min(max((state - front) * scale, 0), most), cut to whole numbers; 0 for -infinity. Is every state a number?
+METASTABLE_WIDE bool find_buckets(std::span<const double> state, double front, double scale, double most,
                                   std::int32_t* bucket) {
+  std::int64_t numbers = 0;
   for (std::size_t k = 0; k < state.size(); ++k) {
     const double place = 1 + std::min(std::max((state[k] - front) * scale, 0.0), most);
     bucket[k] = static_cast<std::int32_t>(state[k] > -std::numeric_limits<double>::infinity() ? place : 0.0);
+    numbers += state[k] == state[k] ? 1 : 0;
   }
+  return numbers == static_cast<std::int64_t>(state.size());
 }
+
+[[noreturn]] void refuse() { throw std::domain_error("grid: a landing is not a number"); }
 
 }  // namespace
 
@@ -79,8 +84,10 @@ std::uint32_t Grid::cell(double state) const {
 
 void Grid::tally(std::span<const double> state, std::span<const double> weight, std::span<double> sums) const {
   if (edge_.empty()) {
-    for (std::size_t k = 0; k < state.size(); ++k)
+    for (std::size_t k = 0; k < state.size(); ++k) {
+      if (std::isnan(state[k])) refuse();
       sums[state[k] == -std::numeric_limits<double>::infinity() ? 0 : 1 + cell(state[k])] += weight[k];
+    }
     return;
   }
   // Without branches: a landing that cannot be foreseen costs no more than one that can.
@@ -92,7 +99,7 @@ void Grid::tally(std::span<const double> state, std::span<const double> weight, 
   for (std::size_t first = 0; first < state.size(); first += chunk) {
     const std::size_t count = std::min(chunk, state.size() - first);
     const double *const x = state.data() + first, *const w = weight.data() + first;
-    find_buckets({x, count}, edges_.front(), table_scale_, most, slot.data());
+    if (!find_buckets({x, count}, edges_.front(), table_scale_, most, slot.data())) refuse();
     for (std::size_t k = 0; k < count; ++k) {
       const std::int32_t b = slot[k];
       slot[k] = start[b] + static_cast<std::int32_t>(x[k] >= edge[b]);

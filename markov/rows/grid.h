@@ -26,6 +26,7 @@ class Grid {
   std::uint32_t cell(double state) const;
 
   /// Does sums[1 + cell(state[k])] += weight[k] for all k in order; a state of -infinity counts in sums[0].
+  /// @throws std::domain_error if a state is not a number
   /// @param sums  size cells() + 1
   void tally(std::span<const double> state, std::span<const double> weight, std::span<double> sums) const;
 

@@ -99,7 +99,8 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     }
     if (first == space.nodes() && upper < highest) {
       upper = std::min(highest, lower + 1.5 * (upper - lower));
-      if (!std::isfinite(upper)) throw std::invalid_argument("method integrated: states grow without limit");
+      if (!std::isfinite(upper))
+        throw ConvergenceError("method integrated", upper, "states grow without limit; method sampled takes them");
       continue;
     }
     if (first < space.nodes())

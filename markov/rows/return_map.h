@@ -29,6 +29,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -54,7 +55,8 @@ inline constexpr double rest_landing = -std::numeric_limits<double>::infinity();
 ///   landing(state, phase, noise)   the next state, or nothing when the system comes to rest
 ///
 /// Members used when present (see AnyReturnMap for their meaning): rest_probability, landing_range,
-/// landing_density, landing_points, states_of_extremes, tabulate, duration, advance, assumptions, violates.
+/// landing_density, landing_points, landing_defect, states_of_extremes, tabulate, duration, advance, assumptions,
+/// violates.
 template <class M>
 concept ReturnMap = requires(const M& map, double state, int phase, std::span<const double> noise) {
   { map.state_interval(phase) } -> std::convertible_to<std::pair<double, double>>;
@@ -114,6 +116,12 @@ class AnyReturnMap {
                                        std::vector<std::pair<double, double>>& points) const {
     return self_->landing_points(state, phase, breaks, points);
   }
+  /// Where landing() reads an approximation of the true landing: one draw of E[f(true landing)] - E[f(landing)],
+  /// f(rest) being 0; its mean over `noise` is that difference. Returns nothing if landing() is exact.
+  std::optional<double> landing_defect(double state, int phase, std::span<const double> noise,
+                                       const std::function<double(double next)>& f) const {
+    return self_->landing_defect(state, phase, noise, f);
+  }
   /// Lists states at `phase`, ascending, with an extreme landing among `next`: expectations of a function that is
   /// not smooth at `next` are not smooth there. The list is empty if the map does not tell.
   std::vector<double> states_of_extremes(int phase, std::span<const double> next) const {
@@ -146,6 +154,8 @@ class AnyReturnMap {
     virtual std::optional<double> landing_density(double, int, std::span<const double>, std::span<double>) const = 0;
     virtual std::optional<double> landing_points(double, int, std::span<const double>,
                                                  std::vector<std::pair<double, double>>&) const = 0;
+    virtual std::optional<double> landing_defect(double, int, std::span<const double>,
+                                                 const std::function<double(double)>&) const = 0;
     virtual std::vector<double> states_of_extremes(int, std::span<const double>) const = 0;
     virtual std::unique_ptr<NoiseTable> tabulate(int, std::span<const double>) const = 0;
     virtual std::optional<double> duration(double, int) const = 0;
@@ -223,6 +233,13 @@ class AnyReturnMap {
                                          std::vector<std::pair<double, double>>& points) const override {
       if constexpr (requires { map.landing_points(state, phase, breaks, points); })
         return map.landing_points(state, phase, breaks, points);
+      else
+        return std::nullopt;
+    }
+    std::optional<double> landing_defect(double state, int phase, std::span<const double> noise,
+                                         const std::function<double(double)>& f) const override {
+      if constexpr (requires { map.landing_defect(state, phase, noise, f); })
+        return map.landing_defect(state, phase, noise, f);
       else
         return std::nullopt;
     }

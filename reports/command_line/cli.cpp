@@ -40,6 +40,7 @@ Command steps() {
             o.add("initial-speed", "MEAN,SD", "",
                   "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)", dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
+            o.add_flag("direct", "Follow every landing instead of reading a table, hundreds of times slower (settled)");
             o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
             o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
             add_standard_errors(o);
@@ -50,6 +51,9 @@ Command steps() {
             StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
             request.sensitivities = o.flag("sensitivities");
             request.explain = o.flag("explain");
+            request.setting.direct = o.flag("direct");
+            if (request.setting.direct && request.setting.law != dynamics::Law::settled)
+              throw std::invalid_argument("--direct: has a meaning under --law settled only");
             request.standard_errors = standard_errors(o, request.setting);
             run_steps(request);
           }};

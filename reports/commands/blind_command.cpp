@@ -24,6 +24,7 @@
 #include "markov/parallel.h"
 #include "reports/diagnosis/blind_json.h"
 #include "reports/diagnosis/blind_tables.h"
+#include "reports/output/file_lock.h"
 #include "reports/output/input_file.h"
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
@@ -141,6 +142,13 @@ std::vector<RecordedAnswer> checked_record(const Places& places) {
   return read_record(places.record.string(), file_text(places.record).value_or(""));
 }
 
+// The record is a chain of digests, which one process at a time may lengthen.
+FileLock lock_answers(const Places& places) {
+  FileLock lock(places.answers / ".lock", FileLock::Missing::create);
+  if (!lock.held()) throw OutputError(places.answers, "another `blind answer` is writing there");
+  return lock;
+}
+
 // Last line of the errors beside an answer that the tool failed to give; a tool that was killed with this program, or
 // still runs, leaves none.
 constexpr std::string_view failed_line = "exit code ";
@@ -206,6 +214,7 @@ void run_blind_answer(const BlindRequest& request) {
   if (fs::exists(places.marker))
     throw OutputError(places.sealed, "was opened; an answer written now would not be blind");
   make_folder(places.answers);
+  const FileLock alone = lock_answers(places);
   std::vector<RecordedAnswer> record = checked_record(places);
   std::set<int> answered;
   for (const RecordedAnswer& entry : record) answered.insert(entry.number);
@@ -268,6 +277,8 @@ void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
     truths.push_back(read_truth(path.string(), *text));
   }
   std::map<int, analysis::BlindAnswer> given;
+  const std::optional<FileLock> alone =
+      fs::is_directory(places.answers) ? std::optional(lock_answers(places)) : std::nullopt;
   const std::vector<RecordedAnswer> record = checked_record(places);
   if (record.empty()) throw OutputError(places.record, "no case is answered; `blind answer` does that");
   for (const RecordedAnswer& entry : record) {

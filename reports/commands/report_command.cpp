@@ -51,7 +51,7 @@ class Report {
  private:
   std::size_t work() const {
     const std::size_t ramps = request_.settings.size();
-    return study_units * (2 * ramps + ramps * (16 + 12) + energy_spreads.size());
+    return study_units * (3 * ramps + ramps * (16 + 12) + energy_spreads.size());
   }
 
   Provenance provenance_for(const std::vector<analysis::Setting>& settings) const {
@@ -64,7 +64,7 @@ class Report {
   void ramps() {
     std::vector<Studied> studied;
     std::vector<analysis::Setting> settings;
-    for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb}) {
+    for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::settled}) {
       for (analysis::Setting setting : request_.settings) {
         setting.law = law;
         analysis::StudyOptions options = request_.study;
@@ -80,7 +80,8 @@ class Report {
     section(
         "ramps", "The ramps side by side",
         "Read down a column for one ramp under one contact law; “infinite” means that launches this fast never come "
-        "to rest, whatever the contacts do.",
+        "to rest, whatever the contacts do. " +
+            laws_text(studied),
         {}, {ramps_table(studied, provenance)});
     section(
         "regime", "What survivors look like",
@@ -141,7 +142,10 @@ class Report {
          {analysis::Parameter::friction_mean, analysis::axis_values(0.2, 0.5, 0.1)});
   }
 
+  // Energies of single impacts: a landing under settled is many, with slides between.
   void energies() {
+    if (request_.settings.front().law == dynamics::Law::settled)
+      return progress_.advance(study_units * energy_spreads.size());
     std::vector<analysis::EnergyLosses> losses;
     std::vector<analysis::Setting> settings;
     for (std::size_t k = 0; k < energy_spreads.size(); ++k) {

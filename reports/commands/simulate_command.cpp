@@ -15,6 +15,8 @@
 namespace metastable::reports {
 namespace {
 
+constexpr const char* is_experiment = "experiment.toml";  // a folder without it is not an experiment yet
+
 analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
   return {fmt::format("{}", request.setting.slope_deg), request.setting,
           analysis::simulate_trials(request.setting, {.trials = request.trials,
@@ -34,7 +36,7 @@ void check_empty(const std::filesystem::path& folder) {
 void run_simulate(const SimulateRequest& request) {
   const std::filesystem::path folder = request.out;
   check_empty(folder);
-  make_folder(folder);
+  OutputFolder whole(folder);
   const std::vector<analysis::SimulatedCondition> conditions =
       request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
                        : std::vector<analysis::SimulatedCondition>{one_condition(request)};
@@ -47,12 +49,12 @@ void run_simulate(const SimulateRequest& request) {
   analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
   if (request.camera) {
     files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
-    write_file(folder / "angle.csv", analysis::angle_csv(conditions, *request.camera));
+    write_file(whole.path() / "angle.csv", analysis::angle_csv(conditions, *request.camera));
   }
-  // experiment.toml last: a folder without it is not an experiment yet.
-  write_file(folder / "collisions.csv", files.collisions_csv);
-  write_file(folder / "trials.csv", files.trials_csv);
-  write_file(folder / "experiment.toml", files.experiment_toml);
+  write_file(whole.path() / "collisions.csv", files.collisions_csv);
+  write_file(whole.path() / "trials.csv", files.trials_csv);
+  write_file(whole.path() / "experiment.toml", files.experiment_toml);
+  whole.commit(is_experiment);
   for (const auto& [id, setting, trials] : conditions) {
     const auto rested = std::count_if(trials.begin(), trials.end(),
                                       [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
@@ -64,6 +66,7 @@ void run_simulate(const SimulateRequest& request) {
 void run_reality(const RealityRequest& request) {
   const std::filesystem::path folder = request.out;
   check_empty(folder);
+  OutputFolder whole(folder);
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
   const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
   Provenance provenance{request.command, {}, request.reality.seed, version()};
@@ -73,11 +76,11 @@ void run_reality(const RealityRequest& request) {
   options.dropped = request.dropped;
   options.camera = request.camera;
   const analysis::RealityFiles made = analysis::reality_files(request.conditions, setup, trials, options);
-  make_folder(folder);
-  if (made.angle_csv) write_file(folder / "angle.csv", *made.angle_csv);
-  write_file(folder / "collisions.csv", made.files.collisions_csv);
-  if (!made.files.trials_csv.empty()) write_file(folder / "trials.csv", made.files.trials_csv);
-  write_file(folder / "experiment.toml", made.files.experiment_toml);
+  if (made.angle_csv) write_file(whole.path() / "angle.csv", *made.angle_csv);
+  write_file(whole.path() / "collisions.csv", made.files.collisions_csv);
+  if (!made.files.trials_csv.empty()) write_file(whole.path() / "trials.csv", made.files.trials_csv);
+  write_file(whole.path() / "experiment.toml", made.files.experiment_toml);
+  whole.commit(is_experiment);
   std::size_t collisions = 0, rested = 0, flown = 0;
   for (const dynamics::LaboratoryTrial& trial : trials) {
     collisions += trial.collisions.size();

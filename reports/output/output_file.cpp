@@ -42,7 +42,7 @@ void remove_left_behind(const fs::path& target) {
         begin.size() + static_cast<std::size_t>(end) != name.size() || writer <= 0)
       continue;
     std::error_code ignored;
-    if (::kill(writer, 0) != 0 && errno == ESRCH) fs::remove(entry->path(), ignored);
+    if (::kill(writer, 0) != 0 && errno == ESRCH) fs::remove_all(entry->path(), ignored);
   }
 }
 
@@ -108,6 +108,41 @@ void OutputFile::commit() {
   fs::rename(temporary_, target_, error);
   if (error) throw OutputError(path_, error.message());
   temporary_.clear();
+}
+
+OutputFolder::OutputFolder(const fs::path& target) : target_(target) {
+  if (target.empty()) throw OutputError(target, "the name is empty");
+  if (!target_.has_filename()) target_ = target_.parent_path();  // a slash at the end
+  std::error_code error;
+  if (fs::exists(target_, error) && !fs::is_directory(target_, error))
+    throw OutputError(target, std::strerror(ENOTDIR));
+  if (fs::is_symlink(target_, error)) target_ = fs::canonical(target_, error);
+  if (target_.has_parent_path()) make_folder(target_.parent_path());
+  remove_left_behind(target_);
+  const fs::path temporary = temporary_name(target_);
+  if (!fs::create_directory(temporary, error)) throw OutputError(target, error.message());
+  temporary_ = temporary;
+}
+
+OutputFolder::~OutputFolder() {
+  std::error_code ignored;
+  if (!temporary_.empty()) fs::remove_all(temporary_, ignored);
+}
+
+void OutputFolder::commit(const fs::path& last) {
+  std::error_code error;
+  fs::rename(temporary_, target_, error);  // no target, or an empty one
+  if (!error) {
+    temporary_.clear();
+    return;
+  }
+  const auto move = [&](const fs::path& file) {
+    fs::rename(temporary_ / file, target_ / file, error);
+    if (error) throw OutputError(target_ / file, error.message());
+  };
+  for (const fs::directory_entry& entry : fs::directory_iterator(temporary_))
+    if (entry.path().filename() != last) move(entry.path().filename());
+  move(last);
 }
 
 void write_file(const fs::path& path, std::string_view content) {

@@ -39,6 +39,25 @@ class OutputFile {
   std::ostringstream buffer_;  // until commit
 };
 
+/// A folder is filled under a temporary name beside its target and takes its place on commit(); without commit()
+/// nothing is left. What killed writers left of the same target is removed.
+class OutputFolder {
+ public:
+  /// @throws OutputError if nothing can be written there: at once, before any long computation.
+  explicit OutputFolder(const std::filesystem::path& target);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  const std::filesystem::path& path() const { return temporary_; }  ///< where to write
+  /// A target that holds files keeps them and gets these beside them, each whole, `last` as the last one.
+  /// @throws OutputError if it cannot. Call once.
+  void commit(const std::filesystem::path& last);
+
+ private:
+  std::filesystem::path target_, temporary_;
+};
+
 /// Writes the whole of `content` into `path` ("-": standard output), or nothing. @throws OutputError
 void write_file(const std::filesystem::path& path, std::string_view content);
 

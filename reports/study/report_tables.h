@@ -21,6 +21,9 @@ struct Studied {
 /// All ramps under all laws side by side: quantities down, settings across.
 Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance);
 
+/// One sentence: under which of these laws some trials rest on every ramp and others do not.
+std::string laws_text(const std::vector<Studied>& columns);
+
 /// Expected steps over two parameters; `studies` row by row (`down` slow, `across` fast).
 Table grid_table(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
                  const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,

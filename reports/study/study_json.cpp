@@ -121,6 +121,7 @@ Json study_json(const analysis::Metastability& study, const analysis::RestThresh
                                     {"slope_deg", optional_number(thresholds.safe_slope_deg)}};
   json["error"] = {{"discretization", number(study.steps.discretization_error)},
                    {"sampling", number(study.steps.sampling_error)}};
+  if (study.steps.landing_error > 0) json["error"]["landings"] = study.steps.landing_error;
   json["resolution"] = {{"cells", study.cells},
                         {"samples", study.samples},
                         {"replicates", study.replicates},

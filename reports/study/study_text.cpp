@@ -36,6 +36,8 @@ constexpr Word assumptions[] = {
      "The model holds it there. Where this is frequent, real wheels hop and the numbers are the model's alone."},
     {"negative loss", "one of the two losses of the collision, normal or along the ramp, is below zero",
      "The contact law is used outside the range that it was made for."},
+    {"foot unsettled", "the next leg lands while the foot before it still hops or slides",
+     "The chain takes every landing as one from a standing foot, with the momentum that the moving one carries."},
     {"energy gain", "the collision gives energy to the wheel",
      "No passive contact does; a share that is not small speaks against the law or its friction and restitution."}};
 
@@ -101,6 +103,7 @@ std::string thresholds_text(const analysis::RestThresholds& thresholds) {
   std::string text = thresholds.safe_speed
                          ? fmt::format("out of reach for launches of {:.4g} rad/s and faster", *thresholds.safe_speed)
                          : std::string("within reach at every speed");
+  if (!thresholds.slope_sought) return text;
   text += thresholds.safe_slope_deg
               ? fmt::format("; on slopes above {:.3f} deg fast enough launches never rest", *thresholds.safe_slope_deg)
               : std::string("; no slope puts it out of reach");
@@ -134,10 +137,12 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
                  ? "none: every launch rests at its first collision"
                  : fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.restart_mean, study.survivors.restart_sd));
   text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.spectrum.moduli, ", ")));
-  std::string mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);
+  std::string mixing;
+  if (study.spectrum.moduli.size() > 1) mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);
   if (study.spectrum.total_variation_steps)
-    mixing += fmt::format(", {} from the launch (total variation)", *study.spectrum.total_variation_steps);
-  text += line("mixing", mixing);
+    mixing += fmt::format("{}{} {}from the launch (total variation)", mixing.empty() ? "" : ", ",
+                          *study.spectrum.total_variation_steps, mixing.empty() ? "steps " : "");
+  if (!mixing.empty()) text += line("mixing", mixing);
   text += "\n";
   text += line("rest", thresholds_text(thresholds));
   for (const analysis::ViolationShare& share : study.violations)
@@ -154,6 +159,10 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
   if (!endless) {
     text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)",
                                                study.steps.discretization_error, study.steps.sampling_error));
+    if (study.steps.landing_error > 0)
+      text +=
+          line("landings", fmt::format("read from a table, which moves the steps by {:.2g} at most (in the interval)",
+                                       study.steps.landing_error));
     text +=
         line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.steps.solver_disagreement));
     if (!study.message.empty()) text += "\n" + study.message + "\n";

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "analysis/sensitivity/comparison.h"
 #include "analysis/study/setting.h"
@@ -205,6 +206,19 @@ TEST(IntegratedStudy, LeavesUnreachableRestToTheSampledStudy) {
   const Metastability result = integrated(setting, 0.01, 64);
   EXPECT_EQ(result.status, Status::rest_unreachable);
   EXPECT_EQ(result.method, Method::sampled);
+}
+
+TEST(IntegratedStudy, SpreadsTooNarrowForItsNodesAreRefusedWithTheWayOut) {
+  Setting setting;
+  setting.friction = {0.4, 1e-9};
+  try {
+    study(setting, {.method = Method::integrated});
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(),
+                 "friction: sd 1e-09 is too narrow for method integrated, which takes 0 and 0.0001 or more; method "
+                 "sampled takes any");
+  }
 }
 
 }  // namespace

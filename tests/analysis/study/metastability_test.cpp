@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <vector>
@@ -36,7 +37,7 @@ Sample sample(const std::vector<double>& values) {
 // The chain against whole trials that share nothing with it but the map: uneven legs, defaults of the program.
 TEST(Metastability, AgreesWithMonteCarloTrials) {
   Setting setting = paper_setting(9.59, false);
-  setting.ramp_length = 1e6;  // trials go on to rest
+  setting.ramp_length = std::numeric_limits<double>::infinity();  // trials go on to rest
   const Metastability chain = [&] {
     Setting on_ramp = setting;
     on_ramp.ramp_length = 3.66;
@@ -332,6 +333,52 @@ TEST(Metastability, PlainDrawsThatSeeNoRestSaySo) {
   const Metastability result = study(setting, options);
   EXPECT_EQ(result.status, Status::rest_unresolved);
   EXPECT_NE(result.message.find("plain"), std::string::npos);
+}
+
+TEST(Metastability, RestTooRareForDoublesIsSaid) {
+  Setting setting = paper_setting(15, true);
+  setting.law = dynamics::Law::coulomb;
+  setting.wheel.leg_length.assign(8, 0.43);
+  setting.restitution = {0.9, 0.035};
+  setting.friction = {0.14, 0.0165};
+  setting.initial_speed = {2.6, 0.7};
+  const Metastability result = study(setting, {.brief = true});
+  EXPECT_EQ(result.status, Status::rest_unresolved);
+  EXPECT_NE(result.message.find("exceed the range of double precision"), std::string::npos) << result.message;
+}
+
+// Nothing but a fast launch passes the widest cells, which must not pass for a regime: the same as after a slow one.
+TEST(Metastability, RegimeDoesNotDependOnTheLaunch) {
+  Setting setting = paper_setting(2, true);
+  setting.law = dynamics::Law::coulomb;
+  setting.wheel.leg_length.assign(8, 0.26);
+  setting.initial_speed = {8, 1};
+  const Metastability slow = study(setting);
+  setting.initial_speed = {80, 1};
+  const Metastability fast = study(setting);
+  EXPECT_NEAR(slow.steps.from_quasi_stationary.value, 1.12363, 5e-4);  // --method integrated
+  EXPECT_NEAR(fast.steps.from_quasi_stationary.value, 1.12363, 1e-3);
+  EXPECT_LT(fast.steps.from_quasi_stationary.upper - fast.steps.from_quasi_stationary.lower, 0.01);
+  // Spectra sees eigenvalues there that are rounding. Said, not shown.
+  EXPECT_NEAR(fast.spectrum.moduli.front(), 0.11003, 5e-4);
+  EXPECT_EQ(fast.spectrum.moduli.size(), 1u);
+  EXPECT_NE(fast.message.find("eigenvalues beyond lambda_1: "), std::string::npos) << fast.message;
+}
+
+// Survivors who leave the usual speeds upwards come back: they must not pass for failures where these are rare.
+TEST(Metastability, RareRestAfterAFastLaunch) {
+  Setting setting = paper_setting(2.18, true);
+  setting.law = dynamics::Law::coulomb;
+  setting.wheel.leg_length.assign(8, 0.153);
+  setting.restitution = {0.74, 0.09};
+  setting.friction = {0.57, 0.057};
+  setting.initial_speed = {15, 0.5};
+  const StudyOptions options{.tolerance = 0.05, .threads = 1, .brief = true};
+  const Metastability fast = study(setting, options);
+  setting.initial_speed = {4, 0.5};
+  const Metastability slow = study(setting, options);
+  EXPECT_LT(fast.spectrum.failure_rate.value, 0.01);
+  EXPECT_LT(std::abs(std::log(fast.spectrum.failure_rate.value / slow.spectrum.failure_rate.value)), 0.05);
 }
 
 TEST(Metastability, ToleranceThatCannotBeMetIsSaidAndTheResultKept) {

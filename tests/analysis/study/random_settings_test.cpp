@@ -97,8 +97,9 @@ TEST(RandomSettings, AreAllAnsweredAndAgreeWithSimulation) {
         judge(drawn.setting, result, 2 * drawn.options.tolerance);
     } catch (const Contradiction& contradiction) {
       ADD_FAILURE() << contradiction.what();
-    } catch (const markov::ConvergenceError&) {
+    } catch (const markov::ConvergenceError& error) {
       ++refused;
+      fmt::print("refused: {}: {}\n", name(index, drawn), error.what());
     } catch (const std::exception& error) {
       ADD_FAILURE() << error.what();
     }

@@ -3,7 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <limits>
 #include <stdexcept>
+
+#include "analysis/experiment/experiment_folder.h"
+#include "analysis/sensitivity/comparison.h"
+#include "analysis/study/certify.h"
+#include "analysis/study/metastability.h"
 
 namespace metastable::analysis {
 namespace {
@@ -42,18 +48,44 @@ TEST(Setting, ErrorsNameTheQuantityAndItsRange) {
   expect_message([](Setting& s) { s.first_landing_leg = 8; }, "first landing leg: 8 is outside 0..7");
   expect_message([](Setting& s) { s.rebound_lost = 2; }, "rebound");
   expect_message([](Setting& s) { s.correlation = 1; }, "correlation");
+  // What no wheel has, but the arithmetic would take.
+  expect_message([](Setting& s) { s.wheel.hub_mass = 1e250; }, "hub_mass: 1e+250 kg is outside [1e-06, 1e+06]");
+  expect_message([](Setting& s) { s.wheel.leg_length[3] = 1e9; },
+                 "leg_length[3]: 1000000000 m is outside [0.001, 100]");
+  expect_message([](Setting& s) { s.wheel.inertia = 0.0035; }, "inertia: 0.0035 kg m^2 is below M (mean L)^2");
+  expect_message([](Setting& s) { s.wheel.radius_of_gyration = 5; }, "radius_of_gyration: 5 m is outside");
+  expect_message(
+      [](Setting& s) {
+        s.initial_speed = {1e200, 1};
+      },
+      "initial speed: mean 1e+200 rad/s is outside [0, 1000]");
+  expect_message([](Setting& s) { s.friction.mean = 40; }, "friction: mean 40 is outside [0, 10]");
+  expect_message([](Setting& s) { s.restitution.mean = 1.4; }, "restitution: mean 1.4 is outside [0, 1]");
+  expect_message([](Setting& s) { s.pairs = {{.restitution = 0.4, .friction = 100}}; }, "pairs[0]: friction 100 is");
+  expect_message([](Setting& s) { s.ramp_length = 1e9; }, "ramp length: 1000000000 m is outside [0.001, 100000]");
+  Setting endless;
+  endless.ramp_length = std::numeric_limits<double>::infinity();
+  EXPECT_NO_THROW(endless.validate());
 }
 
-TEST(Setting, SettledIsSimulatedAndHasNoChain) {
+TEST(Setting, SettledHasItsRanges) {
   Setting setting;
   setting.law = dynamics::Law::settled;
   EXPECT_NO_THROW(setting.validate());
-  EXPECT_THROW(setting.problem(), std::invalid_argument);
   setting.restitution.mean = 0.96;
   EXPECT_THROW(setting.validate(), std::invalid_argument);
   setting.restitution.mean = 0.4;
   setting.wheel.tip_radius = 0.01;  // more than a twentieth of the shortest leg
   EXPECT_THROW(setting.validate(), std::invalid_argument);
+}
+
+TEST(Setting, IsCheckedWhereverTheLibraryTakesOne) {
+  Setting setting;
+  setting.wheel.gravity = 1e9;
+  EXPECT_THROW(study(setting), std::invalid_argument);
+  EXPECT_THROW(compare({setting, setting}, {}), std::invalid_argument);
+  EXPECT_THROW(simulate_trials(setting, {}), std::invalid_argument);
+  EXPECT_THROW(certify(setting), std::invalid_argument);
 }
 
 }  // namespace

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
@@ -215,6 +217,28 @@ TEST(ViolationRates, CountWhatTheMapReports) {
   EXPECT_EQ(rates[1][0], 0.0);
   EXPECT_NEAR(rates[1][3], 1.0, 1e-12);
   EXPECT_NEAR(rates[1].back(), 1.0, 1e-12);  // the launch
+}
+
+// A map with a hole: what lands nowhere must not pass for rest.
+struct MapWithAHole : LinearMap {
+  std::optional<double> landing(double state, int phase, std::span<const double> noise) const {
+    return state > 3 && state < 3.1 ? std::numeric_limits<double>::quiet_NaN()
+                                    : *LinearMap::landing(state, phase, noise);
+  }
+};
+
+TEST(Discretization, LandingThatIsNoNumberIsAnErrorNamingTheState) {
+  MapWithAHole map;
+  map.b = 20;
+  const auto message = [&](double launched) -> std::string {
+    try {
+      discretize(map, StateSpace({Grid::uniform(0, 60, 200)}), {[=](double) { return launched; }, 0}, {});
+    } catch (const std::domain_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(message(40).find("return map: the landing from state 3.0"), std::string::npos) << message(40);
 }
 
 }  // namespace

@@ -39,6 +39,25 @@ class Refusals : public test::InFolder {
   }
 };
 
+TEST_F(Refusals, OfWheelsThatSettledDoesNotHold) {
+  const auto steps = [](std::vector<std::string> more) {
+    more.insert(more.begin(), {"steps", "--law", "settled"});
+    return more;
+  };
+  expect_refused({
+      {steps({"--radius-of-gyration", "0"}), "settled: radius_of_gyration: 0 is outside (0, inf) m"},
+      {steps({"--radius-of-gyration", "-1"}), "--radius-of-gyration: -1 is outside [0, 1000]"},
+      {steps({"--tip-radius", "0.01"}),
+       "tip_radius: 0.01 m is outside [0, 0.00754] m (a twentieth of the shortest leg)"},
+      {steps({"--tip-radius", "-0.001"}), "--tip-radius: -0.001 is outside [0, 5]"},
+      {steps({"--restitution", "0.97,0.01"}), "restitution: mean 0.97 is outside [0, 0.95], the range of law settled"},
+      {steps({"--restitution", "0.96"}), "restitution: mean: the constant 0.96 is outside [0, 0.95]"},
+      {steps({"--contact-list", file("pairs.csv", "restitution,friction\n0.4,0.4\n0.96,0.3\n")}),
+       "pairs[1]: restitution 0.96 is outside [0, 0.95], the range of law settled"},
+      {{"steps", "--direct"}, "--direct: has a meaning under --law settled only"},
+  });
+}
+
 TEST_F(Refusals, OfOptionsThatDoNothing) {
   expect_refused({
       {{"steps", "--leg-count", "12"}, "--leg-count: has a meaning where --legs is one length; it is 'paper'"},

@@ -10,6 +10,7 @@
 #include "analysis/experiment/experiment.h"
 #include "reports/diagnosis/blind_json.h"
 #include "reports/diagnosis/blind_tables.h"
+#include "reports/output/file_lock.h"
 #include "tests/reports/support.h"
 
 namespace metastable::reports::test {
@@ -176,6 +177,19 @@ TEST_F(BlindRun, KeepsTruthsApart) {
   request_.sealed = request_.folder + "/truths";
   EXPECT_NE(message_of([&] { run_blind_make(request_); }).find("truths must be kept apart"), std::string::npos);
   EXPECT_NE(message_of([&] { run_blind_answer(request_); }).find("holds no blind case"), std::string::npos);
+}
+
+TEST_F(BlindRun, OneProcessAtATimeAnswers) {
+  run_blind_make(request_);
+  fs::create_directories(fs::path(request_.folder) / "answers");
+  const auto answers = [&] { return message_of([&] { run_blind_answer(request_); }); };
+  {
+    const FileLock other(fs::path(request_.folder) / "answers" / ".lock", FileLock::Missing::create);
+    EXPECT_NE(answers().find("answers: another `blind answer` is writing there"), std::string::npos);
+    EXPECT_NE(message_of([&] { run_blind_open(request_, Unanswered::refused); }).find("another `blind answer`"),
+              std::string::npos);
+  }
+  EXPECT_EQ(answers(), "accepted");
 }
 
 }  // namespace

@@ -120,5 +120,52 @@ TEST_F(OutputFileTest, MakesFolders) {
   EXPECT_THROW(make_folder(folder_ / "file" / "below"), OutputError);
 }
 
+TEST_F(OutputFileTest, FolderAppearsWholeOrNotAtAll) {
+  const fs::path target = folder_ / "run";
+  {
+    OutputFolder folder(target);
+    write_file(folder.path() / "a.csv", "a");
+  }
+  EXPECT_EQ(files(), 0u);
+  for (const bool empty_target : {false, true}) {
+    if (empty_target) fs::create_directory(target);
+    OutputFolder folder(target);
+    write_file(folder.path() / "a.csv", "a");
+    EXPECT_FALSE(fs::exists(target / "a.csv"));
+    folder.commit("a.csv");
+    EXPECT_EQ(read(target / "a.csv"), "a");
+    EXPECT_EQ(files(), 1u);
+    fs::remove_all(target);
+  }
+  // Beside what somebody keeps there.
+  fs::create_directory(target);
+  write_file(target / "notes.txt", "mine");
+  {
+    OutputFolder folder(target.string() + "/");
+    write_file(folder.path() / "a.csv", "a");
+    write_file(folder.path() / "b.csv", "b");
+    folder.commit("a.csv");
+  }
+  EXPECT_EQ(read(target / "notes.txt") + read(target / "a.csv") + read(target / "b.csv"), "mineab");
+  EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(OutputFileTest, FolderOfAKilledWriterGoesWithTheNext) {
+  EXPECT_EXIT(
+      {
+        OutputFolder folder(folder_ / "run");
+        write_file(folder.path() / "a.csv", "half");
+        kill(getpid(), SIGKILL);
+      },
+      testing::KilledBySignal(SIGKILL), "");
+  EXPECT_EQ(files(), 1u);
+  EXPECT_FALSE(fs::exists(folder_ / "run"));
+  OutputFolder folder(folder_ / "run");
+  write_file(folder.path() / "a.csv", "whole");
+  folder.commit("a.csv");
+  EXPECT_EQ(read(folder_ / "run" / "a.csv"), "whole");
+  EXPECT_EQ(files(), 1u);
+}
+
 }  // namespace
 }  // namespace metastable::reports

@@ -1,0 +1,177 @@
+#include "dynamics/settled/settled_table.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace metastable::dynamics {
+namespace {
+
+constexpr double crowding = 1.5;  // of nodes in speed, towards the slowest
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+// Of the k-th of `size` weights: the product of k - j over all other j.
+constexpr double denominator(std::size_t k, std::size_t size) {
+  constexpr double factorial[] = {1, 1, 2, 6, 24, 120};
+  const std::size_t above = size - 1 - k;
+  return (above % 2 == 0 ? 1 : -1) * factorial[k] * factorial[above];
+}
+
+}  // namespace
+
+void SettledTable::resize() {
+  const std::size_t count = index(rows) * index(speeds);
+  standstill.resize(index(rows));
+  edges.resize(count * (stops + 1));
+  unsettled.resize(count);
+  kept.resize(count * index(places()));
+  displacement.resize(kept.size());
+}
+
+double SettledTable::eta(int row) const {
+  return row < smooth_rows ? eta_low + (smooth_eta - eta_low) * row / (smooth_rows - 1)
+                           : smooth_eta + (eta_high - smooth_eta) * (row - smooth_rows + 1) / (rows - smooth_rows);
+}
+
+double SettledTable::speed(double still, double share) const {
+  const double from = still + clear_of_rest;
+  return from + (omega_high - from) * std::expm1(crowding * share) / std::expm1(crowding);
+}
+
+double SettledTable::share(double still, double omega) const {
+  const double from = still + clear_of_rest;
+  return std::log1p((omega - from) / (omega_high - from) * std::expm1(crowding)) / crowding;
+}
+
+double SettledTable::bend_at(double omega, double eta) const {
+  return std::exp(bend[0] + eta * (bend[1] + eta * bend[2]) + omega * (bend[3] + eta * (bend[4] + eta * bend[5])));
+}
+
+SettledSlice SettledTable::slice(double eta) const { return {*this, eta}; }
+
+SettledSlice::Stencil SettledSlice::stencil(double place, int count, std::size_t size) {
+  Stencil s;
+  s.size = std::min(index(count), size);
+  const int last = count - static_cast<int>(s.size);
+  const int first = std::clamp(static_cast<int>(place) - static_cast<int>(s.size - 1) / 2, 0, last);
+  s.first = index(first);
+  // The products of (t - j) / (k - j) over all j but k.
+  const double t = place - first;
+  double before = 1;
+  for (std::size_t k = 0; k < s.size; ++k) {
+    s.weight[k] = before;
+    before *= t - static_cast<double>(k);
+  }
+  double after = 1;
+  for (std::size_t k = s.size; k-- > 0;) {
+    s.weight[k] *= after / denominator(k, s.size);
+    after *= t - static_cast<double>(k);
+  }
+  return s;
+}
+
+SettledSlice::SettledSlice(const SettledTable& table, double eta)
+    : table_(&table), eta_(eta), edges_(index(table.speeds) * (SettledTable::stops + 1)), rough_(index(table.speeds)) {
+  constexpr std::size_t stops = SettledTable::stops;
+  const bool below_smooth = eta <= table.smooth_eta;
+  const int below = table.smooth_rows - 1;
+  const double place = below_smooth ? (eta - table.eta_low) / (table.smooth_eta - table.eta_low) * below
+                                    : below + (eta - table.smooth_eta) / (table.eta_high - table.smooth_eta) *
+                                                  (table.rows - table.smooth_rows);
+  row_ = below_smooth ? stencil(place, table.smooth_rows, smooth) : stencil(place, table.rows, straight);
+  rough_row_ = below_smooth ? stencil(place, table.smooth_rows, rough) : row_;
+  for (std::size_t j = 0; j < row_.size; ++j) standstill_ += row_.weight[j] * table.standstill[row_.first + j];
+  for (std::size_t i = 0; i < rough_.size(); ++i) {
+    for (std::size_t j = 0; j < row_.size; ++j) rough_[i] |= table.unsettled[(row_.first + j) * rough_.size() + i];
+    for (std::size_t n = 0; n <= stops; ++n) edges_[i * (stops + 1) + n] = value(table.edges, i, stops + 1, n);
+  }
+}
+
+double SettledSlice::value(const std::vector<double>& values, std::size_t speed, std::size_t stride,
+                           std::size_t place) const {
+  double sum = 0;
+  for (std::size_t j = 0; j < row_.size; ++j)
+    sum += row_.weight[j] * values[((row_.first + j) * rough_.size() + speed) * stride + place];
+  return sum;
+}
+
+SettledSlice::Place SettledSlice::at(double omega) const {
+  constexpr std::size_t stops = SettledTable::stops;
+  Place place;
+  place.slice_ = this;
+  place.omega_ = omega;
+  place.at_ = place_of(omega);
+  const Stencil speed = stencil(place.at_, table_->speeds, smooth);
+  for (std::size_t i = 0; i < speed.size; ++i) place.rough_ |= rough_[speed.first + i];
+  for (std::size_t i = 0; i < speed.size; ++i)
+    for (std::size_t n = 0; n <= stops; ++n)
+      place.edge_[n] += speed.weight[i] * edges_[(speed.first + i) * (stops + 1) + n];
+  place.bend_ = table_->bend_at(std::min(omega, table_->omega_high), eta_);
+  place.scale_ = (table_->frictions - 1) / std::log1p(1 / place.bend_);
+  return place;
+}
+
+double SettledSlice::resting_at(double place) const {
+  constexpr std::size_t stops = SettledTable::stops;
+  const Stencil speed = stencil(place, table_->speeds, smooth);
+  double resting = 0;
+  for (std::size_t i = 0; i < speed.size; ++i)
+    resting += speed.weight[i] * edges_[(speed.first + i) * (stops + 1) + stops];
+  return resting;
+}
+
+double SettledSlice::resting_friction(double omega) const { return resting_at(place_of(omega)); }
+
+double SettledSlice::place_of(double omega) const {
+  return table_->share(standstill_, std::min(omega, table_->omega_high)) * (table_->speeds - 1);
+}
+
+std::size_t SettledSlice::Place::piece_of(double friction) const {
+  std::size_t n = 0;
+  while (n < SettledTable::stops && friction < edge_[n]) ++n;
+  return n;
+}
+
+bool SettledSlice::Place::rough(double friction) const { return (rough_ >> piece_of(friction) & 1) != 0; }
+
+MappedLanding SettledSlice::Place::land(double friction) const {
+  constexpr int stops = SettledTable::stops, piece = SettledTable::piece;
+  const SettledTable& table = *slice_->table_;
+  if (friction < resting_friction() && friction < table.sticking) return {0, 0, true};
+  const std::size_t n = piece_of(friction);
+  const bool is_rough = (rough_ >> n & 1) != 0;
+  const std::size_t nodes = is_rough ? SettledSlice::rough : smooth;
+  const Stencil& row = is_rough ? slice_->rough_row_ : slice_->row_;
+  const Stencil speed = stencil(at_, table.speeds, nodes);
+  const double high = n == 0 ? table.sticking : edge_[n - 1], low = edge_[n];
+  const double part = high > low ? std::clamp((friction - low) / (high - low), 0.0, 1.0) : 1;
+  const Stencil mu = n < stops ? stencil((1 - part) * (piece - 1), piece, nodes)
+                               : stencil(scale_ * std::log1p(part / bend_), table.frictions, nodes);
+  const std::size_t stride = index(table.places()), first = n * piece + mu.first;
+  double kept = 0, displacement = 0;
+  for (std::size_t j = 0; j < row.size; ++j)
+    for (std::size_t i = 0; i < speed.size; ++i) {
+      const std::size_t at = ((row.first + j) * index(table.speeds) + speed.first + i) * stride + first;
+      double kept_here = 0, displacement_here = 0;
+      for (std::size_t k = 0; k < mu.size; ++k) {
+        kept_here += mu.weight[k] * table.kept[at + k];
+        displacement_here += mu.weight[k] * table.displacement[at + k];
+      }
+      kept += row.weight[j] * speed.weight[i] * kept_here;
+      displacement += row.weight[j] * speed.weight[i] * displacement_here;
+    }
+  return {std::max(0.0, kept * omega_ * omega_), displacement, false};
+}
+
+double SettledSlice::slowest(double friction, double low, double high) const {
+  double from = place_of(low), to = place_of(high);
+  if (!(resting_at(to) <= friction)) return high;
+  if (resting_at(from) <= friction) return low;
+  while (to - from > 1e-10) {  // mu_r falls with the speed
+    const double middle = (from + to) / 2;
+    (resting_at(middle) <= friction ? to : from) = middle;
+  }
+  return table_->speed(standstill_, to / (table_->speeds - 1));
+}
+
+}  // namespace metastable::dynamics

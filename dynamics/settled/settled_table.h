@@ -1,0 +1,107 @@
+#pragma once
+// Landings of one leg under `settled`, kept at nodes of restitution, speed and friction, and read between them.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace metastable::dynamics {
+
+class SettledSlice;
+
+/// What a landing leaves.
+struct MappedLanding {
+  /// omega_eq^2 of the standing foot that carries the same angular momentum to the next touch [rad^2/s^2]
+  /// (Landing::carried_squared); 0 at rest.
+  double carried_squared = 0;
+  double displacement = 0;  ///< of the foot down the plane [m]; 0 at rest
+  bool rest = false;
+};
+
+/// One leg's table. By restitution the speed at which even a sticking foot rests; from there on, spread in speed, mu_r
+/// and the frictions mu_2, mu_3, ... from which slip stops in the second, third, ... impact: there the landing has a
+/// kink, between them it is smooth. Landings are kept on every piece [mu_c, mu_2], ... at a few even places, on the
+/// last one, down to mu_r, spread evenly in log(1 + part / bend), part = (mu - mu_r) / (its width), bend falling
+/// exponentially with omega: steep above mu_r, nearly straight in that scale.
+/// Between the nodes polynomials of degree 5 are read; landings of degree 3 where feet are still unsettled at some of
+/// the nodes (there they have kinks and jumps of their own), and by straight lines in eta above smooth_eta.
+struct SettledTable {
+  static constexpr int stops = 8;                // mu_2 to mu_9
+  static constexpr int piece = 4;                // places on a piece but the last
+  static constexpr double clear_of_rest = 0.02;  // the first speed, over the one at which a sticking foot rests [rad/s]
+
+  double eta_low = 0, smooth_eta = 0.6, eta_high = 0.95;  // rows stand as densely on either side of smooth_eta
+  int smooth_rows = 13, rows = 20;                        // up to smooth_eta, all
+  int speeds = 26, frictions = 20;                        // nodes
+  double omega_high = 9;                                  // [rad/s]
+  double sticking = 0;                                    // mu_c
+  bool usable = false;
+  std::array<double, 6> bend{};            // of log(bend): 1, omega times 1, eta, eta^2
+  std::vector<double> standstill;          // by row [rad/s]
+  std::vector<double> edges;               // by row, speed: mu_2, mu_3, ..., mu_r
+  std::vector<double> kept, displacement;  // by row, speed, place: carried_squared / omega-^2, [m]
+  std::vector<std::uint16_t> unsettled;    // by row, speed: a bit for each piece with an unsettled landing
+
+  void resize();
+  double eta(int row) const;
+  int places() const { return stops * piece + frictions; }
+  /// Speeds stand closer where the wheel barely passes. @param still standstill [rad/s]; @param share in [0, 1]
+  double speed(double still, double share) const;
+  double share(double still, double omega) const;
+  double bend_at(double omega, double eta) const;
+  bool holds(double eta) const { return usable && eta >= eta_low && eta <= eta_high; }
+  SettledSlice slice(double eta) const;  ///< @param eta that holds()
+};
+
+/// The table at one restitution. Refers to the table.
+class SettledSlice {
+ public:
+  SettledSlice(const SettledTable& table, double eta);
+
+  double lowest_speed() const { return standstill_ + SettledTable::clear_of_rest; }
+  bool holds(double omega) const { return omega >= lowest_speed() && omega <= table_->omega_high; }
+  /// At one of its speeds.
+  class Place {
+   public:
+    double resting_friction() const { return edge_[SettledTable::stops]; }
+    MappedLanding land(double friction) const;  ///< friction above mu_c is read as mu_c
+    /// Are feet unsettled at some of the nodes around?
+    bool rough(double friction) const;
+
+   private:
+    friend class SettledSlice;
+    std::size_t piece_of(double friction) const;
+    const SettledSlice* slice_ = nullptr;
+    double omega_ = 0, at_ = 0;  // at_: on the axis of speeds
+    std::array<double, SettledTable::stops + 1> edge_{};
+    double bend_ = 0, scale_ = 0;
+    std::uint16_t rough_ = 0;  // of any node around: a bit for each piece
+  };
+  /// @param omega at least lowest_speed(); above the table's speeds the last one's share of omega^2 is kept
+  Place at(double omega) const;
+  double resting_friction(double omega) const;  ///< likewise
+  /// The least speed in [low, high] that `friction` survives; high if none.
+  double slowest(double friction, double low, double high) const;
+
+ private:
+  // Neighbouring nodes around a place on an axis and their weights: Lagrange's polynomial through them.
+  static constexpr std::size_t smooth = 6, rough = 4, straight = 2;  // nodes
+  struct Stencil {
+    std::size_t first = 0, size = 0;
+    std::array<double, smooth> weight{};
+  };
+  double place_of(double omega) const;  // on the axis of speeds
+  double resting_at(double place) const;
+  static Stencil stencil(double place, int count, std::size_t size);
+  double value(const std::vector<double>& values, std::size_t speed, std::size_t stride, std::size_t place) const;
+
+  const SettledTable* table_;
+  double eta_, standstill_ = 0;
+  Stencil row_, rough_row_;           // where feet settle, and where not
+  std::vector<double> edges_;         // by speed
+  std::vector<std::uint16_t> rough_;  // by speed: of any row around, a bit for each piece
+  friend class Place;
+};
+
+}  // namespace metastable::dynamics

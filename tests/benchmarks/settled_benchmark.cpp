@@ -1,0 +1,117 @@
+// The law `settled`: landings followed and read, the table, a study from it.
+
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "analysis/study/metastability.h"
+#include "analysis/study/setting.h"
+#include "dynamics/settled/settled_map.h"
+#include "markov/parallel.h"
+
+namespace {
+
+using namespace metastable;
+
+// mu ~ N(0.4, 0.03^2), eta ~ N(0.4, 0.05^2), J = 0.0025 kg m^2: what the engines were given.
+analysis::Setting engine_wheel() {
+  analysis::Setting setting;
+  setting.law = dynamics::Law::settled;
+  setting.wheel.radius_of_gyration = std::sqrt(0.0025 / setting.wheel.hub_mass);
+  setting.restitution = {0.4, 0.05};
+  setting.friction = {0.4, 0.03};
+  return setting;
+}
+
+dynamics::SettledMapOptions on_threads(int threads) {
+  dynamics::SettledMapOptions options;
+  options.executor = [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
+    markov::parallel_for(count, threads, work);
+  };
+  return options;
+}
+
+dynamics::SettledWheel wheel(const analysis::Setting& setting) {
+  return dynamics::settled_wheel(setting.wheel, setting.slope_deg * std::numbers::pi / 180);
+}
+
+// Over speeds, restitutions and frictions of steady rolling.
+template <class Land>
+void landings(benchmark::State& state, const Land& land) {
+  std::size_t k = 0;
+  for (auto _ : state) {
+    const double one = std::fmod(0.618 * static_cast<double>(k), 1.0),
+                 two = std::fmod(0.414 * static_cast<double>(k), 1.0);
+    benchmark::DoNotOptimize(land(static_cast<int>(k % 8), 4.3 + one, {0.3 + 0.2 * two, 0.34 + 0.12 * one}));
+    ++k;
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(k));
+}
+
+void landings_followed(benchmark::State& state) {
+  const dynamics::SettledMotion motion(wheel(engine_wheel()));
+  landings(state, [&](int leg, double omega, const dynamics::Contact& c) { return motion.land(leg, omega, c); });
+}
+
+void landings_read(benchmark::State& state) {
+  const auto map = dynamics::SettledMap::of(wheel(engine_wheel()), on_threads(0));
+  landings(state, [&](int leg, double omega, const dynamics::Contact& c) { return map->land(leg, omega, c); });
+}
+
+// Each time on another slope: tables are kept.
+void table(benchmark::State& state) {
+  analysis::Setting setting = engine_wheel();
+  for (auto _ : state) {
+    setting.slope_deg += 0.001;
+    benchmark::DoNotOptimize(dynamics::SettledMap::of(wheel(setting), on_threads(static_cast<int>(state.range(0)))));
+  }
+}
+
+// The whole study, everything `metastable steps` prints, from the table.
+void study(benchmark::State& state) {
+  const analysis::Problem problem = engine_wheel().problem();
+  const analysis::StudyOptions options{.method = state.range(0) == 0 ? analysis::Method::sampled
+                                                                     : analysis::Method::integrated};
+  for (auto _ : state) benchmark::DoNotOptimize(analysis::study(problem, options));
+}
+
+// The same wheel under `published`.
+void study_published(benchmark::State& state) {
+  analysis::Setting setting = engine_wheel();
+  setting.law = dynamics::Law::published;
+  setting.wheel.radius_of_gyration.reset();
+  const analysis::Problem problem = setting.problem();
+  const analysis::StudyOptions options{.method = state.range(0) == 0 ? analysis::Method::sampled
+                                                                     : analysis::Method::integrated};
+  for (auto _ : state) benchmark::DoNotOptimize(analysis::study(problem, options));
+}
+
+BENCHMARK(landings_followed);
+BENCHMARK(landings_read);
+BENCHMARK(table)
+    ->ArgName("threads")
+    ->Arg(1)
+    ->Arg(2)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime()
+    ->Unit(benchmark::kSecond)
+    ->Iterations(1);
+BENCHMARK(study)
+    ->ArgName("integrated")
+    ->Arg(0)
+    ->Arg(1)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime()
+    ->Unit(benchmark::kSecond)
+    ->Iterations(1);
+BENCHMARK(study_published)
+    ->ArgName("integrated")
+    ->Arg(0)
+    ->Arg(1)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime()
+    ->Unit(benchmark::kSecond)
+    ->Iterations(1);
+
+}  // namespace
