@@ -17,7 +17,7 @@ namespace {
 constexpr double kFarthest = 60;      // action beyond which failures are not looked for
 constexpr double kBucket = 1;         // of actions, expanded together
 constexpr double kWorthAgain = 0.05;  // an expanded node is looked at again if its action falls by this
-constexpr int kHalvings = 6;          // of a gap between scores, to find where failures begin
+constexpr int kHalvings = 9;          // of a gap between scores, to find where failures begin
 constexpr std::size_t kBatch = 32;    // nodes whose landings are asked for at once
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
