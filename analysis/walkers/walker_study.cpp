@@ -1,0 +1,69 @@
+#include "analysis/walkers/walker_study.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+
+const char* name_of(Walker walker) { return walker == Walker::simplest ? "simplest" : "compass"; }
+const char* name_of(dynamics::Terrain terrain) { return terrain == dynamics::Terrain::fresh ? "fresh" : "facets"; }
+
+}  // namespace
+
+Walker walker_from_name(const std::string& name) {
+  for (const Walker walker : {Walker::simplest, Walker::compass})
+    if (name == name_of(walker)) return walker;
+  throw std::invalid_argument(fmt::format("walker: '{}' is none of simplest, compass", name));
+}
+
+dynamics::Terrain terrain_from_name(const std::string& name) {
+  for (const dynamics::Terrain terrain : {dynamics::Terrain::fresh, dynamics::Terrain::facets})
+    if (name == name_of(terrain)) return terrain;
+  throw std::invalid_argument(fmt::format("terrain: '{}' is none of fresh, facets", name));
+}
+
+dynamics::WalkerMap WalkerSetting::map() const {
+  if (!(slope_deg > 0 && slope_deg < 45))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside (0, 45) deg", slope_deg));
+  if (!(slope_sd_deg > 0 && slope_sd_deg < 45))
+    throw std::invalid_argument(
+        fmt::format("slope-sd: {:.6g} deg is outside (0, 45) deg (without noise nothing fails)", slope_sd_deg));
+  return {walker == Walker::simplest ? dynamics::TwoLinkWalker::simplest() : dynamics::TwoLinkWalker::compass(),
+          {.slope_rad = slope_deg * degree, .slope_sd_rad = slope_sd_deg * degree, .terrain = terrain}};
+}
+
+std::string WalkerSetting::describe() const {
+  return fmt::format("walker {}, slope {:.6g} deg, sd {:.6g} deg, terrain {}", name_of(walker), slope_deg, slope_sd_deg,
+                     name_of(terrain));
+}
+
+markov::BatchMap batch_map(const dynamics::WalkerMap& map) {
+  markov::BatchMap batch;
+  batch.dimension = map.dimension();
+  batch.names = map.names();
+  batch.step = [map](int, auto states, auto scores, auto next, auto failed) { map.step(states, scores, next, failed); };
+  batch.inside = [](int, auto state) { return state[0] > 0 && state[0] < std::numbers::pi / 2; };
+  return batch;
+}
+
+std::vector<double> gait_state(const WalkerSetting& setting, const dynamics::Gait& gait) {
+  std::vector<double> state = gait.state;
+  if (setting.terrain == dynamics::Terrain::facets) state.push_back(setting.slope_deg * degree);
+  return state;
+}
+
+WalkerStudy study_walker(const WalkerSetting& setting, const markov::MeshStudyOptions& options) {
+  const dynamics::WalkerMap map = setting.map();
+  WalkerStudy study;
+  study.gait = dynamics::find_gait(map.walker(), setting.slope_deg * degree);
+  study.passage = markov::mesh_study(batch_map(map), gait_state(setting, study.gait), options);
+  return study;
+}
+
+}  // namespace metastable::analysis

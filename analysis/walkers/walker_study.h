@@ -1,0 +1,46 @@
+#pragma once
+// A walker on rough ground: its gait, and how many steps it takes before it falls.
+
+#include <string>
+
+#include "analysis/statistics/estimate.h"
+#include "dynamics/walkers/gait.h"
+#include "dynamics/walkers/walker_map.h"
+#include "markov/mesh/batch_map.h"
+#include "markov/mesh/mesh_study.h"
+
+namespace metastable::analysis {
+
+enum class Walker { simplest, compass };
+
+struct WalkerSetting {
+  Walker walker = Walker::compass;
+  double slope_deg = 3;
+  double slope_sd_deg = 0.5;  ///< > 0: without noise a walker that has a stable gait never falls
+  dynamics::Terrain terrain = dynamics::Terrain::fresh;
+
+  dynamics::WalkerMap map() const;
+  /// One line, for provenance.
+  std::string describe() const;
+};
+
+/// @throws std::invalid_argument for a name that is none of "simplest", "compass"; of "fresh", "facets"
+Walker walker_from_name(const std::string& name);
+dynamics::Terrain terrain_from_name(const std::string& name);
+
+/// The walker's map in batches. States: as WalkerMap's. Section: 0 < half angle < pi/2.
+markov::BatchMap batch_map(const dynamics::WalkerMap& map);
+
+struct WalkerStudy {
+  dynamics::Gait gait;
+  markov::MeshStudy passage;  ///< from the gait; the last slope is the mean
+};
+
+/// The state just after a strike in the gait, with the mean slope underfoot where the terrain remembers it.
+std::vector<double> gait_state(const WalkerSetting& setting, const dynamics::Gait& gait);
+
+/// @throws std::invalid_argument for a setting out of range; std::domain_error where there is no gait;
+///         markov::MapError where it is unstable or never fails; as markov::mesh_study
+WalkerStudy study_walker(const WalkerSetting& setting, const markov::MeshStudyOptions& options = {});
+
+}  // namespace metastable::analysis

@@ -1,0 +1,61 @@
+#include "markov/mesh/batch_map.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace metastable::markov {
+
+void require_map(const BatchMap& map) {
+  if (map.dimension < 1 || map.dimension > 4)
+    throw std::invalid_argument(fmt::format("return map: {} dimensions, 1 to 4 expected", map.dimension));
+  if (map.phases < 1) throw std::invalid_argument(fmt::format("return map: {} phases, 1 or more expected", map.phases));
+  if (map.scores < 0 || (map.scores > 0 && !map.step) || (map.scores == 0 && !map.draw))
+    throw std::invalid_argument(
+        "return map: either `step` with one score or more, or `draw` with none (the map draws for itself)");
+  if (!map.names.empty() && map.names.size() != static_cast<std::size_t>(map.dimension))
+    throw std::invalid_argument("return map: one name for each dimension expected");
+}
+
+std::string describe_state(const BatchMap& map, std::span<const double> state) {
+  std::string text;
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    const std::string name = map.names.empty() ? fmt::format("x{}", k + 1) : map.names[k];
+    text += fmt::format("{}{} = {:.9g}", k ? ", " : "", name, state[k]);
+  }
+  return text;
+}
+
+namespace {
+
+void check(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> next,
+           std::span<const std::uint8_t> failed) {
+  const auto dimension = static_cast<std::size_t>(map.dimension);
+  const int landing_phase = (phase + 1) % map.phases;
+  for (std::size_t i = 0; i < failed.size(); ++i) {
+    if (failed[i]) continue;
+    const auto landing = next.subspan(i * dimension, dimension);
+    const bool finite = std::all_of(landing.begin(), landing.end(), [](double x) { return std::isfinite(x); });
+    if (finite && (!map.inside || map.inside(landing_phase, landing))) continue;
+    throw MapError(fmt::format("return map: from the state {} (phase {}) it leads to {}, which is {}",
+                               describe_state(map, states.subspan(i * dimension, dimension)), phase,
+                               describe_state(map, landing), finite ? "outside its own section" : "not finite"));
+  }
+}
+
+}  // namespace
+
+void checked_step(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> scores,
+                  std::span<double> next, std::span<std::uint8_t> failed) {
+  map.step(phase, states, scores, next, failed);
+  check(map, phase, states, next, failed);
+}
+
+void checked_draw(const BatchMap& map, int phase, std::span<const double> states, std::span<const std::uint64_t> words,
+                  std::span<double> next, std::span<std::uint8_t> failed) {
+  map.draw(phase, states, words, next, failed);
+  check(map, phase, states, next, failed);
+}
+
+}  // namespace metastable::markov

@@ -1,0 +1,56 @@
+#pragma once
+// Any stochastic return map of up to four dimensions: what meshes and simulations ask of it.
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace metastable::markov {
+
+/// Says that a map broke its promises, and from which state.
+class MapError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A stochastic return map, in batches: n states in rows of `dimension` numbers, scores in rows of `scores` independent
+/// standard normal numbers. The event at phase p is followed by the one at phase (p + 1) % phases.
+struct BatchMap {
+  int dimension = 1;               ///< 1 to 4
+  int scores = 1;                  ///< 1 or more; 0 for a map that draws for itself
+  int phases = 1;                  ///< >= 1
+  std::vector<std::string> names;  ///< of the numbers of a state, with units; empty: numbered
+  /// Writes where each state leads under its scores, or sets its `failed` to 1 (the row of `next` is then not read).
+  /// Must be safe to call from several threads.
+  std::function<void(int phase, std::span<const double> states, std::span<const double> scores, std::span<double> next,
+                     std::span<std::uint8_t> failed)>
+      step;
+  /// For maps with scores = 0, instead of `step`: each row draws with random words of its own (words[i]). Such maps can
+  /// be simulated only; meshes refuse them, because the tails of their noise cannot be weighted.
+  std::function<void(int phase, std::span<const double> states, std::span<const std::uint64_t> words,
+                     std::span<double> next, std::span<std::uint8_t> failed)>
+      draw;
+  /// Whether a state lies in the section, where the map is defined; empty: everywhere. A mesh counts its nodes outside
+  /// as failed; a landing outside is an error.
+  std::function<bool(int phase, std::span<const double> state)> inside;
+};
+
+/// @throws std::invalid_argument naming what is missing or out of range
+void require_map(const BatchMap& map);
+
+/// Calls map.step and looks at what comes back.
+/// @throws MapError naming the state from which a landing is not finite or outside the map's section
+void checked_step(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> scores,
+                  std::span<double> next, std::span<std::uint8_t> failed);
+
+/// The same for maps that draw for themselves.
+void checked_draw(const BatchMap& map, int phase, std::span<const double> states, std::span<const std::uint64_t> words,
+                  std::span<double> next, std::span<std::uint8_t> failed);
+
+/// A state as words: "half angle [rad] = 0.27, ...".
+std::string describe_state(const BatchMap& map, std::span<const double> state);
+
+}  // namespace metastable::markov

@@ -1,0 +1,92 @@
+#include "markov/mesh/batch_simulation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+
+#include "markov/mesh/score_lattice.h"
+#include "markov/parallel.h"
+#include "markov/rows/draws.h"
+
+namespace metastable::markov {
+namespace {
+
+constexpr std::size_t kTogether = 128;  // trials followed side by side
+constexpr std::uint64_t kStream = 0x2000;
+
+/// Trials first .. first + count - 1, all to their failures; stops early once `spent` exceeds the limit.
+void follow(const BatchMap& map, std::span<const double> start, const SimulationOptions& options, std::size_t first,
+            std::span<std::uint64_t> steps, std::atomic<std::uint64_t>& spent) {
+  const auto d = static_cast<std::size_t>(map.dimension), s = static_cast<std::size_t>(map.scores);
+  std::vector<std::size_t> trial(steps.size());
+  std::vector<double> states, scores, next;
+  std::vector<std::uint64_t> words;
+  std::vector<std::uint8_t> failed;
+  for (std::size_t i = 0; i < trial.size(); ++i) {
+    trial[i] = first + i;
+    states.insert(states.end(), start.begin(), start.end());
+  }
+  for (std::uint64_t number = 1; !trial.empty(); ++number) {
+    const int phase = static_cast<int>((number - 1) % static_cast<std::uint64_t>(map.phases));
+    next.resize(states.size());
+    failed.assign(trial.size(), 0);
+    if (map.scores > 0) {
+      scores.resize(trial.size() * s);
+      for (std::size_t i = 0; i < trial.size(); ++i)
+        for (std::size_t k = 0; k < s; k += 4) {
+          const auto u = uniforms(options.seed, kStream + k / 4, trial[i], number);
+          for (std::size_t j = k; j < std::min(s, k + 4); ++j) scores[i * s + j] = normal_score(u[j - k]);
+        }
+      checked_step(map, phase, states, scores, next, failed);
+    } else {
+      words.resize(trial.size());
+      for (std::size_t i = 0; i < trial.size(); ++i)
+        words[i] = random_words(options.seed, kStream, trial[i], number)[0];
+      checked_draw(map, phase, states, words, next, failed);
+    }
+    if ((spent += trial.size()) > options.most_steps) return;
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < trial.size(); ++i) {
+      if (failed[i]) {
+        steps[trial[i] - first] = number;
+        continue;
+      }
+      trial[left] = trial[i];
+      std::copy_n(next.data() + i * d, d, states.data() + left++ * d);
+    }
+    trial.resize(left);
+    states.resize(left * d);
+  }
+}
+
+}  // namespace
+
+std::optional<SimulatedSteps> simulate_steps(const BatchMap& map, std::span<const double> start,
+                                             const SimulationOptions& options) {
+  require_map(map);
+  if (options.trials < 2)
+    throw std::invalid_argument(fmt::format("simulation: {} trials, 2 or more expected", options.trials));
+  if (start.size() != static_cast<std::size_t>(map.dimension))
+    throw std::invalid_argument(fmt::format("simulation: a start of {} numbers expected", map.dimension));
+  SimulatedSteps simulated;
+  simulated.trials = options.trials;
+  simulated.steps.assign(options.trials, 0);
+  std::atomic<std::uint64_t> spent = 0;
+  parallel_for((options.trials + kTogether - 1) / kTogether, options.threads, [&](std::size_t share) {
+    const std::size_t first = share * kTogether, count = std::min(kTogether, options.trials - first);
+    if (spent <= options.most_steps)
+      follow(map, start, options, first, std::span(simulated.steps).subspan(first, count), spent);
+  });
+  if (spent > options.most_steps) return std::nullopt;
+  const auto n = static_cast<double>(options.trials);
+  double squares = 0;
+  for (const std::uint64_t steps : simulated.steps) simulated.mean += static_cast<double>(steps) / n;
+  for (const std::uint64_t steps : simulated.steps) squares += std::pow(static_cast<double>(steps) - simulated.mean, 2);
+  simulated.standard_error = std::sqrt(squares / (n - 1) / n);
+  return simulated;
+}
+
+}  // namespace metastable::markov

@@ -1,0 +1,33 @@
+#pragma once
+// Direct simulation of any return map, many trials at a time.
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "markov/mesh/batch_map.h"
+
+namespace metastable::markov {
+
+struct SimulationOptions {
+  std::size_t trials = 1000;  ///< >= 2
+  std::uint64_t seed = 1;
+  int threads = 0;                                    ///< 0: all cores; the bits do not depend on it
+  std::uint64_t most_steps = std::uint64_t{1} << 62;  ///< of all trials together
+};
+
+struct SimulatedSteps {
+  double mean = 0, standard_error = 0;  ///< of the steps before failure, the failing one included
+  std::size_t trials = 0;
+  std::vector<std::uint64_t> steps;  ///< of each trial
+};
+
+/// Follows every trial from `start` (a state at phase 0) to its failure; scores, or words for maps that draw for
+/// themselves, by counter (Philox) at trial and step. Nothing if most_steps do not suffice (a mean of the trials that
+/// ended would be too low).
+/// @throws std::invalid_argument for options out of range; MapError as checked_step does
+std::optional<SimulatedSteps> simulate_steps(const BatchMap& map, std::span<const double> start,
+                                             const SimulationOptions& options);
+
+}  // namespace metastable::markov

@@ -1,0 +1,103 @@
+#pragma once
+// A return map of one to four dimensions as a sparse chain: nodes of a lattice in the principal axes of its noise, as
+// far as failures are worth it.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "markov/chain/chain.h"
+#include "markov/mesh/batch_map.h"
+#include "markov/mesh/noise_frame.h"
+
+namespace metastable::markov {
+
+struct MeshOptions {
+  double spacing = 0.5;  ///< of the nodes, in stationary sds of the noise; in (0, 2]
+  std::uint64_t seed = 1;
+  std::uint32_t shift = 0;     ///< which random shift of the lattice of nodes
+  double margin = 12;          ///< nodes as far as the action of the cheapest failure and this
+  double score_spacing = 0.6;  ///< of the lattice of scores
+  double score_reach = 8.5;
+  std::size_t most_bytes = std::size_t{3} << 30;  ///< for rows and nodes; more is refused
+};
+
+/// Rows are interpolated: a landing is shared among the corners of the simplex (Kuhn's, in random orientation) of nodes
+/// around it, so entries are never negative and means are exact; the sharing acts as noise of h^2/6 an axis and step,
+/// and expected steps come out low by a smooth error in h^2. The noise is a lattice of scores with an offset of its own
+/// for every node; with one score, bisection finds where between them failures begin.
+///
+/// The mesh grows from the start and the noise-free orbit by least action: the chain's own, -ln of an entry against the
+/// largest of its row, by Dijkstra's algorithm, up to the cheapest failure and `margin` beyond. What leaves the mesh is
+/// kept apart. Cost: nodes times scores evaluations of the map.
+class Mesh {
+ public:
+  /// @param start  a state at phase 0
+  /// @throws MapError as checked_step does; when no failure is met within an action of 60: it never fails within reach
+  /// @throws std::invalid_argument for options out of range
+  /// @throws std::length_error when it would take more memory than allowed: says how much for how many nodes
+  Mesh(const BatchMap& map, std::vector<NoiseFrame> frames, std::span<const double> start, const MeshOptions& options);
+
+  std::size_t size() const { return kill_.size(); }
+  std::size_t entries() const { return column_.size(); }
+  int phases() const { return static_cast<int>(frames_.size()); }
+  double cheapest_failure() const { return cheapest_failure_; }  ///< its action; exp(-action) is its order of rarity
+  std::span<const double> kill() const { return kill_; }
+  std::span<const double> leave() const { return leave_; }  ///< probability of leaving the mesh
+  std::span<const std::uint32_t> columns(std::size_t row) const {
+    return {column_.data() + row_start_[row], row_start_[row + 1] - row_start_[row]};
+  }
+  std::span<const double> values(std::size_t row) const {
+    return {value_.data() + row_start_[row], row_start_[row + 1] - row_start_[row]};
+  }
+  /// Phase and state of a node.
+  int phase(std::size_t node) const;
+  std::vector<double> state(std::size_t node) const;
+
+  /// Nodes around a state with their weights; nodes that are not part of the mesh are left out.
+  struct Corners {
+    std::array<std::uint32_t, 5> node{};
+    std::array<double, 5> weight{};
+    int count = 0;
+  };
+  Corners corners(int phase, std::span<const double> state) const;
+
+  /// y = x Q and y = Q x, diagonals included. O(entries).
+  void apply_left(std::span<const double> x, std::span<double> y) const;
+  void apply(std::span<const double> x, std::span<double> y) const;
+
+  /// As a chain for the other solvers; what leaves the mesh counts as failed.
+  Chain chain() const;
+
+ private:
+  struct Growth;
+  using Place = std::array<std::int32_t, 4>;
+  std::pair<int, Place> place(std::size_t node) const;
+
+  /// Open addressing from packed places to nodes.
+  class Table {
+   public:
+    static constexpr std::uint32_t none = 0xffffffffU;
+    std::uint32_t find(std::uint64_t key) const;
+    void insert(std::uint64_t key, std::uint32_t node);
+    std::size_t bytes() const { return slot_.capacity() * sizeof(slot_[0]); }
+
+   private:
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> slot_;
+    std::size_t used_ = 0;
+  };
+
+  std::vector<NoiseFrame> frames_;
+  double spacing_ = 0;
+  std::array<double, 4> shift_{};
+  Table table_;
+  std::vector<std::uint64_t> key_;  ///< phase and place of each node
+  std::vector<std::size_t> row_start_{0};
+  std::vector<std::uint32_t> column_;
+  std::vector<double> value_, kill_, leave_;
+  double cheapest_failure_ = 0;
+};
+
+}  // namespace metastable::markov

@@ -1,0 +1,96 @@
+#include "markov/mesh/mesh_passage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace metastable::markov {
+namespace {
+
+constexpr int kProducts = 20000;
+constexpr double kSettled = 1e-9;  // relative change of the failures of a revolution
+constexpr int kInARow = 3;
+
+}  // namespace
+
+MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
+  const std::size_t n = mesh.size();
+  const int phases = mesh.phases();
+  std::vector<double> x(n, 0.0), y(n), before;
+  const Mesh::Corners corners = mesh.corners(0, start);
+  for (int c = 0; c < corners.count; ++c)
+    x[corners.node[static_cast<std::size_t>(c)]] += corners.weight[static_cast<std::size_t>(c)];
+
+  MeshPassage passage;
+  double alive = 1, alive_lower = 1, steps_lower = 0, last_failures = 0;
+  std::vector<double> distances;
+  int settled = 0;
+  while (settled < kInARow) {
+    if (passage.products >= kProducts)
+      throw ConvergenceError("mesh", last_failures, "survivors still change after 20000 products");
+    // One revolution: of those alive at its beginning, which fail in it, and how many steps they take.
+    before = x;
+    double here = 1, failures = 0, taken = 0, here_lower = 1, failures_lower = 0, taken_lower = 0;
+    std::vector<double> distribution(n, 0.0);
+    for (int phase = 0; phase < phases; ++phase) {
+      double kill = 0, leave = 0;
+      for (std::size_t i = 0; i < n; ++i) {
+        kill += x[i] * mesh.kill()[i];
+        leave += x[i] * mesh.leave()[i];
+        distribution[i] += x[i];
+      }
+      taken += here;
+      failures += here * kill;
+      here *= 1 - kill;
+      taken_lower += here_lower;
+      failures_lower += here_lower * std::min(1.0, kill + leave);
+      here_lower *= std::max(0.0, 1 - kill - leave);
+      passage.survival.push_back(alive * here);
+      mesh.apply_left(x, y);
+      ++passage.products;
+      const double mass = std::accumulate(y.begin(), y.end(), 0.0);
+      if (!(mass > 0)) {  // nobody survives
+        passage.steps = passage.steps_upper = passage.steps + alive * taken;
+        passage.steps_lower = steps_lower + alive_lower * taken_lower;
+        passage.failure_rate = 1;
+        passage.distribution = std::move(distribution);
+        return passage;
+      }
+      for (std::size_t i = 0; i < n; ++i) x[i] = y[i] / mass;
+    }
+    double distance = 0;
+    for (std::size_t i = 0; i < n; ++i) distance += 0.5 * std::abs(x[i] - before[i]);
+    distances.push_back(distance);
+    settled = std::abs(failures - last_failures) <= kSettled * failures && distance <= 1e-6 ? settled + 1 : 0;
+    last_failures = failures;
+    if (settled == kInARow) {
+      passage.steps_upper = passage.steps + alive * taken / failures;
+      passage.steps_lower = steps_lower + alive_lower * taken_lower / failures_lower;
+      passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);
+      passage.failure_rate = phases == 1 ? failures : -std::expm1(std::log1p(-failures) / phases);
+      passage.distribution = std::move(distribution);
+    } else {
+      passage.steps += alive * taken;
+      steps_lower += alive_lower * taken_lower;
+      alive *= here;
+      alive_lower *= here_lower;
+    }
+  }
+  // The distance falls by |lambda_2 / lambda_1| a step, oscillating: its decline over the second half tells.
+  const std::size_t last = distances.size() - 1, first = last / 2;
+  if (distances[last] > 0 && distances[first] > distances[last])
+    passage.mixing_steps = static_cast<double>((last - first) * static_cast<std::size_t>(phases)) /
+                           std::log(distances[first] / distances[last]);
+  return passage;
+}
+
+std::vector<std::vector<double>> failure_in_step(const Mesh& mesh, int window) {
+  std::vector<std::vector<double>> u{{mesh.kill().begin(), mesh.kill().end()}};
+  for (int n = 1; n <= window; ++n) {
+    u.emplace_back(mesh.size());
+    mesh.apply(u[u.size() - 2], u.back());
+  }
+  return u;
+}
+
+}  // namespace metastable::markov

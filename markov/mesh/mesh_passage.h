@@ -1,0 +1,29 @@
+#pragma once
+// What a mesh says of failure, by products of its rows with distributions alone: nothing small is subtracted.
+
+#include <span>
+#include <vector>
+
+#include "markov/mesh/mesh.h"
+
+namespace metastable::markov {
+
+struct MeshPassage {
+  double steps = 0;                  ///< expected steps before failure from the start, the failing one included
+  double steps_lower = 0;            ///< if what leaves the mesh failed at once
+  double steps_upper = 0;            ///< if it went on as the others do
+  double failure_rate = 0;           ///< a step, once settled: distribution . kill (for phases: of the mean step)
+  double mixing_steps = 0;           ///< e-folding of the distance from the quasi-stationary distribution
+  std::vector<double> survival;      ///< survival[k]: share that survives step k + 1, until settled; then geometric
+  std::vector<double> distribution;  ///< quasi-stationary, of one phase each summing to one
+  int products = 0;
+};
+
+/// Follows the distribution of survivors from `start` (a state at phase 0) until it keeps its form.
+/// @throws ConvergenceError if it does not within 20000 products
+MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start);
+
+/// Returns u[n][i], n = 0 .. window: the probability that a walker at node i fails in exactly its (n+1)-th step.
+std::vector<std::vector<double>> failure_in_step(const Mesh& mesh, int window);
+
+}  // namespace metastable::markov

@@ -1,0 +1,67 @@
+#pragma once
+// Expected steps of any return map with an interval, and what two independent ways say of it.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "markov/mesh/batch_map.h"
+#include "markov/mesh/mesh.h"
+
+namespace metastable::markov {
+
+struct MeshStudyOptions {
+  double spacing = 0;  ///< of the coarsest mesh, in stationary sds; the others' fall by sqrt 2 each. 0: by dimension
+  int sizes = 0;       ///< 3 or 4; 0: 3, in four dimensions 4
+  int shifts = 6;      ///< of each size, >= 6
+  double margin = 0;   ///< MeshOptions::margin; 0: 12, in four dimensions 10
+  std::uint64_t seed = 1;
+  int threads = 0;                                ///< 0: all cores; the bits do not depend on it
+  std::size_t guided_samples = 4000;              ///< 0: none
+  std::uint64_t simulated_steps = 2000000;        ///< direct simulation takes about so many steps; 0: none
+  std::size_t most_bytes = std::size_t{3} << 30;  ///< of all meshes held at once
+};
+
+/// A number with its 95 % interval.
+struct MeshEstimate {
+  double value = 0, lower = 0, upper = 0;
+};
+
+struct MeshSize {
+  double spacing = 0;
+  std::size_t nodes = 0, entries = 0;  ///< of the first shift
+  std::vector<double> steps;           ///< of each shift
+};
+
+struct MeshStudy {
+  MeshEstimate steps;         ///< expected steps before failure from the start
+  MeshEstimate failure_rate;  ///< a step, from the quasi-stationary distribution
+  double mixing_steps = 0;
+  std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
+  double cheapest_failure = 0;
+  /// Relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization, and what
+  /// leaves the mesh.
+  double shift_error = 0, discretization_error = 0, bracket = 0;
+  std::vector<MeshSize> sizes;
+  std::optional<MeshEstimate> guided, simulated;  ///< expected steps in the two other ways, where they reach
+  std::size_t guided_samples = 0, simulated_trials = 0;
+  /// Empty, or says which ways disagree and that `steps` must not be used.
+  std::string disagreement;
+};
+
+/// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
+/// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
+/// discretization error; the bracket of what leaves the mesh is added. The discretization error is the difference from
+/// the extrapolation without the coarsest size; with four sizes, at least half of that between the two triples'.
+///
+/// Beside it stand importance sampling guided by the coarsest mesh that T > 100 steps makes worth it, and direct
+/// simulation where 100 trials or more fit into `simulated_steps`. Two ways disagree when they lie further apart
+/// than 1.7 times (99.9 %) their joint 95 % half-width.
+/// @param start  a state at phase 0
+/// @throws as Mesh, noise_frames and mesh_passage do
+MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options = {});
+
+}  // namespace metastable::markov

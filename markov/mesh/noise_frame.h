@@ -1,0 +1,28 @@
+#pragma once
+// The principal axes of a map's noise: in them, the linear response to the noise has unit variance in every direction.
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "markov/mesh/batch_map.h"
+
+namespace metastable::markov {
+
+/// Coordinates u of one phase: state = centre + axes u, u = inverse (state - centre). Matrices are row-major.
+struct NoiseFrame {
+  std::vector<double> centre;  ///< the noise-free orbit's state
+  std::vector<double> axes;    ///< dimension x dimension
+  std::vector<double> inverse;
+  std::vector<double> sds;  ///< share of each axis in the correlations' spread, falling; sds^2 sum to the dimension
+};
+
+/// Finds the noise-free orbit by following the map from `start` at phase 0, its derivatives by central differences, and
+/// from them the stationary covariance of the linear response, S' = A S A^T + B B^T, phase by phase. Axes are the
+/// eigenvectors of its correlations. An axis narrower than 0.05 of the widest counts as that wide:
+/// bent landings would fill it with nodes that tell nothing (a compass on facets takes twelve times fewer).
+/// @throws MapError when the noise-free map fails, does not settle, or is unstable, naming the state; as checked_step
+/// does
+std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double> start);
+
+}  // namespace metastable::markov

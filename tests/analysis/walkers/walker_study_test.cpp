@@ -1,0 +1,61 @@
+#include "analysis/walkers/walker_study.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "markov/mesh/batch_simulation.h"
+#include "markov/mesh/guided_sampling.h"
+#include "markov/mesh/mesh_passage.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double per_radian = 57.29577951308232;
+
+/// The first three sizes of a four-dimensional mesh are all that a test can afford; guided sampling is right on any.
+TEST(WalkerStudy, FourDimensionsOnTheCoarsestMeshes) {
+  const WalkerSetting setting{Walker::compass, 3, 0.004 * per_radian, dynamics::Terrain::facets};
+  const dynamics::WalkerMap map = setting.map();
+  const markov::BatchMap batch = batch_map(map);
+  const std::vector<double> start = gait_state(setting, dynamics::find_gait(map.walker(), 3 / per_radian));
+  const auto frames = markov::noise_frames(batch, start);
+  ASSERT_EQ(frames.front().centre.size(), 4u);
+  std::vector<double> steps;
+  for (const double spacing : {2.0, 1.5}) {
+    const markov::Mesh mesh(batch, frames, start, {.spacing = spacing, .margin = 7, .score_spacing = 0.8});
+    const markov::MeshPassage passage = markov::mesh_passage(mesh, start);
+    EXPECT_LT(passage.steps_upper / passage.steps_lower, 1.06);
+    steps.push_back(passage.steps);
+  }
+  // Low, and rising towards 68.87 (direct simulation by an independent program, standard error 0.30).
+  EXPECT_LT(steps[0], steps[1]);
+  EXPECT_LT(steps[1], 68.87);
+  const auto simulated = markov::simulate_steps(batch, start, {.trials = 400, .seed = 5});
+  ASSERT_TRUE(simulated);
+  EXPECT_NEAR(simulated->mean, 68.87, 4 * std::hypot(simulated->standard_error, 0.30));
+}
+
+// Reference: 28.151 (0.059), by an independent simulation.
+TEST(WalkerStudy, SimplestWalkerIsWhatSimulationsSay) {
+  WalkerSetting setting{Walker::simplest, 0.009 * per_radian, 0.0015 * per_radian, dynamics::Terrain::fresh};
+  const WalkerStudy study =
+      study_walker(setting, {.spacing = 1.0, .margin = 6, .guided_samples = 0, .simulated_steps = 20000});
+  EXPECT_NEAR(study.passage.steps.value, 28.151, 0.45);
+  EXPECT_LE(study.passage.steps.lower, 28.151 + 0.12);
+  EXPECT_GE(study.passage.steps.upper, 28.151 - 0.12);
+  EXPECT_EQ(study.passage.disagreement, "");
+  EXPECT_NEAR(study.gait.state[0], 0.200310900544, 1e-10);
+}
+
+TEST(WalkerStudy, NamesWhatIsOutOfRange) {
+  EXPECT_THROW(study_walker({Walker::compass, -1, 0.5, dynamics::Terrain::fresh}), std::invalid_argument);
+  EXPECT_THROW(study_walker({Walker::compass, 3, 0, dynamics::Terrain::fresh}), std::invalid_argument);
+  EXPECT_THROW(study_walker({Walker::compass, 30, 0.5, dynamics::Terrain::fresh}), markov::MapError);     // unstable
+  EXPECT_THROW(study_walker({Walker::simplest, 0.9, 0.01, dynamics::Terrain::fresh}), markov::MapError);  // unstable
+  EXPECT_THROW(walker_from_name("biped"), std::invalid_argument);
+  EXPECT_THROW(terrain_from_name("sand"), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace metastable::analysis
