@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kRevolutions = 5000;
-constexpr double kSettled = 1e-11;
+constexpr double orbit_tolerance = 1e-11;
 constexpr double kNarrowest = 0.05;  // of the widest axis: nodes there are no nearer
 
 class Probe {
@@ -48,7 +48,7 @@ std::vector<VectorXd> settled_orbit(const BatchMap& map, const Probe& probe, std
     }
     const double moved = (next - state).cwiseAbs().maxCoeff();
     state = next;
-    if (moved <= kSettled * (1 + state.cwiseAbs().maxCoeff())) return orbit;
+    if (moved <= orbit_tolerance * (1 + state.cwiseAbs().maxCoeff())) return orbit;
   }
   throw MapError(fmt::format("return map: without noise it does not settle; it was last at {}",
                              describe_state(map, {state.data(), static_cast<std::size_t>(state.size())})));
