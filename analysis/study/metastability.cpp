@@ -26,7 +26,7 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t first_cells = 128;
 constexpr std::size_t first_samples = 4096;
 constexpr std::size_t most_endless = 2048;     // cells a phase
-constexpr double narrowest_integrated = 1e-4;  // sd of eta or mu: between its nodes rest is lost
+constexpr double narrowest_integrated = 1e-3;  // sd of eta or mu: between its nodes rest is lost
 constexpr int sizes = 3;                       // cell sizes a ladder holds: cells, cells / 2, cells / 4
 // The extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
 constexpr double change_over_error = 3;

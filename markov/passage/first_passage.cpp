@@ -245,7 +245,8 @@ class RewardMixture {
 constexpr double kLogNegligible = -39.0;    // survivors fewer than about 1e-17 are let go
 constexpr double kSettledIncrement = 1e-9;  // of mean and variance over a period, relative to the largest reward
 constexpr double kBlockShare = 2e-3;        // length of a tail block over the periods before it
-constexpr std::size_t kRewardSteps = 200000;
+constexpr double kNegligibleShare = 1e-12;  // of a period's failures: far below what a settled period may still change
+constexpr std::size_t kRewardSteps = 20000;
 
 /// Returns mean and variance of a whole number from 0 to length - 1 with weights exp(log_factor * k).
 struct Block {
@@ -281,7 +282,8 @@ RewardMixture::RewardMixture(const ChainSolver& solver, const QuasiStationary& q
     }
     if (head_.size() > kRewardSteps) {
       throw ConvergenceError("reward iteration", head_.back().weight,
-                             "the reward of a step has not settled after " + std::to_string(kRewardSteps) + " steps");
+                             "the reward of a step has not settled after " + std::to_string(kRewardSteps) +
+                                 " steps; a looser tolerance or other rows may do (--method)");
     }
     advance();
   }
@@ -338,6 +340,8 @@ bool RewardMixture::settled() const {
     const Component& now = head_[i];
     const Component& before = head_[i - period_];
     const Component& earlier = head_[i - 2 * period_];
+    // A phase that hardly ever fails may take for ever to settle.
+    if (now.weight < kNegligibleShare * absorbed) continue;
     const double mean_change = now.mean - 2 * before.mean + earlier.mean;
     const double variance_change = now.variance - 2 * before.variance + earlier.variance;
     if (std::abs(now.weight - factor * before.weight) > increment * now.weight ||

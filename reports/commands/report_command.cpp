@@ -67,6 +67,7 @@ class Report {
     for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::settled}) {
       for (analysis::Setting setting : request_.settings) {
         setting.law = law;
+        if (law == dynamics::Law::settled && setting.restitution.mean > dynamics::most_settled_restitution) continue;
         analysis::StudyOptions options = request_.study;
         options.progress = study_progress(progress_);
         Studied one{analysis::study(setting, options), {}};

@@ -212,7 +212,7 @@ TEST(IntegratedStudy, SpreadsTooNarrowForItsNodesAreRefusedWithTheWayOut) {
     FAIL();
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(),
-                 "friction: sd 1e-09 is too narrow for method integrated, which takes 0 and 0.0001 or more; method "
+                 "friction: sd 1e-09 is too narrow for method integrated, which takes 0 and 0.001 or more; method "
                  "sampled takes any");
   }
 }

@@ -408,5 +408,17 @@ TEST(Metastability, RefusesOptionsOutOfRange) {
   expect_message({.replicates = 1}, "replicates: 1 is outside 2..64");
 }
 
+// On two of the legs rest is 1e30 times rarer than on the others, and what they pay never settles by itself.
+TEST(Metastability, LegsThatHardlyEverFailDoNotHoldTheOthersUp) {
+  Setting setting;
+  setting.slope_deg = 3.5;
+  setting.law = dynamics::Law::coulomb;
+  setting.initial_speed = {4, 0.3};
+  const Metastability result = study(setting);
+  // metastable steps --law coulomb --slope 3.5 --initial-speed 4,0.3 --method integrated
+  EXPECT_LE(result.steps.from_start.lower, 1.2837e5);
+  EXPECT_GE(result.steps.from_start.upper, 1.2837e5);
+}
+
 }  // namespace
 }  // namespace metastable::analysis
