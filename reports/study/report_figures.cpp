@@ -78,6 +78,7 @@ Figure survival_figure(const std::vector<Studied>& settings, const Provenance& p
   figure.x = {"steps n", ""};
   figure.y = {.label = "P(steps > n)", .logarithmic = true, .high = 1.0};
   figure.legend = Legend::below;
+  figure.height = 540;  // room for the legend
   figure.provenance = provenance;
   bool any_endless = false;
   for (std::size_t i = 0; i < settings.size(); ++i) {
