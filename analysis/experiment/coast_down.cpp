@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -15,6 +15,7 @@
 #include "analysis/experiment/input_error.h"
 #include "analysis/statistics/median.h"
 #include "dynamics/wheel/ranges.h"
+#include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 namespace {
@@ -226,7 +227,7 @@ LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear) {
   double scale = 0;
   for (int i = 0; i < 200; ++i) {
     normal = terms.transpose() * weight.asDiagonal() * terms;
-    const Eigen::VectorXd next = normal.ldlt().solve(terms.transpose() * weight.cwiseProduct(y));
+    const Eigen::VectorXd next = markov::solve_symmetric(normal, terms.transpose() * weight.cwiseProduct(y));
     residual = y - terms * next;
     std::vector<double> sizes(omega.size());
     for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] = std::abs(residual[static_cast<Eigen::Index>(k)]);
@@ -237,7 +238,7 @@ LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear) {
     for (Eigen::Index k = 0; k < rows; ++k) weight[k] = std::min(1.0, huber * scale / std::abs(residual[k]));
   }
   fit.loss = {value[0], linear ? value[2] : 0, value[1], scale};
-  const Eigen::MatrixXd covariance = scale * scale / 0.95 * (terms.transpose() * terms).inverse();
+  const Eigen::MatrixXd covariance = scale * scale / 0.95 * markov::inverse_of(terms.transpose() * terms);
   fit.constant_error = std::sqrt(covariance(0, 0));
   fit.quadratic_error = std::sqrt(covariance(1, 1));
   if (linear) fit.linear_error = std::sqrt(covariance(2, 2));
