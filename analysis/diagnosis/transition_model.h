@@ -64,6 +64,7 @@ struct FreeParameter {
   double lower = 0, upper = 0;
   double step = 1e-4;  ///< for differences
   double try_at = 0;   ///< a size worth starting from where the neutral value says nothing; 0: start at neutral
+  double likely = 0;   ///< a size that the data show by themselves, from which fits start as well; 0: there is none
 };
 
 /// A number as it is reported: by its name.
