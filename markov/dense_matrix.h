@@ -21,6 +21,10 @@ struct SymmetricEigen {
 /// @param matrix  [n x n], n >= 1, of which the lower triangle is read
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix);
 
+/// Returns the modulus of the largest eigenvalue, real or complex, of a matrix [n x n], n >= 1, to nine digits: by
+/// repeated squaring (Gelfand's formula).
+double spectral_radius(Eigen::MatrixXd matrix);
+
 /// Returns the inverse of an invertible matrix [n x n].
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix);
 

@@ -444,6 +444,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     d.data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
   for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
   d.data.notes = model.notes();
+  d.data.accepted_defects = model.accepted_defects();
   d.gap.refitted = model.recalibrated();
 
   progress(0, "the model as given");

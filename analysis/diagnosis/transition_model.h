@@ -160,6 +160,8 @@ class TransitionModel {
                                 std::uint64_t seed) const = 0;
   /// What is not known or was assumed, a sentence each.
   virtual const std::vector<std::string>& notes() const = 0;
+  /// Says what was wrong with the data or the nominal model and taken all the same; "" if nothing was.
+  virtual std::string accepted_defects() const { return ""; }
   /// What a recalibration is reported by: contact or loss parameters.
   virtual std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const = 0;
 };

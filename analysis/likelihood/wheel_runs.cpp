@@ -112,30 +112,11 @@ std::vector<double> stance_residuals(const WheelRuns& measured) {
   return residual;
 }
 
-// Returns the step of the last digit that reported speeds have, 0 where they have more than seven or are too few to say.
-double last_digit(const WheelRuns& measured) {
-  std::vector<double> speeds;
-  for (const WheelRun& run : measured.runs)
-    for (const RunCollision& m : run.collisions) {
-      speeds.push_back(m.before);
-      if (m.after) speeds.push_back(*m.after);
-    }
-  if (speeds.size() < least_stances) return 0;
-  double step = 1;
-  for (int digits = 0; digits <= 7; ++digits, step /= 10) {
-    const bool all = std::all_of(speeds.begin(), speeds.end(), [&](double speed) {
-      const double steps = speed / step;
-      return std::abs(steps - std::round(steps)) < 1e-6;
-    });
-    if (all) return step;
-  }
-  return 0;
-}
-
 // A stated noise is that of the sensor, the digits' comes to it, and a stated 0 means as good as the digits. Where
 // nobody stated it, or the stances are more exact than was said, they tell it.
-void estimate_noise(WheelRuns& measured, std::optional<double> stated) {
-  const double digits = last_digit(measured) / std::sqrt(12.0), least = std::max(finest_noise, digits);
+void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
+  const std::optional<double> stated = sensor.noise_sd;
+  const double digits = sensor.last_digit.value_or(0) / std::sqrt(12.0), least = std::max(finest_noise, digits);
   measured.noise = std::hypot(stated.value_or(0), least);
   measured.noise_stated = stated.has_value();
   if (stated && digits > *stated)
@@ -164,7 +145,7 @@ void estimate_noise(WheelRuns& measured, std::optional<double> stated) {
     measured.noise = seen;
     measured.notes.push_back(
         fmt::format("no sensor noise is stated: {:.2g} rad/s taken from the stances", measured.noise));
-  } else if (seen * (1 + chance_of_deviation / size) < measured.noise) {
+  } else if (sensor.last_digit && seen * (1 + chance_of_deviation / size) < measured.noise) {
     measured.notes.push_back(fmt::format(
         "sensor noise of {:.2g} rad/s is stated, and the stances are more exact: {:.2g} rad/s taken", *stated, seen));
     measured.noise = seen;
@@ -216,7 +197,7 @@ WheelRuns wheel_runs(const Experiment& experiment) {
         m.context.since_previous = *c.time - *trial.collisions[k - 1].time;
       m.context.run_share = count > 1 ? static_cast<double>(t) / (count - 1) : 0;
       m.before = c.omega_minus;
-      m.after = c.omega_plus;
+      if (c.omega_plus) m.after = std::max(0.0, *c.omega_plus);  // one that turned back has rested
       if (c.omega_plus && *c.omega_plus > 0) measured.speeds_after = true;
       run.collisions.push_back(m);
     }
@@ -225,7 +206,7 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   measured.noise = experiment.sensor.noise_sd.value_or(0);
   find_legs(measured, leg_column);
   complete_contexts(measured);
-  estimate_noise(measured, experiment.sensor.noise_sd);
+  estimate_noise(measured, experiment.sensor);
   for (WheelRun& run : measured.runs) mark_jam(measured, run);
   if (experiment.columns.time == Presence::none)
     measured.notes.push_back(

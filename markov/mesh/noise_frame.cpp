@@ -108,7 +108,7 @@ std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double
     q.push_back(b * b.transpose());
     revolution = a.back() * revolution;
   }
-  const double growth = revolution.eigenvalues().cwiseAbs().maxCoeff();
+  const double growth = spectral_radius(revolution);
   if (!(growth < 1))
     throw MapError(fmt::format("return map: without noise its orbit through {} is unstable (largest eigenvalue {:.6g})",
                                describe_state(map, {orbit[0].data(), static_cast<std::size_t>(map.dimension)}),
