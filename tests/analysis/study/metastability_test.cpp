@@ -20,6 +20,17 @@
 namespace metastable::analysis {
 namespace {
 
+Setting equal_legs_under_coulomb(double slope_deg, double leg, Spread restitution, Spread friction, Spread launch) {
+  Setting setting;
+  setting.slope_deg = slope_deg;
+  setting.law = dynamics::Law::coulomb;
+  setting.wheel.leg_length.assign(8, leg);
+  setting.restitution = restitution;
+  setting.friction = friction;
+  setting.initial_speed = launch;
+  return setting;
+}
+
 struct Sample {
   double mean = 0, sd = 0, error = 0;
 };
@@ -336,12 +347,7 @@ TEST(Metastability, PlainDrawsThatSeeNoRestSaySo) {
 }
 
 TEST(Metastability, RestTooRareForDoublesIsSaid) {
-  Setting setting = paper_setting(15, true);
-  setting.law = dynamics::Law::coulomb;
-  setting.wheel.leg_length.assign(8, 0.43);
-  setting.restitution = {0.9, 0.035};
-  setting.friction = {0.14, 0.0165};
-  setting.initial_speed = {2.6, 0.7};
+  const Setting setting = equal_legs_under_coulomb(15, 0.43, {0.9, 0.035}, {0.14, 0.0165}, {2.6, 0.7});
   const Metastability result = study(setting, {.brief = true});
   EXPECT_EQ(result.status, Status::rest_unresolved);
   EXPECT_NE(result.message.find("exceed the range of double precision"), std::string::npos) << result.message;
@@ -349,10 +355,7 @@ TEST(Metastability, RestTooRareForDoublesIsSaid) {
 
 // Nothing but a fast launch passes the widest cells, which must not pass for a regime: the same as after a slow one.
 TEST(Metastability, RegimeDoesNotDependOnTheLaunch) {
-  Setting setting = paper_setting(2, true);
-  setting.law = dynamics::Law::coulomb;
-  setting.wheel.leg_length.assign(8, 0.26);
-  setting.initial_speed = {8, 1};
+  Setting setting = equal_legs_under_coulomb(2, 0.26, {0.4, 0.1}, {0.4, 0.1}, {8, 1});
   const Metastability slow = study(setting);
   setting.initial_speed = {80, 1};
   const Metastability fast = study(setting);
@@ -367,12 +370,7 @@ TEST(Metastability, RegimeDoesNotDependOnTheLaunch) {
 
 // Survivors who leave the usual speeds upwards come back: they must not pass for failures where these are rare.
 TEST(Metastability, RareRestAfterAFastLaunch) {
-  Setting setting = paper_setting(2.18, true);
-  setting.law = dynamics::Law::coulomb;
-  setting.wheel.leg_length.assign(8, 0.153);
-  setting.restitution = {0.74, 0.09};
-  setting.friction = {0.57, 0.057};
-  setting.initial_speed = {15, 0.5};
+  Setting setting = equal_legs_under_coulomb(2.18, 0.153, {0.74, 0.09}, {0.57, 0.057}, {15, 0.5});
   const StudyOptions options{.tolerance = 0.05, .threads = 1, .brief = true};
   const Metastability fast = study(setting, options);
   setting.initial_speed = {4, 0.5};
