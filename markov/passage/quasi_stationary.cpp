@@ -22,7 +22,7 @@ constexpr double kStays = 1e-12;
 constexpr double kNobody = 1e-13;        // lambda_1 of interpolated rows from which nobody survives: rounding
 constexpr int kNobodyLeft = 100;         // iterations spent on its vectors
 constexpr double kHardlyAnybody = 1e-6;  // lambda_1 of rows that keep so few that neighbouring eigenvalues are rounding
-constexpr int kFewLeft = 1000;           // iterations spent on theirs
+constexpr int kFewLeft = kPatience;      // iterations spent on theirs
 
 double total(const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); }
 

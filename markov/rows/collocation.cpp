@@ -8,9 +8,7 @@
 #include <string>
 #include <tuple>
 
-#include "markov/chain/solver.h"
 #include "markov/parallel.h"
-#include "markov/passage/quasi_stationary.h"
 
 namespace metastable::markov {
 namespace {
@@ -24,8 +22,8 @@ constexpr std::size_t cells = 64;         // of a phase, to find it
 constexpr std::size_t few_points = 4000;  // of a row
 constexpr std::size_t lanes = 8;          // landings worked on together
 constexpr std::size_t few_edges = 12, many_edges = 24;
-constexpr int most_generations = 8;
-constexpr double edge_ratio = 4;  // beyond the bulk
+constexpr int most_generations = 24;  // of cheap rows: without noise the expected steps are a staircase, a step at each
+constexpr double edge_ratio = 4;      // beyond the bulk
 constexpr const char* no_points =
     "method integrated: the map does not tell its landing's distribution; use the sampled method";
 
@@ -215,12 +213,14 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
     const Chain chain(std::move(row_start), std::move(column), std::move(value), std::move(kill));
     const Reachability reachable = classify(chain);
     if (std::find(reachable.must_rest.begin(), reachable.must_rest.end(), 0) != reachable.must_rest.end()) return {};
-    const std::vector<double> quasi = quasi_stationary(ChainSolver(chain)).distribution;
-    std::vector<double> after(cells, 0.0);
+    std::vector<double> of_launch(n, 0.0);
+    const auto after =
+        std::span(of_launch).subspan(static_cast<std::size_t>((launch.phase + 1) % phases) * cells, cells);
     for (const auto& [score, weight] : launch_points(launch, {})) {
       const NodeRow landed = row(launch.state(score), launch.phase);
       for (std::size_t j = 0; j < cells; ++j) after[j] += weight * landed.landing[j];
     }
+    const std::vector<double> quasi = survivors_or_visits(chain, of_launch);
     std::size_t first = 0;
     for (std::size_t p = 0; p < static_cast<std::size_t>(phases); ++p) {
       double above = 0, launched_above = 0;

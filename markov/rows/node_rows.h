@@ -39,6 +39,11 @@ struct LaunchPoint {
 /// spread; by panels where rows, as functions of the state, have kinks at some of `states`.
 std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<const double> states);
 
+/// Says where survivors are, by state; where their iteration does not settle, because cells that only a fast launch
+/// passes keep as many as the others, where the trials of a launch that leads to `after` go (both sum to one a phase at
+/// most).
+std::vector<double> survivors_or_visits(const Chain& chain, std::span<const double> after);
+
 /// Finds where the launch leads, by launch_points().
 Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,
                       std::span<const double> kinks, int threads);
