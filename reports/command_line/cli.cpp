@@ -233,8 +233,12 @@ int parse_and_run(int argc, const char* const* argv) {
     for (const CLI::App* sub : subcommands)  // before what may be missing because of it
       for (const std::string& word : sub->remaining())
         if (word.starts_with("-"))
-          throw std::invalid_argument(fmt::format("{}: is no option of '{}'", word, sub->get_name()));
-    throw std::invalid_argument(error.what());
+          throw std::invalid_argument(
+              fmt::format("{0}: is no option of '{1}'; 'metastable {1} --help' lists them", word, sub->get_name()));
+    if (argv[1][0] == '-')
+      throw std::invalid_argument(
+          fmt::format("{}: is no option before a subcommand; --help and --version are", argv[1]));
+    throw std::invalid_argument(fmt::format("{}; see 'metastable {} --help'", error.what(), argv[1]));
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!subcommands[i]->parsed()) continue;

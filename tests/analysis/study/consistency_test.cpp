@@ -47,10 +47,10 @@ TEST(Consistency, IntegratedSurvivalMayRiseWithinItsErrorOnly) {
   Metastability study = sound();
   study.method = Method::integrated;
   study.steps.discretization_error = 1e-4;
-  study.steps.survival[5] = study.steps.survival[4] * (1 + 0.5e-4);
+  study.steps.survival[60] = study.steps.survival[59] * (1 + 0.5e-4);
   EXPECT_NO_THROW(require_consistent(study));
-  study.steps.survival[5] = study.steps.survival[4] * (1 + 2e-4);
-  expect_contradiction([&] { require_consistent(study); }, "survival of 5 steps");
+  study.steps.survival[60] = study.steps.survival[59] * (1 + 2e-4);
+  expect_contradiction([&] { require_consistent(study); }, "survival of 60 steps");
 }
 
 TEST(Consistency, IntervalAndCertificateOverlap) {

@@ -14,7 +14,10 @@
 #include "analysis/study/setting.h"
 #include "dynamics/return_map/rough_terrain.h"
 #include "dynamics/return_map/trials.h"
+#include "markov/rows/collocation.h"
 #include "markov/rows/draws.h"
+#include "markov/rows/state_space.h"
+#include "tests/analysis/settings.h"
 
 namespace metastable::analysis {
 namespace {
@@ -237,6 +240,20 @@ TEST(IntegratedStudy, AFastLaunchWithoutNoiseIsExact) {
     for (; state; ++sum) state = map.landing(*state, 0, none);
   }
   EXPECT_NEAR(integrated(setting, 0.05).steps.from_start.value, sum / shares, 2e-4);  // a step of the staircase is 1
+}
+
+// Cells that only the launch passes lead back into themselves as often as the others survive.
+TEST(IntegratedStudy, RangesAreFoundWhereTheSurvivorsOfCellsDoNotSettle) {
+  Setting setting = gentle_coulomb();
+  setting.slope_deg = 0.17198217060336954;
+  setting.restitution = {0.6982241123734467, 0.1638539202239025};
+  setting.friction = {0.16948030764114325, 0.0869723477633949};
+  setting.initial_speed = {43.359397516838136, 0.027145300481685675};
+  const Problem problem = setting.problem();
+  const double bulk = 2 * markov::bulk_below_launch(problem.map, problem.launch, 1);
+  const auto ranges = markov::collocation_ranges(problem.map, problem.launch, 1, bulk);
+  ASSERT_EQ(ranges.size(), 1u);
+  EXPECT_GT(ranges[0].second, 0.54 * 43 * 43);  // what `coulomb` leaves of the launch at least
 }
 
 TEST(IntegratedStudy, LeavesUnreachableRestToTheSampledStudy) {
