@@ -11,10 +11,10 @@
 namespace metastable::reports {
 namespace {
 
-// The significant digits that a relative error leaves, six at most: what a terminal line holds.
+// The significant digits that a relative error leaves, six at most; three where none is known.
 std::string show(double value, double error) {
   if (std::isinf(value)) return "infinite";
-  const int digits = error > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(error))), 2, 6) : 6;
+  const int digits = error > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(error))), 2, 6) : 3;
   return plain_text(to_decimal(value, NumberFormat::general, digits));
 }
 
@@ -139,7 +139,7 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
   if (study.steps.reach_end) {  // about exp(-n / steps)
     const double reached = *study.steps.reach_end;
     text += line(fmt::format("reaches the end of {} m", setting.ramp_length),
-                 show(reached, reached > 0 ? -std::log(reached) * error : 0));
+                 show(reached, reached > 0 ? -std::log(reached) * std::max(error, 0.001) : 0));
   }
   text += line(endless ? "stationary speed" : "quasi-stationary speed",
                fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.mean, study.survivors.sd));
