@@ -238,7 +238,7 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
     }
     if (first == cells && upper < highest) {
       upper = std::min(highest, lower + 1.5 * (upper - lower));
-      if (!std::isfinite(upper))
+      if (upper > lower + most_growth * length)
         throw ConvergenceError("method integrated", upper, "states grow without limit; method sampled takes them");
       continue;
     }

@@ -96,7 +96,7 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     }
     if (first == space.nodes() && upper < highest) {
       upper = std::min(highest, lower + 1.5 * (upper - lower));
-      if (!std::isfinite(upper))
+      if (upper > lower + most_growth * length)
         throw ConvergenceError("method integrated", upper, "states grow without limit; method sampled takes them");
       continue;
     }

@@ -39,6 +39,10 @@ struct LaunchPoint {
 /// spread; by panels where rows, as functions of the state, have kinks at some of `states`.
 std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<const double> states);
 
+/// Where survivors are still at the upper edge of a range so many times as long as the first try, their states grow
+/// without limit.
+inline constexpr double most_growth = 1e6;
+
 /// Says where survivors are, by state; where their iteration does not settle, because cells that only a fast launch
 /// passes keep as many as the others, where the trials of a launch that leads to `after` go (both sum to one a phase at
 /// most).
