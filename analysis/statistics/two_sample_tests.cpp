@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -128,11 +129,15 @@ EffectSize superiority(std::span<const double> a, std::span<const double> b) {
   for (std::size_t i = 0; i < a.size(); ++i)
     for (std::size_t j = 0; j < b.size(); ++j) {
       const double win = a[i] > b[j] ? 1 : a[i] == b[j] ? 0.5 : 0;
-      of_a[i] += win / m;
-      of_b[j] += win / n;
+      of_a[i] += win;
+      of_b[j] += win;
     }
+  // Whole counts, so that samples apart from each other are told as such.
+  const double value = std::accumulate(of_a.begin(), of_a.end(), 0.0) / (n * m);
+  for (double& wins : of_a) wins /= m;
+  for (double& wins : of_b) wins /= n;
   const Moments ma = moments(of_a), mb = moments(of_b);
-  const double value = ma.mean, se = std::sqrt(ma.variance / n + mb.variance / m);
+  const double se = std::sqrt(ma.variance / n + mb.variance / m);
   if (value <= 0 || value >= 1) {
     const double bound = std::pow(0.025, 1 / std::min(n, m));
     return value >= 1 ? EffectSize{1, bound, 1} : EffectSize{0, 0, 1 - bound};

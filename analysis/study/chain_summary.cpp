@@ -115,11 +115,13 @@ void describe_violations(const Problem& problem, const markov::StateSpace& space
     mask[i] = nu[i] / nu_total > 1e-9 || visits[i] / visit_total > 1e-9 ? 1.0 : 0.0;
   const auto rates = markov::violation_rates(problem.map, space, problem.launch, mask,
                                              {.count = violation_draws, .seed = options.seed});
+  // Interpolated weights, some of them below 0, may put a share of nothing as far below it.
+  const auto share = [](double weight, double total) { return std::clamp(weight / total, 0.0, 1.0); };
   for (std::size_t a = 0; a < names.size(); ++a) {
     const double at_launch = rates[a].back();
     const std::vector<double> by_state(rates[a].begin(), std::prev(rates[a].end()));
     result.violations.push_back(
-        {names[a], dot(nu, by_state) / nu_total, (dot(visits, by_state) + at_launch) / visit_total});
+        {names[a], share(dot(nu, by_state), nu_total), share(dot(visits, by_state) + at_launch, visit_total)});
   }
 }
 

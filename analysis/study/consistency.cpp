@@ -16,7 +16,8 @@ void require(bool holds, const std::string& what) {
 }
 
 void require_survival(const Metastability& study) {
-  // Interpolated rows have entries of both signs, and a probability no more digits than the study.
+  // Interpolated rows have entries of both signs: a probability is a sum that holds to the error of the rows, which the
+  // study tells from the change of the expected steps under refinement. Below that error a rise is no contradiction.
   const double slack =
       study.method == Method::integrated ? std::max(rounding, study.steps.discretization_error) : rounding;
   double sum = 0;

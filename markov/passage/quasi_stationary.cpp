@@ -22,7 +22,7 @@ constexpr double kStays = 1e-12;
 constexpr double kNobody = 1e-13;        // lambda_1 of interpolated rows from which nobody survives: rounding
 constexpr int kNobodyLeft = 100;         // iterations spent on its vectors
 constexpr double kHardlyAnybody = 1e-6;  // lambda_1 of rows that keep so few that neighbouring eigenvalues are rounding
-constexpr int kFewLeft = 1000;           // iterations spent on theirs
+constexpr int kFewLeft = kPatience;      // iterations spent on theirs
 
 double total(const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); }
 
@@ -118,10 +118,14 @@ LeadingPair iterate_shifted(const Chain& chain, LeadingPair pair) {
   const std::size_t n = chain.size();
   for (double& entry : pair.right) entry = std::max(entry, std::numeric_limits<double>::min());
   for (int k = 0; k < kShifted; ++k, ++pair.iterations) {
-    std::vector<double>&x = pair.right, image = markov::apply(chain, x);
-    double shift = 0;
-    for (std::size_t i = 0; i < n; ++i) shift = std::max(shift, image[i] / x[i]);
-    shift *= 1 + 8 * std::numeric_limits<double>::epsilon();
+    std::vector<double>&x = pair.right, growth(n);  // (Qx)_i / x_i; (Qx)_i itself may be too small for doubles
+    for (std::size_t i = 0; i < n; ++i) {
+      growth[i] = chain.stay(i);
+      const auto to = chain.columns(i);
+      for (std::size_t e = 0; e < to.size(); ++e) growth[i] += chain.values(i)[e] * (x[to[e]] / x[i]);
+    }
+    const double shift =
+        *std::max_element(growth.begin(), growth.end()) * (1 + 8 * std::numeric_limits<double>::epsilon());
     std::vector<std::size_t> start{0};
     std::vector<std::uint32_t> column;
     std::vector<double> value, kill, left(n);
@@ -132,7 +136,7 @@ LeadingPair iterate_shifted(const Chain& chain, LeadingPair pair) {
         value.push_back(chain.values(i)[e] / shift * (x[to[e]] / x[i]));
       }
       start.push_back(column.size());
-      kill.push_back(1 - image[i] / x[i] / shift);
+      kill.push_back(std::max(0.0, 1 - growth[i] / shift));
       left[i] = pair.left[i] * x[i];
     }
     const Elimination shifted(Chain(std::move(start), std::move(column), std::move(value), std::move(kill)));

@@ -8,9 +8,7 @@
 #include <string>
 #include <tuple>
 
-#include "markov/chain/solver.h"
 #include "markov/parallel.h"
-#include "markov/passage/quasi_stationary.h"
 
 namespace metastable::markov {
 namespace {
@@ -24,8 +22,9 @@ constexpr std::size_t cells = 64;         // of a phase, to find it
 constexpr std::size_t few_points = 4000;  // of a row
 constexpr std::size_t lanes = 8;          // landings worked on together
 constexpr std::size_t few_edges = 12, many_edges = 24;
-constexpr int most_generations = 8;
-constexpr double edge_ratio = 4;  // beyond the bulk
+constexpr int most_generations = 8;         // of cheap rows
+constexpr int noise_free_generations = 24;  // of maps whose expected steps are a staircase, a step at each
+constexpr double edge_ratio = 4;            // beyond the bulk
 constexpr const char* no_points =
     "method integrated: the map does not tell its landing's distribution; use the sampled method";
 
@@ -76,12 +75,14 @@ NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, 
   return row;
 }
 
-// Are rows made of so few points that many of them do not matter?
-bool cheap(const AnyReturnMap& map) {
+// Points that a row is made of. Of few of them, many do not matter; a map without noise has one.
+std::size_t points_of_a_row(const AnyReturnMap& map) {
   std::vector<std::pair<double, double>> points;
   map.landing_points(map.state_interval(0).first + 1, 0, {}, points);
-  return points.size() < few_points;
+  return points.size();
 }
+
+bool cheap(const AnyReturnMap& map) { return points_of_a_row(map) < few_points; }
 
 MakeNodeRow rows(const AnyReturnMap& map, const NodeSpace& space) {
   return [&](double state, int phase) { return make_row(map, space, state, phase); };
@@ -106,9 +107,9 @@ Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double st
 std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
                                                    const std::vector<std::pair<double, double>>& ranges,
                                                    int generations, double bulk) {
-  const bool all = cheap(map);
-  std::size_t most = all ? many_edges : few_edges;
-  if (all) generations = most_generations;
+  const std::size_t points = points_of_a_row(map);
+  std::size_t most = points < few_points ? many_edges : few_edges;
+  if (points < few_points) generations = points > 1 ? most_generations : noise_free_generations;
   const std::size_t phases = ranges.size();
   std::vector<std::vector<double>> edges, last;
   for (const auto& [lower, upper] : ranges) {
@@ -215,12 +216,14 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
     const Chain chain(std::move(row_start), std::move(column), std::move(value), std::move(kill));
     const Reachability reachable = classify(chain);
     if (std::find(reachable.must_rest.begin(), reachable.must_rest.end(), 0) != reachable.must_rest.end()) return {};
-    const std::vector<double> quasi = quasi_stationary(ChainSolver(chain)).distribution;
-    std::vector<double> after(cells, 0.0);
+    std::vector<double> of_launch(n, 0.0);
+    const auto after =
+        std::span(of_launch).subspan(static_cast<std::size_t>((launch.phase + 1) % phases) * cells, cells);
     for (const auto& [score, weight] : launch_points(launch, {})) {
       const NodeRow landed = row(launch.state(score), launch.phase);
       for (std::size_t j = 0; j < cells; ++j) after[j] += weight * landed.landing[j];
     }
+    const std::vector<double> quasi = survivors_or_visits(chain, of_launch);
     std::size_t first = 0;
     for (std::size_t p = 0; p < static_cast<std::size_t>(phases); ++p) {
       double above = 0, launched_above = 0;
@@ -235,7 +238,7 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
     }
     if (first == cells && upper < highest) {
       upper = std::min(highest, lower + 1.5 * (upper - lower));
-      if (!std::isfinite(upper))
+      if (upper > lower + most_growth * length)
         throw ConvergenceError("method integrated", upper, "states grow without limit; method sampled takes them");
       continue;
     }

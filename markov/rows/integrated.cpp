@@ -5,9 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "markov/chain/solver.h"
-#include "markov/passage/quasi_stationary.h"
-
 namespace metastable::markov {
 namespace {
 
@@ -82,7 +79,7 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
       continue;
     }
     if (!rests) return {};
-    const std::vector<double> quasi = quasi_stationary(ChainSolver(pilot.chain.chain)).distribution;
+    const std::vector<double> quasi = survivors_or_visits(pilot.chain.chain, pilot.chain.launch.after);
     // The lowest node that has at most the shares wanted at it and above it, at every phase.
     std::size_t first = 0;
     for (int p = 0; p < space.phases(); ++p) {
@@ -99,7 +96,7 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     }
     if (first == space.nodes() && upper < highest) {
       upper = std::min(highest, lower + 1.5 * (upper - lower));
-      if (!std::isfinite(upper))
+      if (upper > lower + most_growth * length)
         throw ConvergenceError("method integrated", upper, "states grow without limit; method sampled takes them");
       continue;
     }

@@ -5,7 +5,10 @@
 #include <numbers>
 #include <numeric>
 
+#include "markov/chain/elimination.h"
+#include "markov/chain/solver.h"
 #include "markov/parallel.h"
+#include "markov/passage/quasi_stationary.h"
 
 namespace metastable::markov {
 namespace {
@@ -47,6 +50,20 @@ std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<cons
   for (LaunchPoint& r : rule) total += r.weight *= std::exp(-0.5 * r.score * r.score);
   for (LaunchPoint& r : rule) r.weight /= total;
   return rule;
+}
+
+std::vector<double> survivors_or_visits(const Chain& chain, std::span<const double> after) {
+  const ChainSolver solver(chain);
+  try {
+    return quasi_stationary(solver).distribution;
+  } catch (const RestTooRare&) {
+    throw;
+  } catch (const ConvergenceError&) {
+    std::vector<double> visits = solver.solve_left(after);
+    const double all = std::accumulate(visits.begin(), visits.end(), 0.0);
+    for (double& share : visits) share /= all;
+    return visits;
+  }
 }
 
 Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,

@@ -39,6 +39,15 @@ struct LaunchPoint {
 /// spread; by panels where rows, as functions of the state, have kinks at some of `states`.
 std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<const double> states);
 
+/// Where survivors are still at the upper edge of a range so many times as long as the first try, their states grow
+/// without limit.
+inline constexpr double most_growth = 1e6;
+
+/// Says where survivors are, by state; where their iteration does not settle, because cells that only a fast launch
+/// passes keep as many as the others, where the trials of a launch that leads to `after` go (both sum to one a phase at
+/// most).
+std::vector<double> survivors_or_visits(const Chain& chain, std::span<const double> after);
+
 /// Finds where the launch leads, by launch_points().
 Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,
                       std::span<const double> kinks, int threads);

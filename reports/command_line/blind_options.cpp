@@ -13,11 +13,11 @@ std::vector<Command> blind_commands() {
              o.add_place("DIR", "Folder of the run");
              o.add("sealed", "DIR", "", "Folder of the truths (default: DIR-sealed, beside the run)");
              o.add("seed", "SEED", "", "make: of all cases (default: from the system's entropy)");
-             o.add("per-effect", "N", "6", "make: cases of each effect at each of 1x, 2x, 4x");
-             o.add("none", "N", "300", "make: cases without a gap");
-             o.add("pairs", "N", "50", "make: cases with two effects");
-             o.add("outside", "N", "50", "make: cases with an effect that no catalogue holds");
-             o.add("left-out", "N", "3", "make: cases of each effect with a catalogue that lacks it");
+             o.add("per-effect", "N", "6", "make: cases of each effect at each of 1x, 2x, 4x, 0..1000");
+             o.add("none", "N", "300", "make: cases without a gap, 0..5000");
+             o.add("pairs", "N", "50", "make: cases with two effects, 0..5000");
+             o.add("outside", "N", "50", "make: cases with an effect that no catalogue holds, 0..5000");
+             o.add("left-out", "N", "3", "make: cases of each effect with a catalogue that lacks it, 0..1000");
              o.add("tool", "PROGRAM", "",
                    "answer: run 'PROGRAM diagnose CASE --json FILE ...' (default: this program)");
              o.add_flag("partial", "open: although some cases are not answered");

@@ -38,7 +38,7 @@ namespace {
 Command steps() {
   return {"steps", "Expected steps before failure of one setting, with their interval",
           [](Options& o) {
-            o.add("slope", "DEG", "7.02", "Ramp slope [deg], from 0.001 to below half the angle between legs");
+            add_slope(o);
             o.add("initial-speed", "MEAN,SD", "",
                   "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)", dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
@@ -64,7 +64,9 @@ Command steps() {
 Command compare() {
   return {"compare", "Expected steps of two or more slopes on common random numbers",
           [](Options& o) {
-            o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]; later ones are compared with the first");
+            o.add("slopes", "DEG,DEG,...", "7.02,9.59",
+                  "Ramp slopes [deg], each from 0.001 to below half the angle between legs; later ones are compared "
+                  "with the first");
             o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
                   dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
@@ -84,7 +86,9 @@ Command sweep() {
   return {
       "sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
       [](Options& o) {
-        o.add("slope", "RANGE", "7.02", "[deg] first:last:step, a comma list or one value; likewise the other axes");
+        o.add("slope", "RANGE", "7.02",
+              "[deg] first:last:step, a comma list or one value, each from 0.001 to below half the angle between legs; "
+              "likewise the other axes");
         o.add("restitution-mean", "RANGE", "", "Mean of eta", dynamics::range::restitution);
         o.add("restitution-sd", "RANGE", "", "Sd of eta", dynamics::range::restitution);
         o.add("friction-mean", "RANGE", "", "Mean of mu", dynamics::range::friction);
@@ -133,7 +137,8 @@ Command sweep() {
 Command report() {
   return {"report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
           [](Options& o) {
-            o.add("slopes", "DEG,DEG,...", "7.02,9.59", "Ramp slopes [deg]");
+            o.add("slopes", "DEG,DEG,...", "7.02,9.59",
+                  "Ramp slopes [deg], each from 0.001 to below half the angle between legs");
             o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
                   dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
@@ -150,7 +155,7 @@ Command verify() {
   return {"verify", "How accurate the program is: known values, doubling of nodes, three solvers side by side",
           [](Options& o) {
             o.add("seeds", "N", "0",
-                  "Sampled studies a benchmark, to count how often their interval is right; 0: none");
+                  "Sampled studies a benchmark, 0..1000, to count how often their interval is right; 0: none");
             o.add("nodes", "N", "512", "Nodes a landing leg at which doubling stops, 128..4096");
             o.add_threads();
             o.add("out", "DIR", "", "Folder for the tables (CSV, Markdown, LaTeX)");
@@ -271,7 +276,10 @@ int parse_and_run(int argc, const char* const* argv) {
           throw std::invalid_argument(fmt::format("{}: is no option of '{}'{}", word, all[i].name,
                                                   did_you_mean(word.substr(0, word.find('=')), names)));
         }
-    throw std::invalid_argument(error.what());
+    if (argv[1][0] == '-')
+      throw std::invalid_argument(
+          fmt::format("{}: is no option before a subcommand; --help and --version are", argv[1]));
+    throw std::invalid_argument(fmt::format("{}; see 'metastable {} --help'", error.what(), argv[1]));
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!subcommands[i]->parsed()) continue;

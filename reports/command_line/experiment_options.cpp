@@ -90,7 +90,7 @@ void simulate_reality(const Options& o, const SimulateRequest& plain) {
 Command simulate() {
   return {"simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)",
           [](Options& o) {
-            o.add("slope", "DEG", "7.02", "Ramp slope [deg]");
+            add_slope(o);
             o.add("initial-speed", "MEAN,SD", "",
                   "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)", dynamics::range::speed);
             add_wheel(o), add_contact(o), add_course(o);
@@ -98,11 +98,11 @@ Command simulate() {
                 "stand-in",
                 "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
                 "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
-            o.add("trials", "N", "50", "Trials");
-            o.add("collisions", "N", "16", "Most collisions of a trial");
+            o.add("trials", "N", "50", "Trials, 1..1000000");
+            o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000");
             o.add("angle-rate", "HZ", "",
                   "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
-            o.add("angle-noise", "RAD", "", "White noise of the angle (default 0.0002; needs --angle-rate)");
+            o.add("angle-noise", "RAD", "", "White noise of the angle, 0 or more (default 0.0002; needs --angle-rate)");
             add_reality(o);
             o.add_seed();
             o.add_threads();
@@ -148,8 +148,8 @@ Command coast_down() {
         o.add_places("LOG",
                      "Files without header: time [us], drum speed [km/h], drum revolutions, wheel speed, wheel "
                      "revolutions; each becomes a condition");
-        o.add("stop", "RAD/S", "5", "Speed at which a run ends");
-        o.add("block", "N", "50", "Revolutions of a block, which serves as a trial");
+        o.add("stop", "RAD/S", "5", "Speed at which a run ends, above 0");
+        o.add("block", "N", "50", "Revolutions of a block, which serves as a trial, 10..100000");
         o.add("blocks", "all|odd|even", "all", "Which blocks: one half to fit a nominal loss, the other to check it");
         o.add("nominal", "DIR", "", "Take the nominal loss of this experiment folder (default: fitted to the logs)");
         o.add_flag("linear", "Fit a loss proportional to omega even where it is within five standard errors of none");
@@ -189,11 +189,12 @@ Command collisions() {
       [](Options& o) {
         o.add_place("DIR", "Experiment folder with experiment.toml and angle.csv");
         o.add("window", "N", "", "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples)");
-        o.add("collisions", "N", "16", "Most collisions of a trial");
-        o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides");
+        o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000");
+        o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides, above 0");
         o.add("omega-minus", "fit|peak", "fit",
               "Stance motion extrapolated to the collision, or the smoothed speed's peak");
-        o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision");
+        o.add("fit-span", "S", "0.08",
+              "Stance motion is fitted to this much time on either side of a collision, above 0");
         o.add_threads();
         o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
       },

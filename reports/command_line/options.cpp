@@ -98,7 +98,7 @@ double Options::number(const std::string& name) const { return number_value(name
 
 void Options::add_seed() { add("seed", "SEED", "1", "Seed of the random numbers"); }
 
-void Options::add_threads() { add("threads", "T", "0", "Threads; 0: all cores. Results do not depend on it"); }
+void Options::add_threads() { add("threads", "T", "0", "Threads, 0..1024; 0: all cores. Results do not depend on it"); }
 
 std::uint64_t Options::whole(const std::string& name, std::uint64_t least, std::uint64_t most) const {
   return whole_value(name, text(name), least, most);

@@ -74,6 +74,10 @@ analysis::Setting checked(analysis::Setting setting) {
 
 }  // namespace
 
+void add_slope(Options& options) {
+  options.add("slope", "DEG", "7.02", "Ramp slope [deg], from 0.001 to below half the angle between legs");
+}
+
 void add_wheel(Options& options) {
   options.add("legs", "paper|L|L1,L2,...", "paper",
               "Leg lengths [m]: the paper's, one for all, or a list in landing order", range::leg_length);
@@ -105,21 +109,22 @@ void add_contact(Options& options) {
 
 void add_course(Options& options) {
   options.add("ramp-length", "M", "3.66", "Ramp length [m]", range::ramp_length);
-  options.add("first-leg", "I", "0", "Leg that lands at collision 1");
+  options.add("first-leg", "I", "0", "Leg that lands at collision 1, from 0 to the number of legs less one");
 }
 
 void add_study(Options& options) {
   options.add("method", "sampled|integrated", "sampled",
               "How rows are made: by sampling eta and mu per cell, or by quadrature over them (independent eta, mu)");
   options.add("cells", "N", "", "Cells per landing leg, 8..4096 (default: refined until the tolerance is met)");
-  options.add("samples", "S", "", "Draws per cell and replicate (default: raised until the tolerance is met)");
-  options.add("tolerance", "REL", "0.01", "Half-width of the 95 % interval of the expected steps, relative");
+  options.add("samples", "S", "",
+              "Draws per cell and replicate, 16..16777216 (default: raised until the tolerance is met)");
+  options.add("tolerance", "REL", "0.01", "Half-width of the 95 % interval of the expected steps, relative, (0, 1)");
   options.add("sequence", "sobol|random", "sobol", "Where the draws come from");
   options.add("draws", "weighted|plain", "weighted", "Weighted draws cover the tails; plain ones see what is frequent");
-  options.add("tail", "P", "1e-30", "Tail probability the weighted draws reach");
+  options.add("tail", "P", "1e-30", "Tail probability the weighted draws reach, 1e-300..1e-3");
   options.add("replicates", "R", "8", "Independent randomisations behind the interval, 2..64");
-  options.add("mixing-distance", "D", "0.05", "Total variation distance that counts as mixed");
-  options.add("eigenvalues", "K", "6", "How many eigenvalue moduli to report");
+  options.add("mixing-distance", "D", "0.05", "Total variation distance that counts as mixed, (0, 1)");
+  options.add("eigenvalues", "K", "6", "How many eigenvalue moduli to report, 1..64");
   options.add_seed();
   options.add_threads();
 }
@@ -214,7 +219,7 @@ analysis::StudyOptions study_options(const Options& options) {
 
 void add_standard_errors(Options& options) {
   options.add("slope-se", "DEG", "",
-              "Standard error of each slope: an interval from it is given apart; likewise below");
+              "Standard error of each slope, 0 or more: an interval from it is given apart; likewise below");
   options.add("restitution-se", "MEAN,SD", "", "Of the mean of eta, and of its sd");
   options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd");
   options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]");

@@ -13,6 +13,7 @@
 
 namespace metastable::reports {
 
+void add_slope(Options& options);
 void add_wheel(Options& options);
 void add_contact(Options& options);
 void add_course(Options& options);

@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <stdexcept>
+#include <system_error>
 
 #include "reports/output/interrupt.h"
 
@@ -29,7 +30,8 @@ std::string read_file(const std::filesystem::path& path) {
   // Not blocking: while nobody writes into a pipe, Ctrl-C ends the program.
   const Descriptor file{::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)};
   struct stat status {};
-  if (file.number < 0 || ::fstat(file.number, &status) != 0 || S_ISDIR(status.st_mode)) refuse("");
+  if (file.number < 0 || ::fstat(file.number, &status) != 0) refuse(": " + std::system_category().message(errno));
+  if (S_ISDIR(status.st_mode)) refuse(": it is a folder");
   if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode)) refuse(": it is neither a file nor a pipe");
   std::string text;
   char buffer[65536];
@@ -41,7 +43,7 @@ std::string read_file(const std::filesystem::path& path) {
     const ssize_t count = ::read(file.number, buffer, sizeof buffer);
     if (count > 0) text.append(buffer, static_cast<std::size_t>(count));
     if (count == 0) return text;
-    if (count < 0 && errno != EAGAIN && errno != EINTR) refuse("");
+    if (count < 0 && errno != EAGAIN && errno != EINTR) refuse(": " + std::system_category().message(errno));
   }
 }
 

@@ -52,12 +52,14 @@ std::size_t longest(const Lines& texts) {
   return most;
 }
 
-// Lines of at most `width` characters as far as words allow. A name that is longer breaks after underscores and pluses.
+constexpr std::string_view in_names = "_+-";  // a long name may break behind these
+
+// Lines of at most `width` characters as far as words allow. A name that is longer breaks too.
 Lines broken(const std::string& text, std::size_t width) {
   Lines lines;
   for (const std::string& word : pieces(text, "")) {
     std::string_view space = " ";
-    for (const std::string& part : length(word) <= width ? Lines{word} : pieces(word, "_+")) {
+    for (const std::string& part : length(word) <= width ? Lines{word} : pieces(word, in_names)) {
       if (!lines.empty() && length(lines.back()) + space.size() + length(part) <= width)
         lines.back().append(space).append(part);
       else
@@ -80,7 +82,7 @@ struct Shown {
   void measure() {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const std::size_t whole = length(cells[i]), words = longest(pieces(cells[i], ""));
-      const std::array<std::size_t, 4> of{longest(pieces(cells[i], "_+")), words, text[i] ? words : whole, whole};
+      const std::array<std::size_t, 4> of{longest(pieces(cells[i], in_names)), words, text[i] ? words : whole, whole};
       body = std::max(body, i > 0 ? whole : whole / 2 + 1);
       for (std::size_t k = 0; k < of.size(); ++k) least[k] = std::max(least[k], of[k]);
     }
@@ -105,6 +107,57 @@ void fit(std::vector<Shown>& columns, std::size_t width) {
         const std::size_t wanted = std::min(cap, headings ? column.least.back() : column.body);
         if (wanted > column.width && total() + wanted - column.width <= width) column.width = wanted;
       }
+}
+
+// More columns than `width` holds come one part below the other; those of text that stand first are in each.
+std::vector<std::vector<Shown>> parts(const std::vector<Shown>& columns, std::size_t width) {
+  const auto first_number = std::ranges::find_if(columns, [](const Shown& column) { return !column.flush_left; });
+  const std::vector<Shown> names(columns.begin(), first_number);
+  std::vector<std::vector<Shown>> all{names};
+  const auto used = [](const std::vector<Shown>& part) {
+    std::size_t sum = 0;
+    for (const Shown& column : part) sum += gap + column.least.front();
+    return sum;
+  };
+  for (auto column = first_number; column != columns.end(); ++column) {
+    if (all.back().size() > names.size() && used(all.back()) + gap + column->least.front() > width)
+      all.push_back(names);
+    all.back().push_back(*column);
+  }
+  return all;
+}
+
+// The columns in lines, all rows of them.
+std::string side_by_side(std::vector<Shown> columns, std::size_t rows, std::size_t width) {
+  fit(columns, width);
+
+  std::vector<std::string> blocks;
+  std::size_t tall = 0;
+  for (std::size_t i = 0; i <= rows; ++i) {
+    std::vector<Lines> cells;
+    std::size_t height = 0;
+    for (const Shown& column : columns) {
+      cells.push_back(broken(column.cells[i], column.width));
+      height = std::max(height, cells.back().size());
+    }
+    std::string& block = blocks.emplace_back();
+    for (std::size_t k = 0; k < height; ++k) {
+      std::string line;
+      for (std::size_t j = 0; j < columns.size(); ++j) {
+        // A heading of two lines stands on the numbers below it.
+        const std::size_t above = i == 0 ? height - cells[j].size() : 0;
+        const std::string text = k >= above && k - above < cells[j].size() ? cells[j][k - above] : "";
+        const std::string space(columns[j].width - std::min(columns[j].width, length(text)), ' ');
+        line += std::string(gap, ' ') + (columns[j].flush_left ? text + space : space + text);
+      }
+      line.erase(line.find_last_not_of(' ') + 1);
+      block += line + "\n";
+    }
+    tall += i > 0 && height > 1;
+  }
+  std::string out;
+  for (std::size_t i = 0; i < blocks.size(); ++i) out += (2 * tall > rows && i > 0 ? "\n" : "") + blocks[i];
+  return out;
 }
 
 }  // namespace
@@ -162,34 +215,12 @@ std::string to_text(const Table& table, std::size_t most, std::size_t width) {
     shown.measure();
     columns.push_back(std::move(shown));
   }
-  fit(columns, width);
-
-  std::vector<std::string> blocks;
-  std::size_t tall = 0;
-  for (std::size_t i = 0; i <= rows; ++i) {
-    std::vector<Lines> cells;
-    std::size_t height = 0;
-    for (const Shown& column : columns) {
-      cells.push_back(broken(column.cells[i], column.width));
-      height = std::max(height, cells.back().size());
-    }
-    std::string& block = blocks.emplace_back();
-    for (std::size_t k = 0; k < height; ++k) {
-      std::string line;
-      for (std::size_t j = 0; j < columns.size(); ++j) {
-        // A heading of two lines stands on the numbers below it.
-        const std::size_t above = i == 0 ? height - cells[j].size() : 0;
-        const std::string text = k >= above && k - above < cells[j].size() ? cells[j][k - above] : "";
-        const std::string space(columns[j].width - std::min(columns[j].width, length(text)), ' ');
-        line += std::string(gap, ' ') + (columns[j].flush_left ? text + space : space + text);
-      }
-      line.erase(line.find_last_not_of(' ') + 1);
-      block += line + "\n";
-    }
-    tall += i > 0 && height > 1;
-  }
   std::string out = wrapped(table.title, "", width);
-  for (std::size_t i = 0; i < blocks.size(); ++i) out += (2 * tall > rows && i > 0 ? "\n" : "") + blocks[i];
+  std::string_view between;
+  for (const std::vector<Shown>& part : parts(columns, width)) {
+    out.append(between).append(side_by_side(part, rows, width));
+    between = "\n";
+  }
   if (table.rows.size() > rows) out += fmt::format("  and {} more\n", table.rows.size() - rows);
   for (const std::string& note : table.notes) out += wrapped(note, "  ", width);
   return out;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "reports/output/table.h"
@@ -10,8 +11,16 @@
 namespace metastable::reports {
 namespace {
 
-// Six significant digits, trailing zeros dropped: what a terminal line holds.
-std::string show(double value) { return std::isinf(value) ? "infinite" : fmt::format("{:.6g}", value); }
+// The significant digits that a relative error leaves, six at most; three where none is known.
+std::string show(double value, double error) {
+  if (std::isinf(value)) return "infinite";
+  const int digits = error > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(error))), 2, 6) : 3;
+  return plain_text(to_decimal(value, NumberFormat::general, digits));
+}
+
+double relative_error(const analysis::Estimate& e) {
+  return std::isfinite(e.value) ? 0.5 * (e.upper - e.lower) / e.value : 0;
+}
 
 std::string line(const std::string& name, const std::string& value) { return fmt::format("  {:<38}{}\n", name, value); }
 
@@ -41,13 +50,13 @@ constexpr Word assumptions[] = {
     {"energy gain", "the collision gives energy to the wheel",
      "No passive contact does; a share that is not small speaks against the law or its friction and restitution."}};
 
-std::string spread_text(const analysis::Accumulated& total) {
-  return fmt::format("sd {}, median {}, 5 to 95 %: {} to {}", show(total.sd), show(*total.quantile(0.5)),
-                     show(*total.quantile(0.05)), show(*total.quantile(0.95)));
+std::string spread_text(const analysis::Accumulated& total, double error) {
+  return fmt::format("sd {}, median {}, 5 to 95 %: {} to {}", show(total.sd, error), show(*total.quantile(0.5), error),
+                     show(*total.quantile(0.05), error), show(*total.quantile(0.95), error));
 }
 
-std::string total_line(const std::string& name, const analysis::Accumulated& total) {
-  return line(name, fmt::format("mean {}, {}", show(total.mean), spread_text(total)));
+std::string total_line(const std::string& name, const analysis::Accumulated& total, double error) {
+  return line(name, fmt::format("mean {}, {}", show(total.mean, error), spread_text(total, error)));
 }
 
 }  // namespace
@@ -113,6 +122,7 @@ std::string thresholds_text(const analysis::RestThresholds& thresholds) {
 std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds) {
   const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
+  const double error = relative_error(study.steps.from_start);
   std::string text = setting.describe() + "\n\n";
   if (study.status == analysis::Status::rest_unresolved) return text + "  " + study.message + "\n";
   if (endless) {
@@ -122,12 +132,15 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
     text += line("  from the metastable regime", estimate_text(study.steps.from_quasi_stationary));
     text += line("  from the worst start", estimate_text(study.steps.worst_start));
     text += line("failure rate per step", estimate_text(study.spectrum.failure_rate));
-    text += line("steps", spread_text(study.steps.distribution));
-    if (study.steps.seconds) text += total_line("seconds", *study.steps.seconds);
-    if (study.steps.metres) text += total_line("metres", *study.steps.metres);
+    text += line("steps", spread_text(study.steps.distribution, error));
+    if (study.steps.seconds) text += total_line("seconds", *study.steps.seconds, error);
+    if (study.steps.metres) text += total_line("metres", *study.steps.metres, error);
   }
-  if (study.steps.reach_end)
-    text += line(fmt::format("reaches the end of {} m", setting.ramp_length), show(*study.steps.reach_end));
+  if (study.steps.reach_end) {  // about exp(-n / steps)
+    const double reached = *study.steps.reach_end;
+    text += line(fmt::format("reaches the end of {} m", setting.ramp_length),
+                 show(reached, reached > 0 ? -std::log(reached) * std::max(error, 0.001) : 0));
+  }
   text += line(endless ? "stationary speed" : "quasi-stationary speed",
                fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.mean, study.survivors.sd));
   if (!endless)

@@ -116,6 +116,10 @@ TEST(TwoSampleTests, SuperiorityIsTheMannWhitneyShare) {
   const EffectSize all = superiority(std::vector<double>{5, 6, 7}, b);
   EXPECT_EQ(all.value, 1);
   EXPECT_NEAR(all.lower, std::pow(0.025, 1.0 / 3), 1e-12);
+  // Sums of 1/754 are not 1: samples that lie apart are told by whole counts.
+  const EffectSize apart = superiority(std::vector<double>(808, 2), std::vector<double>(754, 1));
+  EXPECT_EQ(apart.value, 1);
+  EXPECT_NEAR(apart.lower, std::pow(0.025, 1.0 / 754), 1e-12);
 }
 
 }  // namespace

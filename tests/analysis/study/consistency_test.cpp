@@ -42,6 +42,17 @@ TEST(Consistency, ASoundStudyPassesAndEachFaultIsNamed) {
   expect_contradiction([&] { require_consistent(rate); }, "by another");
 }
 
+// Interpolated rows know a probability to the error that the study found: a rise below it is no contradiction.
+TEST(Consistency, IntegratedSurvivalMayRiseWithinItsErrorOnly) {
+  Metastability study = sound();
+  study.method = Method::integrated;
+  study.steps.discretization_error = 1e-4;
+  study.steps.survival[60] = study.steps.survival[59] * (1 + 0.5e-4);
+  EXPECT_NO_THROW(require_consistent(study));
+  study.steps.survival[60] = study.steps.survival[59] * (1 + 2e-4);
+  expect_contradiction([&] { require_consistent(study); }, "survival of 60 steps");
+}
+
 TEST(Consistency, IntervalAndCertificateOverlap) {
   const Estimate& steps = sound().steps.from_start;
   CertifiedSteps certified;

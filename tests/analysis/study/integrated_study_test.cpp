@@ -3,12 +3,21 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "analysis/sensitivity/comparison.h"
 #include "analysis/study/setting.h"
 #include "dynamics/return_map/rough_terrain.h"
+#include "dynamics/return_map/trials.h"
+#include "markov/rows/collocation.h"
+#include "markov/rows/draws.h"
+#include "markov/rows/state_space.h"
+#include "tests/analysis/settings.h"
 
 namespace metastable::analysis {
 namespace {
@@ -94,10 +103,7 @@ TEST(IntegratedStudy, IntervalsHoldTheValueOfATighterTolerance) {
     double slope_deg;
     Spread friction;
   };
-  for (const Case& c : {Case{7.02, {0.3, 0.02}},
-                        {8.4, {0.3, 0.1}},
-                        {9.59, {0.25, 0.14}},
-                        {9.59, {0.36, 0.02}}}) {
+  for (const Case& c : {Case{7.02, {0.3, 0.02}}, {8.4, {0.3, 0.1}}, {9.59, {0.25, 0.14}}, {9.59, {0.36, 0.02}}}) {
     Setting setting = equal_legs(7.02, c.friction);
     setting.slope_deg = c.slope_deg;
     const Metastability fine = integrated(setting, 1e-6);
@@ -194,6 +200,60 @@ TEST(IntegratedStudy, NamesTheReasonWhereThereAreNoRows) {
   } catch (const std::invalid_argument& error) {
     EXPECT_NE(std::string(error.what()).find("correlated restitution and friction"), std::string::npos);
   }
+}
+
+double simulated(const Setting& setting, int trials) {
+  const dynamics::WheelMap map = setting.map();
+  double sum = 0;
+  for (int i = 0; i < trials; ++i)
+    sum +=
+        static_cast<double>(dynamics::steps_to_rest(map, setting.launch(), 0, 7, static_cast<std::uint64_t>(i), 1000));
+  return sum / trials;
+}
+
+// Hardly anybody survives a revolution: survival from the slow states falls below what doubles hold.
+TEST(IntegratedStudy, ARampWithoutSlopeHasItsAnswer) {
+  Setting setting;
+  setting.slope_deg = 0.001;
+  setting.initial_speed = {5, 0.3};
+  const Metastability result = integrated(setting, 1e-3);
+  EXPECT_EQ(result.status, Status::converged);
+  EXPECT_NEAR(result.steps.from_start.value, simulated(setting, 40000), 5 * 0.471 / std::sqrt(40000));  // sd 0.471
+  EXPECT_NEAR(result.steps.from_quasi_stationary.value, 1, 1e-6);
+}
+
+// Without noise the expected steps are a staircase in the launch speed, here of 13 steps: each has an edge of its own.
+TEST(IntegratedStudy, AFastLaunchWithoutNoiseIsExact) {
+  Setting setting;
+  setting.law = dynamics::Law::plastic;
+  setting.slope_deg = 2.67;
+  setting.wheel.leg_length.assign(8, 0.2307);
+  setting.initial_speed = {94.8, 1.9};
+  const dynamics::WheelMap map = setting.map();
+  constexpr int shares = 20000;
+  double sum = 0;
+  for (int k = 0; k < shares; ++k) {
+    const double omega =
+        setting.initial_speed.mean + setting.initial_speed.sd * markov::normal_score((k + 0.5) / shares);
+    std::optional<double> state = omega * omega;
+    const std::vector<double> none(static_cast<std::size_t>(map.noise_dimension()), 0.0);
+    for (; state; ++sum) state = map.landing(*state, 0, none);
+  }
+  EXPECT_NEAR(integrated(setting, 0.05).steps.from_start.value, sum / shares, 2e-4);  // a step of the staircase is 1
+}
+
+// Cells that only the launch passes lead back into themselves as often as the others survive.
+TEST(IntegratedStudy, RangesAreFoundWhereTheSurvivorsOfCellsDoNotSettle) {
+  Setting setting = gentle_coulomb();
+  setting.slope_deg = 0.17198217060336954;
+  setting.restitution = {0.6982241123734467, 0.1638539202239025};
+  setting.friction = {0.16948030764114325, 0.0869723477633949};
+  setting.initial_speed = {43.359397516838136, 0.027145300481685675};
+  const Problem problem = setting.problem();
+  const double bulk = 2 * markov::bulk_below_launch(problem.map, problem.launch, 1);
+  const auto ranges = markov::collocation_ranges(problem.map, problem.launch, 1, bulk);
+  ASSERT_EQ(ranges.size(), 1u);
+  EXPECT_GT(ranges[0].second, 0.54 * 43 * 43);  // what `coulomb` leaves of the launch at least
 }
 
 TEST(IntegratedStudy, LeavesUnreachableRestToTheSampledStudy) {

@@ -92,8 +92,10 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"steps", "--method", "guess"}, "--method: 'guess'"},
       {{"steps", "--seed", "1", "--seed", "2"}, "--seed: given 2 times"},
       {{"steps", "--json", path("no/such/folder/x.json")}, "no/such/folder"},
-      {{"steps", "--config", path("missing.toml")}, "missing.toml: cannot be read"},
-      {{"steps", "--config", path("")}, ": cannot be read"},
+      {{"steps", "--config", path("missing.toml")}, "missing.toml: cannot be read: No such file or directory"},
+      {{"--foo"}, "--foo: is no option before a subcommand; --help and --version are"},
+      {{"describe"}, "DIR is required; see 'metastable describe --help'"},
+      {{"steps", "--config", path("")}, ": cannot be read: it is a folder"},
       {{"steps", "--contact-list", path("missing.csv")}, "missing.csv: cannot be read"},
       {{"steps", "--contact-list", path("")}, ": cannot be read"},
       {{"steps", "--config", file("key.toml", "slope = 7.02\nslop = 3\n")}, "key.toml:2: unknown key 'slop'"},
@@ -328,7 +330,7 @@ TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
   EXPECT_EQ(metastable({"coast-down", free, free, "--out", path("c")}).err,
             "metastable: " + free + ": a log named so was there before\n");
   EXPECT_EQ(metastable({"coast-down", path("none.csv"), "--out", path("c")}).err,
-            "metastable: " + path("none.csv") + ": cannot be read\n");
+            "metastable: " + path("none.csv") + ": cannot be read: No such file or directory\n");
   EXPECT_FALSE(std::filesystem::exists(path("c")));
   EXPECT_EQ(metastable({"blind", "shut", path("run")}).err,
             "metastable: ACTION: 'shut' is none of 'make', 'answer', 'open'\n");

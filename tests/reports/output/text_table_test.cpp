@@ -88,6 +88,21 @@ TEST(TextTable, NoLineIsLongerThanTheWindow) {
   }
 }
 
+// Twelve columns in sixty characters: the ones that find no room stand below, beside the names again.
+TEST(TextTable, MoreColumnsThanTheWindowHoldsGoOnBelow) {
+  Table table{.id = "t", .title = "T", .columns = {{"conditions"}}, .rows = {{"fast-9.59, slow-9.59"}, {"all"}}};
+  for (int i = 0; i < 11; ++i) {
+    table.columns.push_back({"P Kolmogorov-Smirnov " + std::to_string(i)});
+    for (std::vector<Cell>& row : table.rows) row.emplace_back(static_cast<std::int64_t>(1000 + i));
+  }
+  const std::string text = to_text(table, 10, 60);
+  EXPECT_LE(widest(text), 60U) << text;
+  EXPECT_NE(text.find("conditions"), text.rfind("conditions")) << text;
+  EXPECT_NE(text.find("\n\n"), std::string::npos) << text;
+  for (int i = 0; i < 11; ++i) EXPECT_NE(text.find(std::to_string(1000 + i)), std::string::npos) << text;
+  EXPECT_EQ(to_text(table, 10, 400).find("\n\n"), std::string::npos);
+}
+
 TEST(TextTable, ANumberThatSaysNothingIsSaidSo) {
   const Table table{.id = "t",
                     .title = "T",
