@@ -60,7 +60,6 @@ struct PaperStudyOptions {
   std::size_t samples = 8192;  ///< of the variance shares, >= 32; `settled`, whose trials are rolled, takes an eighth
   std::uint64_t seed = 1;
   int threads = 0;
-  bool designs = true;                  ///< with the table of what a designer may change (stopping.h), some seconds
   std::function<void()> progress = {};  ///< after each of paper_study_units() pieces of work; may throw to stop
 };
 /// Calls of `progress` by one study_variant().

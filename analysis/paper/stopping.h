@@ -39,8 +39,8 @@ struct Stopping {
   int rests() const;
 };
 
-/// The paper's wheel at 7.02 deg under `settled` with eta ~ N(0.4, 0.05^2), mu ~ N(0.4, 0.03^2): spreads with which it
-/// rolls steadily and stops now and then.
+/// The paper's wheel at 7.02 deg under `settled` with eta ~ N(0.4, 0.05^2), mu ~ N(0.4, 0.03^2), J = 0.0025 kg m^2: the
+/// wheel of the engines (analysis/README.md), which rolls steadily and stops now and then.
 Setting stopping_setting();
 
 /// Thresholds by landings that are followed, rests counted in trials rolled without an end of the ramp (at most 200
@@ -56,11 +56,12 @@ struct DesignChange {
   double times = 1;  ///< as many as without the change
 };
 
-/// Inertia of the hub, tolerance of the legs, friction, restitution, slope, tips: the first entry is `base` itself.
-/// Each takes a coarse table of landings (some seconds), whose error the intervals hold.
-/// @param base under `settled`, eta and mu independent normals
-/// @param progress called before each of design_change_count() changes; may throw to stop
-std::vector<DesignChange> design_changes(const Setting& base, std::uint64_t seed, int threads,
+/// Inertia of the hub, tolerance of the legs, friction, restitution, slope, tips: the first entry is `base` itself. The
+/// steps are collisions over rests of `trials` wheels that are rolled, with the same random numbers for every change, at
+/// most 300 collisions each: collisions over rests, so that what is cut off hardly matters. Infinite where none rests.
+/// @param base under `settled`; @param trials >= 1; the same bits on any number of threads
+/// @param progress called after each of design_change_count() changes; may throw to stop
+std::vector<DesignChange> design_changes(const Setting& base, int trials, std::uint64_t seed, int threads,
                                          const std::function<void()>& progress = {});
 std::size_t design_change_count();
 

@@ -96,8 +96,7 @@ void Setting::validate() const {
         fmt::format("first landing leg: {} is outside 0..{}", first_landing_leg, wheel.legs() - 1));
 }
 
-Problem Setting::problem(int threads, const std::function<void(double)>& progress,
-                         dynamics::SettledMapOptions table) const {
+Problem Setting::problem(int threads, const std::function<void(double)>& progress) const {
   validate();
   const dynamics::TruncatedNormal speed = launch();
   const auto state = [speed](double score) {
@@ -113,13 +112,14 @@ Problem Setting::problem(int threads, const std::function<void(double)>& progres
     return problem;
   };
   if (law != dynamics::Law::settled) return problem_of(map());
-  table.direct = direct;
-  table.progress = progress;
-  table.executor = [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
+  dynamics::SettledMapOptions options;
+  options.direct = direct;
+  options.progress = progress;
+  options.executor = [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
     markov::parallel_for(count, threads, work);
   };
   return problem_of(dynamics::SettledReturnMap(wheel, slope_deg * std::numbers::pi / 180.0, noise(),
-                                               speed.at_score(launch_reach), std::move(table)));
+                                               speed.at_score(launch_reach), std::move(options)));
 }
 
 std::string Setting::describe() const {

@@ -8,7 +8,6 @@
 
 #include "analysis/study/problem.h"
 #include "dynamics/return_map/wheel_map.h"
-#include "dynamics/settled/settled_map.h"
 #include "dynamics/settled/settled_motion.h"
 
 namespace metastable::analysis {
@@ -47,9 +46,7 @@ struct Setting {
   /// The generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on the
   /// ramp. Under `settled` a table of landings is built, at most once for wheel and slope (SettledMap::of).
   /// @param threads of the table, 0: all cores; @param progress of the table: its share done, from any thread
-  /// @param table its nodes and range, `settled` only; a coarse one serves rough answers
-  Problem problem(int threads = 0, const std::function<void(double)>& progress = {},
-                  dynamics::SettledMapOptions table = {}) const;
+  Problem problem(int threads = 0, const std::function<void(double)>& progress = {}) const;
   /// One line that names every quantity, for captions and provenance.
   std::string describe() const;
 };

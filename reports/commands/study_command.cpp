@@ -42,9 +42,8 @@ void run_study(const StudyRequest& request) {
                                            : analysis::paper_experiments(analysis::read_experiment(request.data));
   PageFolder pages(request.out);
   const std::vector<analysis::Variant> variants = analysis::paper_variants();
-  std::optional<Progress> progress(
-      std::in_place, "study",
-      variants.size() * analysis::paper_study_units() + (asked.designs ? analysis::design_change_count() : 0));
+  std::optional<Progress> progress(std::in_place, "study",
+                                   variants.size() * analysis::paper_study_units() + analysis::design_change_count());
   analysis::PaperStudyOptions options = asked;
   options.progress = [&] { progress->advance(); };
   Studies studies;
@@ -52,8 +51,8 @@ void run_study(const StudyRequest& request) {
     studies.push_back(analysis::study_variant(variant, experiments, options));
   const analysis::Setting stops = analysis::stopping_setting();
   const analysis::Stopping stopping = analysis::stopping(stops, options.trials, options.seed, options.threads);
-  std::vector<analysis::DesignChange> designs;
-  if (options.designs) designs = analysis::design_changes(stops, options.seed, options.threads, options.progress);
+  const std::vector<analysis::DesignChange> designs =
+      analysis::design_changes(stops, options.trials, options.seed, options.threads, options.progress);
   progress.reset();
 
   const Provenance provenance{
@@ -82,11 +81,9 @@ void run_study(const StudyRequest& request) {
                 {},
                 {hypotheses_table(analysis::paper_hypotheses(studies), studies, provenance),
                  variance_table(studies, provenance)});
-  std::vector<Table> stopping_tables{stopping_table(stopping, provenance)};
-  if (!designs.empty()) stopping_tables.push_back(design_table(designs, provenance));
   pages.section("stopping", "Why a wheel that rolls steadily stops: the law settled", stopping_story(stopping),
                 {sticking_figure(stopping, provenance), resting_figure(stopping, provenance)},
-                std::move(stopping_tables));
+                {stopping_table(stopping, provenance), design_table(designs, provenance)});
   std::vector<Figure> fig4{fig4_experiment_figure(experiments, provenance)};
   for (Figure& figure : all_variants(studies, [&](const auto& s) { return fig4_figures(s, provenance); }))
     fig4.push_back(std::move(figure));

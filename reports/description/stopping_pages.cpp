@@ -50,15 +50,16 @@ std::string stopping_story(const Stopping& s) {
       "A foot that lands sticks if μ ≥ μ_c = d h/(J/M + h²), d being its distance ahead of the hub and h the hub's "
       "height; above μ_c the landing does not depend on μ. A leg that lands after a shorter one reaches further ahead "
       "of a lower hub: leg {} ({:+.1f} mm against the leg before it) needs {:.3f}, leg {} ({:+.1f} mm) {:.3f}, so that "
-      "{:.0f} and {:.0f} % of their landings slide. A foot that slides is pushed forward under the hub, takes more out "
-      "of the spin the longer it slides, and below μ_r the wheel no longer passes over it. μ_r falls with the speed "
-      "ω−, so that one slide, which leaves the wheel slow, makes the next rest likelier. Steady wheels touch at {:.2f} "
-      "rad/s, where μ_r is {:.3f} for leg {} and {:.3f} for leg {}: of {} rests rolled, {:.0f} % are on leg {}, with "
-      "{:.0f} % of the landings. Rest is a tail of μ alone: a little more friction, or less scatter of it, buys "
-      "orders of magnitude of steps; more of the same legs' length, or a longer ramp, buys nothing.",
+      "{:.0f} and {:.0f} % of their landings slide. The less friction a sliding foot has, the more its impact takes of "
+      "the spin (the first one leaves ω+/ω− = 1 − (1 + η) c (d − μ h)/(J/M + d² − μ d h), c being the chord between "
+      "the feet), and below μ_r the wheel no longer passes over it. μ_r falls with the speed ω−: a wheel that one "
+      "slide "
+      "has slowed down stops more easily at the next. Steady wheels touch at {:.2f} rad/s, where μ_r is {:.3f} for leg "
+      "{} and {:.3f} for leg {}: {:.0f} % of the {} rests rolled are on leg {}, with {:.0f} % of the landings. Rest is "
+      "thus a tail of μ: what moves μ_r or the mean of μ by a few per cent multiplies the steps (last table).",
       most.leg, 1e3 * most.longer, most.sticking, least.leg, 1e3 * least.longer, least.sticking, 100 * most.slides,
-      100 * least.slides, mean_speed(s), most.resting, most.leg, least.resting, least.leg, s.rests(),
-      100 * share(most.rests, s.rests()), most.leg, 100 * share(most.landings, s.landings()));
+      100 * least.slides, mean_speed(s), most.resting, most.leg, least.resting, least.leg,
+      100 * share(most.rests, s.rests()), s.rests(), most.leg, 100 * share(most.landings, s.landings()));
 }
 
 Figure sticking_figure(const Stopping& stopping, const Provenance& provenance) {
@@ -68,6 +69,7 @@ Figure sticking_figure(const Stopping& stopping, const Provenance& provenance) {
   figure.x = friction_axis(stopping);
   figure.y = {"longer than the leg before it", "mm"};
   figure.legend = Legend::below;
+  figure.height = 560;
   figure.provenance = provenance;
   double low = 0, high = 0;
   for (const StoppingLeg& leg : stopping.legs) {
@@ -104,6 +106,7 @@ Figure resting_figure(const Stopping& stopping, const Provenance& provenance) {
   figure.x = friction_axis(stopping);
   figure.y = {"speed before the landing, ω−", "rad/s"};
   figure.legend = Legend::below;
+  figure.height = 560;
   figure.provenance = provenance;
   double low = 100, high = 0;
   for (const analysis::RestingCurve& curve : stopping.curves) {
@@ -124,7 +127,13 @@ Figure resting_figure(const Stopping& stopping, const Provenance& provenance) {
                              {},
                              {},
                              colour});
-    figure.series.push_back({"", Style::dashed, {sticking, sticking}, {curve.speed.front(), high}, {}, {}, colour});
+    figure.series.push_back({k == 0 ? "dashed: μ_c, the foot slides left of it" : "",
+                             Style::dashed,
+                             {sticking, sticking},
+                             {curve.speed.front(), high},
+                             {},
+                             {},
+                             colour});
   }
   figure.reference_lines = {{false, mean_speed(stopping), "steady"}};
   return figure;
@@ -163,7 +172,7 @@ Table design_table(const std::vector<analysis::DesignChange>& changes, const Pro
     table.rows.push_back({change.what, change.from, change.to, change.steps, change.times});
   table.notes = {
       fmt::format("Expected steps before failure from the launch, no end of the ramp, each with the one "
-                  "change: {}. The intervals hold what a coarse table of landings does to the steps.",
+                  "change: {}. Wheels rolled with the same random numbers.",
                   changes.empty() ? std::string() : changes.front().setting.describe())};
   return table;
 }

@@ -22,7 +22,6 @@ TEST_F(StudyCommandTest, WritesThePageAndEveryTableTheSameTwice) {
     request.out = path(name);
     request.options.trials = 20;
     request.options.samples = 32;
-    request.options.designs = false;  // design_changes() has a test of its own
     request.options.threads = name[0] == 'o' ? 1 : 2;
     printed([&] { run_study(request); });
   }
