@@ -254,8 +254,32 @@ WheelCandidate ramp_vibration() {
 WheelCandidate sensor_noise(const WheelDesign& design) {
   WheelCandidate c = spread("sensor_noise", "sd_rad_s", &Extension::noise_sd, 1, 0.01);
   c.candidate.exact = true;
+  FreeParameter& variance = c.candidate.parameters[0];
+  variance.step = std::min(variance.step, 0.01 * design.noise * design.noise);  // slopes are those at what is stated
+  if (design.noise_seen > 2 * design.noise) variance.likely = design.noise_seen * design.noise_seen;
   if (!design.noise_stated)
-    c.candidate.undecidable = "no sensor noise is stated: it was assumed or taken from the data";
+    c.candidate.undecidable = "the sensor noise is not the stated one: it was assumed or taken from the data";
+  return c;
+}
+
+// Variants are the speeds at which feet begin to hop: 0, and some between those that were seen.
+WheelCandidate bounce(const WheelDesign& design) {
+  WheelCandidate c;
+  c.candidate.id = "bounce";
+  c.candidate.parameters = {{0, 0, 1, 1e-3, 0.05}};
+  c.candidate.variants = {{0.0}};
+  for (const double speed : design.speeds) c.candidate.variants.push_back({speed});
+  if (design.speeds.size() > 1)
+    c.candidate.refine = {0.5 * (design.speeds.back() - design.speeds.front()) /
+                          static_cast<double>(design.speeds.size() - 1)};
+  c.candidate.report = [](const Values& variant, const Values& v) {
+    return std::vector<NamedValue>{{"rebound_lost", v[0]}, {"onset_rad_s", variant[0]}};
+  };
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0]}}; };
+  c.apply = [](Extension& e, const Values& variant, const Values& v) {
+    e.rebound_lost = v[0];
+    e.hops_from = variant[0];
+  };
   return c;
 }
 
@@ -297,7 +321,7 @@ std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
       contact_outliers(),
       sensor_noise(design),
       sensor_bias(design),
-      simple("bounce", "rebound_lost", &Extension::rebound_lost, {0, 0, 1, 1e-3, 0.05}),
+      bounce(design),
       needing(2, design.successive, after_another, ramp_vibration()),
       slip_reversal(design),
   };

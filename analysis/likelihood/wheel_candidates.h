@@ -16,11 +16,14 @@ struct WheelDesign {
   int legs = 8;
   bool legs_known = true, speeds_after = true;
   bool launches_stated = true, noise_stated = true;
+  double noise = 0.01;    ///< of reported speeds in the nominal model [rad/s]
+  double noise_seen = 0;  ///< by how much stances scatter [rad/s]; 0: too few to say
   std::size_t trials = 0;
   std::size_t launches = 0;         ///< for which a launch speed is stated
   std::size_t successive = 0;       ///< collisions with one before them in their trial
   std::size_t away = 0;             ///< collisions away from the start of the ramp
   std::vector<double> leg_lengths;  ///< stated [m]
+  std::vector<double> speeds;       ///< between the measured omega-, rising: quantiles [rad/s]
   double furthest = 1.8;            ///< landing foot [m]
   double ramp_length = 3.66;        ///< [m]
   dynamics::Law law = dynamics::Law::published;

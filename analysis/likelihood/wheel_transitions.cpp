@@ -99,11 +99,21 @@ void WheelTransitions::set_up_parameters() {
   design.launches_stated = std::any_of(measured_.conditions.begin(), measured_.conditions.end(),
                                        [](const Condition& one) { return one.initial_speed.has_value(); });
   design.noise_stated = measured_.noise_stated;
+  design.noise = measured_.noise;
+  design.noise_seen = measured_.noise_seen;
   design.leg_lengths = measured_.wheel.leg_length;
   design.law = measured_.law;
   design.furthest = 0.1;
   for (const WheelRun& run : measured_.runs)
     design.furthest = std::max(design.furthest, run.collisions.back().context.position);
+  std::vector<double> speeds;
+  for (const WheelRun& run : measured_.runs)
+    for (const RunCollision& m : run.collisions) speeds.push_back(m.before);
+  std::sort(speeds.begin(), speeds.end());
+  for (const double share : {0.15, 0.3, 0.45, 0.6, 0.75, 0.9})
+    if (const double speed = speeds[static_cast<std::size_t>(share * static_cast<double>(speeds.size()))];
+        design.speeds.empty() || speed > design.speeds.back())
+      design.speeds.push_back(speed);
   design.trials = measured_.runs.size();
   for (const Event& e : events_) {
     design.launches += e.kind == EventKind::launch;
