@@ -20,6 +20,7 @@
 #include "reports/command_line/command.h"
 #include "reports/command_line/option_values.h"
 #include "reports/command_line/setting_options.h"
+#include "reports/command_line/walker_options.h"
 #include "reports/commands/compare_command.h"
 #include "reports/commands/report_command.h"
 #include "reports/commands/request.h"
@@ -46,8 +47,10 @@ Command steps() {
             add_standard_errors(o);
             o.add("json", "FILE|-", "", "Write the results as JSON");
             o.add_flag("explain", "What stands behind the words of the answer");
+            add_walker(o);
           },
           [](const Options& o, const std::string& line) {
+            if (asks_for_walker(o)) return run_walker_steps(walker_steps_request(o, line));
             StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
             request.sensitivities = o.flag("sensitivities");
             request.explain = o.flag("explain");
