@@ -69,6 +69,13 @@ bool Options::flag(const std::string& name) const {
   return value == "true";
 }
 
+std::vector<std::string> Options::given_names() const {
+  std::vector<std::string> names;
+  for (const auto& [name, texts] : texts_)
+    if (!texts.empty()) names.push_back(name);
+  return names;
+}
+
 void Options::check_given() const {
   for (const auto& [name, texts] : texts_)
     if (std::ranges::find(texts, "") != texts.end())

@@ -39,6 +39,8 @@ class Options {
   /// Nothing that was given may be empty. @throws std::invalid_argument
   void check_given() const;
 
+  /// Long names of all options given.
+  std::vector<std::string> given_names() const;
   bool has(const std::string& name) const { return texts_.contains(name); }
   bool given(const std::string& name) const { return !texts_.at(name).empty(); }
   const std::vector<std::string>& all(const std::string& name) const { return texts_.at(name); }
