@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,6 +13,7 @@
 #include "analysis/statistics/minimize.h"
 #include "analysis/statistics/profile_interval.h"
 #include "dynamics/return_map/landing_density.h"
+#include "markov/dense_matrix.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -174,20 +175,20 @@ void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, con
                     highest[2], highest[1]);
     return;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  const markov::SymmetricEigen eigen = markov::symmetric_eigen(information);
   for (Eigen::Index k = information.rows() - 1; k >= 0; --k) {
     FitDirection direction;
-    direction.sd = eigen.eigenvalues()[k] > 0 ? 1 / std::sqrt(eigen.eigenvalues()[k]) : infinity;
+    direction.sd = eigen.values[k] > 0 ? 1 / std::sqrt(eigen.values[k]) : infinity;
     for (std::size_t a = 0; a < free.size(); ++a)
-      direction.weight[free[a]] = eigen.eigenvectors()(static_cast<Eigen::Index>(a), k);
+      direction.weight[free[a]] = eigen.vectors(static_cast<Eigen::Index>(a), k);
     fit.directions.push_back(direction);
   }
-  if (!(eigen.eigenvalues()[0] > 0)) {
+  if (!(eigen.values[0] > 0)) {
     fit.status = ContactFit::Status::undetermined;
     fit.message = "the likelihood does not fall off in every direction: the four numbers are one choice among many";
     return;
   }
-  const Eigen::MatrixXd covariance = information.inverse();
+  const Eigen::MatrixXd covariance = markov::inverse_of(information);
   for (std::size_t a = 0; a < free.size(); ++a) {
     const auto i = static_cast<Eigen::Index>(a);
     fit.standard_error[free[a]] = std::sqrt(covariance(i, i));

@@ -120,14 +120,16 @@ RankedCause fit_cause(const TransitionModel& model, const Fit& base, const Scann
     std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(scanned, variant));
     Fit tried = best_fit(model, base.nuisance, terms);
-    if (tried.penalised < base.penalised) {  // a bad start: from nothing instead
-      for (std::size_t p = 0; p < terms.back().values.size(); ++p) {
-        const FreeParameter& parameter = scanned.candidate->parameters[p];
-        terms.back().values[p] = parameter.try_at != 0 ? parameter.try_at * small_start : parameter.neutral;
-      }
+    const auto try_from = [&](auto value_of) {
+      for (std::size_t p = 0; p < terms.back().values.size(); ++p)
+        terms.back().values[p] = value_of(scanned.candidate->parameters[p]);
       Fit again = fit(model, base.nuisance, terms);
       if (again.penalised > tried.penalised) tried = std::move(again);
-    }
+    };
+    if (tried.penalised < base.penalised)  // a bad start: from nothing instead
+      try_from([](const FreeParameter& p) { return p.try_at != 0 ? p.try_at * small_start : p.neutral; });
+    if (scanned.candidate->parameters.size() == 1 && scanned.candidate->parameters[0].likely != 0)
+      try_from([](const FreeParameter& p) { return p.likely; });
     if (first || tried.penalised > cause.fit.penalised) cause.fit = std::move(tried);
     first = false;
   }

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
@@ -22,6 +20,7 @@
 #include "analysis/diagnosis/visibility.h"
 #include "analysis/statistics/interval_95.h"
 #include "dynamics/wheel/effect_catalogue.h"
+#include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 namespace {
@@ -59,8 +58,7 @@ double recalibration_p_value(const TransitionModel& model, const Fit& as_given, 
   Eigen::MatrixXd root_prior = Eigen::MatrixXd::Zero(size, size);
   for (Eigen::Index p = 0; p < size; ++p) root_prior(p, p) = model.nuisances()[static_cast<std::size_t>(p)].prior_sd;
   // In units of the prior: eigenvalues l of the information; a direction's share of chance gain is l/(1+l) chi^2_1.
-  const Eigen::VectorXd eigenvalues =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(root_prior * as_given.information * root_prior).eigenvalues();
+  const Eigen::VectorXd eigenvalues = markov::symmetric_eigen(root_prior * as_given.information * root_prior).values;
   double mean = 0, variance = 0;
   for (const double one : eigenvalues) {
     const double l = std::max(0.0, one - 1);  // the prior is part of the information
@@ -144,7 +142,8 @@ Cause describe(const TransitionModel& model, const RankedCause& ranked) {
   }
   Eigen::MatrixXd steadied = ranked.fit.information;
   steadied.diagonal().array() += 1e-12;
-  const Eigen::MatrixXd covariance = steadied.ldlt().solve(Eigen::MatrixXd::Identity(steadied.rows(), steadied.cols()));
+  const Eigen::MatrixXd covariance =
+      markov::solve_columns(steadied, Eigen::MatrixXd::Identity(steadied.rows(), steadied.cols()));
   auto first = static_cast<Eigen::Index>(model.nuisances().size());
   for (const EffectTerm& term : ranked.terms) {
     cause.parameters.push_back(estimates(term, covariance, first));
@@ -173,7 +172,7 @@ void keep_positive(const TransitionModel& model, const Fit& fit, const Eigen::Ma
 // Intervals follow the slopes of the reported numbers, unless those take a positive one below zero.
 std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit) {
   const Eigen::MatrixXd covariance =
-      fit.information.ldlt().solve(Eigen::MatrixXd::Identity(fit.information.rows(), fit.information.cols()));
+      markov::solve_columns(fit.information, Eigen::MatrixXd::Identity(fit.information.rows(), fit.information.cols()));
   std::vector<EstimatedParameter> all;
   const std::vector<NamedValue> here = model.report_nuisances(fit.nuisance);
   for (std::size_t k = 0; k < here.size(); ++k) {
@@ -445,6 +444,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     d.data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
   for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
   d.data.notes = model.notes();
+  d.data.accepted_defects = model.accepted_defects();
   d.gap.refitted = model.recalibrated();
 
   progress(0, "the model as given");

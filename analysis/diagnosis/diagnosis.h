@@ -168,6 +168,7 @@ struct Diagnosis {
     std::size_t trials = 0, collisions = 0, events = 0;
     std::vector<std::string> condition_names;
     std::vector<std::string> notes;  ///< what is not known, was assumed or is rough, a sentence each
+    std::string accepted_defects;    ///< TransitionModel::accepted_defects(), which the verdict repeats
   } data;
 };
 

@@ -159,6 +159,8 @@ std::string next_step(const Diagnosis& d) {
 std::vector<std::string> sentences(const Diagnosis& d) {
   std::vector<std::string> all;
   say_verdict(all, d);
+  if (!d.data.accepted_defects.empty())
+    all.push_back(fmt::format("It stands on defects that were accepted: {}.", d.data.accepted_defects));
   say_where(all, d);
   say_what_closes(all, d);
   say_what_is_hidden(all, d);

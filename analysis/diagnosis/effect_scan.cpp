@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <stdexcept>
 
 #include "analysis/statistics/random.h"
+#include "markov/dense_matrix.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -31,7 +30,7 @@ double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const
   }
   Eigen::MatrixXd steadied = info;
   steadied.diagonal() *= 1 + 1e-8;
-  const Eigen::VectorXd step = steadied.ldlt().solve(u);
+  const Eigen::VectorXd step = markov::solve_symmetric(steadied, u);
   if (start) *start = step;
   const double gain = u.dot(step);
   return std::isfinite(gain) && gain > 0 ? gain : 0;
@@ -97,7 +96,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   const Eigen::MatrixXd cross =
       held.change.transpose() * all.change + held_stretch.transpose() * stretch;  // [held x columns]
   Eigen::MatrixXd weights = cross;
-  if (columns > 0) weights = fit.information.ldlt().solve(cross);  // Eigen's solve refers to a first element
+  if (columns > 0) weights = markov::solve_columns(fit.information, cross);  // Eigen's solve refers to a first element
   scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch - cross.transpose() * weights;
   const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
@@ -133,8 +132,8 @@ Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
   const double trials = static_cast<double>(rows.rows());
   const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
   const Eigen::ArrayXd own = scan.information.diagonal().array().max(1e-300);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> split(scan.information);
-  rows = split.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * split.eigenvectors().transpose() *
+  const markov::SymmetricEigen split = markov::symmetric_eigen(scan.information);
+  rows = split.values.cwiseMax(0).cwiseSqrt().asDiagonal() * split.vectors.transpose() *
          (scatter / own).max(1).sqrt().matrix().asDiagonal();
   return rows;
 }

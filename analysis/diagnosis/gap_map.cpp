@@ -1,6 +1,5 @@
 #include "analysis/diagnosis/gap_map.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -13,6 +12,7 @@
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/wheel/truncated_normal.h"
+#include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 namespace {
@@ -230,7 +230,7 @@ Efficient project(const std::vector<Column>& columns, const TransitionModel& mod
   }
   gram.diagonal() *= 1 + 1e-9;
   gram.diagonal().array() += 1e-12;
-  const Eigen::MatrixXd weights = gram.ldlt().solve(held.transpose() * all.dense);
+  const Eigen::MatrixXd weights = markov::solve_columns(gram, held.transpose() * all.dense);
   all.dense -= held * weights;
   all.sums -= left.transpose() * weights;
   return all;
@@ -272,7 +272,7 @@ double left_of_shift(const Column& column, const Fit& fit) {
     const auto i = static_cast<Eigen::Index>(column.terms[k].first);
     follows += (column.weights.empty() ? 1 : column.weights[k]) * fit.derivatives.change.row(i).transpose();
   }
-  return 1 - follows.dot(fit.information.ldlt().solve(follows)) / column.variance;
+  return 1 - follows.dot(markov::solve_symmetric(fit.information, follows)) / column.variance;
 }
 
 // Gives the cells their own statistics, sizes and p-values.

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,6 +15,7 @@
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/wheel/truncated_normal.h"
+#include "markov/dense_matrix.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -141,14 +141,13 @@ Flexible flexible_model(const Fit& chosen, const Eigen::MatrixXd& cells, const E
   const Eigen::MatrixXd gram = cells.transpose() * training.asDiagonal() * cells;
   Eigen::MatrixXd ridge = gram;
   ridge.diagonal().array() += 1 / (cell_shift_sd * cell_shift_sd);
-  const auto solver = ridge.ldlt();
-  const Eigen::VectorXd shift = solver.solve(cells.transpose() * (training.asDiagonal() * f.bounded));
+  const Eigen::VectorXd shift = markov::solve_symmetric(ridge, cells.transpose() * (training.asDiagonal() * f.bounded));
   f.predicted = cells * shift;
   // Without a gap the shifts are noise, less what the fitted parameters took up: their expected loss on a new event
   // is half its predicted variance.
   const Eigen::MatrixXd taken = chosen.derivatives.change.transpose() * (training.asDiagonal() * cells);
-  const Eigen::MatrixXd left = gram - taken.transpose() * chosen.information.ldlt().solve(taken);
-  const Eigen::MatrixXd noise = solver.solve(solver.solve(left).transpose());
+  const Eigen::MatrixXd left = gram - taken.transpose() * markov::solve_columns(chosen.information, taken);
+  const Eigen::MatrixXd noise = markov::solve_columns(ridge, markov::solve_columns(ridge, left).transpose());
   f.variance = (cells * noise).cwiseProduct(cells).rowwise().sum();
   return f;
 }

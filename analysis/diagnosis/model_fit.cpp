@@ -1,8 +1,9 @@
 #include "analysis/diagnosis/model_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 namespace {
@@ -96,7 +97,7 @@ Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::Ve
     for (Eigen::Index b = 0; b < size; ++b)
       block(a, b) = information(part[static_cast<std::size_t>(a)], part[static_cast<std::size_t>(b)]);
   block.diagonal() *= 1 + 1e-9;
-  return block.ldlt().solve(picked(gradient, part));
+  return markov::solve_symmetric(block, picked(gradient, part));
 }
 
 // Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does.

@@ -64,6 +64,7 @@ struct FreeParameter {
   double lower = 0, upper = 0;
   double step = 1e-4;  ///< for differences
   double try_at = 0;   ///< a size worth starting from where the neutral value says nothing; 0: start at neutral
+  double likely = 0;   ///< a size that the data show by themselves, from which fits start as well; 0: there is none
 };
 
 /// A number as it is reported: by its name.
@@ -159,6 +160,8 @@ class TransitionModel {
                                 std::uint64_t seed) const = 0;
   /// What is not known or was assumed, a sentence each.
   virtual const std::vector<std::string>& notes() const = 0;
+  /// Says what was wrong with the data or the nominal model and taken all the same; "" if nothing was.
+  virtual std::string accepted_defects() const { return ""; }
   /// What a recalibration is reported by: contact or loss parameters.
   virtual std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const = 0;
 };

@@ -1,9 +1,9 @@
 #include "analysis/diagnosis/visibility.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "markov/dense_matrix.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
@@ -40,7 +40,7 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
       const Eigen::VectorXd cross = own.block(1, 0, count - 1, 1);
       Eigen::MatrixXd rest = own.block(1, 1, count - 1, count - 1);
       rest.diagonal() *= 1 + 1e-9;
-      information -= cross.dot(rest.ldlt().solve(cross));
+      information -= cross.dot(markov::solve_symmetric(rest, cross));
     }
     const FreeParameter& p = candidate->parameters[0];
     const double size = std::sqrt(seen_gain / std::max(information, 1e-300));
@@ -71,7 +71,7 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
         theirs.diagonal() *= 1 + 1e-9;
         theirs.diagonal().array() += 1e-300;
         const Eigen::VectorXd cross = scan.information.block(at, first, size_of, count) * direction;
-        share = std::max(share, cross.dot(theirs.ldlt().solve(cross)) / strength);
+        share = std::max(share, cross.dot(markov::solve_symmetric(theirs, cross)) / strength);
       }
       if (share > 0.5) v.alike.emplace_back(other.candidate->id, std::min(1.0, share));
     }
@@ -107,8 +107,8 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
     Eigen::MatrixXd theirs = scan.information.block(n, n, m, m);
     theirs.diagonal() *= 1 + 1e-9;
     const Eigen::VectorXd cross = scan.information.block(n, 0, m, n) * size;
-    all[i].separation =
-        std::max(0.0, size.dot(scan.information.block(0, 0, n, n) * size) - cross.dot(theirs.ldlt().solve(cross)));
+    all[i].separation = std::max(
+        0.0, size.dot(scan.information.block(0, 0, n, n) * size) - cross.dot(markov::solve_symmetric(theirs, cross)));
   });
   std::sort(all.begin(), all.end(),
             [](const NextExperiment& a, const NextExperiment& b) { return a.separation > b.separation; });

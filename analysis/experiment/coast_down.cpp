@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -15,6 +16,7 @@
 #include "analysis/experiment/input_error.h"
 #include "analysis/statistics/median.h"
 #include "dynamics/wheel/ranges.h"
+#include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 namespace {
@@ -22,6 +24,7 @@ namespace {
 constexpr int least_block = 10;                          // revolutions
 constexpr std::size_t around = 5;                        // periods on either side that a period is compared with
 constexpr double missed_from = 1.5, double_below = 0.6;  // of the median period
+constexpr double most_left_out = 0.1;                    // of a run's revolutions
 constexpr double huber = 1.345;                          // 95 % efficiency under normal noise
 constexpr std::array<const char*, 5> columns{"time_us", "drum_speed_km_h", "drum_revolutions", "wheel_speed_km_h",
                                              "wheel_revolutions"};
@@ -69,6 +72,7 @@ CounterLog parse_counter_log(const std::string& file, std::string_view text) {
     std::string_view line = text.substr(0, feed);
     text = feed == std::string_view::npos ? std::string_view{} : text.substr(feed + 1);
     if (line.ends_with('\r')) line.remove_suffix(1);
+    if (line.empty() && text.find_first_not_of("\r\n") == std::string_view::npos) break;  // after the last row
     const std::string_view whole = line;
     std::array<double, 5> values{};
     std::size_t read = 0;
@@ -150,6 +154,7 @@ CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options) 
   constexpr double turn = 2 * std::numbers::pi;
   const double shortest = *std::min_element(medians.begin(), medians.end());
   run.top = turn / shortest;
+  run.stop = options.stop;
   if (!(run.top > options.stop))
     throw std::invalid_argument(fmt::format("{}: the top speed, {:.3g} rad/s, is not above the stop, {:.3g} rad/s",
                                             log.name, run.top, options.stop));
@@ -226,7 +231,7 @@ LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear) {
   double scale = 0;
   for (int i = 0; i < 200; ++i) {
     normal = terms.transpose() * weight.asDiagonal() * terms;
-    const Eigen::VectorXd next = normal.ldlt().solve(terms.transpose() * weight.cwiseProduct(y));
+    const Eigen::VectorXd next = markov::solve_symmetric(normal, terms.transpose() * weight.cwiseProduct(y));
     residual = y - terms * next;
     std::vector<double> sizes(omega.size());
     for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] = std::abs(residual[static_cast<Eigen::Index>(k)]);
@@ -237,12 +242,49 @@ LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear) {
     for (Eigen::Index k = 0; k < rows; ++k) weight[k] = std::min(1.0, huber * scale / std::abs(residual[k]));
   }
   fit.loss = {value[0], linear ? value[2] : 0, value[1], scale};
-  const Eigen::MatrixXd covariance = scale * scale / 0.95 * (terms.transpose() * terms).inverse();
+  const Eigen::MatrixXd covariance = scale * scale / 0.95 * markov::inverse_of(terms.transpose() * terms);
   fit.constant_error = std::sqrt(covariance(0, 0));
   fit.quadratic_error = std::sqrt(covariance(1, 1));
   if (linear) fit.linear_error = std::sqrt(covariance(2, 2));
   fit.outliers = static_cast<std::size_t>((residual.array().abs() > 5 * scale).count());
   return fit;
+}
+
+std::string objection(const CoastDownRun& run, const RevolutionLoss& nominal) {
+  if (static_cast<double>(run.left_out) > most_left_out * static_cast<double>(run.revolutions))
+    return fmt::format(
+        "{}: {} of {} revolutions left out for ticks that were missed, double or displaced, more than a "
+        "tenth",
+        run.name, run.left_out, run.revolutions);
+  // A parabola is least at an end or at its vertex.
+  double least = std::min(nominal.at(run.stop), nominal.at(run.top));
+  const double vertex = nominal.quadratic > 0 ? -nominal.linear / (2 * nominal.quadratic) : 0;
+  if (vertex > run.stop && vertex < run.top) least = std::min(least, nominal.at(vertex));
+  if (least > 0) return "";
+  return fmt::format(
+      "{}: the nominal loss falls to {:.3g} rad^2/s^2 a revolution between {:.3g} and {:.3g} rad/s, and a "
+      "drum that coasts down loses more than nothing",
+      run.name, least, run.stop, run.top);
+}
+
+double run_to_run_of(const std::vector<CoastDownRun>& runs, bool linear) {
+  double slow = 0, fast = std::numeric_limits<double>::infinity();
+  std::vector<RevolutionLoss> losses;
+  for (const CoastDownRun& run : runs) {
+    losses.push_back(fit_loss({run}, linear).loss);
+    slow = std::max(slow, run.stop);
+    fast = std::min(fast, run.top);
+  }
+  const auto count = static_cast<double>(runs.size());
+  const std::array speeds{slow, std::sqrt(slow * fast), fast};
+  double squares = 0;  // of the differences, as shares of the mean loss, mean of the speeds
+  for (const double omega : speeds) {
+    double mean = 0;
+    for (const RevolutionLoss& loss : losses) mean += loss.at(omega) / count;
+    for (const RevolutionLoss& loss : losses)
+      squares += std::pow(loss.at(omega) / mean - 1, 2) / static_cast<double>(speeds.size());
+  }
+  return std::sqrt((squares + usual_run_to_run * usual_run_to_run) / count);
 }
 
 ExperimentFiles coast_down_files(const std::vector<CoastDownRun>& runs, const RevolutionLoss& nominal,
@@ -255,6 +297,9 @@ ExperimentFiles coast_down_files(const std::vector<CoastDownRun>& runs, const Re
   if (rotor_inertia) toml += fmt::format("\n[rotor]\ninertia_kg_m2 = {}\n", *rotor_inertia);
   toml += fmt::format("\n[loss]\nconstant = {}\nlinear = {}\nquadratic = {}\nnoise_sd = {}\n", nominal.constant,
                       nominal.linear, nominal.quadratic, nominal.noise_sd);
+  if (nominal.run_to_run) toml += fmt::format("run_to_run = {}\n", *nominal.run_to_run);
+  if (!nominal.accepted_defects.empty())
+    toml += fmt::format("accepted_defects = {}\n", toml_text(nominal.accepted_defects));
   files.collisions_csv = "condition,trial,collision,time_s,omega_minus_rad_s\n";
   std::size_t trial = 0;
   for (const CoastDownRun& run : runs) {

@@ -40,6 +40,7 @@ struct CoastDownRun {
   std::string name;
   std::vector<std::vector<Revolution>> blocks;  ///< each without a gap, at least 10 revolutions
   double top = 0;                               ///< speed where it starts [rad/s]
+  double stop = 0;                              ///< speed where it ends [rad/s]
   std::size_t revolutions = 0;                  ///< from the top to the stop
   std::size_t left_out = 0;                     ///< of those, in no block
   std::size_t missed = 0;                       ///< ticks that did not come: a period of two or more revolutions
@@ -67,6 +68,15 @@ struct LossFit {
 /// noise_sd from the median absolute residual.
 /// @throws std::invalid_argument for fewer than 20 transitions
 LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear);
+
+/// Returns what keeps a run from being a basis for anything: more than a tenth of its revolutions left out, or a loss
+/// that is not positive over its speeds. "" where nothing does.
+std::string objection(const CoastDownRun& run, const RevolutionLoss& nominal);
+
+/// Returns by how much the loss differs between runs of one drum: an sd, as a share of the loss, over the speeds that
+/// all of them had. One more difference of usual_run_to_run is counted, because runs are few.
+/// @param runs  two or more @param linear  as for fit_loss @throws std::invalid_argument as fit_loss
+double run_to_run_of(const std::vector<CoastDownRun>& runs, bool linear);
 
 /// The folder: one condition a run, blocks as trials in their order.
 ExperimentFiles coast_down_files(const std::vector<CoastDownRun>& runs, const RevolutionLoss& nominal,

@@ -73,7 +73,7 @@ class CollisionRows {
     const dynamics::Range& speeds =
         experiment_.system == System::rimless_wheel ? dynamics::range::speed : dynamics::range::rotor_speed;
     csv_.read(omega_minus, speeds, before);
-    csv_.read(omega_plus, speeds, c.omega_plus);
+    csv_.read(omega_plus, {.low = -speeds.high, .high = speeds.high}, c.omega_plus);
     if (!at) return;
     if (*at == experiment_.trials.size()) {
       MeasuredTrial& fresh = experiment_.trials.emplace_back();
@@ -98,6 +98,9 @@ class CollisionRows {
       csv_.refuse(collision, fmt::format("{} skips: collision {} of trial {} is due", c.number, due, roll.number));
     else if (due > 1)
       compare(roll.collisions.back(), c);
+    if (!roll.collisions.empty() && roll.collisions.back().omega_plus.value_or(0) < 0)
+      csv_.refuse(collision, fmt::format("trial {} goes on after an omega_plus_rad_s of {}: a wheel that turned back",
+                                         roll.number, *roll.collisions.back().omega_plus));
     roll.collisions.push_back(c);
   }
 
@@ -118,6 +121,24 @@ class CollisionRows {
   std::size_t rows_ = 0;
   std::size_t filled_[std::size(collision_columns)] = {};
 };
+
+// Returns the step of the last digit that the speeds have; 0 where they have more than seven or are too few to say.
+double last_digit(const Experiment& experiment) {
+  constexpr std::size_t enough = 20;
+  std::vector<double> speeds;
+  for (const MeasuredTrial& trial : experiment.trials)
+    for (const MeasuredCollision& c : trial.collisions) {
+      speeds.push_back(c.omega_minus);
+      if (c.omega_plus) speeds.push_back(*c.omega_plus);
+    }
+  if (speeds.size() < enough) return 0;
+  double in_one = 1;
+  for (int digits = 0; digits <= 7; ++digits, in_one *= 10)
+    if (std::ranges::all_of(speeds,
+                            [&](double speed) { return std::abs(speed * in_one - std::round(speed * in_one)) < 1e-6; }))
+      return 1 / in_one;
+  return 0;
+}
 
 // Reads trials.csv. Trials of the experiment stand in the order of collisions.entries().
 void read_outcomes(Experiment& experiment, TrialIndex& index, const TrialIndex& collisions, CsvReader& csv) {
@@ -237,6 +258,7 @@ Experiment parse_experiment(const ExperimentSource& source) {
   }
   defects.check();
   std::ranges::sort(experiment.trials, {}, &MeasuredTrial::number);
+  experiment.sensor.last_digit = last_digit(experiment);
   experiment.notes = notes_on(experiment);
   return experiment;
 }

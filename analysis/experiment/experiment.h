@@ -29,7 +29,16 @@ struct RevolutionLoss {
   double linear = 0;     ///< [rad/s]
   double quadratic = 0;  ///< [1]
   double noise_sd = 0;   ///< [rad^2/s^2], >= 0
+  /// By how much each of the terms differs from run to run: an sd, as a share of the loss, in [0, 0.5].
+  std::optional<double> run_to_run = {};
+  std::string accepted_defects =
+      {};  ///< of the runs it was fitted to, or of the trials, a sentence; "": there are none
+
+  /// Returns the mean loss at a speed [rad^2/s^2]. @param omega [rad/s]
+  double at(double omega) const { return constant + linear * omega + quadratic * omega * omega; }
 };
+/// RevolutionLoss::run_to_run of a drum of which one run is known.
+inline constexpr double usual_run_to_run = 0.03;
 
 struct Condition {
   std::string id;
@@ -42,6 +51,9 @@ struct Condition {
 struct Sensor {
   std::optional<double> rate;      ///< [Hz]
   std::optional<double> noise_sd;  ///< believed noise of the reported speeds [rad/s]
+  /// The step of the last digit in the speeds as they were printed [rad/s]; 0: none that tells; nothing: no speeds were
+  /// measured (a design).
+  std::optional<double> last_digit;
 };
 
 struct MeasuredCollision {
@@ -50,7 +62,7 @@ struct MeasuredCollision {
   std::optional<double> time;        ///< [s]
   std::optional<double> position;    ///< of the landing foot, down the ramp from the first [m]
   double omega_minus = 0;            ///< [rad/s]
-  std::optional<double> omega_plus;  ///< [rad/s]
+  std::optional<double> omega_plus;  ///< [rad/s]; below 0 the wheel turned back, after its trial's last collision
 };
 
 struct MeasuredTrial {

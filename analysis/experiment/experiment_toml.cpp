@@ -191,6 +191,8 @@ void read_rotor(Keys& root, Experiment& experiment) {
   experiment.loss.linear = keys->number("linear", true, range::loss).value_or(0);
   experiment.loss.quadratic = keys->number("quadratic", true, range::loss).value_or(0);
   experiment.loss.noise_sd = keys->number("noise_sd", true, range::loss_noise).value_or(0);
+  experiment.loss.run_to_run = keys->number("run_to_run", false, range::run_to_run);
+  experiment.loss.accepted_defects = keys->text("accepted_defects", false).value_or("");
   keys->finish();
 }
 

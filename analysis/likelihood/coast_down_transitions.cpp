@@ -28,8 +28,8 @@ constexpr double glitch_size = 10;  // spread of a revolution that the counter g
 
 // What differs between runs of one rig is no cause: bearings warm up, air gets thinner. Shares of the mean nominal
 // loss.
-constexpr double run_to_run = 0.03;                   // sd of each of its three terms
-constexpr double largest_run_to_run = 0.15;           // and how far they go
+constexpr double least_run_to_run = 0.001;            // no two runs are more alike
+constexpr double farthest_run = 5;                    // sds from run to run: how far its terms go
 constexpr double usual_ring = 0.3, largest_ring = 3;  // more loss where the rig rings
 constexpr double largest_wander = 0.3;                // sd of the loss around its terms
 constexpr double largest_noise = 1;                   // sd from one revolution to the next
@@ -100,6 +100,7 @@ class CoastDownTransitions : public TransitionModel {
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
   const std::vector<std::string>& notes() const override { return notes_; }
+  std::string accepted_defects() const override { return stated_.accepted_defects; }
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override;
@@ -157,6 +158,9 @@ CoastDownTransitions::CoastDownTransitions(const Experiment& experiment) : state
     throw std::invalid_argument("coast_down_transitions: the experiment is a rimless wheel");
   if (experiment.rotor_inertia) inertia_ = *experiment.rotor_inertia;
   if (!experiment.rotor_inertia) notes_.push_back("rotor.inertia_kg_m2 is missing: torques are those of 1 kg m^2");
+  if (!stated_.run_to_run)
+    notes_.push_back(fmt::format("loss.run_to_run is missing: losses that differ by {:.0f} % from run to run are taken",
+                                 100 * usual_run_to_run));
   sensor_ = experiment.sensor.noise_sd.value_or(0);
   for (const Condition& c : experiment.conditions) names_.push_back(c.id);
   for (const MeasuredTrial& trial : experiment.trials) {
@@ -179,7 +183,7 @@ void CoastDownTransitions::set_up_nuisances() {
   for (const Event& e : events_) typical_speed_ += e.speed * e.speed / static_cast<double>(events_.size());
   typical_speed_ = std::max(1e-3, std::sqrt(typical_speed_));
   const double w = typical_speed_;
-  typical_loss_ = std::max(1e-6, stated_.constant + stated_.linear * w + stated_.quadratic * w * w);
+  typical_loss_ = std::max(1e-6, stated_.at(w));
   const double noise = std::clamp(stated_.noise_sd, 1e-6, 0.5 * typical_loss_);
   double slowest = w, fastest = w;
   for (const Event& e : events_) {
@@ -197,8 +201,9 @@ void CoastDownTransitions::set_up_nuisances() {
       {"log wander_sd", std::log(0.1 * noise), 4, 1e-2, -20, std::log(largest_wander * typical_loss_)});
   set(Slot::log_wander_revolutions, {"log wander_revolutions", std::log(20), 1, 1e-2, std::log(2), std::log(500)});
   // The terms of the loss differ from run to run by shares of the mean nominal loss.
+  const double run_to_run = std::max(least_run_to_run, stated_.run_to_run.value_or(usual_run_to_run));
   const auto term = [&](const char* name, double scale) {
-    const double most = largest_run_to_run * typical_loss_, sd = run_to_run * typical_loss_;
+    const double sd = run_to_run * typical_loss_, most = farthest_run * sd;
     return Nuisance{name, 0, sd / scale, 1e-2 * sd / scale, -most / scale, most / scale};
   };
   set(Slot::constant, term("constant", 1));

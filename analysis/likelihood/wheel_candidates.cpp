@@ -254,8 +254,11 @@ WheelCandidate ramp_vibration() {
 WheelCandidate sensor_noise(const WheelDesign& design) {
   WheelCandidate c = spread("sensor_noise", "sd_rad_s", &Extension::noise_sd, 1, 0.01);
   c.candidate.exact = true;
+  FreeParameter& variance = c.candidate.parameters[0];
+  variance.step = std::min(variance.step, 0.01 * design.noise * design.noise);  // slopes are those at what is stated
+  if (design.noise_seen > 2 * design.noise) variance.likely = design.noise_seen * design.noise_seen;
   if (!design.noise_stated)
-    c.candidate.undecidable = "no sensor noise is stated: it was assumed or taken from the data";
+    c.candidate.undecidable = "the sensor noise is not the stated one: it was assumed or taken from the data";
   return c;
 }
 

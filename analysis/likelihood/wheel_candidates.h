@@ -16,6 +16,8 @@ struct WheelDesign {
   int legs = 8;
   bool legs_known = true, speeds_after = true;
   bool launches_stated = true, noise_stated = true;
+  double noise = 0.01;    ///< of reported speeds in the nominal model [rad/s]
+  double noise_seen = 0;  ///< by how much stances scatter [rad/s]; 0: too few to say
   std::size_t trials = 0;
   std::size_t launches = 0;         ///< for which a launch speed is stated
   std::size_t successive = 0;       ///< collisions with one before them in their trial

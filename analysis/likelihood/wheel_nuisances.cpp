@@ -17,7 +17,7 @@ std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::option
                                 std::log(0.5)};
   all[Slot::skew] = {"skew", 0, 0.06, 1e-3, -0.5, 0.5};
   all[Slot::tails] = {"tails", 0, 0.06, 1e-3, -0.4, 0.4};
-  if (noise) all[Slot::log_noise_sd] = {"log noise_sd", std::log(*noise), 0.5, 1e-3, std::log(1e-4), 0};
+  if (noise) all[Slot::log_noise_sd] = {"log noise_sd", std::log(*noise), 0.5, 1e-3, std::log(5e-6), 0};
   return all;
 }
 

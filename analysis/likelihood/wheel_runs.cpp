@@ -19,6 +19,8 @@ constexpr double assumed_noise = 0.01;     // sd of reported speeds where neithe
 constexpr std::size_t least_stances = 20;  // to take the noise from them
 constexpr double two_speeds = 1.2;         // sd of a stance's residual, in noises: of two speeds, one damped to 0.65
 constexpr double rounding = 1e-5;          // residuals below are those of printed digits [rad/s]
+constexpr double finest_noise = 1e-5;      // finer, and the model's own numbers would have to be exact [rad/s]
+constexpr double chance_of_deviation = 4;  // in shares of a median deviation times root n: three and a half of its sds
 
 std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
 
@@ -110,27 +112,45 @@ std::vector<double> stance_residuals(const WheelRuns& measured) {
   return residual;
 }
 
-void estimate_noise(WheelRuns& measured) {
-  measured.noise_stated = measured.noise > 0;
-  if (measured.noise_stated) return;
+// A stated noise is that of the sensor, the digits' comes to it, and a stated 0 means as good as the digits. Where
+// nobody stated it, or the stances are more exact than was said, they tell it.
+void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
+  const std::optional<double> stated = sensor.noise_sd;
+  const double digits = sensor.last_digit.value_or(0) / std::sqrt(12.0), least = std::max(finest_noise, digits);
+  measured.noise = std::hypot(stated.value_or(0), least);
+  measured.noise_stated = stated.has_value();
+  if (stated && digits > *stated)
+    measured.notes.push_back(
+        fmt::format("sensor noise of {:.2g} rad/s is stated: {:.2g} rad/s taken, that of the digits printed", *stated,
+                    measured.noise));
   std::vector<double> residual;
   if (measured.speeds_after) residual = stance_residuals(measured);
   if (residual.size() < least_stances) {
+    if (stated) return;
     measured.noise = assumed_noise;
     measured.notes.push_back(fmt::format("no sensor noise is stated: {} rad/s assumed", assumed_noise));
     return;
   }
-  const double middle = median(residual);
+  const double middle = median(residual), size = std::sqrt(static_cast<double>(residual.size()));
   for (double& r : residual) r = std::abs(r - middle);
   const double deviation = median(residual);
-  measured.noise = std::max(1e-4, median_deviation_to_sd * deviation / two_speeds);
-  measured.exact_stances = std::abs(middle) < rounding && deviation < rounding;
+  double seen = std::max(least, median_deviation_to_sd * deviation / two_speeds);
+  measured.noise_seen = seen;
+  if (seen < least * (1 + chance_of_deviation / size)) seen = least;
+  measured.exact_stances = stated.value_or(0) < rounding && std::abs(middle) < rounding && deviation < rounding;
   if (measured.exact_stances) {
+    measured.noise = seen;
     measured.notes.push_back("the stances repeat the model to rounding, as simulated ones do: they are left out");
-    return;
+  } else if (!stated) {
+    measured.noise = seen;
+    measured.notes.push_back(
+        fmt::format("no sensor noise is stated: {:.2g} rad/s taken from the stances", measured.noise));
+  } else if (sensor.last_digit && seen * (1 + chance_of_deviation / size) < measured.noise) {
+    measured.notes.push_back(fmt::format(
+        "sensor noise of {:.2g} rad/s is stated, and the stances are more exact: {:.2g} rad/s taken", *stated, seen));
+    measured.noise = seen;
+    measured.noise_stated = false;
   }
-  measured.notes.push_back(
-      fmt::format("no sensor noise is stated: {:.2g} rad/s taken from the stances", measured.noise));
 }
 
 }  // namespace
@@ -160,7 +180,6 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   measured.wheel = experiment.wheel;
   measured.law = experiment.contact.law;
   measured.conditions = experiment.conditions;
-  measured.noise = experiment.sensor.noise_sd.value_or(0);
   bool leg_column = true;
   const double count = static_cast<double>(experiment.trials.size());
   for (std::size_t t = 0; t < experiment.trials.size(); ++t) {
@@ -178,15 +197,16 @@ WheelRuns wheel_runs(const Experiment& experiment) {
         m.context.since_previous = *c.time - *trial.collisions[k - 1].time;
       m.context.run_share = count > 1 ? static_cast<double>(t) / (count - 1) : 0;
       m.before = c.omega_minus;
-      m.after = c.omega_plus;
+      if (c.omega_plus) m.after = std::max(0.0, *c.omega_plus);  // one that turned back has rested
       if (c.omega_plus && *c.omega_plus > 0) measured.speeds_after = true;
       run.collisions.push_back(m);
     }
     measured.runs.push_back(std::move(run));
   }
+  measured.noise = experiment.sensor.noise_sd.value_or(0);
   find_legs(measured, leg_column);
   complete_contexts(measured);
-  estimate_noise(measured);
+  estimate_noise(measured, experiment.sensor);
   for (WheelRun& run : measured.runs) mark_jam(measured, run);
   if (experiment.columns.time == Presence::none)
     measured.notes.push_back(

@@ -33,6 +33,7 @@ struct WheelRuns {
   std::vector<Condition> conditions;
   std::vector<WheelRun> runs;
   double noise = 0;                ///< sd of reported speeds [rad/s], stated, taken from the stances or assumed
+  double noise_seen = 0;           ///< by how much stances scatter [rad/s]; 0: too few to say
   double slack = 0;                ///< sd of a stance's outcome because its leg is not known [rad/s]
   bool noise_stated = true;        ///< noise is the experiment's own
   bool legs_known = true;          ///< by the column, or found

@@ -99,6 +99,8 @@ void WheelTransitions::set_up_parameters() {
   design.launches_stated = std::any_of(measured_.conditions.begin(), measured_.conditions.end(),
                                        [](const Condition& one) { return one.initial_speed.has_value(); });
   design.noise_stated = measured_.noise_stated;
+  design.noise = measured_.noise;
+  design.noise_seen = measured_.noise_seen;
   design.leg_lengths = measured_.wheel.leg_length;
   design.law = measured_.law;
   design.furthest = 0.1;

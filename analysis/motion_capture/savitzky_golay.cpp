@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
+#include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 
@@ -24,7 +26,7 @@ SavitzkyGolay::SavitzkyGolay(int window, int degree, int derivative) : window_(w
     for (int p = 0; p <= degree; ++p) powers(i, p) = std::pow(position(i), p);
   // Normal equations: at these degrees and on [-1, 1] they lose no more than a few digits.
   const Eigen::MatrixXd fit =
-      (powers.transpose() * powers).ldlt().solve(powers.transpose());  // samples to coefficients
+      markov::solve_columns(powers.transpose() * powers, powers.transpose());  // samples to coefficients
   weights_.resize(static_cast<std::size_t>(window) * static_cast<std::size_t>(window));
   for (int at = 0; at < window; ++at) {
     Eigen::RowVectorXd value = Eigen::RowVectorXd::Zero(degree + 1);

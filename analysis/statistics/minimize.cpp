@@ -1,6 +1,6 @@
 #include "analysis/statistics/minimize.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace metastable::analysis {
 

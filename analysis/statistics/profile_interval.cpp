@@ -1,6 +1,5 @@
 #include "analysis/statistics/profile_interval.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +7,7 @@
 #include <vector>
 
 #include "analysis/statistics/interval_95.h"
+#include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 namespace {
@@ -161,8 +161,8 @@ std::pair<double, bool> end(Profile& profile, double from, double from_root, dou
 
 Eigen::MatrixXd contour_axes(const Eigen::MatrixXd& hessian) {
   constexpr double flattest = 400;  // 1 / 0.05^2
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian);
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(flattest).cwiseSqrt().cwiseInverse().asDiagonal();
+  const markov::SymmetricEigen eigen = markov::symmetric_eigen(hessian);
+  return eigen.vectors * eigen.values.cwiseMax(flattest).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
 std::vector<ProfileInterval> profile_intervals(const SmoothFunction& cost, const std::vector<Mode>& modes,

@@ -35,6 +35,7 @@ inline constexpr Range rotor_inertia{.low = 1e-12, .high = 1e12};   ///< [kg m^2
 inline constexpr Range rotor_speed{.low = 0, .high = 100000};       ///< [rad/s]
 inline constexpr Range loss{.low = -1e9, .high = 1e9};              ///< coefficients of a rotor's loss
 inline constexpr Range loss_noise{.low = 0, .high = 1e9};           ///< [rad^2/s^2]
+inline constexpr Range run_to_run{.low = 0, .high = 0.5};           ///< of a rotor's loss, a share
 inline constexpr Range log{.low = 0, .high = 1e15};                 ///< anything in a counter's log
 inline constexpr Range rate{.low = 0.001, .high = 1e7};             ///< of a sensor [Hz]
 inline constexpr Range time{.low = -1e10, .high = 1e10};            ///< by whatever clock [s]

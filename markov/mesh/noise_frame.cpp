@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+
+#include "markov/dense_matrix.h"
 
 namespace metastable::markov {
 namespace {
@@ -106,7 +108,7 @@ std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double
     q.push_back(b * b.transpose());
     revolution = a.back() * revolution;
   }
-  const double growth = revolution.eigenvalues().cwiseAbs().maxCoeff();
+  const double growth = spectral_radius(revolution);
   if (!(growth < 1))
     throw MapError(fmt::format("return map: without noise its orbit through {} is unstable (largest eigenvalue {:.6g})",
                                describe_state(map, {orbit[0].data(), static_cast<std::size_t>(map.dimension)}),
@@ -121,13 +123,13 @@ std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double
         const VectorXd sd = covariance.diagonal().cwiseSqrt();
         if (!(sd.minCoeff() > 0)) throw MapError("return map: the noise does not move every number of the state");
         const MatrixXd correlation = sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();
-        const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(correlation);
-        const VectorXd widths = eigen.eigenvalues().reverse().cwiseMax(0).cwiseSqrt();
+        const SymmetricEigen eigen = symmetric_eigen(correlation);
+        const VectorXd widths = eigen.values.reverse().cwiseMax(0).cwiseSqrt();
         const VectorXd used = widths.cwiseMax(kNarrowest * widths[0]);
-        const MatrixXd axes = sd.asDiagonal() * eigen.eigenvectors().rowwise().reverse() * used.asDiagonal();
+        const MatrixXd axes = sd.asDiagonal() * eigen.vectors.rowwise().reverse() * used.asDiagonal();
         frames[p].centre.assign(orbit[p].begin(), orbit[p].end());
         frames[p].axes = row_major(axes);
-        frames[p].inverse = row_major(axes.inverse());
+        frames[p].inverse = row_major(inverse_of(axes));
         frames[p].sds.assign(widths.begin(), widths.end());
       }
       covariance = a[p] * covariance * a[p].transpose() + q[p];

@@ -163,10 +163,15 @@ Command coast_down() {
         o.add_flag("linear", "Fit a loss proportional to omega even where it is within five standard errors of none");
         o.add("rotor-inertia", "KGM2", "", "Of the drum [kg m^2]: turns losses into torques",
               dynamics::range::rotor_inertia);
+        o.add_flag(
+            "accept-defects",
+            "Take a log of which more than a tenth of the revolutions is left out, or a loss that is not positive "
+            "over its speeds: every verdict will repeat it");
         o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
       },
       [](const Options& o, const std::string& line) {
         CoastDownRequest request;
+        request.accept_defects = o.flag("accept-defects");
         request.logs = o.all("LOG");
         request.options.stop = o.number("stop");
         request.options.block = o.count("block", 10, 100000);

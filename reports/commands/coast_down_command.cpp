@@ -25,6 +25,16 @@ void keep(analysis::CoastDownRun& run, const std::string& which) {
   run.blocks = std::move(kept);
 }
 
+// Refuses what is objected to, or takes it down for every verdict to repeat.
+void accept(const std::string& objection, const CoastDownRequest& request, analysis::RevolutionLoss& nominal) {
+  if (objection.empty()) return;
+  if (!request.accept_defects)
+    throw std::invalid_argument(fmt::format(
+        "{}: no basis for a model (--accept-defects takes it, and every verdict will repeat this)", objection));
+  if (!nominal.accepted_defects.empty()) nominal.accepted_defects += "; ";
+  nominal.accepted_defects += objection;
+}
+
 }  // namespace
 
 void run_coast_down(const CoastDownRequest& request) {
@@ -56,6 +66,7 @@ void run_coast_down(const CoastDownRequest& request) {
     const bool linear = request.linear || std::abs(fit.loss.linear) > clearly * fit.linear_error;
     if (!linear) fit = analysis::fit_loss(runs, false);
     nominal = fit.loss;
+    if (runs.size() > 1) nominal.run_to_run = analysis::run_to_run_of(runs, linear);
     origin = "nominal loss fitted robustly to these runs";
     fmt::print("loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}", nominal.constant, fit.constant_error);
     if (linear) fmt::print(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error);
@@ -68,6 +79,15 @@ void run_coast_down(const CoastDownRequest& request) {
     nominal = other.loss;
     origin = fmt::format("nominal loss of the experiment \"{}\"", other.title);
   }
+  if (nominal.run_to_run)
+    fmt::print("from run to run: {:.2g} % of the loss, {}\n", 100 * *nominal.run_to_run,
+               request.nominal.empty() ? fmt::format("from {} runs and one difference of {:.0f} %", runs.size(),
+                                                     100 * analysis::usual_run_to_run)
+                                       : "as the nominal experiment says");
+  else
+    fmt::print("from run to run: {:.0f} % of the loss assumed, because one run does not say (give several)\n",
+               100 * analysis::usual_run_to_run);
+  for (const analysis::CoastDownRun& run : runs) accept(analysis::objection(run, nominal), request, nominal);
   Provenance provenance{request.command, origin, 0, version()};
   const analysis::ExperimentFiles files = analysis::coast_down_files(
       runs, nominal, request.rotor_inertia, "Coast-down of " + runs.front().name, provenance_lines(provenance));

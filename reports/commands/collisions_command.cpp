@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -179,6 +180,8 @@ void run_collisions(const CollisionsRequest& request) {
         "empty\n",
         unfitted);
   for (const auto& [why, trials] : stopped) fmt::print("{} trials without a collision: {}\n", trials, why);
+  if (const auto trials = std::count(cut.begin(), cut.end(), 1); trials > 0)
+    fmt::print("{} trials roll on after collision {}, where --collisions stops them\n", trials, limit);
   print_cut_rests(source, files.collisions, angles, cut, limit);
   if (known)
     print_comparison(analysis::compare_collisions(*known, angles, found, request.peak, request.finder.collisions));

@@ -104,6 +104,7 @@ struct CoastDownRequest {
   std::string nominal;  ///< folder whose [loss] is taken; "": fitted to the logs
   std::string blocks = "all";
   std::optional<double> rotor_inertia;
+  bool accept_defects = false;  ///< of which every verdict then speaks
   std::string out;
   std::string command;
 };

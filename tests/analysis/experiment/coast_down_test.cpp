@@ -72,16 +72,36 @@ TEST(CoastDown, ReportsMissedDoubleAndDisplacedTicks) {
   EXPECT_NEAR(fit.loss.constant, 0.15, 4 * fit.constant_error);
 }
 
+TEST(CoastDown, ObjectsToLogsThatAreNoBasis) {
+  std::vector<double> times = ticks(0.15, 0.002, 0.02, 4);
+  EXPECT_EQ(objection(run_of(times), {0.15, 0, 0.002, 0.02}), "");
+  EXPECT_EQ(objection(run_of(times), {0.15, -0.05, 0.002, 0.02}),
+            ": the nominal loss falls to -0.162 rad^2/s^2 a revolution between 5 and 30.8 rad/s, and a drum that "
+            "coasts down loses more than nothing");
+  for (std::size_t k = 400; k > 200; k -= 8) times.erase(times.begin() + static_cast<std::ptrdiff_t>(k));
+  EXPECT_NE(objection(run_of(times), {0.15, 0, 0.002, 0.02}).find("revolutions left out for ticks"), std::string::npos);
+}
+
+TEST(CoastDown, SaysHowRunsDiffer) {
+  const CoastDownRun first = run_of(ticks(0.15, 0.002, 0.005, 3)), same = run_of(ticks(0.15, 0.002, 0.005, 4)),
+                     other = run_of(ticks(0.165, 0.0022, 0.005, 5));  // a tenth more
+  EXPECT_NEAR(run_to_run_of({first, same}, false), usual_run_to_run / std::sqrt(2.0), 0.005);
+  EXPECT_NEAR(run_to_run_of({first, other}, false), std::sqrt((2 * 0.05 * 0.05 + 0.03 * 0.03) / 2), 0.008);
+}
+
 TEST(CoastDown, FolderIsReadBack) {
   CoastDownRun run = run_of(ticks(0.15, 0.002, 0.05, 5));
   run.name = "free";
-  const ExperimentFiles files = coast_down_files({run}, {0.15, 0, 0.002, 0.05}, 2.5, "drum \"A\"", {"a comment"});
+  const ExperimentFiles files =
+      coast_down_files({run}, {0.15, 0, 0.002, 0.05, 0.04, "its \"ticks\""}, 2.5, "drum \"A\"", {"a comment"});
   const Experiment e =
       parse_experiment({"folder", files.experiment_toml, files.collisions_csv, std::nullopt, std::nullopt});
   EXPECT_EQ(e.system, System::coast_down);
   EXPECT_EQ(e.title, "drum \"A\"");
   EXPECT_EQ(e.trials.size(), run.blocks.size());
   EXPECT_EQ(e.loss.quadratic, 0.002);
+  EXPECT_EQ(e.loss.run_to_run, 0.04);
+  EXPECT_EQ(e.loss.accepted_defects, "its \"ticks\"");
   EXPECT_EQ(e.rotor_inertia, 2.5);
 }
 
@@ -99,6 +119,8 @@ TEST(CoastDown, NamesWhatIsWrongWithALog) {
   EXPECT_EQ(message("1,x,3,4,5\n"), "log.csv:1:3: drum_speed_km_h: 'x' is not a number");
   EXPECT_EQ(message("1,2,3.5,4,5\n"), "log.csv:1:5: drum_revolutions: 3.5 is no whole number");
   EXPECT_EQ(message("1,-2,3,4,5\n"), "log.csv:1:3: drum_speed_km_h: -2 is outside [0, 1e+15]");
+  EXPECT_EQ(message("1,2,3,4,5\n\n1,2,3,4,5\n"), "log.csv:2:1: time_us: '' is not a number");
+  EXPECT_EQ(message("1,2,3,4,5\r\n\r\n\n"), "log.csv: 0 drum revolutions are too few, 20 are needed");
   EXPECT_EQ(message("9,2,3,4,5\n8,2,3,4,5\n"), "log.csv:2:1: time_us: falls to 8");
   EXPECT_EQ(message("9,2,3,4,5\n10,2,2,4,5\n"), "log.csv:2:1: drum_revolutions: falls to 2");
   EXPECT_EQ(message("1,2,3,4,5\n"), "log.csv: 0 drum revolutions are too few, 20 are needed");

@@ -201,6 +201,11 @@ TEST(Experiment, NamesWhatIsWrongWithTheRows) {
                            "a,1,1,1.0,1.0,5\na,1,2,0.9,1.0,5\n")),
             (Strings{"collisions.csv:3:7: time_s: 0.9 s is not after the collision before (1 s)",
                      "collisions.csv:3:11: position_m: 1 m is not below the collision before (1 m)"}));
+  EXPECT_EQ(defects(source(description,
+                           "condition,trial,collision,omega_minus_rad_s,omega_plus_rad_s\n"
+                           "a,1,1,5,-0.1\na,1,2,5,-0.1\n")),
+            (Strings{"collisions.csv:3:5: collision: trial 1 goes on after an omega_plus_rad_s of -0.1: a wheel that "
+                     "turned back"}));
 }
 
 TEST(Experiment, NamesTrialsThatAreInOneFileOnly) {

@@ -5,11 +5,50 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <random>
 
+#include "analysis/experiment/experiment_folder.h"
 #include "tests/analysis/diagnosed.h"
+#include "tests/analysis/settings.h"
 
 namespace metastable::analysis {
 namespace {
+
+// Trials simulated under the nominal model, with this noise on every speed, printed with so many digits.
+WheelRuns printed(double noise, int digits, std::optional<double> stated) {
+  Setting setting = paper_setting(7.02, false);
+  ExperimentFiles files = experiment_files(setting, simulate_trials(setting, {.trials = 60, .seed = 5}), "printed", {});
+  Experiment e = parse_experiment(source_of(files, "printed"));
+  std::mt19937_64 bits(7);
+  std::normal_distribution<double> error(0, noise);
+  const double in_one = std::pow(10, digits);
+  const auto print = [&](double speed) { return std::round(std::max(0.01, speed + error(bits)) * in_one) / in_one; };
+  for (MeasuredTrial& trial : e.trials)
+    for (MeasuredCollision& c : trial.collisions) {
+      c.omega_minus = print(c.omega_minus);
+      if (*c.omega_plus > 0) c.omega_plus = print(*c.omega_plus);
+    }
+  e.sensor = {.rate = {}, .noise_sd = stated, .last_digit = 1 / in_one};
+  return wheel_runs(e);
+}
+
+TEST(WheelRuns, DigitsAreNoise) {
+  for (const std::optional<double> stated : {std::optional<double>(), std::optional(0.0)})
+    for (const int digits : {2, 3, 4})
+      EXPECT_NEAR(printed(0, digits, stated).noise * std::pow(10, digits), 1 / std::sqrt(12.0), 0.02) << digits;
+  EXPECT_TRUE(printed(0, 6, 0.0).exact_stances);
+}
+
+TEST(WheelRuns, NoiseIsWhatIsStatedUnlessTheStancesAreMoreExact) {
+  EXPECT_NEAR(printed(0.1, 4, 0.02).noise, 0.02, 1e-4);
+  EXPECT_TRUE(printed(0.1, 4, 0.02).noise_stated);
+  EXPECT_NEAR(printed(0.1, 4, 0.02).noise_seen, 0.1, 0.02);
+  EXPECT_NEAR(printed(0.003, 4, 0.02).noise, 0.003, 0.001);
+  EXPECT_FALSE(printed(0.003, 4, 0.02).noise_stated);
+  EXPECT_NEAR(printed(0.1, 4, 0.0).noise, 3e-5, 1e-5);
+  EXPECT_NEAR(printed(0.1, 4, {}).noise, 0.1, 0.02);
+}
 
 TEST(WheelRuns, LegsThatWereNotNotedAreFoundFromTheStances) {
   const auto design = wheel_transitions(test::wheel_design(20, 10));

@@ -1,0 +1,35 @@
+#include "markov/dense_matrix.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace metastable::markov {
+
+Eigen::VectorXd solve_symmetric(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right) {
+  return matrix.ldlt().solve(right);
+}
+
+Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
+  return matrix.ldlt().solve(right);
+}
+
+SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+double spectral_radius(Eigen::MatrixXd matrix) {
+  double log_radius = 0, power = 1;
+  for (int squaring = 0; squaring < 40; ++squaring, power *= 2) {
+    const double size = matrix.norm();
+    if (!(size > 0)) return 0;
+    log_radius += std::log(size) / power;
+    matrix /= size;
+    matrix *= matrix;
+  }
+  return std::exp(log_radius);
+}
+
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix) { return matrix.inverse(); }
+
+}  // namespace metastable::markov
