@@ -16,8 +16,8 @@ constexpr dynamics::Range gigabytes{.low = 0.001, .high = 1e6};
 constexpr double garcia_slope_deg = 0.5156620156177409;  // 0.009 rad
 
 analysis::WalkerSetting base_setting(const Options& o, const std::vector<std::string>& own) {
-  static const std::vector<std::string> all{"walker",  "slope", "slopes",  "slope-sd", "terrain", "memory",
-                                            "spacing", "seed",  "threads", "json",     "out"};
+  static const std::vector<std::string> all{"walker",          "slope",   "slopes", "slope-sd", "terrain", "memory",
+                                            "simulated-steps", "spacing", "seed",   "threads",  "json",    "out"};
   for (const std::string& name : o.given_names())
     if (std::ranges::find(all, name) == all.end() && std::ranges::find(own, name) == own.end())
       throw std::invalid_argument(fmt::format("--{}: has no meaning with --walker", name));
@@ -36,6 +36,8 @@ WalkerRequest base_request(const Options& o, const std::string& command_line) {
   if (o.has("memory") && o.given("memory"))
     request.study.most_bytes = static_cast<std::size_t>(o.number("memory") * 0x1p30);
   if (o.has("spacing") && o.given("spacing")) request.study.spacing = o.number("spacing");
+  if (o.has("simulated-steps") && o.given("simulated-steps"))
+    request.study.simulated_steps = o.whole("simulated-steps", 0, 1000000000000);
   if (o.has("json")) request.json = o.text("json");
   if (o.has("out")) request.out = o.text("out");
   request.command = command_line;
@@ -67,13 +69,15 @@ void add_walker(Options& o, const std::string& sd, bool meshes) {
         "With --walker: of the coarsest mesh's nodes, in stationary sds of the noise (default: by dimension, 0.5, 0.7, "
         "1.4); the two or three finer ones follow by sqrt 2",
         spacings);
+  o.add("simulated-steps", "N", "",
+        "With --walker: about how many steps the direct simulation beside takes, 0..10^12 (default: 2000000)");
   o.add("memory", "GB", "", "With --walker: most memory of its meshes (default: 3); what they would take is foreseen",
         gigabytes);
 }
 
 bool asks_for_walker(const Options& o) {
   if (o.given("walker")) return true;
-  for (const char* name : {"slope-sd", "terrain", "spacing", "memory"})
+  for (const char* name : {"slope-sd", "terrain", "spacing", "simulated-steps", "memory"})
     if (o.has(name) && o.given(name))
       throw std::invalid_argument(fmt::format("--{}: has a meaning with --walker only", name));
   return false;
