@@ -24,7 +24,7 @@ set(ROOMS
   "analysis/description: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/study analysis/experiment"
   "analysis/likelihood: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment"
   "analysis/blind: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment analysis/likelihood"
-  "analysis/motion_capture: dynamics/wheel dynamics/return_map analysis/statistics analysis/experiment"
+  "analysis/motion_capture: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/experiment"
   "analysis/paper: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/study analysis/experiment analysis/description"
   "analysis/sensitivity: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/return_map analysis/statistics analysis/study"
   "reports/output: analysis/statistics analysis/experiment"

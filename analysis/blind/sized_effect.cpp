@@ -57,6 +57,11 @@ SizedEffect contact_distribution(const Draw& d) {
   });
 }
 
+SizedEffect bounce(const Draw& d) {
+  const double onset = std::max(0.0, d.dice.uniform(-4, 5));  // every other wheel hops at all speeds
+  return sized(d, 0.02, 1, [onset](double s) { return Values{{"rebound_lost", {s}}, {"onset_rad_s", {onset}}}; });
+}
+
 SizedEffect initial_speed(const Draw& d) {
   const double a = d.dice.uniform(-0.25, 0.25) * std::numbers::pi;
   return sized(d, 0.08, 0.6,
@@ -166,7 +171,7 @@ const std::map<std::string, Entry>& all() {
         {":spread", ":memory", "phase"}}},
       {"sensor_bias",
        {[](const D& d) { return either_sign(d, "bias_rad_s", 0.005, 0.3, {"omega_plus_rad_s"}); }, {"phase", ":mean"}}},
-      {"bounce", {[](const D& d) { return plain(d, "rebound_lost", 0.02, 1); }, {"phase", "speed", "condition"}}},
+      {"bounce", {bounce, {"phase", "speed", "condition"}}},
       {"ramp_vibration", {ramp_vibration, {"time", "speed", "phase", ":spread"}}},
       {"slip_reversal",
        {[](const D& d) { return sized(d, 1, 1, [](double) { return Values{}; }); },

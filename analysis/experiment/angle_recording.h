@@ -16,6 +16,8 @@ struct AngleRecording {
   std::vector<double> time, angle_rad;
 };
 
+inline constexpr double recorded_after_rest_s = 0.3;  ///< of a wheel that has come to rest [s]
+
 struct CameraOptions {
   double rate = 120;             ///< frames per second [Hz], [10, 100000]
   double noise_sd_rad = 0.0002;  ///< white noise of the angle, >= 0

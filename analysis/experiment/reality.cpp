@@ -1,6 +1,5 @@
 #include "analysis/experiment/reality.h"
 
-#include <Random123/philox.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/experiment/angle_recording.h"
 #include "analysis/experiment/csv_field.h"
 #include "analysis/experiment/experiment_notes.h"
 #include "analysis/statistics/random.h"
@@ -16,8 +16,6 @@
 
 namespace metastable::analysis {
 namespace {
-
-constexpr double recorded_after_rest = 0.3;  // [s] recorded of a wheel that has come to rest
 
 // Returns the number that a reader finds where the files hold this one.
 double as_written(double value) {
@@ -39,29 +37,22 @@ dynamics::Wheel stated_wheel(const Setting& setting) {
   return wheel;
 }
 
-// Draws a uniform in (0, 1) from Philox4x64 at counter (index, number, stream), key (seed), apart from the
-// laboratory's.
-double uniform(std::uint64_t seed, std::uint64_t index, std::uint64_t number, std::uint64_t stream) {
-  const r123::Philox4x64::ctr_type counter{{index, number, stream, 0}};
-  const auto bits = r123::Philox4x64()(counter, r123::Philox4x64::key_type{{seed, 0}});
-  return unit_interval(bits[0]);
-}
-
 std::string angles(const std::string& id, const dynamics::LaboratoryTrial& trial, std::size_t index,
                    const CameraOptions& camera) {
   const bool rested = trial.outcome == dynamics::Outcome::rest;
   const double last = trial.collisions.back().time, turned = trial.motion.back().time;
-  const double begin = trial.motion.front().time, end = rested ? 2 * turned - last + recorded_after_rest : turned;
-  const double offset = uniform(camera.seed, index, 0, 201);
+  const double begin = trial.motion.front().time, end = rested ? 2 * turned - last + recorded_after_rest_s : turned;
+  const double offset = uniform_at(camera.seed, index, 0, 201);
   std::string rows;
   for (std::uint64_t k = 0;; ++k) {
     const double time = begin + (static_cast<double>(k) + offset) / camera.rate;
     if (!(time < end)) return rows;
     // A wheel that turns back falls the way it came, onto both feet.
     const double moment = rested && time > turned ? std::max(last, 2 * turned - time) : time;
-    const double noise = camera.noise_sd_rad > 0
-                             ? camera.noise_sd_rad * dynamics::normal_quantile(uniform(camera.seed, index, k + 1, 201))
-                             : 0;
+    const double noise =
+        camera.noise_sd_rad > 0
+            ? camera.noise_sd_rad * dynamics::normal_quantile(uniform_at(camera.seed, index, k + 1, 201))
+            : 0;
     fmt::format_to(std::back_inserter(rows), "{},{},{:.6f},{:.{}f}\n", id, index + 1, time,
                    dynamics::angle_at(trial.motion, moment) + noise, camera.decimals);
   }
@@ -80,6 +71,11 @@ dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& 
   const Setting& first = conditions.front().setting;
   if (first.correlation != 0 || !first.pairs.empty())
     throw std::invalid_argument("laboratory: restitution and friction are independent normals there");
+  if (first.law == dynamics::Law::settled)
+    throw std::invalid_argument(
+        "laboratory: its wheel has no flight and no sliding feet, which settled is about; published, coulomb or "
+        "plastic "
+        "are judged there");
   if (first.rebound_lost != 0)
     throw std::invalid_argument("laboratory: the share of the rebound that is lost is its effect 'bounce'");
   if (options.collisions < 1 || options.collisions > 100000)
@@ -109,8 +105,9 @@ dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& 
   }
   if (options.shuffled)  // Fisher-Yates
     for (std::size_t i = setup.order.size() - 1; i > 0; --i)
-      std::swap(setup.order[i],
-                setup.order[static_cast<std::size_t>(uniform(options.seed, i, 0, 200) * static_cast<double>(i + 1))]);
+      std::swap(
+          setup.order[i],
+          setup.order[static_cast<std::size_t>(uniform_at(options.seed, i, 0, 200) * static_cast<double>(i + 1))]);
   return setup;
 }
 

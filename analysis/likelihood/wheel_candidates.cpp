@@ -262,6 +262,27 @@ WheelCandidate sensor_noise(const WheelDesign& design) {
   return c;
 }
 
+// Variants are the speeds at which feet begin to hop: 0, and some between those that were seen.
+WheelCandidate bounce(const WheelDesign& design) {
+  WheelCandidate c;
+  c.candidate.id = "bounce";
+  c.candidate.parameters = {{0, 0, 1, 1e-3, 0.05}};
+  c.candidate.variants = {{0.0}};
+  for (const double speed : design.speeds) c.candidate.variants.push_back({speed});
+  if (design.speeds.size() > 1)
+    c.candidate.refine = {0.5 * (design.speeds.back() - design.speeds.front()) /
+                          static_cast<double>(design.speeds.size() - 1)};
+  c.candidate.report = [](const Values& variant, const Values& v) {
+    return std::vector<NamedValue>{{"rebound_lost", v[0]}, {"onset_rad_s", variant[0]}};
+  };
+  c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0]}}; };
+  c.apply = [](Extension& e, const Values& variant, const Values& v) {
+    e.rebound_lost = v[0];
+    e.hops_from = variant[0];
+  };
+  return c;
+}
+
 WheelCandidate slip_reversal(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "slip_reversal";
@@ -300,7 +321,7 @@ std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
       contact_outliers(),
       sensor_noise(design),
       sensor_bias(design),
-      simple("bounce", "rebound_lost", &Extension::rebound_lost, {0, 0, 1, 1e-3, 0.05}),
+      bounce(design),
       needing(2, design.successive, after_another, ramp_vibration()),
       slip_reversal(design),
   };

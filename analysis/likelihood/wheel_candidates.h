@@ -23,6 +23,7 @@ struct WheelDesign {
   std::size_t successive = 0;       ///< collisions with one before them in their trial
   std::size_t away = 0;             ///< collisions away from the start of the ramp
   std::vector<double> leg_lengths;  ///< stated [m]
+  std::vector<double> speeds;       ///< between the measured omega-, rising: quantiles [rad/s]
   double furthest = 1.8;            ///< landing foot [m]
   double ramp_length = 3.66;        ///< [m]
   dynamics::Law law = dynamics::Law::published;

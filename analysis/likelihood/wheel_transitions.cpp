@@ -106,6 +106,14 @@ void WheelTransitions::set_up_parameters() {
   design.furthest = 0.1;
   for (const WheelRun& run : measured_.runs)
     design.furthest = std::max(design.furthest, run.collisions.back().context.position);
+  std::vector<double> speeds;
+  for (const WheelRun& run : measured_.runs)
+    for (const RunCollision& m : run.collisions) speeds.push_back(m.before);
+  std::sort(speeds.begin(), speeds.end());
+  for (const double share : {0.15, 0.3, 0.45, 0.6, 0.75, 0.9})
+    if (const double speed = speeds[static_cast<std::size_t>(share * static_cast<double>(speeds.size()))];
+        design.speeds.empty() || speed > design.speeds.back())
+      design.speeds.push_back(speed);
   design.trials = measured_.runs.size();
   for (const Event& e : events_) {
     design.launches += e.kind == EventKind::launch;

@@ -1,6 +1,5 @@
 #include "analysis/statistics/kaplan_meier.h"
 
-#include <Random123/philox.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,13 +16,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int resamples = 2000;
-
-// Draws a uniform in (0, 1) from Philox4x64 at counter (replicate, number, 2).
-double uniform(std::uint64_t seed, std::uint64_t replicate, std::uint64_t number) {
-  const r123::Philox4x64::ctr_type counter{{replicate, number, 2, 0}};
-  const r123::Philox4x64::key_type key{{seed, 0}};
-  return unit_interval(r123::Philox4x64()(counter, key)[0]);
-}
+constexpr std::uint64_t stream = 2;  // of random numbers
 
 // Returns the area under S over [0, steps) and S there.
 struct Restricted {
@@ -101,12 +94,13 @@ ExpectedSteps expected_steps(std::span<const ObservedSteps> trials, int steady_f
   std::vector<ObservedSteps> resampled(trials.size());
   for (std::uint64_t r = 0; r < resamples; ++r) {
     for (std::size_t t = 0; t < trials.size(); ++t)
-      resampled[t] = trials[static_cast<std::size_t>(uniform(seed, r, t + 1) * static_cast<double>(trials.size()))];
+      resampled[t] =
+          trials[static_cast<std::size_t>(uniform_at(seed, r, t + 1, stream) * static_cast<double>(trials.size()))];
     const Restricted one = restricted(resampled, steady ? transient : points.back().steps);
     double steps = one.area;
     if (steady && one.survival > 0)
-      steps += one.survival /
-               boost::math::quantile(boost::math::beta_distribution<>(d + 0.5, m - d + 0.5), uniform(seed, r, 0));
+      steps += one.survival / boost::math::quantile(boost::math::beta_distribution<>(d + 0.5, m - d + 0.5),
+                                                    uniform_at(seed, r, 0, stream));
     replicates.push_back(steps);
   }
   std::sort(replicates.begin(), replicates.end());

@@ -18,6 +18,10 @@ r123::Philox4x64::ctr_type words(const r123::Philox4x64::ctr_type& counter, std:
 
 }  // namespace
 
+double uniform_at(std::uint64_t seed, std::uint64_t index, std::uint64_t number, std::uint64_t stream) {
+  return unit_interval(words({{index, number, stream, 0}}, seed, 0)[0]);
+}
+
 std::vector<double> normal_multipliers(std::uint64_t seed, std::uint64_t draw, DrawStream stream, std::size_t count) {
   std::vector<double> multipliers(count);
   for (std::size_t t = 0; t < count; t += 4) {

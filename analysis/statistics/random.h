@@ -10,6 +10,9 @@ namespace metastable::analysis {
 /// The centre of one of 2^52 equal cells of (0, 1), picked by the upper bits of a random word: never 0 or 1.
 inline double unit_interval(std::uint64_t word) { return (static_cast<double>(word >> 12) + 0.5) * 0x1p-52; }
 
+/// Draws a uniform in (0, 1) from Philox4x64 at counter (index, number, stream), key (seed).
+double uniform_at(std::uint64_t seed, std::uint64_t index, std::uint64_t number, std::uint64_t stream);
+
 /// What draws under one seed are for; each has numbers of its own.
 enum class DrawStream : std::uint64_t {
   chance_of_effects = 1,  ///< multipliers of the effects' scores

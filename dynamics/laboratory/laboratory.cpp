@@ -263,7 +263,8 @@ class Laboratory::Roll {
     impact.contact_mass = lab_.model_.contact_mass;
     const ImpactWork work = integrate_impact(impact);
     if (work.jammed) return 0;
-    double loss = factor * (work.total() + c_.rebound_lost * work.released);
+    const double hop = touch.before.speed >= c_.hops_from ? c_.rebound_lost * work.released : 0;
+    double loss = factor * (work.total() + hop);
     if (c_.stored > 0) {
       const double lost = loss;
       if (losses_ > 1) loss -= c_.stored * (last_loss_ - loss_sum_ / losses_);

@@ -36,6 +36,7 @@ struct LaboratoryChanges {
   double outlier_share = 0, outlier_ratio = 1;
   double sensor_noise = 0, sensor_bias = 0;
   double rebound_lost = 0;
+  double hops_from = 0;  // omega- [rad/s]
   double vibration = 0, vibration_hz = 10;
   bool slip_reversal = false;
   // outside the catalogue

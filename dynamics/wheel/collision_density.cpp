@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "dynamics/wheel/coulomb_law.h"
+#include "dynamics/wheel/published_roots.h"
 #include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::dynamics {
@@ -99,98 +100,71 @@ double contact_duration(double restitution) {
   return std::sqrt(std::numbers::pi * std::numbers::pi + log_eta * log_eta);
 }
 
-// Describes one collision under `published` that ends at one omega+. In units of M v0^2 r^2 / 2 its loss is
-// [alpha D + (beta + delta D) mu (c mu - b)] / D^2 with D = a - b mu.
+// Gives what the restitutions of one collision under `published` contribute to one omega+.
 class PublishedCollision {
  public:
   PublishedCollision(const ContactModel& model, const ContactSpread& contact, const Collision& c, double before,
                      double after, const CollisionChange& change, double speed)
       : contact_(contact), change_(change), friction_(contact, change) {
     const double r2 = c.landing_length * c.landing_length;
-    a_ = r2 + c.contact_x * c.contact_x;
-    b_ = c.contact_x * c.contact_y;
-    c_ = r2 + c.contact_y * c.contact_y;
     const double v0 = c.normal_speed, omega = v0 / c.chord;
     const double unit = model.mass * v0 * v0 * r2 * change.loss_ratio;
-    loss_ = (before * omega * omega - after * speed * speed) / unit;
+    loss_ = {.a = r2 + c.contact_x * c.contact_x,
+             .b = c.contact_x * c.contact_y,
+             .c = r2 + c.contact_y * c.contact_y,
+             .loss = (before * omega * omega - after * speed * speed) / unit,
+             .kept = 1 - change.rebound_lost,
+             .pull = model.gravity * std::sin(c.slope_rad) / (v0 * r2),
+             .time = std::sqrt(model.contact_mass / model.ramp_stiffness),
+             .usual_friction = friction_.mean()};
     loss_rate_ = 2 * after * speed / unit;
-    time_ = std::sqrt(model.contact_mass / model.ramp_stiffness);
-    pull_ = model.gravity * std::sin(c.slope_rad) / (v0 * r2);
   }
 
-  // Describes the loss at one restitution as a function of mu.
-  struct Curve {
-    double alpha, beta, delta;
-    double steady, q2, q1, q0;  // of the quadratic that is left when the small term with delta is put into beta
-    double discriminant;        // not positive: every friction loses more
-  };
-  // @param duration  contact_duration(restitution)
-  Curve curve(double restitution, double duration) const {
+  // Takes one more restitution into a batch. @param duration  contact_duration(restitution)
+  void add(FrictionRoots& roots, std::size_t at, double restitution, double duration) const {
     const bool usual = change_.restitution_ratio == 1;
-    const double eta = usual ? restitution : std::min(1.0, restitution * change_.restitution_ratio);
-    Curve k;
-    k.alpha = 1 - eta * eta * (1 - change_.rebound_lost), k.beta = (1 + eta) * (1 + eta);
-    k.delta = pull_ * (1 + eta) * time_ * (usual ? duration : contact_duration(eta));
-    k.steady = k.beta + k.delta * (a_ - b_ * friction_.mean());
-    k.q2 = k.steady * c_ - loss_ * b_ * b_, k.q1 = b_ * (2 * loss_ * a_ - k.alpha - k.steady);
-    k.q0 = a_ * (k.alpha - loss_ * a_);
-    k.discriminant = k.q1 * k.q1 - 4 * k.q2 * k.q0;
-    return k;
+    roots.restitution[at] = usual ? restitution : std::min(1.0, restitution * change_.restitution_ratio);
+    roots.duration[at] = usual ? duration : contact_duration(roots.restitution[at]);
+  }
+  void solve(FrictionRoots& roots, std::size_t count) const { find_friction_roots(loss_, roots, count); }
+
+  // Returns what the frictions of one restitution with a positive discriminant contribute.
+  SpeedDensity of(const FrictionRoots& roots, std::size_t at) const {
+    SpeedDensity one{0, friction_.above(roots.upper[at])};
+    if (roots.upper[at] > 0) one.density = friction_.density(roots.upper[at]) * roots.upper_rate[at] * loss_rate_;
+    if (roots.lower[at] > 0) {
+      one.below += friction_.below(roots.lower[at]);
+      one.density += friction_.density(roots.lower[at]) * roots.lower_rate[at] * loss_rate_;
+    }
+    return one;
   }
 
-  // Adds what the frictions of one curve with a positive discriminant contribute: those above its upper root lose more,
-  // and so do those below its lower root, if it has one.
-  SpeedDensity along(const Curve& k) const {
-    SpeedDensity one;
-    const double root = std::sqrt(k.discriminant);
-    const auto [upper, upper_rate] =
-        refine(k, root, k.q1 <= 0 ? (root - k.q1) / (2 * k.q2) : -2 * k.q0 / (k.q1 + root), 1);
-    one.below = friction_.above(upper);
-    if (upper > 0) one.density = friction_.density(upper) * upper_rate * loss_rate_;
-    if (k.q2 <= 0) return one;
-    const double start = k.q1 <= 0 ? 2 * k.q0 / (root - k.q1) : -(k.q1 + root) / (2 * k.q2);
-    if (start <= 0) return one;
-    const auto [lower, lower_rate] = refine(k, root, start, -1);
-    if (!(lower > 0 && lower < upper)) return one;
-    one.below += friction_.below(lower);
-    one.density += friction_.density(lower) * lower_rate * loss_rate_;
-    return one;
+  // Solves for one restitution alone.
+  FrictionRoots alone(double restitution) const {
+    FrictionRoots roots;
+    add(roots, 0, restitution, contact_duration(restitution));
+    solve(roots, 1);
+    return roots;
   }
 
   // Returns the spacing of nodes in eta's score, from the loss's slopes at the means.
   double spacing() const {
     const double eta = std::min(1.0, contact_.restitution_mean * change_.restitution_ratio), mu = friction_.mean();
-    const double d = a_ - b_ * mu, squared = (1 + eta) * (1 + eta), rubbing = mu * (c_ * mu - b_);
-    const double kept = 1 - change_.rebound_lost, alpha = 1 - eta * eta * kept;
+    const auto& [a, b, c, loss, kept, pull, time, usual] = loss_;
+    const double d = a - b * mu, squared = (1 + eta) * (1 + eta), rubbing = mu * (c * mu - b);
+    const double alpha = 1 - eta * eta * kept;
     const double by_eta = (-2 * eta * kept * d + 2 * (1 + eta) * rubbing) / (d * d);
-    const double by_mu =
-        (squared * (2 * c_ * mu - b_) - alpha * b_ + 2 * b_ * (alpha + squared * rubbing / d)) / (d * d);
+    const double by_mu = (squared * (2 * c * mu - b) - alpha * b + 2 * b * (alpha + squared * rubbing / d)) / (d * d);
     return node_spacing(contact_.restitution_sd * change_.restitution_ratio * std::abs(by_eta),
-                        friction_.sd() * (std::abs(by_mu) + friction_.sd() * squared * c_ / (d * d)));
+                        friction_.sd() * (std::abs(by_mu) + friction_.sd() * squared * c / (d * d)));
   }
 
  private:
-  // Finds the loss's root near mu, by one Newton step for what the quadratic leaves out, no further than the
-  // quadratic's other side; and how much mu changes there with the loss.
-  // @param root  the slope of the quadratic at its roots
-  std::pair<double, double> refine(const Curve& k, double root, double mu, double side) const {
-    const auto slope = [&](double d) {
-      return -k.alpha * b_ + (k.beta + k.delta * d) * (2 * c_ * mu - b_) - k.delta * b_ * mu * (c_ * mu - b_) +
-             2 * loss_ * b_ * d;
-    };
-    const double d = a_ - b_ * mu;
-    const double left = (k.alpha * d + (k.beta + k.delta * d) * mu * (c_ * mu - b_) - loss_ * d * d) / slope(d);
-    if (std::abs(left) < root / std::abs(4 * k.q2)) mu -= left;
-    const double there = a_ - b_ * mu, steep = std::max(side * slope(there), 0.5 * root);
-    return std::pair{mu, there * there / steep};
-  }
-
   const ContactSpread& contact_;
   const CollisionChange& change_;
   Friction friction_;
-  double a_, b_, c_;
-  double loss_, loss_rate_;  // and -d loss/d omega+
-  double time_, pull_;
+  PublishedLoss loss_;
+  double loss_rate_ = 0;  // -d loss/d omega+
 };
 
 // Sums over eta from the least restitution that can lose so little: near it the density grows like an inverse square
@@ -199,26 +173,32 @@ class PublishedCollision {
 SpeedDensity sum_from_least_restitution(const PublishedCollision& collision, const ContactSpread& contact, double mass,
                                         double edge, double next) {
   std::uintmax_t iterations = 40;
-  const double low = boost::math::tools::toms748_solve(
-                         [&](double eta) { return collision.curve(eta, contact_duration(eta)).discriminant; }, edge,
-                         next, boost::math::tools::eps_tolerance<double>(40), iterations)
-                         .second;
+  const double low =
+      boost::math::tools::toms748_solve([&](double eta) { return collision.alone(eta).discriminant[0]; }, edge, next,
+                                        boost::math::tools::eps_tolerance<double>(40), iterations)
+          .second;
   const double high = std::max(next, std::min(1.0, contact.restitution_mean + farthest_score * contact.restitution_sd));
   using Rule = boost::math::quadrature::gauss<double, 30>;
   const auto score = [&](double eta) { return (eta - contact.restitution_mean) / contact.restitution_sd; };
   const double half = std::sqrt(high - low) / 2;
   const double scale = 2 * half / (contact.restitution_sd * mass);
   SpeedDensity result{0, (normal_cdf(score(low)) - normal_cdf(score(0))) / mass};
+  FrictionRoots roots;
+  std::array<double, FrictionRoots::most> weight;
+  std::size_t count = 0;
   for (std::size_t i = 0; i < Rule::abscissa().size(); ++i)
     for (const double side : {1.0, -1.0}) {
       const double t = half * (1 + side * Rule::abscissa()[i]), eta = low + t * t;
-      const PublishedCollision::Curve k = collision.curve(eta, contact_duration(eta));
-      if (!(k.discriminant > 0)) continue;
-      const double weight = Rule::weights()[i] * t * scale * normal_density(score(eta));
-      const SpeedDensity one = collision.along(k);
-      result.below += weight * one.below;
-      result.density += weight * one.density;
+      weight[count] = Rule::weights()[i] * t * scale * normal_density(score(eta));
+      collision.add(roots, count++, eta, contact_duration(eta));
     }
+  collision.solve(roots, count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(roots.discriminant[i] > 0)) continue;
+    const SpeedDensity one = collision.of(roots, i);
+    result.below += weight[i] * one.below;
+    result.density += weight[i] * one.density;
+  }
   result.below = std::clamp(result.below, 0.0, 1.0);
   return result;
 }
@@ -291,24 +271,30 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
 
   SpeedDensity result;
   double edge = -1;  // the largest restitution of a node that cannot lose so little
-  for (const Node& node : nodes) {
-    const PublishedCollision::Curve k = collision.curve(node.restitution, node.duration);
-    if (!(k.discriminant > 0)) {
-      result.below += node.weight;
-      edge = std::max(edge, node.restitution);
-      continue;
+  FrictionRoots roots;
+  for (std::size_t from = 0; from < nodes.size(); from += FrictionRoots::most) {
+    const std::size_t count = std::min(FrictionRoots::most, nodes.size() - from);
+    for (std::size_t i = 0; i < count; ++i)
+      collision.add(roots, i, nodes[from + i].restitution, nodes[from + i].duration);
+    collision.solve(roots, count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Node& node = nodes[from + i];
+      if (!(roots.discriminant[i] > 0)) {
+        result.below += node.weight;
+        edge = std::max(edge, node.restitution);
+        continue;
+      }
+      const SpeedDensity one = collision.of(roots, i);
+      result.below += node.weight * one.below;
+      result.density += node.weight * one.density;
     }
-    const SpeedDensity one = collision.along(k);
-    result.below += node.weight * one.below;
-    result.density += node.weight * one.density;
   }
   result.below = std::clamp(result.below, 0.0, 1.0);
   if (edge < 0) return result;
   const Node* next = nullptr;  // after the edge
   for (const Node& node : nodes)
     if (node.restitution > edge && (!next || node.restitution < next->restitution)) next = &node;
-  if (!next || next->weight * collision.along(collision.curve(next->restitution, next->duration)).density <
-                   1e-4 * result.density)
+  if (!next || next->weight * collision.of(collision.alone(next->restitution), 0).density < 1e-4 * result.density)
     return result;
   return sum_from_least_restitution(collision, contact_, restitution_mass_, edge, next->restitution);
 }

@@ -172,7 +172,7 @@ CollisionChange ExtendedWheel::change(const StepContext& context, double omega) 
   const Extension& e = extension_;
   CollisionChange change;
   change.friction_shift = context.friction_shift;
-  change.rebound_lost = e.rebound_lost;
+  if (omega >= e.hops_from) change.rebound_lost = e.rebound_lost;
   change.friction_ratio = 1 + e.drift * context.run_share;
   if (e.stribeck != 0) change.friction_ratio *= 1 + e.stribeck * std::exp(-omega / e.stribeck_speed);
   if (e.patch_friction != 1 && context.position >= e.patch_from && context.position <= e.patch_to)

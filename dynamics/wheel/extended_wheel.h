@@ -38,6 +38,7 @@ struct Extension {
   double noise_sd = 0;                           ///< of reported speeds, beyond the stated [rad/s]
   double bias_before = 0, bias_after = 0;        ///< of reported omega-, omega+ [rad/s]
   double rebound_lost = 0;                       ///< share
+  double hops_from = 0;                          ///< omega- from which on it is lost [rad/s]
   double ring_cosine = 0, ring_sine = 0;         ///< loss times 1 + cosine cos(2 pi f dt) + sine sin(2 pi f dt)
   double ring_frequency = 10;                    ///< f [Hz]
   double launch_shift = 0;                       ///< added to the mean launch speed [rad/s]

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "analysis/statistics/interval_95.h"
+#include "reports/diagnosis/diagnosis_tables.h"
 
 namespace metastable::reports {
 namespace {
@@ -19,7 +20,6 @@ using analysis::GapMap;
 
 constexpr double full_colour = 6;  // score beyond which colours do not change
 constexpr std::size_t bars_at_most = 12;
-constexpr double shown_probability = 0.0005;
 constexpr int given_colour = 1, recalibrated_colour = 4, effect_colour = 0, floor_colour = 6;
 
 constexpr std::string_view stance_mark = ", stance", collision_mark = ", collision",
@@ -142,7 +142,7 @@ std::vector<Figure> ranking_figures(const Diagnosis& d) {
                    [](const auto& a, const auto& b) { return std::get<0>(a) > std::get<0>(b); });
   BarChart bars{.name = {}, .value = {}};
   for (const auto& [probability, name, colour] : all) {
-    if (bars.name.size() == bars_at_most || (bars.name.size() >= 3 && probability < shown_probability)) break;
+    if (bars.name.size() == bars_at_most || (bars.name.size() >= 3 && probability < worded_probability)) break;
     bars.name.push_back(name);
     bars.value.push_back(probability);
     bars.colour.push_back(colour);

@@ -9,6 +9,9 @@
 
 namespace metastable::reports {
 
+/// Causes less probable are in the files only, in no figure and on no terminal.
+inline constexpr double worded_probability = 0.0005;
+
 /// Adjusted p-value below which a cell of the map counts as beyond chance.
 constexpr double where_level = 0.05;
 /// The cells beyond chance, by rising adjusted p-value, then by falling statistic.

@@ -15,7 +15,6 @@ namespace metastable::reports {
 namespace {
 
 constexpr std::size_t most_cells = 10, most_causes = 8;
-constexpr double worded_probability = 0.0005;  // causes below are only in the files
 
 // One effect a line, with the one that is most like it.
 Table visibility_lines(const analysis::Diagnosis& d) {

@@ -116,7 +116,10 @@ OutputFolder::OutputFolder(const fs::path& target) : target_(target) {
   std::error_code error;
   if (fs::exists(target_, error) && !fs::is_directory(target_, error))
     throw OutputError(target, std::strerror(ENOTDIR));
-  if (fs::is_symlink(target_, error)) target_ = fs::canonical(target_, error);
+  if (fs::is_symlink(target_, error)) {
+    target_ = fs::canonical(target_, error);
+    if (error) throw OutputError(target, error.message());
+  }
   if (target_.has_parent_path()) make_folder(target_.parent_path());
   remove_left_behind(target_);
   const fs::path temporary = temporary_name(target_);

@@ -302,6 +302,18 @@ TEST(Laboratory, FlightLetsFastWheelsLift) {
   for (const LaboratoryTrial& trial : run_all(setup)) EXPECT_FALSE(trial.collisions.front().flew);
 }
 
+TEST(Laboratory, FeetHopFromTheirOnsetOn) {
+  const auto after = [](double onset) {
+    LaboratorySetup setup = paper_setup();
+    setup.effects = {{"bounce", {0.8, onset}}};
+    return run_all(setup).front().collisions.front();
+  };
+  const LaboratoryCollision none = run_all(paper_setup()).front().collisions.front(), all = after(0);
+  EXPECT_LT(all.omega_plus, none.omega_plus);
+  EXPECT_EQ(after(none.omega_minus - 0.01).omega_plus, all.omega_plus);
+  EXPECT_EQ(after(none.omega_minus + 0.01).omega_plus, none.omega_plus);
+}
+
 // The mean speed over a window before a collision: below the speed there while the wheel speeds up.
 TEST(Laboratory, SmoothingReportsMeansOverTheWindow) {
   LaboratorySetup setup = paper_setup();

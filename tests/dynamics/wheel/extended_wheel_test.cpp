@@ -105,6 +105,18 @@ TEST(ExtendedWheel, DensityIsThatOfDrawnSteps) {
     }
 }
 
+TEST(ExtendedWheel, FeetHopFromTheirOnsetOn) {
+  Extension hopping;
+  hopping.rebound_lost = 0.5;
+  hopping.hops_from = 5;
+  const ExtendedWheel wheel = extended(hopping), plain = extended({});
+  const Contact contact{0.5, 0.35};
+  EXPECT_EQ(wheel.omega_plus({.leg = 0}, 4.9, contact, false), plain.omega_plus({.leg = 0}, 4.9, contact, false));
+  EXPECT_LT(*wheel.omega_plus({.leg = 0}, 5, contact, false), *plain.omega_plus({.leg = 0}, 5, contact, false) - 0.1);
+  EXPECT_EQ(wheel.after_collision({.leg = 0}, 4.9, 3.4).below, plain.after_collision({.leg = 0}, 4.9, 3.4).below);
+  EXPECT_GT(wheel.after_collision({.leg = 0}, 5, 3.4).below, plain.after_collision({.leg = 0}, 5, 3.4).below);
+}
+
 // A sag that is a stretch of another slope's mean: the energy over the whole stretch is that of the drop in height.
 TEST(ExtendedWheel, SagGivesBackWhatItTook) {
   for (const auto shape : {Extension::Shape::parabola, Extension::Shape::sine, Extension::Shape::step}) {

@@ -80,6 +80,11 @@ TEST_F(OutputFileTest, FollowsASymbolicLink) {
   EXPECT_EQ(read(folder_ / "real"), "new");
 }
 
+TEST_F(OutputFileTest, AFolderBehindABrokenLinkIsRefused) {
+  fs::create_symlink("nowhere", folder_ / "link");
+  EXPECT_THROW(OutputFolder(folder_ / "link"), OutputError);
+}
+
 TEST_F(OutputFileTest, ADeviceIsWrittenToNotReplaced) {
   write_file("/dev/null", "gone");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
