@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <new>
 #include <optional>
-#include <ranges>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -18,10 +17,13 @@
 
 #include "analysis/experiment/input_error.h"
 #include "reports/command_line/command.h"
+#include "reports/command_line/manual.h"
 #include "reports/command_line/option_values.h"
 #include "reports/command_line/setting_options.h"
+#include "reports/command_line/suggestion.h"
 #include "reports/command_line/walker_options.h"
 #include "reports/commands/compare_command.h"
+#include "reports/commands/doctor_command.h"
 #include "reports/commands/report_command.h"
 #include "reports/commands/request.h"
 #include "reports/commands/steps_command.h"
@@ -180,10 +182,41 @@ Command verify() {
           }};
 }
 
-std::vector<Command> commands() {
+// What CLI11 knows of the commands' options, for manual pages and completion.
+std::vector<ManualCommand> manual_of(const std::vector<CLI::App*>& subcommands) {
+  std::vector<ManualCommand> manual;
+  for (const CLI::App* sub : subcommands) {
+    ManualCommand& command = manual.emplace_back(ManualCommand{sub->get_name(), sub->get_description(), {}});
+    for (const CLI::Option* option : sub->get_options()) {
+      const bool place = option->get_positional();
+      command.options.push_back({place ? option->get_single_name() : "--" + option->get_lnames().front(),
+                                 place || option->get_expected_max() == 0 ? "" : option->get_type_name(),
+                                 option->get_default_str(), option->get_description(), place});
+    }
+  }
+  return manual;
+}
+
+// @param manual  of all commands, known once they are declared
+std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
+  return {{"man", "The manual page of the program or of a command, for `man -l -`",
+           [](Options& o) { o.add_optional_place("COMMAND", "One of the commands"); },
+           [&manual](const Options& o, const std::string&) {
+             fmt::print("{}", manual_page(manual, o.text("COMMAND"), version()));
+           }},
+          {"completion", "A script that completes commands and options: source <(metastable completion bash)",
+           [](Options& o) { o.add_place("SHELL", "bash, zsh or fish"); },
+           [&manual](const Options& o, const std::string&) {
+             fmt::print("{}", completion_script(manual, o.text("SHELL")));
+           }},
+          {"doctor", "What is installed, and what each missing piece would add", [](Options&) {},
+           [](const Options&, const std::string&) { run_doctor(); }}};
+}
+
+std::vector<Command> commands(const std::vector<ManualCommand>& manual) {
   std::vector<Command> all{steps(), compare(), sweep()};
   for (const std::vector<Command>& more :
-       {experiment_commands(), std::vector<Command>{report(), verify()}, blind_commands()})
+       {experiment_commands(), std::vector<Command>{report(), verify()}, blind_commands(), help_commands(manual)})
     all.insert(all.end(), more.begin(), more.end());
   return all;
 }
@@ -218,7 +251,8 @@ int parse_and_run(int argc, const char* const* argv) {
   app.footer(
       "Exit codes: 0 done, 2 wrong option or file (one that cannot be written too), 3 a computation failed, 130 "
       "interrupted, 143 terminated.");
-  const std::vector<Command> all = commands();
+  std::vector<ManualCommand> manual;
+  const std::vector<Command> all = commands(manual);
   std::deque<Options> options;
   std::vector<CLI::App*> subcommands;
   std::deque<std::string> config_files;
@@ -231,11 +265,14 @@ int parse_and_run(int argc, const char* const* argv) {
         ->check([](const std::string& file) { return file.empty() ? std::string("what is given is empty") : ""; }, "");
     subcommands.push_back(sub);
   }
+  manual = manual_of(subcommands);
   if (argc < 2 || (argv[1][0] != '-' &&
                    std::none_of(all.begin(), all.end(), [&](const Command& c) { return c.name == argv[1]; }))) {
-    const std::string names = fmt::format("{}", fmt::join(all | std::views::transform(&Command::name), ", "));
-    throw std::invalid_argument(argc < 2 ? fmt::format("a subcommand is needed: {}", names)
-                                         : fmt::format("'{}' is none of the subcommands {}", argv[1], names));
+    std::vector<std::string> names;
+    for (const Command& command : all) names.push_back(command.name);
+    throw std::invalid_argument(argc < 2 ? fmt::format("a subcommand is needed: {}", fmt::join(names, ", "))
+                                         : fmt::format("'{}' is none of the subcommands {}{}", argv[1],
+                                                       fmt::join(names, ", "), did_you_mean(argv[1], names)));
   }
   try {
     app.parse(argc, argv);
@@ -245,10 +282,15 @@ int parse_and_run(int argc, const char* const* argv) {
     fmt::print("{}", text.view());
     return code;
   } catch (const CLI::ParseError& error) {
-    for (const CLI::App* sub : subcommands)  // before what may be missing because of it
-      for (const std::string& word : sub->remaining())
-        if (word.starts_with("-"))
-          throw std::invalid_argument(fmt::format("{}: is no option of '{}'", word, sub->get_name()));
+    for (std::size_t i = 0; i < all.size(); ++i)  // before what may be missing because of it
+      for (const std::string& word : subcommands[i]->remaining())
+        if (word.starts_with("-")) {
+          std::vector<std::string> names;
+          for (const ManualOption& option : manual[i].options)
+            if (!option.place) names.push_back(option.name);
+          throw std::invalid_argument(fmt::format("{}: is no option of '{}'{}", word, all[i].name,
+                                                  did_you_mean(word.substr(0, word.find('=')), names)));
+        }
     throw std::invalid_argument(error.what());
   }
   for (std::size_t i = 0; i < all.size(); ++i) {

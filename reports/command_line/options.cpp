@@ -9,6 +9,7 @@
 
 #include "reports/command_line/config_file.h"
 #include "reports/command_line/option_values.h"
+#include "reports/command_line/suggestion.h"
 
 namespace metastable::reports {
 
@@ -40,6 +41,16 @@ void Options::add_place(const std::string& name, const std::string& help) {
   command_.add_option(name, texts_[name], help)->required()->expected(1)->allow_extra_args(false)->type_name("");
 }
 
+void Options::add_optional_place(const std::string& name, const std::string& help) {
+  command_.add_option(name, texts_[name], help)->expected(1)->allow_extra_args(false)->type_name("");
+}
+
+std::vector<std::string> Options::names() const {
+  std::vector<std::string> all;
+  for (const auto& [name, texts] : texts_) all.push_back(name);
+  return all;
+}
+
 void Options::add_places(const std::string& name, const std::string& help) {
   command_.add_option(name, texts_[name], help)->required()->expected(1, -1)->type_name("");
 }
@@ -47,8 +58,9 @@ void Options::add_places(const std::string& name, const std::string& help) {
 void Options::read(const std::string& file) {
   for (const ConfigEntry& entry : read_config(file)) {
     if (entry.key == "config" || !texts_.contains(entry.key))
-      throw std::invalid_argument(fmt::format("{}:{}: unknown key '{}' (keys are the long options of 'metastable {}')",
-                                              file, entry.line, entry.key, command_.get_name()));
+      throw std::invalid_argument(
+          fmt::format("{}:{}: unknown key '{}' (keys are the long options of 'metastable {}'){}", file, entry.line,
+                      entry.key, command_.get_name(), did_you_mean(entry.key, names())));
     std::vector<std::string>& texts = texts_[entry.key];
     if (texts.empty()) texts = entry.values;
   }
@@ -67,13 +79,6 @@ bool Options::flag(const std::string& name) const {
   if (value != "true" && value != "false")
     throw std::invalid_argument(fmt::format("--{}: '{}' is neither true nor false", name, value));
   return value == "true";
-}
-
-std::vector<std::string> Options::given_names() const {
-  std::vector<std::string> names;
-  for (const auto& [name, texts] : texts_)
-    if (!texts.empty()) names.push_back(name);
-  return names;
 }
 
 void Options::check_given() const {

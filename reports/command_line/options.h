@@ -32,6 +32,8 @@ class Options {
   void add_threads();
   /// What the command is about, given by its place on the command line; required.
   void add_place(const std::string& name, const std::string& help);
+  /// Likewise, and may be left out.
+  void add_optional_place(const std::string& name, const std::string& help);
   /// One or more of those.
   void add_places(const std::string& name, const std::string& help);
   /// Keys of the file that the command line did not give.
@@ -39,8 +41,7 @@ class Options {
   /// Nothing that was given may be empty. @throws std::invalid_argument
   void check_given() const;
 
-  /// Long names of all options given.
-  std::vector<std::string> given_names() const;
+  std::vector<std::string> names() const;  ///< all of them, without dashes
   bool has(const std::string& name) const { return texts_.contains(name); }
   bool given(const std::string& name) const { return !texts_.at(name).empty(); }
   const std::vector<std::string>& all(const std::string& name) const { return texts_.at(name); }

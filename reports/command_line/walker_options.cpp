@@ -18,8 +18,8 @@ constexpr double garcia_slope_deg = 0.5156620156177409;  // 0.009 rad
 analysis::WalkerSetting base_setting(const Options& o, const std::vector<std::string>& own) {
   static const std::vector<std::string> all{"walker",          "slope",   "slopes", "slope-sd", "terrain", "memory",
                                             "simulated-steps", "spacing", "seed",   "threads",  "json",    "out"};
-  for (const std::string& name : o.given_names())
-    if (std::ranges::find(all, name) == all.end() && std::ranges::find(own, name) == own.end())
+  for (const std::string& name : o.names())
+    if (o.given(name) && std::ranges::find(all, name) == all.end() && std::ranges::find(own, name) == own.end())
       throw std::invalid_argument(fmt::format("--{}: has no meaning with --walker", name));
   if (!o.given("slope-sd")) throw std::invalid_argument("--slope-sd: is needed with --walker");
   analysis::WalkerSetting setting;

@@ -1,0 +1,17 @@
+#pragma once
+// Finds the word that was meant.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace metastable::reports {
+
+/// Returns the name that fewest typing errors (a letter more, less, other, or two exchanged) lead from `word` to; ""
+/// where more than a third of the word's letters would be wrong, or two names are as near.
+std::string nearest(std::string_view word, const std::vector<std::string>& names);
+
+/// Returns "; did you mean 'NAME'?" for the nearest name, or "".
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& names);
+
+}  // namespace metastable::reports

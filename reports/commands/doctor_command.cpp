@@ -1,0 +1,45 @@
+#include "reports/commands/doctor_command.h"
+
+#include <fmt/format.h>
+#include <stdio.h>
+
+#include <array>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+namespace {
+
+// Returns the first line that a program prints, or "" where there is no such program.
+std::string first_line(const char* command) {
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(::popen(command, "r"), ::pclose);
+  if (!pipe) return "";
+  std::array<char, 200> line{};
+  if (std::fgets(line.data(), line.size(), pipe.get()) == nullptr) return "";
+  const std::string text = line.data();
+  return text.substr(0, text.find('\n'));
+}
+
+}  // namespace
+
+void run_doctor() {
+  fmt::print("{}\n", version_text());
+  fmt::print("cores: {}; every answer is the same bits on any number of them\n", std::thread::hardware_concurrency());
+#if defined(__x86_64__)
+  fmt::print("vectors: {}\n", __builtin_cpu_supports("avx2")
+                                  ? "AVX2, which the sampled chain, walkers and densities use"
+                                  : "SSE2 (a machine with AVX2 takes some two thirds of the time, for the same bits)");
+#endif
+  const std::string gnuplot = first_line("gnuplot --version 2>/dev/null");
+  if (gnuplot.empty())
+    fmt::print(
+        "gnuplot: missing; figures (report, study, sweep, describe and diagnose --out) need it: install "
+        "gnuplot-nox\n");
+  else
+    fmt::print("gnuplot: {}, which draws the figures\n", gnuplot);
+}
+
+}  // namespace metastable::reports

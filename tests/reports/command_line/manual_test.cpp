@@ -1,0 +1,67 @@
+#include "reports/command_line/manual.h"
+
+#include <gtest/gtest.h>
+#include <stdio.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+
+#include "tests/reports/support.h"
+
+namespace metastable::reports {
+namespace {
+
+const std::vector<ManualCommand> manual{
+    {"steps",
+     "Expected steps",
+     {{"--law", "published|coulomb", "published", "Contact law", false},
+      {"--slope", "DEG", "7.02", "Ramp's slope [deg]: any", false},
+      {"--json", "FILE|-", "", "Write JSON", false},
+      {"--direct", "", "", "-follow every landing", false}}},
+    {"describe", "What the trials say", {{"DIR", "", "", "Folder", true}, {"--out", "DIR", "", "Folder", false}}}};
+
+// What bash itself makes of the script, for the words of a command line of which the last is to be completed.
+std::string completed(const std::string& words, int last) {
+  const std::filesystem::path script = std::filesystem::path(testing::TempDir()) / "metastable_completion.bash";
+  std::ofstream(script) << completion_script(manual, "bash") << "COMP_WORDS=(" << words << ")\nCOMP_CWORD=" << last
+                        << "\n_metastable\necho \"${COMPREPLY[*]}\"\n";
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(::popen(("bash " + script.string()).c_str(), "r"), ::pclose);
+  std::array<char, 400> line{};
+  return std::fgets(line.data(), line.size(), pipe.get()) == nullptr ? "" : line.data();
+}
+
+TEST(Manual, BashCompletesCommandsOptionsAndValues) {
+  EXPECT_EQ(completed("metastable ''", 1), "steps describe --help --version\n");
+  EXPECT_EQ(completed("metastable st", 1), "steps\n");
+  EXPECT_EQ(completed("metastable steps --s", 2), "--slope\n");
+  EXPECT_EQ(completed("metastable steps --law ''", 3), "published coulomb\n");
+  EXPECT_EQ(completed("metastable steps --law c", 3), "coulomb\n");
+  EXPECT_EQ(completed("metastable steps --slope ''", 3), "\n");
+  EXPECT_EQ(completed("metastable steps --json /bi", 3), "/bin\n");
+  EXPECT_EQ(completed("metastable describe /bi", 2), "/bin\n");
+}
+
+TEST(Manual, OtherShellsAndPagesEscapeWhatTheyWouldTakeForSyntax) {
+  const std::string zsh = completion_script(manual, "zsh"), fish = completion_script(manual, "fish");
+  EXPECT_NE(zsh.find(R"('*--slope=[Ramp'\''s slope (deg)\: any]:DEG: ')"), std::string::npos) << zsh;
+  EXPECT_NE(zsh.find("'*--law=[Contact law]:published|coulomb:(published coulomb)'"), std::string::npos) << zsh;
+  EXPECT_NE(fish.find(R"(-l slope -x -d 'Ramp'\''s slope [deg]: any')"), std::string::npos) << fish;
+  EXPECT_NE(fish.find("from describe' -l out -r -F"), std::string::npos) << fish;
+  const std::string page = manual_page(manual, "steps", "1.0");
+  EXPECT_NE(page.find("\\fB\\-\\-slope\\fR \\fIDEG\\fR\nRamp's slope [deg]: any (default: 7.02).\n"), std::string::npos)
+      << page;
+  EXPECT_NE(page.find("\n\\-follow every landing.\n"), std::string::npos) << page;
+  EXPECT_NE(manual_page(manual, "", "1.0").find("\\fBmetastable\\-describe\\fR(1)\nWhat the trials say.\n"),
+            std::string::npos);
+}
+
+TEST(Manual, RefusesOtherShellsAndCommands) {
+  EXPECT_THROW(completion_script(manual, "tcsh"), std::invalid_argument);
+  EXPECT_THROW(manual_page(manual, "walk", "1.0"), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace metastable::reports
