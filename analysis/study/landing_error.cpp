@@ -14,7 +14,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t replicates = 4;
-constexpr std::size_t landings_a_replicate = 256, pairs_a_replicate = 128;
+constexpr std::size_t draws_a_replicate = 256;
 constexpr std::uint32_t of_landings = 1u << 20;  // the first of their randomisations
 
 // Expected steps between the states of a phase: straight lines.
@@ -38,59 +38,46 @@ double landing_error(const Problem& problem, int phases, std::span<const double>
                      const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options) {
   const markov::AnyReturnMap& map = problem.map;
   const auto dimension = static_cast<std::size_t>(map.noise_dimension());
-  const std::vector<double> no_noise(2 * dimension, 0.0);
-  const auto nothing = [](double) { return 0.0; };
+  const std::vector<double> no_noise(dimension, 0.0);
+  if (!map.landing_defect(states[0], 0, no_noise, [](double) { return 1.0; })) return 0;
   const std::size_t per_phase = states.size() / static_cast<std::size_t>(phases);
-  const auto worth = [&](int phase) {  // of the states at a phase, in steps
-    const std::size_t first = static_cast<std::size_t>(phase % phases) * per_phase;
-    return Between(states.subspan(first, per_phase), std::span<const double>(solved.mean).subspan(first, per_phase));
+  const auto defect = [&](double state, int phase, std::span<const double> score) {
+    const std::size_t next = static_cast<std::size_t>((phase + 1) % phases) * per_phase;
+    return *map.landing_defect(
+        state, phase, score,
+        Between(states.subspan(next, per_phase), std::span<const double>(solved.mean).subspan(next, per_phase)));
   };
   std::vector<double> visits = solved.solver.solve_left(sampled.launch.after);
   std::partial_sum(visits.begin(), visits.end(), visits.begin());
   const double all_visits = visits.back();
   // Half of the tasks are of the launch; every draw is written to its place, so that threads change no bit.
-  const auto mean_of = [&](std::size_t draws_a_replicate, int noise_dimension, const auto& defect) {
-    std::vector<double> part(2 * replicates * draws_a_replicate);
-    std::vector<markov::Draws> draws;
-    for (std::size_t r = 0; r < 2 * replicates; ++r)
-      draws.push_back(markov::make_draws(noise_dimension, {.count = draws_a_replicate,
-                                                           .seed = options.seed,
-                                                           .replicate = static_cast<std::uint32_t>(of_landings + r),
-                                                           .tail = options.tail}));
-    const auto scores = static_cast<std::size_t>(noise_dimension);
-    markov::parallel_for(part.size(), options.threads, [&](std::size_t task) {
-      const std::size_t k = task % draws_a_replicate;
-      const markov::Draws& of = draws[task / draws_a_replicate];
-      const auto score = std::span(of.score).subspan(k * scores, scores);
-      if (task < replicates * draws_a_replicate) {
-        const auto at = std::upper_bound(visits.begin(), visits.end(), of.offset[k] * all_visits) - visits.begin();
-        const auto i = std::min(static_cast<std::size_t>(at), visits.size() - 1);
-        part[task] = of.weight[k] * all_visits * defect(states[i], static_cast<int>(i / per_phase), score);
-      } else {
-        const double state = problem.launch.state(markov::normal_score(of.offset[k]));
-        part[task] = of.weight[k] * defect(state, problem.launch.phase, score);
-      }
-    });
-    std::array<double, replicates> change{};
-    for (std::size_t task = 0; task < part.size(); ++task)
-      change[task / draws_a_replicate % replicates] += part[task] / solved.from_start;
-    const double mean = std::accumulate(change.begin(), change.end(), 0.0) / replicates;
-    double squares = 0;
-    for (const double one : change) squares += (one - mean) * (one - mean);
-    return std::abs(mean) + 2 * std::sqrt(squares / (replicates * (replicates - 1)));
-  };
-  double error = 0;
-  if (map.landing_defect(states[0], 0, std::span(no_noise).first(dimension), nothing))
-    error += mean_of(landings_a_replicate, static_cast<int>(dimension),
-                     [&](double state, int phase, std::span<const double> score) {
-                       return *map.landing_defect(state, phase, score, worth(phase + 1));
-                     });
-  if (map.memory_defect(states[0], 0, no_noise, nothing))
-    error += mean_of(pairs_a_replicate, static_cast<int>(2 * dimension),
-                     [&](double state, int phase, std::span<const double> score) {
-                       return *map.memory_defect(state, phase, score, worth(phase + 2));
-                     });
-  return error;
+  std::vector<double> part(2 * replicates * draws_a_replicate);
+  std::vector<markov::Draws> draws;
+  for (std::size_t r = 0; r < 2 * replicates; ++r)
+    draws.push_back(markov::make_draws(map.noise_dimension(), {.count = draws_a_replicate,
+                                                               .seed = options.seed,
+                                                               .replicate = static_cast<std::uint32_t>(of_landings + r),
+                                                               .tail = options.tail}));
+  markov::parallel_for(part.size(), options.threads, [&](std::size_t task) {
+    const std::size_t k = task % draws_a_replicate;
+    const markov::Draws& of = draws[task / draws_a_replicate];
+    const auto score = std::span(of.score).subspan(k * dimension, dimension);
+    if (task < replicates * draws_a_replicate) {
+      const auto at = std::upper_bound(visits.begin(), visits.end(), of.offset[k] * all_visits) - visits.begin();
+      const auto i = std::min(static_cast<std::size_t>(at), visits.size() - 1);
+      part[task] = of.weight[k] * all_visits * defect(states[i], static_cast<int>(i / per_phase), score);
+    } else {
+      const double state = problem.launch.state(markov::normal_score(of.offset[k]));
+      part[task] = of.weight[k] * defect(state, problem.launch.phase, score);
+    }
+  });
+  std::array<double, replicates> change{};
+  for (std::size_t task = 0; task < part.size(); ++task)
+    change[task / draws_a_replicate % replicates] += part[task] / solved.from_start;
+  const double mean = std::accumulate(change.begin(), change.end(), 0.0) / replicates;
+  double squares = 0;
+  for (const double one : change) squares += (one - mean) * (one - mean);
+  return std::abs(mean) + 2 * std::sqrt(squares / (replicates * (replicates - 1)));
 }
 
 void add_landing_error(Metastability& result, double error, double tolerance) {
@@ -105,10 +92,8 @@ void add_landing_error(Metastability& result, double error, double tolerance) {
   rate.upper = std::max(rate.value, std::min(1.0, rate.upper * std::exp(error)));
   if (error <= tolerance || result.status != Status::converged) return;
   result.status = Status::tolerance_not_met;
-  result.message = fmt::format(
-      "tolerance {} not met: landings read from a table, each from a standing "
-      "foot, may move the expected steps by {:.2g}",
-      tolerance, error);
+  result.message = fmt::format("tolerance {} not met: landings read from a table may move the expected steps by {:.2g}",
+                               tolerance, error);
 }
 
 }  // namespace metastable::analysis

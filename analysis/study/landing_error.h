@@ -1,5 +1,5 @@
 #pragma once
-// What reading landings from a table, and each from a state that does not tell all, does to the expected steps.
+// What reading landings from a table does to the expected steps.
 
 #include <span>
 
@@ -7,10 +7,9 @@
 
 namespace metastable::analysis {
 
-/// Relative error of the expected steps from the launch, 0 where the map has neither defect: to first order the
+/// Relative error of the expected steps from the launch, 0 where the map's landings are exact: to first order the
 /// visits to every state times the mean difference in expected steps between the true landing and the one read
-/// (AnyReturnMap::landing_defect), by weighted draws; two standard errors of it over four randomisations are added. The
-/// same of what the state leaves out (AnyReturnMap::memory_defect), with the expected steps two events on.
+/// (AnyReturnMap::landing_defect), by weighted draws; two standard errors of it over four randomisations are added.
 /// Cost: some thousand landings followed.
 /// @param states as in summarize()
 double landing_error(const Problem& problem, int phases, std::span<const double> states,

@@ -103,7 +103,7 @@ struct StepsToRest {
   Estimate worst_start;                ///< from the slowest survivor of a step
   double discretization_error = 0;     ///< relative, of from_start: a third of the extrapolation's last change
   double sampling_error = 0;           ///< relative 95 % half-width of from_start over replicates
-  double landing_error = 0;            ///< relative: of tables of landings, and of states that tell too little
+  double landing_error = 0;            ///< relative, where landings are read from a table (landing_error.h)
   double solver_disagreement = 0;      ///< relative difference of the launch's expected steps, elimination against KLU
   std::vector<double> replicate_logs;  ///< ln(expected steps from the launch) of each replicate, extrapolated
   Accumulated distribution;            ///< from the launch, the last step counted

@@ -173,9 +173,9 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
     text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)",
                                                study.steps.discretization_error, study.steps.sampling_error));
     if (study.steps.landing_error > 0)
-      text += line("landings",
-                   fmt::format("from a table and from feet that stand: moves the steps by {:.2g} (in the interval)",
-                               study.steps.landing_error));
+      text +=
+          line("landings", fmt::format("read from a table, which moves the steps by {:.2g} at most (in the interval)",
+                                       study.steps.landing_error));
     text +=
         line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.steps.solver_disagreement));
     if (!study.message.empty()) text += "\n" + study.message + "\n";

@@ -200,7 +200,7 @@ TEST(PaperTables, Fig4ComparesTheStarts) {
   const Studies all = studies();
   const Table table = fig4_table(all, experiments(), {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 4u);
+  ASSERT_EQ(table.rows.size(), 5u);
   expect_cell(at(table, 0, "source"), "stand-in (simulated)");
   const analysis::ConditionComparison c =
       analysis::compare_conditions(all[0].fig4.fast.speeds, all[0].fig4.slow.speeds);
@@ -226,7 +226,7 @@ TEST(PaperTables, Fig6AndEqualLegs) {
   all[0].fig6[3].runs[2].measured_legs.trial_means.clear();
   const Table table = fig6_table(all, {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 12u);
+  ASSERT_EQ(table.rows.size(), 16u);
   expect_cell(at(table, 1, "variant"), "published, goes on");
   expect_cell(at(table, 1, "μ"), 0.45);
   expect_near(at(table, 1, "steady, launch 3.35"), steady(1.21));
@@ -247,7 +247,7 @@ TEST(PaperTables, Fig6AndEqualLegs) {
 
   const Table legs = equal_legs_table(all, {});
   test::expect_rectangular(legs);
-  ASSERT_EQ(legs.rows.size(), 36u);
+  ASSERT_EQ(legs.rows.size(), 48u);
   expect_cell(at(legs, 4, "variant"), "published, goes on");
   expect_cell(at(legs, 4, "μ"), 0.45);
   expect_cell(at(legs, 4, "launch"), 5.35);
@@ -263,7 +263,7 @@ TEST(PaperTables, Fig7SpreadsOfBoth) {
   all[1].fig7[2].runs[0].against_experiment.reset();
   const Table table = fig7_table(all, experiments(), {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 36u);
+  ASSERT_EQ(table.rows.size(), 48u);
   const std::size_t row = 12 + 5;  // second variant, second panel, third run
   expect_cell(at(table, row, "variant"), "published, rests");
   expect_cell(at(table, row, "sd of μ"), 0.1);
@@ -279,7 +279,7 @@ TEST(PaperTables, Fig7SpreadsOfBoth) {
 TEST(PaperTables, Fig8LossesBesideThePaper) {
   const Table table = fig8_table(studies(), {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 12u);
+  ASSERT_EQ(table.rows.size(), 16u);
   expect_cell(at(table, 4, "variant"), "published, rests");
   expect_cell(at(table, 4, "sd of η and μ"), 0.05);
   expect_near(at(table, 4, "tangential net, mean"), with_error(2.101, 0.003));
@@ -296,7 +296,7 @@ TEST(PaperTables, Fig8LossesBesideThePaper) {
 TEST(PaperTables, Fig9MeansOfBoth) {
   const Table table = fig9_table(studies(), {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 36u);
+  ASSERT_EQ(table.rows.size(), 48u);
   const std::size_t row = 24 + 3 * 2 + 1;  // third variant, third panel, second run
   expect_cell(at(table, row, "variant"), "coulomb");
   expect_cell(at(table, row, "mean of μ"), 0.4);
