@@ -17,7 +17,7 @@ set(ROOMS
   "dynamics/bounds: dynamics/wheel dynamics/return_map"
   "dynamics/walkers:"
   "analysis/statistics: markov dynamics/wheel"
-  "analysis/walkers: markov/mesh dynamics/walkers analysis/statistics"
+  "analysis/walkers: markov/passage markov/mesh dynamics/walkers analysis/statistics"
   "analysis/diagnosis: markov dynamics/wheel analysis/statistics"
   "analysis/study: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/settled dynamics/return_map dynamics/bounds analysis/statistics"
   "analysis/experiment: markov dynamics/wheel dynamics/laboratory dynamics/settled dynamics/return_map analysis/statistics analysis/study"
@@ -30,9 +30,9 @@ set(ROOMS
   "reports/output: analysis/statistics analysis/experiment"
   "reports/description: dynamics/wheel analysis/statistics analysis/description analysis/paper reports/output"
   "reports/diagnosis: dynamics/wheel analysis/statistics analysis/diagnosis analysis/blind reports/output"
-  "reports/study: markov/rows dynamics/wheel analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
-  "reports/commands: markov markov/passage dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/likelihood analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity reports/output reports/description reports/diagnosis reports/study"
-  "reports/command_line: markov/chain dynamics/wheel analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands")
+  "reports/study: markov/rows dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
+  "reports/commands: markov markov/passage dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/likelihood analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity analysis/walkers reports/output reports/description reports/diagnosis reports/study"
+  "reports/command_line: markov/chain dynamics/wheel analysis/walkers analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands")
 
 # Where less than a whole room may be seen: who (a pattern of files), which room, which of its headers.
 set(NARROW

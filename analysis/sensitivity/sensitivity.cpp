@@ -73,9 +73,7 @@ std::vector<Sensitivity> by_paths(const Setting& setting, const Metastability& s
     neighbours.push_back({moved(setting, one, -step), moved(setting, one, step), 2 * step});
   }
   // The draws reach as deep into the tails as the study had to go.
-  StudyOptions own = options;
-  while (own.tail > 1e-300 && std::log(study.spectrum.failure_rate.value) < 0.6 * std::log(own.tail))
-    own.tail = std::max(1e-300, own.tail * own.tail * own.tail);
+  const StudyOptions own = deep_enough(options, study.spectrum.failure_rate.value);
   const std::optional<Pilot> pilot = solve_pilot(setting.problem(), own);
   if (!pilot) throw markov::ConvergenceError("sensitivities", 1, "no draw came to rest");
   const markov::StateSpace coarse = pilot->graded(study.cells / 2), fine = coarse.halved();

@@ -77,6 +77,12 @@ std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& opt
   }
 }
 
+StudyOptions deep_enough(StudyOptions options, double failure_rate) {
+  while (options.tail > 1e-300 && std::log(failure_rate) < 0.6 * std::log(options.tail))
+    options.tail = std::max(1e-300, options.tail * options.tail * options.tail);
+  return options;
+}
+
 markov::DrawOptions draw_options(const StudyOptions& options, std::size_t samples, int replicate) {
   return {.count = samples,
           .seed = options.seed,

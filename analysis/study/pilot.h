@@ -33,6 +33,9 @@ std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& opt
 /// As many cells as give the bulk `cells` of them where a fast launch needs some of its own.
 std::size_t with_launch(const Problem& problem, std::size_t cells, std::uint64_t seed);
 
+/// The options with a tail as deep as a study goes where failures have this rate.
+StudyOptions deep_enough(StudyOptions options, double failure_rate);
+
 /// The draws of one replicate of a study.
 markov::DrawOptions draw_options(const StudyOptions& options, std::size_t samples, int replicate);
 

@@ -7,24 +7,20 @@
 #include <stdexcept>
 
 namespace metastable::analysis {
-namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+const char* terrain_name(dynamics::Terrain terrain) { return terrain == dynamics::Terrain::fresh ? "fresh" : "facets"; }
 
-const char* name_of(Walker walker) { return walker == Walker::simplest ? "simplest" : "compass"; }
-const char* name_of(dynamics::Terrain terrain) { return terrain == dynamics::Terrain::fresh ? "fresh" : "facets"; }
-
-}  // namespace
+const char* walker_name(Walker walker) { return walker == Walker::simplest ? "simplest" : "compass"; }
 
 Walker walker_from_name(const std::string& name) {
   for (const Walker walker : {Walker::simplest, Walker::compass})
-    if (name == name_of(walker)) return walker;
+    if (name == walker_name(walker)) return walker;
   throw std::invalid_argument(fmt::format("walker: '{}' is none of simplest, compass", name));
 }
 
 dynamics::Terrain terrain_from_name(const std::string& name) {
   for (const dynamics::Terrain terrain : {dynamics::Terrain::fresh, dynamics::Terrain::facets})
-    if (name == name_of(terrain)) return terrain;
+    if (name == terrain_name(terrain)) return terrain;
   throw std::invalid_argument(fmt::format("terrain: '{}' is none of fresh, facets", name));
 }
 
@@ -39,8 +35,8 @@ dynamics::WalkerMap WalkerSetting::map() const {
 }
 
 std::string WalkerSetting::describe() const {
-  return fmt::format("walker {}, slope {:.6g} deg, sd {:.6g} deg, terrain {}", name_of(walker), slope_deg, slope_sd_deg,
-                     name_of(terrain));
+  return fmt::format("walker {}, slope {:.6g} deg, sd {:.6g} deg, terrain {}", walker_name(walker), slope_deg,
+                     slope_sd_deg, terrain_name(terrain));
 }
 
 markov::BatchMap batch_map(const dynamics::WalkerMap& map) {

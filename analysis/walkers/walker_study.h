@@ -1,6 +1,7 @@
 #pragma once
 // A walker on rough ground: its gait, and how many steps it takes before it falls.
 
+#include <numbers>
 #include <string>
 
 #include "analysis/statistics/estimate.h"
@@ -10,6 +11,9 @@
 #include "markov/mesh/mesh_study.h"
 
 namespace metastable::analysis {
+
+/// [rad]
+inline constexpr double degree = std::numbers::pi / 180;
 
 enum class Walker { simplest, compass };
 
@@ -24,6 +28,10 @@ struct WalkerSetting {
   std::string describe() const;
 };
 
+/// "simplest", "compass"
+const char* walker_name(Walker walker);
+/// "fresh", "facets"
+const char* terrain_name(dynamics::Terrain terrain);
 /// @throws std::invalid_argument for a name that is none of "simplest", "compass"; of "fresh", "facets"
 Walker walker_from_name(const std::string& name);
 dynamics::Terrain terrain_from_name(const std::string& name);

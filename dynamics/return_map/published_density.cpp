@@ -14,9 +14,9 @@
 // There is one compiled version for each generation of vector units, chosen when the program starts. Fused
 // multiply-adds make the last bits depend on it.
 #ifdef METASTABLE_AVX2
-#define METASTABLE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
+#define METASTABLE_WIDEST __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
-#define METASTABLE_WIDE
+#define METASTABLE_WIDEST
 #endif
 
 namespace metastable::dynamics {
@@ -327,7 +327,7 @@ enum class Lower { before_least, after_least };
 }
 
 // Integrates exp(-z_eta^2/2 - z_mu^2/2) / |grad g| along the curves g = level, lane by lane.
-METASTABLE_WIDE
+METASTABLE_WIDEST
 void along_curves(const Row& r, const double* levels, const Rules& rules, double* sums) {
   Curves c;
   begin(r, levels, c);

@@ -17,12 +17,6 @@
 #include "dynamics/return_map/published_density.h"
 #include "dynamics/return_map/rest_probability.h"
 
-#ifdef METASTABLE_AVX2
-#define METASTABLE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define METASTABLE_WIDE
-#endif
-
 namespace metastable::dynamics {
 namespace {
 

@@ -8,12 +8,6 @@
 #include <numbers>
 #include <stdexcept>
 
-#ifdef METASTABLE_AVX2
-#define METASTABLE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define METASTABLE_WIDE
-#endif
-
 namespace metastable::dynamics {
 namespace {
 

@@ -2,12 +2,6 @@
 
 #include <cmath>
 
-#ifdef METASTABLE_AVX2
-#define METASTABLE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define METASTABLE_WIDE
-#endif
-
 namespace metastable::dynamics {
 
 METASTABLE_WIDE void find_friction_roots(const PublishedLoss& of, FrictionRoots& roots, std::size_t count) {

@@ -5,9 +5,9 @@
 #include <numeric>
 
 #ifdef METASTABLE_AVX2
-#define METASTABLE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
+#define METASTABLE_WIDEST __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
-#define METASTABLE_WIDE
+#define METASTABLE_WIDEST
 #endif
 
 namespace metastable::markov::dense {
@@ -93,7 +93,7 @@ void multiply(Part target, Part visits, Part onward, std::size_t rows, std::size
   add_product(target, visits, packed.get(), rows, pivots, columns);
 }
 
-METASTABLE_WIDE void eliminate_few_columns(Part rows, Part factor, std::size_t pivots, std::size_t count) {
+METASTABLE_WIDEST void eliminate_few_columns(Part rows, Part factor, std::size_t pivots, std::size_t count) {
   for (std::size_t n = pivots; n-- > 1;) {
     const double* const from = rows.row(n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -104,8 +104,8 @@ METASTABLE_WIDE void eliminate_few_columns(Part rows, Part factor, std::size_t p
   }
 }
 
-METASTABLE_WIDE void visit_few_pivots(Part visits, std::size_t count, Part square, const double* exit,
-                                      std::size_t pivots) {
+METASTABLE_WIDEST void visit_few_pivots(Part visits, std::size_t count, Part square, const double* exit,
+                                        std::size_t pivots) {
   // Rows side by side, transposed: the recursion runs down the pivots of each.
   constexpr std::size_t lanes = 8;
   double lane[kFewPivots][lanes] = {};

@@ -19,6 +19,7 @@ constexpr double kBucket = 1;         // of actions, expanded together
 constexpr double kWorthAgain = 0.05;  // an expanded node is looked at again if its action falls by this
 constexpr int kHalvings = 9;          // of a gap between scores, to find where failures begin
 constexpr std::size_t kBatch = 32;    // nodes whose landings are asked for at once
+constexpr std::size_t kEntryBytes = sizeof(std::uint32_t) + sizeof(double);
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Keys: 15 bits an axis, phases above.
@@ -162,6 +163,7 @@ struct Mesh::Growth {
   void store(std::uint32_t node, std::vector<std::pair<std::uint64_t, double>>& parts, double killed);
   void relax(std::uint32_t node);
   void lower(std::uint32_t node, double to);
+  std::size_t bytes() const;
   void require_memory() const;
 
   Mesh& mesh;
@@ -370,10 +372,13 @@ void Mesh::Growth::expand(std::span<const std::uint32_t> nodes) {
   }
 }
 
+std::size_t Mesh::Growth::bytes() const {
+  return mesh.column_.size() * kEntryBytes + mesh.table_.bytes() +
+         mesh.key_.size() * (sizeof(std::uint64_t) + sizeof(Row) + 6 * sizeof(double));
+}
+
 void Mesh::Growth::require_memory() const {
-  const std::size_t bytes = mesh.column_.size() * (sizeof(std::uint32_t) + sizeof(double)) + mesh.table_.bytes() +
-                            mesh.key_.size() * (sizeof(std::uint64_t) + sizeof(Row) + 6 * sizeof(double));
-  if (bytes > options.most_bytes)
+  if (bytes() > options.most_bytes)
     throw std::length_error(
         fmt::format("mesh: spacing {:.3g} takes more than {:.1f} GB, {} nodes and {} entries so far", options.spacing,
                     static_cast<double>(options.most_bytes) / 0x1p30, mesh.key_.size(), mesh.column_.size()));
@@ -445,6 +450,7 @@ void Mesh::Growth::finish() {
     table.insert(mesh.key_[node], static_cast<std::uint32_t>(keys.size()));
     keys.push_back(mesh.key_[node]);
   }
+  mesh.bytes_ = bytes() + column.size() * kEntryBytes;
   mesh.column_ = std::move(column);
   mesh.value_ = std::move(value);
   mesh.table_ = std::move(table);

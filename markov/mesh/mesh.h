@@ -42,6 +42,8 @@ class Mesh {
 
   std::size_t size() const { return kill_.size(); }
   std::size_t entries() const { return column_.size(); }
+  /// What growing it takes at most, rows and nodes.
+  std::size_t bytes() const { return bytes_; }
   int phases() const { return static_cast<int>(frames_.size()); }
   double cheapest_failure() const { return cheapest_failure_; }  ///< its action; exp(-action) is its order of rarity
   std::span<const double> kill() const { return kill_; }
@@ -98,6 +100,7 @@ class Mesh {
   std::vector<std::uint32_t> column_;
   std::vector<double> value_, kill_, leave_;
   double cheapest_failure_ = 0;
+  std::size_t bytes_ = 0;
 };
 
 }  // namespace metastable::markov

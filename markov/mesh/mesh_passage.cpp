@@ -25,11 +25,17 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
   double alive = 1, alive_lower = 1, steps_lower = 0, last_failures = 0;
   std::vector<double> distances;
   int settled = 0;
+  passage.visits.assign(n, 0.0);
+  std::vector<double> met(n);
+  const auto visit = [&](double times) {
+    for (std::size_t i = 0; i < n; ++i) passage.visits[i] += times * met[i];
+  };
   while (settled < kInARow) {
     if (passage.products >= kProducts)
       throw ConvergenceError("mesh", last_failures, "survivors still change after 20000 products");
     // One revolution: of those alive at its beginning, which fail in it, and how many steps they take.
     before = x;
+    std::fill(met.begin(), met.end(), 0.0);
     double here = 1, failures = 0, taken = 0, here_lower = 1, failures_lower = 0, taken_lower = 0;
     std::vector<double> distribution(n, 0.0);
     for (int phase = 0; phase < phases; ++phase) {
@@ -38,6 +44,7 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
         kill += x[i] * mesh.kill()[i];
         leave += x[i] * mesh.leave()[i];
         distribution[i] += x[i];
+        met[i] += here * x[i];
       }
       taken += here;
       failures += here * kill;
@@ -53,6 +60,7 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
         passage.steps = passage.steps_upper = passage.steps + alive * taken;
         passage.steps_lower = steps_lower + alive_lower * taken_lower;
         passage.failure_rate = 1;
+        visit(alive);
         passage.distribution = std::move(distribution);
         return passage;
       }
@@ -69,7 +77,9 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
       passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);
       passage.failure_rate = phases == 1 ? failures : -std::expm1(std::log1p(-failures) / phases);
       passage.distribution = std::move(distribution);
+      visit(alive / failures);
     } else {
+      visit(alive);
       passage.steps += alive * taken;
       steps_lower += alive_lower * taken_lower;
       alive *= here;

@@ -16,6 +16,7 @@ struct MeshPassage {
   double mixing_steps = 0;           ///< e-folding of the distance from the quasi-stationary distribution
   std::vector<double> survival;      ///< survival[k]: share that survives step k + 1, until settled; then geometric
   std::vector<double> distribution;  ///< quasi-stationary, of one phase each summing to one
+  std::vector<double> visits;        ///< expected steps that begin in each node, from the start to failure
   int products = 0;
 };
 

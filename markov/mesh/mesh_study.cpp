@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <mutex>
 #include <stdexcept>
 
 #include "markov/mesh/batch_simulation.h"
@@ -65,10 +66,10 @@ Extrapolated extrapolate(const std::vector<std::vector<double>>& logs) {
   const double quantile = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
   e.shift_error = quantile * std::sqrt(spread / (n - 1) / n);
   e.discretization_error = std::abs(e.log_value - at_zero(mean, 1, sizes));
-  // Where a fourth size was asked for, the square is far off: half of what the extrapolation by three last moved.
+  // Where a fourth size was asked for, the square is far off: what the extrapolation by three last moved.
   if (sizes > 3)
-    e.discretization_error = std::max(
-        e.discretization_error, 0.5 * std::abs(at_zero(mean, sizes - 3, sizes) - at_zero(mean, sizes - 4, sizes - 1)));
+    e.discretization_error = std::max(e.discretization_error,
+                                      std::abs(at_zero(mean, sizes - 3, sizes) - at_zero(mean, sizes - 4, sizes - 1)));
   return e;
 }
 
@@ -87,6 +88,157 @@ std::string disagreement(const char* one, const MeshEstimate& a, const char* oth
       a.value, a.lower, a.upper, other, b.value, b.lower, b.upper);
 }
 
+/// One study while it is made.
+class Run {
+ public:
+  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options)
+      : map_(map),
+        start_(start),
+        options_(options),
+        frames_(noise_frames(map, start)),
+        sizes_(options.sizes > 0    ? static_cast<std::size_t>(options.sizes)
+               : map.dimension == 4 ? 4
+                                    : 3),
+        shifts_(static_cast<std::size_t>(options.shifts)),
+        threads_(std::min(thread_count(options.threads), options.shifts)),
+        steps_(shifts_, std::vector<double>(sizes_)),
+        rates_(steps_),
+        brackets_(steps_) {
+    study_.sizes.resize(sizes_);
+  }
+
+  MeshStudy run() {
+    foresee_memory();
+    parallel_for(sizes_ * shifts_ - 1, threads_, [&](std::size_t task) {
+      // The long ones first; the very last, the first shift of the coarsest size, has been made.
+      solve(sizes_ - 1 - task / shifts_, shifts_ - 1 - task % shifts_);
+    });
+    join();
+    simulate();
+    sample();
+    if (study_.simulated)
+      study_.disagreement = disagreement("the mesh", study_.steps, "direct simulation", *study_.simulated);
+    if (study_.disagreement.empty() && study_.guided)
+      study_.disagreement = disagreement("the mesh", study_.steps, "guided sampling", *study_.guided);
+    return std::move(study_);
+  }
+
+ private:
+  MeshOptions mesh_options(std::size_t size, std::size_t shift) const {
+    const double coarse = options_.spacing > 0 ? options_.spacing : coarsest(map_.dimension);
+    return {.spacing = coarse / std::pow(std::sqrt(2.0), static_cast<double>(size)),
+            .seed = options_.seed,
+            .shift = static_cast<std::uint32_t>(shift),
+            .margin = options_.margin > 0   ? options_.margin
+                      : map_.dimension == 4 ? 10.0
+                                            : 12.0,
+            .score_spacing = score_spacing(map_),
+            .most_bytes = options_.most_bytes / static_cast<std::size_t>(threads_)};
+  }
+
+  void foresee_memory() {
+    // Nodes by the spacing's power; entries a row grow by less than its root.
+    const double coarse = static_cast<double>(solve(0, 0));
+    const double growth = std::pow(std::sqrt(2.0), static_cast<double>(sizes_ - 1));
+    const double finest = coarse * std::pow(growth, map_.dimension + 0.5);
+    study_.expected_bytes = finest * threads_;
+    if (study_.expected_bytes > static_cast<double>(options_.most_bytes))
+      throw std::length_error(fmt::format(
+          "mesh study: its finest meshes, of spacing {:.3g}, would take about {:.2g} GB, {} at a time; {:.2g} GB are "
+          "allowed",
+          mesh_options(sizes_ - 1, 0).spacing, study_.expected_bytes / 0x1p30, threads_,
+          static_cast<double>(options_.most_bytes) / 0x1p30));
+  }
+
+  /// Returns the mesh's bytes.
+  std::size_t solve(std::size_t size, std::size_t shift) {
+    const Mesh mesh(map_, frames_, start_, mesh_options(size, shift));
+    MeshPassage passage = mesh_passage(mesh, start_);
+    steps_[shift][size] = std::log(passage.steps);
+    rates_[shift][size] = std::log(passage.failure_rate);
+    brackets_[shift][size] = 0.5 * std::log(passage.steps_upper / passage.steps_lower);
+    const std::lock_guard lock(mutex_);
+    done_ += mesh_work(size);
+    if (options_.progress) options_.progress(done_ / all_work());
+    if (shift > 0) return mesh.bytes();
+    study_.sizes[size] = {mesh_options(size, 0).spacing, mesh.size(), mesh.entries(), {}};
+    if (size + 1 < sizes_) return mesh.bytes();
+    study_.mixing_steps = passage.mixing_steps;
+    study_.survival = std::move(passage.survival);
+    study_.cheapest_failure = mesh.cheapest_failure();
+    return mesh.bytes();
+  }
+
+  double mesh_work(std::size_t size) const {
+    return std::pow(std::sqrt(2.0), static_cast<double>(size) * map_.dimension);
+  }
+  double all_work() const {
+    double all = 0;
+    for (std::size_t size = 0; size < sizes_; ++size) all += static_cast<double>(shifts_) * mesh_work(size);
+    return 1.25 * all;  // a fifth for the other ways
+  }
+
+  void join() {
+    for (std::size_t size = 0; size < sizes_; ++size)
+      for (std::size_t shift = 0; shift < shifts_; ++shift) {
+        study_.sizes[size].steps.push_back(std::exp(steps_[shift][size]));
+        study_.bracket = std::max(study_.bracket, brackets_[shift][size]);
+      }
+    const Extrapolated by_steps = extrapolate(steps_), by_rate = extrapolate(rates_);
+    study_.shift_error = by_steps.shift_error;
+    study_.discretization_error = by_steps.discretization_error;
+    study_.steps = around(std::exp(by_steps.log_value),
+                          std::hypot(by_steps.shift_error, by_steps.discretization_error) + study_.bracket);
+    study_.failure_rate = around(std::exp(by_rate.log_value),
+                                 std::hypot(by_rate.shift_error, by_rate.discretization_error) + study_.bracket);
+  }
+
+  void simulate() {
+    const auto trials =
+        static_cast<std::size_t>(static_cast<double>(options_.simulated_steps) / std::max(1.0, study_.steps.value));
+    if (trials < kFewestTrials) return;
+    const auto simulated = simulate_steps(map_, start_,
+                                          {.trials = trials,
+                                           .seed = options_.seed,
+                                           .threads = options_.threads,
+                                           .most_steps = 4 * options_.simulated_steps});
+    if (!simulated) return;
+    const double half = kNormal95 * simulated->standard_error;
+    study_.simulated = MeshEstimate{simulated->mean, simulated->mean - half, simulated->mean + half};
+    study_.simulated_trials = trials;
+  }
+
+  void sample() {
+    if (options_.guided_samples == 0 || study_.steps.value <= kSampledFrom) return;
+    // From the start to where failures keep their share: the time to forget the start, some times over.
+    const int forgets = 4 + static_cast<int>(std::ceil(4 * study_.mixing_steps));
+    const Mesh mesh(map_, frames_, start_, mesh_options(std::min<std::size_t>(1, sizes_ - 1), 0));
+    const GuidedRate guided = guided_failure_rate(map_, mesh, start_,
+                                                  {.samples = options_.guided_samples,
+                                                   .burn_in = std::min(3 * forgets, 60000),
+                                                   .window = std::min(forgets, 200),
+                                                   .seed = options_.seed,
+                                                   .threads = options_.threads});
+    if (!(guided.rate > 0)) return;
+    const double beyond = study_.steps.value - 1 / study_.failure_rate.value;  // what the start is worth
+    const double half = kNormal95 * guided.standard_error / guided.rate;
+    const double sampled = 1 / guided.rate + beyond;
+    study_.guided = MeshEstimate{sampled, sampled / (1 + half), half < 1 ? sampled / (1 - half) : sampled / 1e-3};
+    study_.guided_samples = options_.guided_samples;
+  }
+
+  const BatchMap& map_;
+  std::span<const double> start_;
+  const MeshStudyOptions& options_;
+  std::vector<NoiseFrame> frames_;
+  std::size_t sizes_, shifts_;
+  int threads_;
+  std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]
+  MeshStudy study_;
+  std::mutex mutex_;
+  double done_ = 0;
+};
+
 }  // namespace
 
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options) {
@@ -94,89 +246,7 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     throw std::invalid_argument(fmt::format("mesh study: {} sizes, 3 or 4 expected", options.sizes));
   if (options.shifts < 6)
     throw std::invalid_argument(fmt::format("mesh study: {} shifts, 6 or more expected", options.shifts));
-  const auto frames = noise_frames(map, start);
-  const std::size_t sizes = options.sizes > 0 ? static_cast<std::size_t>(options.sizes) : map.dimension == 4 ? 4 : 3;
-  const auto shifts = static_cast<std::size_t>(options.shifts);
-  const double spacing = options.spacing > 0 ? options.spacing : coarsest(map.dimension);
-  const int threads = std::min(thread_count(options.threads), options.shifts);
-
-  MeshStudy study;
-  study.sizes.resize(sizes);
-  std::vector<std::vector<double>> steps(shifts, std::vector<double>(sizes)), rates = steps, brackets = steps;
-  const auto mesh_options = [&](std::size_t size, std::size_t shift) {
-    return MeshOptions{.spacing = spacing / std::pow(std::sqrt(2.0), static_cast<double>(size)),
-                       .seed = options.seed,
-                       .shift = static_cast<std::uint32_t>(shift),
-                       .margin = options.margin > 0   ? options.margin
-                                 : map.dimension == 4 ? 10.0
-                                                      : 12.0,
-                       .score_spacing = score_spacing(map),
-                       .most_bytes = options.most_bytes / static_cast<std::size_t>(threads)};
-  };
-  parallel_for(sizes * shifts, threads, [&](std::size_t task) {
-    const std::size_t size = sizes - 1 - task / shifts, shift = task % shifts;  // the long ones first
-    const Mesh mesh(map, frames, start, mesh_options(size, shift));
-    MeshPassage passage = mesh_passage(mesh, start);
-    steps[shift][size] = std::log(passage.steps);
-    rates[shift][size] = std::log(passage.failure_rate);
-    brackets[shift][size] = 0.5 * std::log(passage.steps_upper / passage.steps_lower);
-    if (shift > 0) return;
-    study.sizes[size] = {mesh_options(size, 0).spacing, mesh.size(), mesh.entries(), {}};
-    if (size + 1 < sizes) return;
-    study.mixing_steps = passage.mixing_steps;
-    study.survival = std::move(passage.survival);
-    study.cheapest_failure = mesh.cheapest_failure();
-  });
-  for (std::size_t size = 0; size < sizes; ++size)
-    for (std::size_t shift = 0; shift < shifts; ++shift) {
-      study.sizes[size].steps.push_back(std::exp(steps[shift][size]));
-      study.bracket = std::max(study.bracket, brackets[shift][size]);
-    }
-  const Extrapolated by_steps = extrapolate(steps), by_rate = extrapolate(rates);
-  study.shift_error = by_steps.shift_error;
-  study.discretization_error = by_steps.discretization_error;
-  study.steps = around(std::exp(by_steps.log_value),
-                       std::hypot(by_steps.shift_error, by_steps.discretization_error) + study.bracket);
-  study.failure_rate = around(std::exp(by_rate.log_value),
-                              std::hypot(by_rate.shift_error, by_rate.discretization_error) + study.bracket);
-
-  const double value = study.steps.value;
-  const auto trials = static_cast<std::size_t>(static_cast<double>(options.simulated_steps) / value);
-  if (trials >= kFewestTrials) {
-    const auto simulated = simulate_steps(map, start,
-                                          {.trials = trials,
-                                           .seed = options.seed,
-                                           .threads = options.threads,
-                                           .most_steps = 4 * options.simulated_steps});
-    if (simulated) {
-      const double half = kNormal95 * simulated->standard_error;
-      study.simulated = MeshEstimate{simulated->mean, simulated->mean - half, simulated->mean + half};
-      study.simulated_trials = trials;
-    }
-  }
-  if (options.guided_samples > 0 && value > kSampledFrom) {
-    // From the start to where failures keep their share: the time to forget the start, some times over.
-    const int forgets = 4 + static_cast<int>(std::ceil(4 * study.mixing_steps));
-    const Mesh mesh(map, frames, start, mesh_options(std::min<std::size_t>(1, sizes - 1), 0));
-    const GuidedRate guided = guided_failure_rate(map, mesh, start,
-                                                  {.samples = options.guided_samples,
-                                                   .burn_in = std::min(3 * forgets, 60000),
-                                                   .window = std::min(forgets, 200),
-                                                   .seed = options.seed,
-                                                   .threads = options.threads});
-    if (guided.rate > 0) {
-      const double beyond = value - 1 / study.failure_rate.value;  // what the start is worth
-      const double half = kNormal95 * guided.standard_error / guided.rate;
-      const double sampled = 1 / guided.rate + beyond;
-      study.guided = MeshEstimate{sampled, sampled / (1 + half), half < 1 ? sampled / (1 - half) : sampled / 1e-3};
-      study.guided_samples = options.guided_samples;
-    }
-  }
-  if (study.simulated)
-    study.disagreement = disagreement("the mesh", study.steps, "direct simulation", *study.simulated);
-  if (study.disagreement.empty() && study.guided)
-    study.disagreement = disagreement("the mesh", study.steps, "guided sampling", *study.guided);
-  return study;
+  return Run(map, start, options).run();
 }
 
 }  // namespace metastable::markov

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,6 +24,8 @@ struct MeshStudyOptions {
   std::size_t guided_samples = 4000;              ///< 0: none
   std::uint64_t simulated_steps = 2000000;        ///< direct simulation takes about so many steps; 0: none
   std::size_t most_bytes = std::size_t{3} << 30;  ///< of all meshes held at once
+  /// Called with the share of the work done, from any thread but one at a time; may throw to stop.
+  std::function<void(double)> progress = {};
 };
 
 /// A number with its 95 % interval.
@@ -46,6 +49,7 @@ struct MeshStudy {
   /// leaves the mesh.
   double shift_error = 0, discretization_error = 0, bracket = 0;
   std::vector<MeshSize> sizes;
+  double expected_bytes = 0;                      ///< of all meshes held at once, as foreseen from the coarsest
   std::optional<MeshEstimate> guided, simulated;  ///< expected steps in the two other ways, where they reach
   std::size_t guided_samples = 0, simulated_trials = 0;
   /// Empty, or says which ways disagree and that `steps` must not be used.
@@ -55,13 +59,16 @@ struct MeshStudy {
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
 /// discretization error; the bracket of what leaves the mesh is added. The discretization error is the difference from
-/// the extrapolation without the coarsest size; with four sizes, at least half of that between the two triples'.
+/// the extrapolation without the coarsest size; with four sizes, at least that between the two triples'.
 ///
 /// Beside it stand importance sampling guided by the coarsest mesh that T > 100 steps makes worth it, and direct
 /// simulation where 100 trials or more fit into `simulated_steps`. Two ways disagree when they lie further apart
 /// than 1.7 times (99.9 %) their joint 95 % half-width.
+/// The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries with them, is
+/// foreseen from it.
 /// @param start  a state at phase 0
-/// @throws as Mesh, noise_frames and mesh_passage do
+/// @throws std::length_error before the other meshes are made if they would take more than most_bytes; as Mesh,
+/// noise_frames and mesh_passage do
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options = {});
 
 }  // namespace metastable::markov

@@ -6,12 +6,6 @@
 #include <limits>
 #include <stdexcept>
 
-#ifdef METASTABLE_AVX2
-#define METASTABLE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define METASTABLE_WIDE
-#endif
-
 namespace metastable::markov {
 namespace {
 

@@ -21,6 +21,7 @@
 #include "reports/command_line/option_values.h"
 #include "reports/command_line/setting_options.h"
 #include "reports/command_line/suggestion.h"
+#include "reports/command_line/walker_options.h"
 #include "reports/commands/compare_command.h"
 #include "reports/commands/doctor_command.h"
 #include "reports/commands/report_command.h"
@@ -48,11 +49,19 @@ Command steps() {
             add_standard_errors(o);
             o.add("json", "FILE|-", "", "Write the results as JSON");
             o.add_flag("explain", "What stands behind the words of the answer");
+            o.add_flag("how-it-fails", "The last steps before failure: which leg, which noise, from where");
+            add_walker(o, "DEG");
           },
           [](const Options& o, const std::string& line) {
+            if (asks_for_walker(o)) {
+              WalkerRequest walker = walker_request(o, line, {"how-it-fails"});
+              walker.how_it_fails = o.flag("how-it-fails");
+              return run_walker_steps(walker);
+            }
             StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
             request.sensitivities = o.flag("sensitivities");
             request.explain = o.flag("explain");
+            request.how_it_fails = o.flag("how-it-fails");
             request.setting.direct = o.flag("direct");
             if (request.setting.direct && request.setting.law != dynamics::Law::settled)
               throw std::invalid_argument("--direct: has a meaning under --law settled only");
@@ -71,8 +80,15 @@ Command compare() {
             o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
             add_standard_errors(o);
             o.add("json", "FILE|-", "", "Write the results as JSON");
+            add_walker(o, "DEG,DEG,...");
           },
           [](const Options& o, const std::string& line) {
+            if (asks_for_walker(o)) {
+              const WalkerRequest walker = walker_request(o, line);
+              if (walker.settings.size() < 2)
+                throw std::invalid_argument("--slopes, --slope-sd: two slopes or two sds at least");
+              return run_walker_compare(walker);
+            }
             CompareRequest request{several_settings(o, 2), study_options(o), o.count("collisions", 1, 63),
                                    o.text("json"), line};
             request.standard_errors = standard_errors(o, request.settings.front());
@@ -94,8 +110,10 @@ Command sweep() {
         add_wheel(o), add_contact(o), add_course(o), add_study(o);
         o.add("out", "FILE", "sweep.csv",
               "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
+        add_walker(o, "RANGE");
       },
       [](const Options& o, const std::string& line) {
+        if (asks_for_walker(o)) return run_walker_sweep(walker_sweep_request(o, line));
         SweepRequest request;
         request.setting = common_setting(o);
         for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
@@ -139,8 +157,10 @@ Command report() {
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
             o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
             o.add("out", "DIR", "report", "Folder for the files");
+            add_walker(o, "DEG,DEG,...");
           },
           [](const Options& o, const std::string& line) {
+            if (asks_for_walker(o)) return run_walker_report(walker_request(o, line));
             run_report(
                 {several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000), o.text("out"), line});
           }};

@@ -10,6 +10,7 @@
 #include "reports/command_line/command.h"
 #include "reports/command_line/option_values.h"
 #include "reports/command_line/setting_options.h"
+#include "reports/command_line/walker_options.h"
 #include "reports/commands/coast_down_command.h"
 #include "reports/commands/collisions_command.h"
 #include "reports/commands/describe_command.h"
@@ -99,17 +100,24 @@ Command simulate() {
                 "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
                 "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
             o.add("trials", "N", "50", "Trials");
-            o.add("collisions", "N", "16", "Most collisions of a trial");
+            o.add("collisions", "N", "16", "Most collisions of a trial (of a walker: strikes, default 1000)");
             o.add("angle-rate", "HZ", "",
                   "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
             o.add("angle-noise", "RAD", "", "White noise of the angle (default 0.0002; needs --angle-rate)");
             add_reality(o);
+            add_walker(o, "DEG", false);
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
           },
           [](const Options& o, const std::string& line) {
             if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
+            if (asks_for_walker(o)) {
+              WalkerRequest walker = walker_request(o, line, {"trials", "collisions"});
+              walker.walks.trials = o.whole("trials", 1, 1000000);
+              if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 1, 1000000);
+              return run_walker_simulate(walker);
+            }
             const bool stand_in = o.flag("stand-in");
             SimulateRequest request{stand_in ? stand_in_base(o) : one_setting(o),
                                     o.count("trials", 1, 1000000),

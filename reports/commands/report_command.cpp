@@ -8,9 +8,11 @@
 
 #include "analysis/paper/energy_losses.h"
 #include "analysis/sensitivity/sweep.h"
+#include "analysis/study/how_it_fails.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/version.h"
+#include "reports/study/last_moments_text.h"
 #include "reports/study/report_figures.h"
 #include "reports/study/report_tables.h"
 #include "reports/study/study_progress.h"
@@ -89,6 +91,7 @@ class Report {
         "Left: speeds just before a collision once the start is forgotten; right: how fast the chance of still rolling "
         "falls, straight on this scale as soon as the regime is metastable.",
         {density_figure(studied, provenance), survival_figure(studied, provenance)}, {});
+    for (const analysis::Setting& setting : request_.settings) last_steps(setting, studied);
     std::vector<Figure> maps;
     for (const analysis::Setting& setting : request_.settings)
       maps.push_back(return_map_figure(setting, provenance_for({setting})));
@@ -97,6 +100,25 @@ class Report {
             "dots to "
             "the lower left are on their way to rest.",
             std::move(maps), {});
+  }
+
+  // Of the law that real wheels obey, or of the next one before it under which this ramp's wheel fails.
+  void last_steps(const analysis::Setting& setting, const std::vector<Studied>& studied) {
+    for (auto one = studied.rbegin(); one != studied.rend(); ++one) {
+      const analysis::Setting& of = *one->study.setting;
+      if (of.slope_deg != setting.slope_deg) continue;
+      analysis::StudyOptions options = request_.study;
+      options.progress = {};
+      const analysis::LastMoments moments = analysis::how_it_fails(of, one->study, options);
+      if (!moments.reason.empty()) continue;
+      const std::string id = slope_id("last-steps", of);
+      section(id, fmt::format("How it fails at {} deg under the law {}", of.slope_deg, dynamics::law_name(of.law)),
+              "Backwards from the collision that brings it to rest: speeds and contacts of the last collisions beside "
+              "those of all others.",
+              last_moments_figures(moments, id, provenance_for({of})),
+              {last_moments_table(moments, id + "-table", provenance_for({of}))});
+      return;
+    }
   }
 
   // One table and one map of expected steps over two axes.

@@ -29,6 +29,7 @@ struct StepsRequest {
   bool certify = false;  ///< guaranteed bounds as well
   bool explain = false;  ///< what the words mean at length
   bool sensitivities = false;
+  bool how_it_fails = false;
   std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to the expected steps
 };
 

@@ -6,9 +6,11 @@
 
 #include "analysis/study/certify.h"
 #include "analysis/study/consistency.h"
+#include "analysis/study/how_it_fails.h"
 #include "reports/output/output_file.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
+#include "reports/study/last_moments_text.h"
 #include "reports/study/study_json.h"
 #include "reports/study/study_progress.h"
 #include "reports/study/study_text.h"
@@ -42,6 +44,11 @@ void run_steps(const StepsRequest& request) {
       extras.propagated =
           analysis::propagate(study.steps.from_start.value, *extras.sensitivities, request.standard_errors);
   }
+  if (request.how_it_fails) {
+    analysis::StudyOptions options = request.study;
+    options.progress = {};
+    extras.last_moments = analysis::how_it_fails(request.setting, study, options);
+  }
   if (json) {
     const Provenance provenance{request.command, request.setting.describe(), request.study.seed, version()};
     json->stream() << steps_json(study, thresholds, provenance, extras);
@@ -53,6 +60,7 @@ void run_steps(const StepsRequest& request) {
   if (extras.propagated)
     fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
   if (extras.sensitivities) fmt::print("\n{}", sensitivities_text(*extras.sensitivities));
+  if (extras.last_moments) fmt::print("\n{}", last_moments_text(*extras.last_moments, "leg", terminal_width()));
   if (study.status != analysis::Status::rest_unresolved)
     fmt::print("\n{}", words_text(study, request.explain, terminal_width()));
 }

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dynamics/wheel/contact_law.h"
+#include "reports/study/last_moments_text.h"
 
 namespace metastable::reports {
 namespace {
@@ -139,6 +140,7 @@ std::string steps_json(const analysis::Metastability& study, const analysis::Res
   json.update(study_json(study, thresholds));
   if (extras.certified) json["certificate"] = certificate_json(*extras.certified);
   if (extras.sensitivities) json["sensitivities"] = sensitivities_json(*extras.sensitivities);
+  if (extras.last_moments) json["how_it_fails"] = Json::parse(last_moments_json(*extras.last_moments));
   if (extras.propagated) json["from_standard_errors"] = propagated_json(*extras.propagated);
   json["provenance"] = provenance_json(provenance);
   return json.dump(2) + "\n";

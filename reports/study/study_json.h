@@ -8,6 +8,7 @@
 #include "analysis/sensitivity/comparison.h"
 #include "analysis/sensitivity/propagation.h"
 #include "analysis/sensitivity/sensitivity.h"
+#include "analysis/statistics/last_moments.h"
 #include "analysis/study/certify.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/rest_thresholds.h"
@@ -19,6 +20,7 @@ namespace metastable::reports {
 struct StepsExtras {
   std::optional<analysis::CertifiedSteps> certified = {};
   std::optional<analysis::Sensitivities> sensitivities = {};
+  std::optional<analysis::LastMoments> last_moments = {};
   std::optional<analysis::Propagated> propagated = {};  ///< from the parameters' standard errors
 };
 

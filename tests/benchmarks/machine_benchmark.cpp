@@ -8,12 +8,6 @@
 
 #include "markov/rows/grid.h"
 
-#ifdef METASTABLE_AVX2
-#define METASTABLE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define METASTABLE_WIDE
-#endif
-
 namespace {
 
 constexpr std::size_t count = 1024;  // numbers that stay in the first cache

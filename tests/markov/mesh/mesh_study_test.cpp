@@ -8,10 +8,7 @@
 namespace metastable::markov {
 namespace {
 
-using testing::linear_batch;
-using testing::linear_steps;
-using testing::skew_batch;
-using testing::two_phase_batch;
+using namespace testing;  // maps.h
 
 MeshStudyOptions quick() { return {.seed = 2, .guided_samples = 400, .simulated_steps = 100000}; }
 

@@ -14,10 +14,7 @@
 namespace metastable::markov {
 namespace {
 
-using testing::linear_batch;
-using testing::linear_steps;
-using testing::skew_batch;
-using testing::two_phase_batch;
+using namespace testing;  // maps.h
 
 const std::vector<double> middle{2};
 

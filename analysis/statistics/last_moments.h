@@ -1,0 +1,40 @@
+#pragma once
+// How something fails, in numbers: what its last steps look like beside all others. Knows no wheel and no walker.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "analysis/statistics/estimate.h"
+
+namespace metastable::analysis {
+
+/// Weighted median as value, 5 % and 95 % quantiles as ends.
+/// @param weights  >= 0, as many as values, some > 0 (otherwise std::invalid_argument)
+Estimate middle_90(std::span<const double> values, std::span<const double> weights);
+
+/// What steps are like: medians with the middle 90 %.
+struct StepProfile {
+  std::vector<Estimate> state;  ///< at the beginning of the step, one a number of the state
+  std::vector<Estimate> noise;  ///< met in it
+  double bound_to_fail =
+      0;  ///< mean chance, at its beginning, of failing before being back in the middle of the regime
+};
+
+/// One step of a path: the state in which it begins, the noise that leads on to the next (or to failure).
+struct PathStep {
+  int phase = 0;
+  std::vector<double> state, noise;
+};
+
+/// The failures of one chain, from its last steps backwards.
+struct LastMoments {
+  std::vector<std::string> state_names, noise_names;  ///< with units
+  std::vector<StepProfile> last;                      ///< last[0]: the step that fails, last[1]: the one before ...
+  StepProfile regime;                                 ///< all steps of the metastable regime
+  std::vector<double> by_phase;                       ///< share of the failures in each phase's step; sums to one
+  std::vector<PathStep> likeliest;                    ///< the most likely last steps, the one that fails at the end
+  std::string reason;                                 ///< why there is nothing; empty if there is
+};
+
+}  // namespace metastable::analysis

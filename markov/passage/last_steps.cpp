@@ -1,0 +1,153 @@
+#include "markov/passage/last_steps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "markov/chain/solver.h"
+
+namespace metastable::markov {
+namespace {
+
+constexpr double kNever = -std::numeric_limits<double>::infinity();
+constexpr std::size_t kEliminated = 3000;  // states
+constexpr int kProducts = 100000;
+constexpr double kExact = 1e-11;  // relative
+
+double logarithm(double probability) { return probability > 0 ? std::log(probability) : kNever; }
+
+void require_size(const char* what, std::size_t given, const Chain& chain) {
+  if (given != chain.size())
+    throw std::invalid_argument(fmt::format("last steps: {} has {} entries for {} states", what, given, chain.size()));
+}
+
+/// Log of the best path's density by its first state, and where it goes from there.
+class BestPath {
+ public:
+  BestPath(const Chain& chain, std::span<const double> measure) : chain_(chain), best_(chain.size()) {
+    for (std::size_t i = 0; i < chain.size(); ++i) best_[i] = logarithm(chain.kill(i));
+    log_measure_.assign(chain.size(), 0.0);
+    for (std::size_t i = 0; i < measure.size(); ++i) log_measure_[i] = std::log(measure[i]);
+  }
+
+  void one_step_earlier() {
+    std::vector<double> worth(best_.size(), kNever);
+    std::vector<std::uint32_t> to(best_.size(), 0);
+    const auto offer = [&](std::size_t i, std::size_t j, double probability) {
+      const double log_density = logarithm(probability) - log_measure_[j] + best_[j];
+      if (!(log_density > worth[i])) return;
+      worth[i] = log_density;
+      to[i] = static_cast<std::uint32_t>(j);
+    };
+    for (std::size_t i = 0; i < best_.size(); ++i) {
+      offer(i, i, chain_.stay(i));
+      for (std::size_t e = 0; e < chain_.columns(i).size(); ++e) offer(i, chain_.columns(i)[e], chain_.values(i)[e]);
+    }
+    best_ = std::move(worth);
+    next_.push_back(std::move(to));
+  }
+
+  /// From where it is best to start when states are met in proportion to `visits`; the last step comes first.
+  std::vector<std::uint32_t> path(std::span<const double> visits) const {
+    std::size_t at = 0;
+    double most = kNever;
+    for (std::size_t i = 0; i < best_.size(); ++i) {
+      const double log_density = logarithm(visits[i]) - log_measure_[i] + best_[i];
+      if (log_density > most) {
+        most = log_density;
+        at = i;
+      }
+    }
+    std::vector<std::uint32_t> states{static_cast<std::uint32_t>(at)};
+    for (std::size_t k = next_.size(); k-- > 0;) states.push_back(next_[k][states.back()]);
+    std::reverse(states.begin(), states.end());
+    return states;
+  }
+
+ private:
+  const Chain& chain_;
+  std::vector<double> best_, log_measure_;
+  std::vector<std::vector<std::uint32_t>> next_;
+};
+
+/// x = Q x + rhs by products, each from nothing: sums of non-negative numbers that only grow.
+std::vector<double> by_products(const Chain& chain, std::span<const double> rhs) {
+  std::vector<double> x(rhs.begin(), rhs.end()), term(x);
+  for (int product = 0; product < kProducts; ++product) {
+    term = markov::apply(chain, term);
+    double most = 0;  // of what this term and, at the same pace, all later ones add
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      x[i] += term[i];
+      if (x[i] > 0) most = std::max(most, term[i] / x[i]);
+    }
+    if (most * static_cast<double>(product + 1) <= kExact) return x;
+  }
+  throw ConvergenceError("passage", kExact, "neither the set nor failure is reached within 100000 steps");
+}
+
+}  // namespace
+
+LastSteps last_steps(const Chain& chain, std::span<const double> visits, int steps, std::span<const double> measure) {
+  require_size("visits", visits.size(), chain);
+  if (!measure.empty()) require_size("measure", measure.size(), chain);
+  if (steps < 1) throw std::invalid_argument(fmt::format("last steps: {} steps, 1 or more expected", steps));
+  LastSteps last;
+  BestPath best(chain, measure);
+  std::vector<double> fails(chain.kill().begin(), chain.kill().end());
+  for (int k = 0;; ++k) {
+    std::vector<double> share(chain.size());
+    double all = 0;
+    for (std::size_t i = 0; i < share.size(); ++i) all += share[i] = visits[i] * fails[i];
+    if (!(all > 0)) {
+      if (k == 0) throw std::domain_error("last steps: none of the states visited fails");
+      break;
+    }
+    if (k > 0) best.one_step_earlier();
+    for (double& one : share) one /= all;
+    last.share.push_back(std::move(share));
+    last.fails_in.push_back(fails);
+    if (k + 1 == steps) break;
+    fails = markov::apply(chain, fails);
+  }
+  last.likeliest = best.path(visits);
+  return last;
+}
+
+PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set) {
+  require_size("set", set.size(), chain);
+  std::vector<std::uint32_t> outside;
+  for (std::size_t i = 0; i < set.size(); ++i)
+    if (!set[i]) outside.push_back(static_cast<std::uint32_t>(i));
+  PassageTo passage;
+  passage.reach.assign(set.begin(), set.end());
+  passage.fail.assign(set.size(), 0.0);
+  passage.steps.assign(set.size(), 0.0);
+  if (outside.empty()) return passage;
+  std::vector<double> to_set(outside.size(), 0.0), kill, ones(outside.size(), 1.0);
+  for (std::size_t n = 0; n < outside.size(); ++n) {
+    kill.push_back(chain.kill(outside[n]));
+    const auto columns = chain.columns(outside[n]);
+    for (std::size_t e = 0; e < columns.size(); ++e)
+      if (set[columns[e]]) to_set[n] += chain.values(outside[n])[e];
+  }
+  const Chain inside = chain.restricted_to(outside);
+  const auto scatter = [&](const std::vector<double>& from, std::vector<double>& to) {
+    for (std::size_t n = 0; n < outside.size(); ++n) to[outside[n]] = from[n];
+  };
+  if (outside.size() <= kEliminated) {
+    const ChainSolver solver(inside);
+    scatter(solver.solve(to_set), passage.reach);
+    scatter(solver.solve(kill), passage.fail);
+    scatter(solver.solve(ones), passage.steps);
+  } else {
+    scatter(by_products(inside, to_set), passage.reach);
+    scatter(by_products(inside, kill), passage.fail);
+    scatter(by_products(inside, ones), passage.steps);
+  }
+  return passage;
+}
+
+}  // namespace metastable::markov

@@ -1,0 +1,48 @@
+#pragma once
+// How a chain fails: its last steps before failure, and which of set and failure comes first.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "markov/chain/chain.h"
+
+namespace metastable::markov {
+
+/// The last steps of walkers that fail; k = 0 is the step that fails, k = 1 the one before, and so on.
+struct LastSteps {
+  /// share[k][i]: probability that step k begins in state i. Each sums to one.
+  std::vector<std::vector<double>> share;
+  /// fails_in[k][i]: probability that a walker in state i fails in exactly its (k + 1)-th step from now.
+  std::vector<std::vector<double>> fails_in;
+  /// The most likely path: the state in which each step begins, likeliest[k] that of step k.
+  std::vector<std::uint32_t> likeliest;
+};
+
+/// Of walkers whose states are met in proportion to `visits`: with a quasi-stationary distribution, the flux into
+/// failure of the metastable regime; with the expected visits after a launch, all its failures (but for those in the
+/// launch's own step). share[k] = visits * fails_in[k], fails_in[0] the kill rates, fails_in[k + 1] = Q fails_in[k]:
+/// nothing is subtracted.
+///
+/// The path has the largest product of visits, entries and kill rate (Viterbi's algorithm), each entry divided by its
+/// state's `measure` (the width of its cell; empty: all alike). O(entries) a step.
+/// @param steps  >= 1; fewer are told where nobody fails so late
+/// @throws std::invalid_argument for sizes that are not the chain's; std::domain_error if no state visited fails
+LastSteps last_steps(const Chain& chain, std::span<const double> visits, int steps,
+                     std::span<const double> measure = {});
+
+/// First passage to a set of states, or to failure if that comes first.
+struct PassageTo {
+  std::vector<double> reach;  ///< committor: probability of being in the set, now or later, before failing
+  std::vector<double> fail;   ///< probability of failing before that; neither is one minus the other
+  std::vector<double> steps;  ///< expected steps until either; 0 in the set
+};
+
+/// Solves the chain outside of the set, by elimination up to 3000 states, beyond them by products.
+/// @param set  one entry a state, 1 for those of the set
+/// @throws std::invalid_argument for another size; std::domain_error where neither is ever reached;
+///         ConvergenceError if 100000 products do not settle
+PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set);
+
+}  // namespace metastable::markov

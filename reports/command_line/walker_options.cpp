@@ -1,0 +1,121 @@
+#include "reports/command_line/walker_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "reports/command_line/option_values.h"
+
+namespace metastable::reports {
+namespace {
+
+constexpr dynamics::Range walker_slopes{.low = 0, .high = 45, .low_open = true, .high_open = true};
+constexpr dynamics::Range spacings{.low = 0.05, .high = 2};
+constexpr dynamics::Range gigabytes{.low = 0.001, .high = 1e6};
+constexpr double garcia_slope_deg = 0.5156620156177409;  // 0.009 rad
+
+analysis::WalkerSetting base_setting(const Options& o, const std::vector<std::string>& own) {
+  static const std::vector<std::string> all{"walker",          "slope",   "slopes", "slope-sd", "terrain", "memory",
+                                            "simulated-steps", "spacing", "seed",   "threads",  "json",    "out"};
+  for (const std::string& name : o.names())
+    if (o.given(name) && std::ranges::find(all, name) == all.end() && std::ranges::find(own, name) == own.end())
+      throw std::invalid_argument(fmt::format("--{}: has no meaning with --walker", name));
+  if (!o.given("slope-sd")) throw std::invalid_argument("--slope-sd: is needed with --walker");
+  analysis::WalkerSetting setting;
+  setting.walker = analysis::walker_from_name(o.text("walker"));
+  setting.slope_deg = setting.walker == analysis::Walker::simplest ? garcia_slope_deg : 3;
+  if (o.given("terrain")) setting.terrain = analysis::terrain_from_name(o.text("terrain"));
+  return setting;
+}
+
+WalkerRequest base_request(const Options& o, const std::string& command_line) {
+  WalkerRequest request;
+  request.study.seed = request.walks.seed = o.seed();
+  request.study.threads = request.walks.threads = o.threads();
+  if (o.has("memory") && o.given("memory"))
+    request.study.most_bytes = static_cast<std::size_t>(o.number("memory") * 0x1p30);
+  if (o.has("spacing") && o.given("spacing")) request.study.spacing = o.number("spacing");
+  if (o.has("simulated-steps") && o.given("simulated-steps"))
+    request.study.simulated_steps = o.whole("simulated-steps", 0, 1000000000000);
+  if (o.has("json")) request.json = o.text("json");
+  if (o.has("out")) request.out = o.text("out");
+  request.command = command_line;
+  return request;
+}
+
+std::vector<double> slopes_in(const Options& o, const std::string& name) {
+  std::vector<double> values = list_value(name, o.text(name));
+  for (const double value : values)
+    if (!walker_slopes.holds(value))
+      throw std::invalid_argument(fmt::format("--{}: {} is outside {}", name, value, walker_slopes.text()));
+  return values;
+}
+
+}  // namespace
+
+void add_walker(Options& o, const std::string& sd, bool meshes) {
+  o.add("walker", "simplest|compass", "",
+        "A walker on two legs instead of the wheel (simplest: lengths in legs, times in sqrt(l/g)); slopes then "
+        "default to 0.009 rad and 3 deg, in " +
+            walker_slopes.text());
+  o.add("slope-sd", sd, "", "With --walker: sd of the slope from step to step [deg], in " + walker_slopes.text());
+  o.add(
+      "terrain", "fresh|facets", "",
+      "With --walker: a plane that tilts anew at every step (default), or facets, on the last of which the feet still "
+      "stand when a step begins");
+  if (!meshes) return;
+  o.add("spacing", "SD", "",
+        "With --walker: of the coarsest mesh's nodes, in stationary sds of the noise (default: by dimension, 0.5, 0.7, "
+        "1.4); the two or three finer ones follow by sqrt 2",
+        spacings);
+  o.add("simulated-steps", "N", "",
+        "With --walker: about how many steps the direct simulation beside takes, 0..10^12 (default: 2000000)");
+  o.add("memory", "GB", "", "With --walker: most memory of its meshes (default: 3); what they would take is foreseen",
+        gigabytes);
+}
+
+bool asks_for_walker(const Options& o) {
+  if (o.given("walker")) return true;
+  for (const char* name : {"slope-sd", "terrain", "spacing", "simulated-steps", "memory"})
+    if (o.has(name) && o.given(name))
+      throw std::invalid_argument(fmt::format("--{}: has a meaning with --walker only", name));
+  return false;
+}
+
+WalkerRequest walker_request(const Options& o, const std::string& command_line, std::vector<std::string> own) {
+  const analysis::WalkerSetting base = base_setting(o, own);
+  WalkerRequest request = base_request(o, command_line);
+  const std::string slope = o.has("slopes") ? "slopes" : "slope";
+  std::vector<double> slopes = o.given(slope) ? slopes_in(o, slope) : std::vector<double>{base.slope_deg};
+  std::vector<double> sds = slopes_in(o, "slope-sd");
+  const std::size_t settings = std::max(slopes.size(), sds.size());
+  for (auto* list : {&slopes, &sds})
+    if (list->size() == 1) list->assign(settings, list->front());
+  if (slopes.size() != sds.size())
+    throw std::invalid_argument(fmt::format("--slope-sd: {} values for {} slopes", sds.size(), slopes.size()));
+  if (slope == "slope" && settings > 1) throw std::invalid_argument("--slope, --slope-sd: one number each expected");
+  for (std::size_t i = 0; i < settings; ++i) {
+    request.settings.push_back(base);
+    request.settings.back().slope_deg = slopes[i];
+    request.settings.back().slope_sd_deg = sds[i];
+  }
+  return request;
+}
+
+WalkerRequest walker_sweep_request(const Options& o, const std::string& command_line) {
+  const analysis::WalkerSetting base = base_setting(o, {});
+  WalkerRequest request = base_request(o, command_line);
+  request.slopes =
+      o.given("slope") ? range_value("slope", o.text("slope"), walker_slopes) : std::vector<double>{base.slope_deg};
+  request.slope_sds = range_value("slope-sd", o.text("slope-sd"), walker_slopes);
+  for (const double slope : request.slopes)
+    for (const double sd : request.slope_sds) {
+      request.settings.push_back(base);
+      request.settings.back().slope_deg = slope;
+      request.settings.back().slope_sd_deg = sd;
+    }
+  return request;
+}
+
+}  // namespace metastable::reports

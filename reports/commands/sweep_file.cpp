@@ -1,0 +1,161 @@
+#include "reports/commands/sweep_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <optional>
+
+#include "reports/output/figure.h"
+#include "reports/output/file_lock.h"
+#include "reports/output/input_file.h"
+#include "reports/output/interrupt.h"
+#include "reports/output/output_file.h"
+
+namespace metastable::reports {
+namespace {
+
+constexpr std::size_t most_lines = 8;         // of a figure
+constexpr std::size_t most_map_columns = 16;  // of a heat map with a number in every cell
+constexpr std::size_t most_map_rows = 16;
+
+// Complete rows behind the head of a file, none if there is no such file; a last line without its end was cut short and
+// is dropped, and so is a head. @throws OutputError if it is another sweep's
+std::vector<std::string> rows_of(const std::filesystem::path& file, const std::string& head, const char* otherwise) {
+  if (!std::filesystem::exists(file)) return {};
+  if (std::filesystem::is_directory(file)) throw OutputError(file, "is a folder");
+  if (!std::filesystem::is_regular_file(file))
+    throw OutputError(file, "is no regular file, from which a sweep could be taken up again");
+  const std::string text = read_file(file);
+  if (head.starts_with(text)) return {};
+  if (!text.starts_with(head)) throw OutputError(file, fmt::format("{}; choose another --out or remove it", otherwise));
+  std::vector<std::string> rows;
+  for (std::size_t at = head.size(); at < text.size();) {
+    const std::size_t end = text.find('\n', at);
+    if (end == std::string::npos) break;
+    rows.push_back(text.substr(at, end + 1 - at));
+    at = end + 1;
+  }
+  return rows;
+}
+
+// Column `index` behind the coordinates: 0 expected steps, 1 and 2 its interval.
+double value_of(const std::string& row, std::size_t index) {
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < index; ++i) at = row.find(',', at) + 1;
+  const std::string text = row.substr(at, row.find(',', at) - at);
+  if (text.empty()) return std::numeric_limits<double>::quiet_NaN();  // a point whose solver failed
+  return text == "infinite" ? std::numeric_limits<double>::infinity() : std::stod(text);
+}
+
+// Nothing if no point has a finite number of steps.
+std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
+  const std::vector<SweepFileAxis>& axes = sweep.axes;
+  Figure figure;
+  figure.id = "sweep";
+  figure.title = "Expected steps before failure";
+  figure.provenance = sweep.provenance;
+  // The two axes shown; further ones stay at their first value.
+  const SweepFileAxis& across = axes.front();
+  const std::size_t second = axes.size() > 1 ? 1 : 0;
+  std::size_t stride = 1, stride_second = 1;
+  for (std::size_t a = 1; a < axes.size(); ++a) stride *= axes[a].values.size();
+  for (std::size_t a = 2; a < axes.size(); ++a) stride_second *= axes[a].values.size();
+  const std::size_t lines = second == 1 ? axes[1].values.size() : 1;
+  const auto row_at = [&](std::size_t i, std::size_t k) -> const std::string& {
+    return rows[i * stride + (second == 1 ? k * stride_second : 0)];
+  };
+  figure.x = {across.label, across.unit};
+  const bool mapped = second == 1 && lines > 4 && lines <= most_map_rows && across.values.size() <= most_map_columns;
+  if (mapped) {
+    figure.y = {axes[1].label, axes[1].unit};
+    HeatMap map{across.values, axes[1].values, {}, "expected steps", true};
+    for (std::size_t k = 0; k < lines; ++k) {
+      map.value.emplace_back();
+      for (std::size_t i = 0; i < across.values.size(); ++i)
+        map.value.back().push_back(value_of(row_at(i, k), axes.size()));
+    }
+    const auto finite = [](const std::vector<double>& row) {
+      return std::any_of(row.begin(), row.end(), [](double value) { return std::isfinite(value); });
+    };
+    if (std::none_of(map.value.begin(), map.value.end(), finite)) return std::nullopt;
+    figure.heat_map = std::move(map);
+    figure.width = 960;
+    return figure;
+  }
+  figure.y = {"expected steps", "", true};
+  const std::size_t shown = std::min(lines, most_lines);
+  for (std::size_t j = 0; j < shown; ++j) {
+    const std::size_t k = shown > 1 ? j * (lines - 1) / (shown - 1) : 0;
+    Series band{"", Style::band, across.values, {}, {}, {}, static_cast<int>(j)};
+    Series line{"", Style::line, across.values, {}, {}, {}, static_cast<int>(j)};
+    if (second == 1) line.label = fmt::format("{} {}", axes[1].label, axes[1].values[k]);
+    for (std::size_t i = 0; i < across.values.size(); ++i) {
+      line.y.push_back(value_of(row_at(i, k), axes.size()));
+      band.lower.push_back(value_of(row_at(i, k), axes.size() + 1));
+      band.upper.push_back(value_of(row_at(i, k), axes.size() + 2));
+    }
+    if (std::none_of(line.y.begin(), line.y.end(), [](double value) { return std::isfinite(value); })) continue;
+    figure.series.push_back(std::move(band));
+    figure.series.push_back(std::move(line));
+  }
+  if (figure.series.empty()) return std::nullopt;
+  figure.legend = Legend::below;
+  return figure;
+}
+
+}  // namespace
+
+void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
+  const std::filesystem::path out = sweep.out, partial = sweep.out + ".partial";
+  std::size_t size = 1;
+  for (const SweepFileAxis& axis : sweep.axes) size *= axis.values.size();
+  std::filesystem::path picture = out;
+  picture.replace_extension(".svg");
+  if (picture == out)
+    throw OutputError(out, "the figure beside the numbers has that name; give the numbers another ending, .csv");
+  std::vector<std::string> rows = rows_of(out, sweep.head, "holds another sweep");
+  std::size_t had = rows.size();
+  if (had < size) {
+    const FileLock lock(partial, FileLock::Missing::create);
+    if (!lock.held()) throw OutputError(partial, "another sweep is writing it");
+    // Read again: the other one may have ended in between.
+    rows = rows_of(out, sweep.head, "holds another sweep");
+    if (rows.empty()) rows = rows_of(partial, sweep.head, "belongs to another sweep");
+    had = rows.size();
+    std::string so_far = sweep.head;
+    for (const std::string& one : rows) so_far += one;
+    const bool kept = read_file(partial).starts_with(so_far);
+    std::filesystem::resize_file(partial, kept ? so_far.size() : 0);
+    std::ofstream journal(partial, std::ios::binary | std::ios::app);
+    const auto append = [&](const std::string& text) {
+      errno = 0;
+      if (!(journal << text << std::flush))
+        throw OutputError(partial, errno != 0 ? std::strerror(errno) : "write error");
+    };
+    if (!kept) append(so_far);
+    try {
+      compute(had, [&](const std::string& row) {
+        rows.push_back(row);
+        append(row);
+      });
+    } catch (const Interrupted& interrupted) {
+      throw Interrupted(interrupted, fmt::format("{} of {} points kept; the same command goes on", rows.size(), size));
+    }
+    journal.close();
+    std::error_code error;
+    std::filesystem::rename(partial, out, error);
+    if (error) throw OutputError(out, error.message());
+  }
+  const std::optional<Figure> drawn = figure_of(sweep, rows);
+  if (drawn) write_file(picture, render_svg(*drawn));
+  fmt::print("{}: {} points ({} taken over); {}\n", out.string(), size, had,
+             drawn ? picture.string() : "no figure: no point has a finite number of steps");
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,41 @@
+#pragma once
+// steps, compare, sweep, simulate and report with --walker.
+
+#include <string>
+#include <vector>
+
+#include "analysis/walkers/walker_study.h"
+#include "analysis/walkers/walker_trials.h"
+
+namespace metastable::reports {
+
+/// What all of them have.
+struct WalkerRequest {
+  std::vector<analysis::WalkerSetting> settings;  ///< one or more
+  markov::MeshStudyOptions study;
+  std::string json;                       ///< file, "-" for standard output, "" for none
+  std::string out;                        ///< file of a sweep, folder of trials or of a report
+  std::string command;                    ///< the command line, for provenance
+  bool how_it_fails = false;              ///< of steps
+  std::vector<double> slopes, slope_sds;  ///< [deg], the axes of a sweep: settings slope by slope
+  analysis::WalkOptions walks = {};       ///< of simulate
+};
+
+/// Prints gait, expected steps, rate, mixing and what stands behind them.
+/// @throws std::runtime_error with one sentence where independent ways disagree: then no number is given (all but
+///         simulate do)
+void run_walker_steps(const WalkerRequest& request);
+
+/// Every setting, and the ratio of the later ones' expected steps to the first one's.
+void run_walker_compare(const WalkerRequest& request);
+
+/// Expected steps over slopes and their sds; taken up again like every sweep.
+void run_walker_sweep(const WalkerRequest& request);
+
+/// walks.csv (every step) and trials.csv in a new folder.
+void run_walker_simulate(const WalkerRequest& request);
+
+/// The page of walkers: numbers, section, last steps.
+void run_walker_report(const WalkerRequest& request);
+
+}  // namespace metastable::reports

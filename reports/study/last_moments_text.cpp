@@ -1,0 +1,138 @@
+#include "reports/study/last_moments_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "reports/output/text_table.h"
+
+namespace metastable::reports {
+namespace {
+
+using analysis::Estimate;
+using analysis::LastMoments;
+using analysis::StepProfile;
+using Json = nlohmann::ordered_json;
+
+std::string step_name(std::size_t k) { return k == 0 ? "the one that fails" : fmt::format("{} before", k); }
+
+std::vector<Cell> profile_row(const std::string& name, const StepProfile& profile) {
+  std::vector<Cell> row{name};
+  for (const Estimate& one : profile.state) row.emplace_back(one);
+  for (const Estimate& one : profile.noise) row.emplace_back(one);
+  row.emplace_back(profile.bound_to_fail);
+  return row;
+}
+
+Json spreads_json(const std::vector<std::string>& names, const std::vector<Estimate>& spreads) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < names.size(); ++i)
+    json[names[i]] = {{"median", spreads[i].value}, {"middle_90", {spreads[i].lower, spreads[i].upper}}};
+  return json;
+}
+
+Json profile_json(const LastMoments& moments, const StepProfile& profile) {
+  return {{"state", spreads_json(moments.state_names, profile.state)},
+          {"noise", spreads_json(moments.noise_names, profile.noise)},
+          {"bound_to_fail", profile.bound_to_fail}};
+}
+
+std::string numbers(const std::vector<double>& values) { return fmt::format("{:.4g}", fmt::join(values, ", ")); }
+
+std::string path_text(const LastMoments& moments, const std::string& phase) {
+  std::vector<std::string> names = moments.state_names;
+  names.insert(names.end(), moments.noise_names.begin(), moments.noise_names.end());
+  std::string text = fmt::format("The most likely last steps ({}):\n", fmt::join(names, ", "));
+  for (const analysis::PathStep& step : moments.likeliest) {
+    const std::string leg = moments.by_phase.size() > 1 ? fmt::format("{} {}: ", phase, step.phase) : "";
+    const std::string met = step.noise.empty() ? "" : " meets " + numbers(step.noise);
+    text += fmt::format("  {}{}{}\n", leg, numbers(step.state), met);
+  }
+  return text;
+}
+
+}  // namespace
+
+Table last_moments_table(const LastMoments& moments, const std::string& id, const Provenance& provenance) {
+  Table table{.id = id,
+              .title = "How it fails: the last steps",
+              .notes = {"Medians with the middle 90 % of what a step begins with and meets. Bound to fail: the mean "
+                        "chance of failing before being back in the middle of the metastable regime."},
+              .columns = {{"step"}},
+              .provenance = provenance};
+  for (const auto* names : {&moments.state_names, &moments.noise_names})
+    for (const std::string& name : *names) table.columns.push_back({.name = name, .level = 90});
+  table.columns.push_back({.name = "bound to fail", .digits = 2});
+  for (std::size_t k = moments.last.size(); k-- > 0;) table.rows.push_back(profile_row(step_name(k), moments.last[k]));
+  table.rows.push_back(profile_row("all steps of the regime", moments.regime));
+  return table;
+}
+
+std::string last_moments_text(const LastMoments& moments, const std::string& phase, std::size_t width) {
+  if (!moments.reason.empty()) return "How it fails is not told: " + moments.reason + ".\n";
+  std::string text = to_text(last_moments_table(moments, "last-steps", {}), 1000, width);
+  if (moments.by_phase.size() > 1) {
+    std::string shares;
+    for (std::size_t p = 0; p < moments.by_phase.size(); ++p)
+      shares += fmt::format("{}{} {} {:.3g} %", p == 0 ? "" : ", ", phase, p, 100 * moments.by_phase[p]);
+    text += wrapped("The step that fails begins with " + shares + ".", "  ", width);
+  }
+  return text + path_text(moments, phase);
+}
+
+std::string last_moments_json(const LastMoments& moments) {
+  if (!moments.reason.empty()) return Json{{"reason", moments.reason}}.dump();
+  Json last = Json::array(), path = Json::array();
+  for (std::size_t k = 0; k < moments.last.size(); ++k) {
+    last.push_back(profile_json(moments, moments.last[k]));
+    last.back()["steps_before_the_last"] = k;
+  }
+  for (const analysis::PathStep& step : moments.likeliest)
+    path.push_back({{"phase", step.phase}, {"state", step.state}, {"noise", step.noise}});
+  return Json{{"last_steps", last},
+              {"regime", profile_json(moments, moments.regime)},
+              {"by_phase", moments.by_phase},
+              {"most_likely_path", path}}
+      .dump();
+}
+
+std::vector<Figure> last_moments_figures(const LastMoments& moments, const std::string& id,
+                                         const Provenance& provenance) {
+  std::vector<Figure> figures;
+  const auto add = [&](const std::string& name, const auto& of) {
+    Figure figure;
+    figure.id = fmt::format("{}-{}", id, figures.size() + 1);
+    figure.title = "Before it fails: " + name;
+    figure.x = {"steps before the one that fails"};
+    figure.x.low = -static_cast<double>(moments.last.size() - 1);
+    figure.x.high = 0.0;
+    figure.y = {name};
+    figure.legend = Legend::below;
+    figure.provenance = provenance;
+    Series band{"", Style::band, {}, {}, {}, {}, 1}, line{"median and middle 90 %", Style::line, {}, {}, {}, {}, 1};
+    for (std::size_t k = moments.last.size(); k-- > 0;) {
+      const Estimate& one = of(moments.last[k]);
+      for (Series* series : {&band, &line}) series->x.push_back(-static_cast<double>(k));
+      band.lower.push_back(one.lower);
+      band.upper.push_back(one.upper);
+      line.y.push_back(one.value);
+    }
+    figure.series = {band, line};
+    const Estimate& regime = of(moments.regime);
+    for (const double level : {regime.lower, regime.value, regime.upper}) {
+      Series usual{
+          level == regime.value ? "all steps of the regime: the same" : "", Style::dashed, line.x, {}, {}, {}, 0};
+      usual.y.assign(line.x.size(), level);
+      figure.series.push_back(std::move(usual));
+    }
+    figures.push_back(std::move(figure));
+  };
+  for (std::size_t i = 0; i < moments.state_names.size(); ++i)
+    add(moments.state_names[i], [i](const StepProfile& p) { return p.state[i]; });
+  for (std::size_t i = 0; i < moments.noise_names.size(); ++i)
+    add(moments.noise_names[i], [i](const StepProfile& p) { return p.noise[i]; });
+  return figures;
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,81 @@
+// How often the intervals of mesh studies hold what simulations say: ten settings, 20 seeds each.
+//   mesh_coverage [seeds] [first setting] [settings]
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/walkers/walker_study.h"
+#include "markov/mesh/batch_simulation.h"
+#include "markov/mesh/mesh_study.h"
+#include "tests/markov/mesh/maps.h"
+
+namespace {
+
+using namespace metastable;
+
+struct Tried {
+  std::string name;
+  markov::BatchMap map;
+  std::vector<double> start;
+  std::size_t trials;  ///< simulated
+};
+
+Tried simplest(double sd, std::size_t trials) {
+  const analysis::WalkerSetting setting{analysis::Walker::simplest, 0.009 / analysis::degree, sd / analysis::degree,
+                                        dynamics::Terrain::fresh};
+  const dynamics::WalkerMap map = setting.map();
+  return {fmt::format("simplest walker, sd {}", sd), analysis::batch_map(map),
+          analysis::gait_state(setting, dynamics::find_gait(map.walker(), 0.009)), trials};
+}
+
+std::vector<Tried> settings() {
+  using namespace markov::testing;
+  std::vector<Tried> all;
+  for (const auto& [sd, trials] : {std::pair(1.5, 200000), std::pair(0.8, 100000), std::pair(0.45, 20000)})
+    all.push_back({fmt::format("linear, sd {}", sd), linear_batch(sd), {2}, static_cast<std::size_t>(trials)});
+  for (const auto& [sd, trials] : {std::pair(0.8, 100000), std::pair(0.5, 20000)})
+    all.push_back({fmt::format("two phases, sd {}", sd), two_phase_batch(sd), {2}, static_cast<std::size_t>(trials)});
+  for (const auto& [sd, trials] : {std::pair(1.5, 200000), std::pair(0.8, 50000), std::pair(0.5, 20000)})
+    all.push_back(
+        {fmt::format("two dimensions, sd {}", sd), skew_batch(sd), {2, -2.0 / 3}, static_cast<std::size_t>(trials)});
+  all.push_back(simplest(0.002, 40000));
+  all.push_back(simplest(0.0012, 20000));
+  return all;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int seeds = argc > 1 ? std::atoi(argv[1]) : 20;
+  const std::vector<Tried> all = settings();
+  const std::size_t first = argc > 2 ? static_cast<std::size_t>(std::atoi(argv[2])) : 0;
+  const std::size_t last =
+      argc > 3 ? std::min(all.size(), first + static_cast<std::size_t>(std::atoi(argv[3]))) : all.size();
+  for (std::size_t i = first; i < last; ++i) {
+    const Tried& tried = all[i];
+    const auto simulated =
+        markov::simulate_steps(tried.map, tried.start, {.trials = tried.trials, .seed = 99, .threads = 1});
+    const double relative = simulated->standard_error / simulated->mean;
+    int held = 0;
+    double width = 0, bias = 0;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      const markov::MeshStudy study = markov::mesh_study(
+          tried.map, tried.start,
+          {.seed = static_cast<std::uint64_t>(seed), .threads = 1, .guided_samples = 0, .simulated_steps = 0});
+      const double off = std::log(study.steps.value / simulated->mean),
+                   half = 0.5 * std::log(study.steps.upper / study.steps.lower);
+      held += std::abs(off) <= std::hypot(half, 1.96 * relative);
+      width += half / seeds;
+      bias += off / seeds;
+    }
+    fmt::print("{:<26} {:>10.5g} ({:.2g} %): held by {} of {}, half-width {:.2g} %, mean deviation {:.2g} %\n",
+               tried.name, simulated->mean, 100 * relative, held, seeds, 100 * width, 100 * bias);
+    std::fflush(stdout);
+  }
+}

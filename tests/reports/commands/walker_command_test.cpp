@@ -1,0 +1,107 @@
+// Walkers on the command line: numbers with what stands beside them, files, and what is refused.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/reports/program.h"
+#include "tests/reports/support.h"
+
+namespace metastable::reports {
+namespace {
+using test::metastable;
+using test::Ran;
+using test::read;
+
+class WalkerCommand : public test::InFolder {};
+
+std::vector<std::string> walker(const std::string& command, const std::vector<std::string>& more) {
+  std::vector<std::string> words{command, "--walker", "simplest", "--slope-sd", "0.17"};  // 3e-3 rad: 5 steps
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+TEST_F(WalkerCommand, StepsSaysWhatStandsBehindThem) {
+  const Ran ran = metastable(
+      walker("steps", {"--spacing", "0.9", "--simulated-steps", "50000", "--how-it-fails", "--json", path("w.json")}));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  for (const char* said : {"expected steps before failure", "by direct simulation", "agreed", "0.200310901",
+                           "-0.1901 ± 0.5576 i", "The most likely last steps", "the one that fails"})
+    EXPECT_NE(ran.out.find(said), std::string::npos) << said << '\n' << ran.out;
+  const auto json = nlohmann::json::parse(read(path("w.json")));
+  EXPECT_EQ(json["status"], "agreed");
+  const double low = json["expected_steps"]["interval_95"][0], high = json["expected_steps"]["interval_95"][1];
+  const double simulated = json["direct_simulation"]["value"];
+  EXPECT_LT(low, simulated * 1.02);
+  EXPECT_GT(high, simulated * 0.98);
+  EXPECT_NEAR(json["gait"]["eigenvalues"][0][0].get<double>(), -0.19010, 1e-4);
+  EXPECT_NEAR(json["gait"]["state"][1].get<double>(), -0.199832473005, 1e-9);
+  EXPECT_EQ(json["how_it_fails"]["by_phase"].size(), 1U);
+  EXPECT_GT(json["how_it_fails"]["last_steps"][0]["bound_to_fail"].get<double>(),
+            json["how_it_fails"]["regime"]["bound_to_fail"].get<double>());
+}
+
+TEST_F(WalkerCommand, SimulateWritesEveryStep) {
+  const Ran ran = metastable(walker("simulate", {"--trials", "5", "--out", path("walks")}));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const std::string walks = read(path("walks/walks.csv")), trials = read(path("walks/trials.csv"));
+  EXPECT_NE(walks.find("trial,step,half angle [rad],"), std::string::npos) << walks.substr(0, 400);
+  EXPECT_NE(trials.find("5,"), std::string::npos);
+  EXPECT_EQ(metastable(walker("simulate", {"--trials", "5", "--out", path("walks")})).code, 2);
+}
+
+TEST_F(WalkerCommand, SweepIsTakenUpAgain) {
+  const std::vector<std::string> words =
+      walker("sweep", {"--slope", "0.5", "--spacing", "1", "--simulated-steps", "20000", "--out", path("s.csv")});
+  ASSERT_EQ(metastable(words).code, 0);
+  const std::string rows = read(path("s.csv"));
+  EXPECT_NE(rows.find("\n0.5,0.17,"), std::string::npos) << rows;
+  EXPECT_NE(rows.find("agreed"), std::string::npos);
+  const Ran again = metastable(words);
+  EXPECT_NE(again.out.find("1 taken over"), std::string::npos) << again.out << again.err;
+}
+
+TEST_F(WalkerCommand, RefusesWhatHasNoMeaning) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"steps", "--walker", "simplest"}, "--slope-sd: is needed with --walker"},
+      {{"steps", "--walker", "biped", "--slope-sd", "1"}, "walker: 'biped' is none of simplest, compass"},
+      {walker("steps", {"--slope", "50"}), "--slope: 50 is outside (0, 45)"},
+      {walker("steps", {"--friction", "0.3"}), "--friction: has no meaning with --walker"},
+      {walker("steps", {"--certify"}), "--certify: has no meaning with --walker"},
+      {walker("steps", {"--terrain", "sand"}), "terrain: 'sand' is none of fresh, facets"},
+      {walker("steps", {"--spacing", "3"}), "--spacing: 3 is outside [0.05, 2]"},
+      {walker("compare", {}), "--slopes, --slope-sd: two slopes or two sds at least"},
+      {walker("compare", {"--slopes", "0.5,0.6,0.7", "--slope-sd", "0.1,0.2"}), "--slope-sd: given 2 times"},
+      {{"steps", "--terrain", "facets"}, "--terrain: has a meaning with --walker only"},
+      {{"steps", "--slope-sd", "0.1"}, "--slope-sd: has a meaning with --walker only"}};
+  for (const auto& [words, said] : cases) {
+    const Ran ran = metastable(words);
+    EXPECT_EQ(ran.code, 2) << said;
+    EXPECT_EQ(ran.err, "metastable: " + said + "\n");
+  }
+  // No gait that is stable: a computation that failed, in one line that names the state.
+  const Ran unstable = metastable({"steps", "--walker", "compass", "--slope", "30", "--slope-sd", "0.5"});
+  EXPECT_EQ(unstable.code, 3);
+  EXPECT_EQ(std::count(unstable.err.begin(), unstable.err.end(), '\n'), 1);
+  // More memory than is allowed is refused before the meshes are made.
+  const Ran large = metastable(walker("steps", {"--memory", "0.001"}));
+  EXPECT_EQ(large.code, 3) << large.out;
+  EXPECT_NE(large.err.find("are allowed"), std::string::npos) << large.err;
+}
+
+TEST_F(WalkerCommand, TheWheelSaysHowItFails) {
+  const Ran ran = metastable(
+      {"steps", "--legs", "0.1519", "--cells", "64", "--samples", "512", "--how-it-fails", "--json", path("h.json")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(ran.out.find("How it fails: the last steps"), std::string::npos) << ran.out;
+  const auto json = nlohmann::json::parse(read(path("h.json")))["how_it_fails"];
+  EXPECT_GT(json["last_steps"][0]["bound_to_fail"].get<double>(), json["last_steps"][2]["bound_to_fail"].get<double>());
+  EXPECT_EQ(json["most_likely_path"].size(), json["last_steps"].size());
+}
+
+}  // namespace
+}  // namespace metastable::reports
