@@ -17,7 +17,7 @@ set(ROOMS
   "dynamics/bounds: dynamics/wheel dynamics/return_map"
   "dynamics/walkers:"
   "analysis/statistics: markov dynamics/wheel"
-  "analysis/walkers: markov/passage markov/mesh dynamics/walkers analysis/statistics"
+  "analysis/walkers: markov markov/passage markov/rows markov/mesh dynamics/walkers analysis/statistics"
   "analysis/diagnosis: markov dynamics/wheel analysis/statistics"
   "analysis/study: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/settled dynamics/return_map dynamics/bounds analysis/statistics"
   "analysis/experiment: markov dynamics/wheel dynamics/laboratory dynamics/settled dynamics/return_map analysis/statistics analysis/study"
