@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <iterator>
 #include <random>
 #include <stdexcept>
@@ -18,6 +17,7 @@
 #include "analysis/study/consistency.h"
 #include "analysis/study/metastability.h"
 #include "dynamics/return_map/trials.h"
+#include "tests/environment.h"
 
 namespace metastable::analysis {
 namespace {
@@ -25,11 +25,6 @@ namespace {
 constexpr std::uint64_t usual_count = 40;
 constexpr std::uint64_t judged = 50;
 constexpr int trials = 4000;
-
-std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
-  const char* text = std::getenv(name);
-  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
-}
 
 struct Drawn {
   Setting setting;

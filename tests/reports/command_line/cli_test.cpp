@@ -351,7 +351,7 @@ TEST_F(CommandLine, ReportIsTheSameBytesOnAnyNumberOfThreads) {
     const auto relative = std::filesystem::relative(entry.path(), folder_ / "one");
     EXPECT_EQ(read(entry.path()), read(folder_ / "two" / relative)) << relative;
   }
-  EXPECT_EQ(files, 1u + 6 * 3 + 8);  // page; six tables three ways; figures
+  EXPECT_EQ(files, 1u + 8 * 3 + 14);  // page; eight tables three ways; figures
   const std::string csv = read(folder_ / "one" / "tables" / "ramps.csv");
   for (const char* part : {"# seed: 1", "# version: ", "# settings: ", "infinite"})
     EXPECT_NE(csv.find(part), std::string::npos) << part;
