@@ -53,6 +53,16 @@ LawComparison compare_laws(const Experiment& experiment, const std::vector<dynam
       const std::vector<dynamics::Trial> simulated = simulate_trials(
           setting, {.trials = trials, .collisions = static_cast<int>(longest), .seed = seed, .threads = threads});
       summarize_speeds(row, speeds(simulated), means);
+      if (setting.law == dynamics::Law::settled) {
+        const dynamics::SettledMotion wheel = setting.motion();
+        const std::vector<LegLandings> data_legs = leg_landings(experiment, i, wheel),
+                                       legs = leg_landings(simulated, wheel);
+        for (std::size_t leg = 0; leg < legs.size(); ++leg) {
+          LegRow& of = result.legs.emplace_back(compare_landings(data_legs[leg], legs[leg]));
+          of.condition = data.condition;
+          of.leg = static_cast<int>(leg);
+        }
+      }
       row.rest_share = exact_share(
           static_cast<std::size_t>(std::count_if(simulated.begin(), simulated.end(),
                                                  [](const auto& t) { return t.outcome == dynamics::Outcome::rest; })),

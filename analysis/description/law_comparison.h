@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/description/contact_fit.h"
+#include "analysis/description/leg_landings.h"
 #include "analysis/description/speed_profile.h"
 #include "analysis/experiment/experiment.h"
 #include "analysis/statistics/estimate.h"
@@ -31,6 +32,7 @@ struct LawRow {
 struct LawComparison {
   std::vector<LawRow> rows;  ///< condition by condition, the measured one first
   std::vector<std::pair<dynamics::Law, ContactFit>> fits;
+  std::vector<LegRow> legs;  ///< beside `settled` as given, where that is asked for
 };
 
 /// Holds every condition against every law, with (eta, mu) as given and as fitted to all conditions (steps from

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -42,6 +43,8 @@ MeanSpread spread(const std::vector<Sums>& trials, const std::vector<int>& colli
 EnergyLosses energy_losses(const Setting& setting, const EnergyLossOptions& options) {
   if (options.trials < 2) throw std::invalid_argument(fmt::format("trials: {} is below 2", options.trials));
   const dynamics::WheelMap map = setting.map();
+  const std::optional<dynamics::SettledMotion> motion =
+      setting.law == dynamics::Law::settled ? std::optional(setting.motion()) : std::nullopt;
   const dynamics::TruncatedNormal launch = setting.launch();
   const dynamics::TrialOptions trial{.first_landing_leg = setting.first_landing_leg,
                                      .max_collisions = options.collisions,
@@ -52,7 +55,9 @@ EnergyLosses energy_losses(const Setting& setting, const EnergyLossOptions& opti
   std::vector<Sums> tangential(count), normal(count);
   std::vector<int> collisions(count);
   markov::parallel_for(count, options.threads, [&](std::size_t t) {
-    for (const dynamics::TrialCollision& collision : dynamics::simulate_trial(map, launch, trial, t).collisions) {
+    const dynamics::Trial rolled = motion ? dynamics::simulate_trial(*motion, map.noise(), launch, trial, t)
+                                          : dynamics::simulate_trial(map, launch, trial, t);
+    for (const dynamics::TrialCollision& collision : rolled.collisions) {
       tangential[t].add(collision.loss.tangential() - collision.loss.potential);
       normal[t].add(collision.loss.normal());
       ++collisions[t];

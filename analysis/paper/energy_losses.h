@@ -15,7 +15,7 @@ struct MeanSpread {
 
 struct EnergyLosses {
   MeanSpread tangential_net;  ///< eps_t - eps_pot, friction loss less the potential energy gained by slipping downhill
-  MeanSpread normal;          ///< eps_n
+  MeanSpread normal;          ///< eps_n; under `settled` what impacts take besides friction
   std::uint64_t collisions = 0;
 };
 

@@ -23,9 +23,9 @@ enum class RestReading { goes_on, rests };
 struct Variant {
   dynamics::Law law = dynamics::Law::published;
   RestReading reading = RestReading::goes_on;
-  std::string name;  ///< "published, goes on", "published, rests", "coulomb"
+  std::string name;  ///< "published, goes on", "published, rests", "coulomb", "settled"
 };
-/// `coulomb` once: at these slopes nothing rests under it.
+/// `coulomb` once: at these slopes nothing rests under it. `settled` once: its wheel cannot go on from rest.
 std::vector<Variant> paper_variants();
 
 /// Holds one simulated velocity profile.
@@ -57,7 +57,7 @@ PaperExperiments simulated_experiments(std::uint64_t seed, int threads);
 
 struct PaperStudyOptions {
   int trials = 1000;           ///< of each simulated profile, >= 20
-  std::size_t samples = 8192;  ///< of the variance shares, >= 32
+  std::size_t samples = 8192;  ///< of the variance shares, >= 32; `settled`, whose trials are rolled, takes an eighth
   std::uint64_t seed = 1;
   int threads = 0;
   std::function<void()> progress = {};  ///< after each of paper_study_units() pieces of work; may throw to stop

@@ -179,6 +179,7 @@ Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, con
   check_leg(motion.wheel().legs(), options.first_landing_leg);
   if (!options.rest_rule) throw std::invalid_argument("rest_rule: under `settled` a wheel that stops has stopped");
   SettledTrial of(motion, noise, launch, options.first_landing_leg, options.seed, index);
+  const double sine = std::sin(motion.wheel().slope_rad);
   Trial trial;
   for (;;) {
     TrialCollision c;
@@ -190,6 +191,10 @@ Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, con
     c.contact = of.contact();
     const Step step = of.step();
     c.omega_plus = std::max(0.0, step.landing.omega_plus);
+    c.loss.normal_pre = step.landing.impact_loss;
+    c.loss.tangential_pre = step.landing.friction_loss;
+    c.loss.slip_distance = -step.landing.slid;
+    c.loss.potential = motion.wheel().mass * motion.wheel().gravity * sine * step.landing.slid;
     trial.collisions.push_back(c);
     trial.outcome = !step.touched                                ? Outcome::rest
                     : of.roll().position() > options.ramp_length ? Outcome::end_of_ramp

@@ -45,9 +45,10 @@ Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const T
                      std::uint64_t index);
 
 /// The same under `settled`: the wheel is rolled event by event, with whatever motion its feet still have when the next
-/// leg touches. Before the first collision it stands on a foot with that collision's contact. `loss` is left empty,
-/// omega_plus is the speed after the first impact; a wheel that chatters on two feet without end counts as one at rest,
-/// and the end of the ramp is reached when the next foot touches beyond it.
+/// leg touches. Before the first collision it stands on a foot with that collision's contact. `loss` is that of the
+/// whole landing: in impacts (normal), by friction (tangential), less what the foot's slide downhill gives back
+/// (potential); omega_plus is the speed after the first impact; a wheel that chatters on two feet without end counts as
+/// one at rest, and the end of the ramp is reached when the next foot touches beyond it.
 /// @throws std::invalid_argument for options out of range, and without the rest rule
 Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
                      const TrialOptions& options, std::uint64_t index);

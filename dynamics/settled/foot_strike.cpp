@@ -5,7 +5,9 @@
 
 namespace metastable::dynamics {
 
-PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const PlaneVelocity& before) {
+PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const PlaneVelocity& before,
+                     double* rubbed_off) {
+  if (rubbed_off != nullptr) *rubbed_off = 0;
   const double d = lever.behind, h = lever.height, k2 = lever.gyration_sq;
   // The contact's response to an impulse (tangential, normal) per unit mass: [[along, -cross], [-cross, normal]].
   const double along = 1 + h * h / k2, normal = 1 + d * d / k2, cross = d * h / k2;
@@ -44,6 +46,7 @@ PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const Pl
     const double work = part * (lift + rise * part / 2);
     pressed += part;
     rubbed += drag * part;
+    if (rubbed_off != nullptr) *rubbed_off -= drag * part * (slip + drive * part / 2);
     lift += rise * part;
     slip += drive * part;
     left -= work;

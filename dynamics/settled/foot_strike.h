@@ -29,6 +29,8 @@ struct ContactLever {
 /// and jams (Painleve: pressing makes it dig in) is struck, too; any other foot that does not approach keeps its
 /// velocity.
 /// @param contact eta in [0, 1], mu >= 0. O(1): at most four pieces of constant slip direction.
-PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const PlaneVelocity& before);
+/// @param rubbed_off if given: set to the work that friction took per unit mass [m^2/s^2]
+PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const PlaneVelocity& before,
+                     double* rubbed_off = nullptr);
 
 }  // namespace metastable::dynamics

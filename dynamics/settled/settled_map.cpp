@@ -149,21 +149,23 @@ double SettledMap::standstill(int leg, double eta) const {
   return rising_root(value, low, at_low, high, at_high, 1e-10 * high);
 }
 
-double SettledMap::solve_resting(int leg, double omega, double eta, double guess) const {
+// @param guess from which to start, 0: none; @param off how far off it may be
+double SettledMap::solve_resting(int leg, double omega, double eta, double guess, double off) const {
   const double barrier = motion_.foot(leg).barrier_squared();
   const auto value = [&](double mu) { return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier); };
   double high = sticking_[static_cast<std::size_t>(leg)] + sticks_by, at_high = value(high);
   if (at_high < 0) return never;
   // Around the guess, or step by step from above: at high omega and eta there are gaps in rest further down.
   double low = high, at_low = at_high;
-  if (guess > 0) {
-    constexpr double near = 2e-4;
-    low = std::max(0.0, guess - near), at_low = value(low);
-    const double above = std::min(guess + near, high), at_above = value(above);
-    if (at_low < 0 && at_above >= 0)
-      high = above, at_high = at_above;
-    else
-      low = high, at_low = at_high;
+  constexpr double farthest = 4e-3;
+  for (double reach = off; guess > 0 && reach <= farthest; reach *= 4) {
+    const double below = std::max(0.0, guess - reach), above = std::min(guess + reach, high);
+    const double at_below = value(below), at_above = value(above);
+    if (at_below < 0 && at_above < 0) guess = above + reach;
+    if (at_below >= 0 && at_above >= 0) guess = below - reach;
+    if (!(at_below < 0 && at_above >= 0)) continue;
+    low = below, at_low = at_below, high = above, at_high = at_above;
+    break;
   }
   for (double step = 2e-3; at_low >= 0 && low > 0;) {
     high = low, at_high = at_low;
@@ -171,18 +173,18 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
     at_low = value(low);
   }
   if (at_low >= 0) return 0;
-  return rising_root(value, low, at_low, high, at_high, 1e-11);
+  return rising_root(value, low, at_low, high, at_high, 1e-10);
 }
 
 double SettledMap::stopping_friction(int leg, double omega, double eta, int strikes, double low, double high) const {
-  if (motion_.slip_after(leg, omega, {eta, low}, strikes) <= 0) return low;
   // The slip falls about straight to 0 and stays there: where the line through the last two meets 0 or a little above.
   double before = low, before_slip = 0, slip = motion_.slip_after(leg, omega, {eta, low}, strikes);
-  for (int i = 0; high - low > 1e-11; ++i) {
+  if (slip <= 0) return low;
+  for (int i = 0; high - low > 1e-10; ++i) {
     double at = (low + high) / 2;
     if (before_slip > slip && i % 3 != 0) {
       const double ahead = (low - before) * slip / (before_slip - slip);
-      at = std::clamp(low + ahead * (i % 3 == 1 ? 1 : 1.01) + 5e-12, low, at);
+      at = std::clamp(low + ahead * (i % 3 == 1 ? 1 : 1.01) + 5e-11, low, at);
     }
     const double slip_at = motion_.slip_after(leg, omega, {eta, at}, strikes);
     if (slip_at > 0) {
@@ -208,7 +210,7 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
     std::array<double, 2> omega{}, found{};
     for (std::size_t s = 0; s < 2; ++s) {
       omega[s] = from + (std::min(range.omega_high, from + 4) - from) * (s == 0 ? 0.3 : 0.8);
-      const double resting = solve_resting(leg, omega[s], eta[j], 0);
+      const double resting = solve_resting(leg, omega[s], eta[j], 0, 0);
       const auto kept = [&](double part) {
         return motion_.land(leg, omega[s], {eta[j], resting + part * (sticking - resting)}).carried_squared;
       };
@@ -250,13 +252,17 @@ void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
   constexpr int stops = SettledTable::stops, piece = SettledTable::piece;
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
   const bool smooth = row < table.smooth_rows;
-  double before = table.sticking, before_last = 0;
+  std::array<double, 4> before{};  // mu_r at the speeds before, the last one first
   for (int i = 0; i < table.speeds; ++i) {
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     const auto at = static_cast<std::size_t>(row * table.speeds + i);
-    double resting = solve_resting(leg, omega, eta, i < 2 ? before - 1e-3 : 2 * before - before_last);
+    // Guessed from the parabola, and the cubic, through the speeds before: these stand evenly on the table's axis.
+    const auto [one, two, three, four] = before;
+    const double parabola = 3 * (one - two) + three, cubic = 4 * (one + three) - 6 * two - four;
+    double resting = i < 4 ? solve_resting(leg, omega, eta, one - (i > 0 ? 1e-3 : 0), 1e-3)
+                           : solve_resting(leg, omega, eta, cubic, std::abs(cubic - parabola) / 4 + 1e-8);
     if (!(resting < table.sticking)) resting = table.sticking - 1e-9;
-    before_last = before, before = resting;
+    before = {resting, one, two, three};
     double* edge = &table.edges[at * (stops + 1)];
     edge[stops] = resting;
     for (int n = 0; n < stops; ++n)
@@ -343,7 +349,8 @@ double SettledMap::resting_friction(int leg, double omega, double eta) const {
 }
 
 double SettledMap::followed_resting_friction(int leg, double omega, double eta, double guess) const {
-  return solve_resting(leg, omega, eta, guess);
+  constexpr double off = 2e-4;
+  return solve_resting(leg, omega, eta, guess, off);
 }
 
 MappedLanding SettledMap::follow(int leg, double omega, const Contact& contact) const {
@@ -379,7 +386,7 @@ void SettledMap::check() {
     const bool rests = direct.end == LandingEnd::rest || direct.end == LandingEnd::given_up;
     const bool is_rough = place.rough(std::max(mu, resting)) || direct.end == LandingEnd::unsettled;
     const bool solves = index % 8 == 0 && !is_rough;
-    const double off_resting = solves ? std::abs(solve_resting(leg, omega, eta, resting) - resting) : 0;
+    const double off_resting = solves ? std::abs(followed_resting_friction(leg, omega, eta, resting) - resting) : 0;
     const double off = (by_table.carried_squared - direct.carried_squared) / (omega * omega);
     const std::lock_guard lock(mutex);
     ++error_.landings;

@@ -82,7 +82,7 @@ class SettledMap {
   void find_bend(SettledTable& table, int leg) const;
   void check();
   double standstill(int leg, double eta) const;
-  double solve_resting(int leg, double omega, double eta, double guess) const;
+  double solve_resting(int leg, double omega, double eta, double guess, double off) const;
   double stopping_friction(int leg, double omega, double eta, int strikes, double low, double high) const;
 
   SettledMotion motion_;

@@ -109,11 +109,14 @@ double SettledRoll::tip_along(int leg) const { return along_ - motion_->wheel().
 
 double SettledRoll::position() const { return tip_along(leg_); }
 
-double SettledRoll::energy() const {
-  const double square = velocity_.along * velocity_.along + velocity_.out * velocity_.out +
-                        motion_->wheel().gyration_sq() * velocity_.spin * velocity_.spin;
-  return motion_->wheel().mass * (square / 2 - sine_ * along_ + cosine_ * height_);
+// Per unit mass.
+double SettledRoll::kinetic() const {
+  return (velocity_.along * velocity_.along + velocity_.out * velocity_.out +
+          motion_->wheel().gyration_sq() * velocity_.spin * velocity_.spin) /
+         2;
 }
+
+double SettledRoll::energy() const { return motion_->wheel().mass * (kinetic() - sine_ * along_ + cosine_ * height_); }
 
 // Top of the barrier over the foot of a leg [rad].
 double SettledRoll::apex(int leg) const {
@@ -124,11 +127,8 @@ double SettledRoll::apex(int leg) const {
 
 // No motion left, and far below the barrier.
 bool SettledRoll::spent() const {
-  const SettledWheel& wheel = motion_->wheel();
-  const double square = velocity_.along * velocity_.along + velocity_.out * velocity_.out +
-                        wheel.gyration_sq() * velocity_.spin * velocity_.spin;
-  const double scale = wheel.gravity * wheel.length(leg_);
-  if (square / 2 > still_share * scale) return false;
+  const double scale = motion_->wheel().gravity * motion_->wheel().length(leg_);
+  if (kinetic() > still_share * scale) return false;
   const double lean = angle_ + std::atan2(sine_, cosine_);
   return lean < 0 && 1 - std::cos(lean) > deep_share;
 }
@@ -243,6 +243,7 @@ SettledRoll::Event SettledRoll::run(bool until_settled) {
   touch_time_ = time_;
   events_ = 0;
   stood_ = -1;
+  const double touch_angle = angle_;
   Event event = Event::strikes;
   while (++events_ < motion_->wheel().max_events) {
     if (event == Event::strikes)
@@ -252,11 +253,28 @@ SettledRoll::Event SettledRoll::run(bool until_settled) {
     else if (event == Event::flies)
       event = fly();
     else
-      return event;
+      break;
   }
+  landing_.slid = tip_along(leg_) - touch_along_ - motion_->wheel().tip_radius * (angle_ - touch_angle);
+  if (events_ < motion_->wheel().max_events) return event;
   landing_.end = LandingEnd::given_up;
   landing_.duration = time_ - touch_time_;
   return Event::given_up;
+}
+
+// The foot that strikes; one that then hardly lifts stays down.
+void SettledRoll::strike_foot() {
+  const double before = kinetic();
+  const ContactLever at = lever(foot_);
+  const Contact& contact = contact_of(foot_);
+  double rubbed = 0;
+  PlaneVelocity after = strike(at, contact, velocity_, &rubbed);
+  if (at.lift(after) < motion_->wheel().rest_speed) after = strike(at, {0, contact.friction}, velocity_, &rubbed);
+  velocity_ = after;
+  ++landing_.strikes;
+  if (landing_.strikes == 1) landing_.omega_plus = velocity_.spin;
+  landing_.friction_loss += motion_->wheel().mass * rubbed;
+  landing_.impact_loss += motion_->wheel().mass * (before - kinetic() - rubbed);
 }
 
 // Impacts at one moment: the foot that strikes, the other one on the ground if that is driven into it, and so on.
@@ -264,13 +282,7 @@ SettledRoll::Event SettledRoll::resolve() {
   const double slow = motion_->wheel().rest_speed;
   for (;;) {
     if (++events_ >= motion_->wheel().max_events) return Event::given_up;
-    const ContactLever at = lever(foot_);
-    const Contact& contact = contact_of(foot_);
-    PlaneVelocity after = strike(at, contact, velocity_);
-    if (at.lift(after) < slow) after = strike(at, {0, contact.friction}, velocity_);
-    velocity_ = after;
-    ++landing_.strikes;
-    if (landing_.strikes == 1) landing_.omega_plus = velocity_.spin;
+    strike_foot();
     if (!has_other_ || lever(other_).lift(velocity_) >= -slow) break;
     std::swap(foot_, other_);
   }
@@ -387,11 +399,13 @@ SettledRoll::Event SettledRoll::carry(bool until_settled) {
       look(lifts_off, motion.normal, 1, 0);
       look(jammed, motion.stiffness, 1, jams);
     }
+    const double energy_before = energy();
     state = motion.at(when);
     time_ += when;
     if (event == turns && state.angle <= top) state.spin = std::min(state.spin, 0.0);
     if (event == stops || event == forward || event == backward) state.slip = 0;
     write_back();
+    if (on.way != 0) landing_.friction_loss += energy_before - energy();
     switch (event) {
       case none:
       case turns:

@@ -37,6 +37,10 @@ struct Landing {
   double omega_plus = 0;  ///< spin after the first impact [rad/s]
   double duration = 0;    ///< from touch to where the landing ended [s]
   int strikes = 0;        ///< impacts, the first one included
+  // Until the landing, or the step it belongs to, has ended; a bearing's drag on a sliding foot counts as friction.
+  double friction_loss = 0;  ///< work of friction, in impacts and while feet slide [J]
+  double impact_loss = 0;    ///< what impacts take besides [J]
+  double slid = 0;           ///< of the landed foot down the plane, without rolling [m]
 };
 
 /// A landing and the way to the next touch.
@@ -118,6 +122,8 @@ class SettledRoll {
   void note_stand(int leg, double angle, double spin);
   void note_moving_touch();
   double tip_along(int leg) const;
+  double kinetic() const;
+  void strike_foot();
 
   const SettledMotion* motion_;
   int leg_;

@@ -34,10 +34,10 @@ struct Collision {
 struct Loss {
   double normal_pre = 0, normal_post = 0;          ///< D_n before and after slip stops (13), (19)
   double tangential_pre = 0, tangential_post = 0;  ///< D_t (16), (21)
-  double potential = 0;      ///< eps_pot (33): M g S sin(gamma), S uphill positive; `published` only
+  double potential = 0;      ///< eps_pot (33): M g S sin(gamma), S uphill positive, `published`; downhill, `settled`
   double rebound = 0;        ///< share of the rebound's energy lost in later hops; `coulomb` only
   double zeta = 0, tau = 0;  ///< shares of the impulse, `published` only
-  double slip_distance = 0;  ///< S [m] (32), uphill positive; `published` only
+  double slip_distance = 0;  ///< S [m] (32), uphill positive; `published` and `settled`
   bool jammed = false;       ///< the foot digs in and the wheel stops; the energies then cover only what went before
   double normal() const { return normal_pre + normal_post; }                      ///< eps_n (23)
   double tangential() const { return tangential_pre + tangential_post; }          ///< eps_t (22)

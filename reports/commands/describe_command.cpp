@@ -39,6 +39,7 @@ void run_describe(const DescribeRequest& request) {
   if (!description.comparisons.empty()) tables.push_back(tests_table(description, provenance));
   if (!description.fits.empty()) tables.push_back(fits_table(description, provenance));
   if (laws) tables.push_back(laws_table(*laws, provenance));
+  if (laws && !laws->legs.empty()) tables.push_back(landings_table(laws->legs, provenance));
   if (!pages) {
     for (const Table& table : tables) fmt::print("{}\n", to_text(table, 1000, terminal_width()));
     return;
@@ -77,10 +78,13 @@ void run_describe(const DescribeRequest& request) {
         "What the trials say about both distributions under the nominal law, and which of their numbers they "
         "cannot tell apart.",
         {}, {fits_table(description, provenance)});
-  if (laws)
+  if (laws) {
+    std::vector<Table> beside{laws_table(*laws, provenance)};
+    if (!laws->legs.empty()) beside.push_back(landings_table(laws->legs, provenance));
     pages->section("laws", "The contact laws beside it",
                    "A law that describes this wheel gives its speed, its spread and its share of rests at once.", {},
-                   {laws_table(*laws, provenance)});
+                   std::move(beside));
+  }
   pages->write_index();
   fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }

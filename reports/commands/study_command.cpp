@@ -9,8 +9,10 @@
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/paper/paper_claims.h"
+#include "analysis/paper/stopping.h"
 #include "reports/description/paper_figures.h"
 #include "reports/description/paper_tables.h"
+#include "reports/description/stopping_pages.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
 #include "reports/output/version.h"
@@ -40,18 +42,24 @@ void run_study(const StudyRequest& request) {
                                            : analysis::paper_experiments(analysis::read_experiment(request.data));
   PageFolder pages(request.out);
   const std::vector<analysis::Variant> variants = analysis::paper_variants();
-  std::optional<Progress> progress(std::in_place, "study", variants.size() * analysis::paper_study_units());
+  std::optional<Progress> progress(std::in_place, "study",
+                                   variants.size() * analysis::paper_study_units() + analysis::design_change_count());
   analysis::PaperStudyOptions options = asked;
   options.progress = [&] { progress->advance(); };
   Studies studies;
   for (const analysis::Variant& variant : variants)
     studies.push_back(analysis::study_variant(variant, experiments, options));
+  const analysis::Setting stops = analysis::stopping_setting();
+  const analysis::Stopping stopping = analysis::stopping(stops, options.trials, options.seed, options.threads);
+  const std::vector<analysis::DesignChange> designs =
+      analysis::design_changes(stops, options.trials, options.seed, options.threads, options.progress);
   progress.reset();
 
   const Provenance provenance{
       request.command,
       fmt::format(
-          "the paper's wheel; {} trials of 16 collisions a profile; {} samples a variance share; experiment: {}",
+          "the paper's wheel; {} trials of 16 collisions a profile; {} samples a variance share (settled: an eighth); "
+          "experiment: {}",
           options.trials, options.samples, experiments.title),
       options.seed, version()};
   Page& page = pages.page();
@@ -59,8 +67,8 @@ void run_study(const StudyRequest& request) {
   page.intro = {
       "T. Nanayakkara, K. Byl, H. Liu, X. Song, T. Villabona, “Dominant Sources of Variability in Passive Walking” "
       "(ICRA "
-      "2012): its simulated figures and its claims, under its own contact law in two readings and under a law that is "
-      "consistent with Coulomb friction.",
+      "2012): its simulated figures and its claims, under its own contact law in two readings, under a law that is "
+      "consistent with Coulomb friction, and under the landings of a rigid body followed until they settle.",
       experiments.stand_in ? "Its measurements are not public: what is called stand-in here is a simulation too."
                            : "Measured trials: " + experiments.title + "."};
   page.provenance = provenance;
@@ -73,6 +81,9 @@ void run_study(const StudyRequest& request) {
                 {},
                 {hypotheses_table(analysis::paper_hypotheses(studies), studies, provenance),
                  variance_table(studies, provenance)});
+  pages.section("stopping", "Why a wheel that rolls steadily stops: the law settled", stopping_story(stopping),
+                {sticking_figure(stopping, provenance), resting_figure(stopping, provenance)},
+                {stopping_table(stopping, provenance), design_table(designs, provenance)});
   std::vector<Figure> fig4{fig4_experiment_figure(experiments, provenance)};
   for (Figure& figure : all_variants(studies, [&](const auto& s) { return fig4_figures(s, provenance); }))
     fig4.push_back(std::move(figure));

@@ -23,6 +23,8 @@ Table survival_table(const analysis::Description& description, const Provenance&
 Table fits_table(const analysis::Description& description, const Provenance& provenance);
 /// Puts measured beside predicted: speeds, spread, share of trials that rest.
 Table laws_table(const analysis::LawComparison& comparison, const Provenance& provenance);
+/// What landings leave, leg by leg, beside `settled`.
+Table landings_table(const std::vector<analysis::LegRow>& legs, const Provenance& provenance);
 
 /// Mean of two values or more with its t-interval.
 Estimate mean_interval(const analysis::SpeedSummary& s);

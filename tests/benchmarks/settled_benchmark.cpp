@@ -68,50 +68,26 @@ void table(benchmark::State& state) {
   }
 }
 
-// The whole study, everything `metastable steps` prints, from the table.
-void study(benchmark::State& state) {
-  const analysis::Problem problem = engine_wheel().problem();
-  const analysis::StudyOptions options{.method = state.range(0) == 0 ? analysis::Method::sampled
-                                                                     : analysis::Method::integrated};
-  for (auto _ : state) benchmark::DoNotOptimize(analysis::study(problem, options));
-}
-
-// The same wheel under `published`.
-void study_published(benchmark::State& state) {
+// The whole study, everything `metastable steps` prints, from the table; under `published` beside it.
+void study(benchmark::State& state, dynamics::Law law) {
   analysis::Setting setting = engine_wheel();
-  setting.law = dynamics::Law::published;
-  setting.wheel.radius_of_gyration.reset();
+  setting.law = law;
+  if (law == dynamics::Law::published) setting.wheel.radius_of_gyration.reset();
   const analysis::Problem problem = setting.problem();
   const analysis::StudyOptions options{.method = state.range(0) == 0 ? analysis::Method::sampled
                                                                      : analysis::Method::integrated};
   for (auto _ : state) benchmark::DoNotOptimize(analysis::study(problem, options));
 }
 
+// Once: these take seconds.
+void once(benchmark::internal::Benchmark* of) {
+  of->UseRealTime()->MeasureProcessCPUTime()->Unit(benchmark::kSecond)->Iterations(1);
+}
+
 BENCHMARK(landings_followed);
 BENCHMARK(landings_read);
-BENCHMARK(table)
-    ->ArgName("threads")
-    ->Arg(1)
-    ->Arg(2)
-    ->UseRealTime()
-    ->MeasureProcessCPUTime()
-    ->Unit(benchmark::kSecond)
-    ->Iterations(1);
-BENCHMARK(study)
-    ->ArgName("integrated")
-    ->Arg(0)
-    ->Arg(1)
-    ->UseRealTime()
-    ->MeasureProcessCPUTime()
-    ->Unit(benchmark::kSecond)
-    ->Iterations(1);
-BENCHMARK(study_published)
-    ->ArgName("integrated")
-    ->Arg(0)
-    ->Arg(1)
-    ->UseRealTime()
-    ->MeasureProcessCPUTime()
-    ->Unit(benchmark::kSecond)
-    ->Iterations(1);
+BENCHMARK(table)->ArgName("threads")->Arg(1)->Arg(2)->Apply(once);
+BENCHMARK_CAPTURE(study, settled, dynamics::Law::settled)->ArgName("integrated")->Arg(0)->Arg(1)->Apply(once);
+BENCHMARK_CAPTURE(study, published, dynamics::Law::published)->ArgName("integrated")->Arg(0)->Arg(1)->Apply(once);
 
 }  // namespace

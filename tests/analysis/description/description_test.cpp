@@ -8,6 +8,7 @@
 
 #include "analysis/description/law_comparison.h"
 #include "analysis/experiment/experiment.h"
+#include "analysis/experiment/experiment_folder.h"
 #include "tests/analysis/folders.h"
 
 namespace metastable::analysis {
@@ -80,6 +81,32 @@ TEST(LawComparison, KnowsTheLawThatMadeTheTrials) {
       EXPECT_NEAR(row.rest_share.value, 0.06348, 4 * std::sqrt(0.06348 * 0.93652 / 400));
     }
   }
+}
+
+// Trials of `settled` leg by leg beside the same law and beside one with less friction.
+TEST(LawComparison, LandingsLegByLegTellFriction) {
+  Setting setting;
+  setting.law = dynamics::Law::settled;
+  setting.restitution = {0.4, 0.05};
+  setting.friction = {0.4, 0.03};
+  const std::vector<dynamics::Trial> trials = simulate_trials(setting, {.trials = 60, .collisions = 30, .seed = 5});
+  const Experiment experiment =
+      parse_experiment(source_of(experiment_files({{"only", setting, trials}}, "made", {}), "made"));
+  const auto told_apart = [&](double friction) {
+    Setting other = setting;
+    other.friction.mean = friction;
+    const dynamics::SettledMotion wheel = other.motion();
+    const auto data = leg_landings(experiment, 0, wheel),
+               legs = leg_landings(simulate_trials(other, {.trials = 200, .collisions = 30, .seed = 6}), wheel);
+    int count = 0;
+    for (std::size_t leg = 0; leg < legs.size(); ++leg) {
+      const LegRow row = compare_landings(data[leg], legs[leg]);
+      count += (*row.p_kept < 0.01) + (*row.p_slide < 0.01);
+    }
+    return count;
+  };
+  EXPECT_LE(told_apart(0.4), 1);
+  EXPECT_GE(told_apart(0.36), 6);
 }
 
 }  // namespace

@@ -3,24 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <random>
-#include <thread>
 #include <vector>
 
 #include "dynamics/return_map/trials.h"
+#include "tests/dynamics/settled_tables.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics {
 namespace {
-
-void two_threads(std::size_t count, const std::function<void(std::size_t)>& work) {
-  std::thread other([&] {
-    for (std::size_t i = 1; i < count; i += 2) work(i);
-  });
-  for (std::size_t i = 0; i < count; i += 2) work(i);
-  other.join();
-}
 
 // Equal legs, J = 0.0025 kg m^2; a table that is enough for eta from 0.2 to 0.6.
 SettledReturnMap engine_wheel(const ContactNoise& noise, bool direct = false) {
@@ -33,7 +24,7 @@ SettledReturnMap engine_wheel(const ContactNoise& noise, bool direct = false) {
   options.frictions = 16;
   options.checks = 20;
   options.direct = direct;
-  options.executor = two_threads;
+  options.executor = test::two_threads;
   return {wheel, 7.02 * test::degree, noise, 6, options};
 }
 

@@ -3,10 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <thread>
 
+#include "tests/dynamics/settled_tables.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {
@@ -17,15 +16,6 @@ SettledWheel paper_wheel(double slope_deg) {
   wheel.radius_of_gyration = std::sqrt(0.0025 / 1.39);
   wheel.slope_rad = slope_deg * degree;
   return wheel;
-}
-
-void two_threads(std::size_t count, const std::function<void(std::size_t)>& work) {
-  const auto every_second = [&](std::size_t first) {
-    for (std::size_t i = first; i < count; i += 2) work(i);
-  };
-  std::thread other([&] { every_second(1); });
-  every_second(0);
-  other.join();
 }
 
 SettledMapOptions narrow() {

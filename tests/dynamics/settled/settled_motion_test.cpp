@@ -123,6 +123,10 @@ RC_GTEST_PROP(SettledMotion, EveryStepEndsAndNeverGainsEnergy, ()) {
   const double before = roll.energy();
   const Step step = roll.step();
   RC_ASSERT(roll.energy() <= before + 1e-11);
+  // What stays down at rest_speed, 1e-5 m/s, is in no loss.
+  RC_ASSERT(std::abs(before - roll.energy() - step.landing.friction_loss - step.landing.impact_loss) < 1e-7);
+  RC_ASSERT(step.landing.friction_loss > -1e-12);
+  RC_ASSERT(step.landing.impact_loss > -1e-12);
   if (step.touched) {
     // On with another foothold, from whatever the feet did.
     roll.set_contact(old);
@@ -132,8 +136,10 @@ RC_GTEST_PROP(SettledMotion, EveryStepEndsAndNeverGainsEnergy, ()) {
   }
   const Landing landing = motion.land(leg, omega, landed, old);
   RC_ASSERT(landing.end == step.landing.end);
-  if (landing.end == LandingEnd::settled)
-    RC_ASSERT(std::abs(landing.carried_squared - step.landing.carried_squared) < 1e-7);
+  if (landing.end != LandingEnd::settled) return;
+  RC_ASSERT(std::abs(landing.carried_squared - step.landing.carried_squared) < 1e-7);
+  if (step.touched && !step.landing.slips_late)
+    RC_ASSERT(std::abs(step.between_feet - motion.foot(leg).pace() - step.landing.slid) < 1e-9);
 }
 
 TEST(SettledMotion, HardlyEverGivenUp) {

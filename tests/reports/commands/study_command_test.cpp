@@ -29,7 +29,8 @@ TEST_F(StudyCommandTest, WritesThePageAndEveryTableTheSameTwice) {
        {"index.html", "tables/claims.csv", "tables/changes.csv", "tables/readings.md", "tables/hypotheses.tex",
         "tables/variance.csv", "tables/fig4.csv", "tables/fig6.csv", "tables/equal-legs.csv", "tables/fig7.csv",
         "tables/fig8.csv", "tables/fig9.csv", "figures/fig4-experiment.svg", "figures/fig6-published-rests-0-55.svg",
-        "figures/fig9-coulomb-0-2.svg"}) {
+        "figures/fig9-coulomb-0-2.svg", "figures/fig6-settled-0-55.svg", "figures/stopping-sticking.svg",
+        "figures/stopping-resting.svg", "tables/stopping.csv"}) {
     EXPECT_FALSE(read(folder_ / "one" / file).empty()) << file;
     EXPECT_EQ(read(folder_ / "one" / file), read(folder_ / "two" / file)) << file;
   }

@@ -98,15 +98,20 @@ analysis::PaperExperiments experiments() {
 
 std::vector<analysis::Claim> claims() {
   using enum analysis::ClaimVerdict;
-  const analysis::Claim same{
-      "Fig. 1",      "one", "0.1", "as printed", {{reproduced, "1a"}, {reproduced, "1b"}, {reproduced, "1c"}},
-      {partly, "1d"}};
+  const analysis::Claim same{"Fig. 1",
+                             "one",
+                             "0.1",
+                             "as printed",
+                             {{reproduced, "1a"}, {reproduced, "1b"}, {reproduced, "1c"}, {reproduced, "1s"}},
+                             {partly, "1d"}};
   const analysis::Claim by_reading{
-      "Fig. 2", "two", "0.2", "in words", {{reproduced, "2a"}, {partly, "2b"}, {partly, "2c"}}, {}};
+      "Fig. 2", "two", "0.2", "in words", {{reproduced, "2a"}, {partly, "2b"}, {partly, "2c"}, {partly, "2s"}}, {}};
   const analysis::Claim by_law{
-      "Fig. 3", "three", "0.3", "otherwise", {{partly, "3a"}, {partly, "3b"}, {not_reproduced, "3c"}}, {}};
+      "Fig. 3", "three", "0.3", "otherwise", {{partly, "3a"}, {partly, "3b"}, {partly, "3c"}, {not_reproduced, "3s"}},
+      {}};
   const analysis::Claim by_both{
-      "Fig. 4", "four", "0.4", "twice", {{reproduced, "4a"}, {partly, "4b"}, {not_applicable, "4c"}}, {}};
+      "Fig. 4", "four", "0.4", "twice", {{reproduced, "4a"}, {partly, "4b"}, {not_applicable, "4c"}, {partly, "4s"}},
+      {}};
   return {same, by_reading, by_law, by_both};
 }
 
@@ -150,7 +155,7 @@ TEST(PaperTables, ChangesSayWhatALawOrAReadingChanges) {
   expect_cell(at(table, reading, "coulomb"), "partly");
   expect_cell(at(table, reading, "changes with"), "reading");
   expect_cell(at(table, law, "changes with"), "law");
-  expect_cell(at(table, law, "coulomb"), "not reproduced");
+  expect_cell(at(table, law, "settled"), "not reproduced");
   expect_cell(at(table, test::row_of(table, "Fig. 4: four"), "changes with"), "reading and law");
   EXPECT_NE(table.notes[0].find("the other 1 of 4"), std::string::npos);
 }
@@ -158,7 +163,7 @@ TEST(PaperTables, ChangesSayWhatALawOrAReadingChanges) {
 TEST(PaperTables, HypothesesAndTheirShares) {
   using enum analysis::ClaimVerdict;
   const std::vector<analysis::Hypothesis> hypotheses{
-      {"H1", "launch", {{reproduced, "a"}, {partly, "b"}, {not_reproduced, "c"}}}};
+      {"H1", "launch", {{reproduced, "a"}, {partly, "b"}, {not_reproduced, "c"}, {partly, "d"}}}};
   const Table table = hypotheses_table(hypotheses, studies(), {});
   test::expect_rectangular(table);
   expect_cell(at(table, 0, ""), "H1");
@@ -166,12 +171,13 @@ TEST(PaperTables, HypothesesAndTheirShares) {
   expect_cell(at(table, 0, "published, goes on"), "yes: a");
   expect_cell(at(table, 0, "published, rests"), "for the steps only: b");
   expect_cell(at(table, 0, "coulomb"), "no: c");
+  expect_cell(at(table, 0, "settled"), "for the steps only: d");
 
   Studies all = studies();
   all[2].variance[3].shares.steps.group.clear();
   const Table variance = variance_table(all, {});
   test::expect_rectangular(variance);
-  ASSERT_EQ(variance.rows.size(), 2u * 2 * 4);  // one law, one set of indices: two laws, two outputs, four frictions
+  ASSERT_EQ(variance.rows.size(), 3u * 2 * 4);  // one law, one set of indices: three laws, two outputs, four frictions
   expect_cell(at(variance, 1, "law"), "published");
   expect_cell(at(variance, 1, "output"), "steady speed [rad/s]");
   expect_cell(at(variance, 1, "mean of μ"), 0.4);
@@ -194,7 +200,7 @@ TEST(PaperTables, Fig4ComparesTheStarts) {
   const Studies all = studies();
   const Table table = fig4_table(all, experiments(), {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 4u);
+  ASSERT_EQ(table.rows.size(), 5u);
   expect_cell(at(table, 0, "source"), "stand-in (simulated)");
   const analysis::ConditionComparison c =
       analysis::compare_conditions(all[0].fig4.fast.speeds, all[0].fig4.slow.speeds);
@@ -220,7 +226,7 @@ TEST(PaperTables, Fig6AndEqualLegs) {
   all[0].fig6[3].runs[2].measured_legs.trial_means.clear();
   const Table table = fig6_table(all, {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 12u);
+  ASSERT_EQ(table.rows.size(), 16u);
   expect_cell(at(table, 1, "variant"), "published, goes on");
   expect_cell(at(table, 1, "μ"), 0.45);
   expect_near(at(table, 1, "steady, launch 3.35"), steady(1.21));
@@ -241,7 +247,7 @@ TEST(PaperTables, Fig6AndEqualLegs) {
 
   const Table legs = equal_legs_table(all, {});
   test::expect_rectangular(legs);
-  ASSERT_EQ(legs.rows.size(), 36u);
+  ASSERT_EQ(legs.rows.size(), 48u);
   expect_cell(at(legs, 4, "variant"), "published, goes on");
   expect_cell(at(legs, 4, "μ"), 0.45);
   expect_cell(at(legs, 4, "launch"), 5.35);
@@ -257,7 +263,7 @@ TEST(PaperTables, Fig7SpreadsOfBoth) {
   all[1].fig7[2].runs[0].against_experiment.reset();
   const Table table = fig7_table(all, experiments(), {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 36u);
+  ASSERT_EQ(table.rows.size(), 48u);
   const std::size_t row = 12 + 5;  // second variant, second panel, third run
   expect_cell(at(table, row, "variant"), "published, rests");
   expect_cell(at(table, row, "sd of μ"), 0.1);
@@ -273,7 +279,7 @@ TEST(PaperTables, Fig7SpreadsOfBoth) {
 TEST(PaperTables, Fig8LossesBesideThePaper) {
   const Table table = fig8_table(studies(), {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 12u);
+  ASSERT_EQ(table.rows.size(), 16u);
   expect_cell(at(table, 4, "variant"), "published, rests");
   expect_cell(at(table, 4, "sd of η and μ"), 0.05);
   expect_near(at(table, 4, "tangential net, mean"), with_error(2.101, 0.003));
@@ -290,7 +296,7 @@ TEST(PaperTables, Fig8LossesBesideThePaper) {
 TEST(PaperTables, Fig9MeansOfBoth) {
   const Table table = fig9_table(studies(), {});
   test::expect_rectangular(table);
-  ASSERT_EQ(table.rows.size(), 36u);
+  ASSERT_EQ(table.rows.size(), 48u);
   const std::size_t row = 24 + 3 * 2 + 1;  // third variant, third panel, second run
   expect_cell(at(table, row, "variant"), "coulomb");
   expect_cell(at(table, row, "mean of μ"), 0.4);
