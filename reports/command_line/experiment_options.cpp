@@ -89,64 +89,64 @@ void simulate_reality(const Options& o, const SimulateRequest& plain) {
 }
 
 Command simulate() {
-  return {
-      "simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)",
-      [](Options& o) {
-        add_slope(o);
-        o.add("initial-speed", "MEAN,SD", "", "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)",
-              dynamics::range::speed);
-        add_wheel(o), add_contact(o), add_course(o);
-        o.add_flag("stand-in",
-                   "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
-                   "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
-        o.add("trials", "N", "50", "Trials, 1..1000000");
-        o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000 (of a walker: strikes, default 1000)");
-        o.add("angle-rate", "HZ", "",
-              "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
-        o.add("angle-noise", "RAD", "", "White noise of the angle, 0 or more (default 0.0002; needs --angle-rate)");
-        add_reality(o);
-        add_walker(o, "DEG", false);
-        o.add_seed();
-        o.add_threads();
-        o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
-      },
-      [](const Options& o, const std::string& line) {
-        if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
-        if (asks_for_walker(o)) {
-          WalkerRequest walker = walker_request(o, line, {"trials", "collisions"});
-          walker.walks.trials = o.whole("trials", 1, 1000000);
-          if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 1, 1000000);
-          return run_walker_simulate(walker);
-        }
-        const bool stand_in = o.flag("stand-in");
-        SimulateRequest request{stand_in ? stand_in_base(o) : one_setting(o),
-                                o.count("trials", 1, 1000000),
-                                o.count("collisions", 1, 100000),
-                                o.seed(),
-                                o.threads(),
-                                o.text("out"),
-                                line};
-        if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
-          throw std::invalid_argument("--angle-noise: needs --angle-rate");
-        request.stand_in = stand_in;
-        const bool reality = o.flag("reality");
-        for (const char* name :
-             {"effect", "outside", "skewness", "sensor-noise", "smoothing", "drop", "no-flight", "shuffle"})
-          if (o.given(name) && !reality) throw std::invalid_argument(fmt::format("--{}: needs --reality", name));
-        if (o.given("angle-rate") || (stand_in && !reality)) {
-          analysis::CameraOptions& camera = request.camera.emplace();
-          if (o.given("angle-rate")) camera.rate = o.number("angle-rate");
-          if (stand_in) camera.decimals = 5;  // a twentieth of the noise; keeps the folder small
-          if (o.given("angle-noise")) camera.noise_sd_rad = o.number("angle-noise");
-          camera.seed = request.seed;
-          camera.threads = request.threads;
-          camera.validate();
-        }
-        if (reality)
-          simulate_reality(o, request);
-        else
-          run_simulate(request);
-      }};
+  return {"simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)",
+          [](Options& o) {
+            add_slope(o);
+            o.add("initial-speed", "MEAN,SD", "",
+                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)", dynamics::range::speed);
+            add_wheel(o), add_contact(o), add_course(o);
+            o.add_flag(
+                "stand-in",
+                "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
+                "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
+            o.add("trials", "N", "50", "Trials, 1..1000000");
+            o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000 (walker: strikes, default 1000)");
+            o.add("angle-rate", "HZ", "",
+                  "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
+            o.add("angle-noise", "RAD", "", "White noise of the angle, >= 0 (default 0.0002; needs --angle-rate)");
+            add_reality(o);
+            add_walker(o, "DEG", false);
+            o.add_seed();
+            o.add_threads();
+            o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+          },
+          [](const Options& o, const std::string& line) {
+            if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
+            if (asks_for_walker(o)) {
+              WalkerRequest walker = walker_request(o, line, {"trials", "collisions"});
+              walker.walks.trials = o.whole("trials", 1, 1000000);
+              if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 1, 1000000);
+              return run_walker_simulate(walker);
+            }
+            const bool stand_in = o.flag("stand-in");
+            SimulateRequest request{stand_in ? stand_in_base(o) : one_setting(o),
+                                    o.count("trials", 1, 1000000),
+                                    o.count("collisions", 1, 100000),
+                                    o.seed(),
+                                    o.threads(),
+                                    o.text("out"),
+                                    line};
+            if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
+              throw std::invalid_argument("--angle-noise: needs --angle-rate");
+            request.stand_in = stand_in;
+            const bool reality = o.flag("reality");
+            for (const char* name :
+                 {"effect", "outside", "skewness", "sensor-noise", "smoothing", "drop", "no-flight", "shuffle"})
+              if (o.given(name) && !reality) throw std::invalid_argument(fmt::format("--{}: needs --reality", name));
+            if (o.given("angle-rate") || (stand_in && !reality)) {
+              analysis::CameraOptions& camera = request.camera.emplace();
+              if (o.given("angle-rate")) camera.rate = o.number("angle-rate");
+              if (stand_in) camera.decimals = 5;  // a twentieth of the noise; keeps the folder small
+              if (o.given("angle-noise")) camera.noise_sd_rad = o.number("angle-noise");
+              camera.seed = request.seed;
+              camera.threads = request.threads;
+              camera.validate();
+            }
+            if (reality)
+              simulate_reality(o, request);
+            else
+              run_simulate(request);
+          }};
 }
 
 Command coast_down() {
@@ -198,11 +198,10 @@ Command collisions() {
         o.add_place("DIR", "Experiment folder with experiment.toml and angle.csv");
         o.add("window", "N", "", "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples)");
         o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000");
-        o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides, above 0");
+        o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides, > 0");
         o.add("omega-minus", "fit|peak", "fit",
               "Stance motion extrapolated to the collision, or the smoothed speed's peak");
-        o.add("fit-span", "S", "0.08",
-              "Stance motion is fitted to this much time on either side of a collision, above 0");
+        o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision, > 0");
         o.add_threads();
         o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
       },
