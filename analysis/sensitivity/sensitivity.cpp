@@ -47,6 +47,9 @@ Setting moved(const Setting& setting, const Sensitivity& one, double by) {
   return result;
 }
 
+// Returns the end of eta's range: 1, or what `settled` takes.
+double highest_restitution(const Setting& setting) { return setting.noise().restitution().upper(); }
+
 // Those that can be moved to both sides: a constant at the end of its range cannot.
 std::vector<Sensitivity> candidates(const Setting& setting, bool legs) {
   std::vector<Sensitivity> list;
@@ -55,7 +58,7 @@ std::vector<Sensitivity> candidates(const Setting& setting, bool legs) {
   };
   for (const Parameter parameter : all_parameters) {
     if (!matters(setting, parameter) || !(width(setting, parameter) > 0)) continue;
-    if (parameter == Parameter::restitution_mean && at_end(setting.restitution, 1)) continue;
+    if (parameter == Parameter::restitution_mean && at_end(setting.restitution, highest_restitution(setting))) continue;
     if (parameter == Parameter::friction_mean && at_end(setting.friction, INFINITY)) continue;
     list.push_back({parameter, {}, parameter_value(setting, parameter), 0, 0});
   }
@@ -98,58 +101,73 @@ std::vector<Sensitivity> by_paths(const Setting& setting, const Metastability& s
   return list;
 }
 
-// A tip's radius ends at 0.
-double room_below(const Sensitivity& one, double step) {
-  return one.parameter == Parameter::tip_radius ? std::min(step, one.value) : step;
+// How far a parameter is moved to either side: its range may end before.
+struct Moves {
+  double back = 0, forth = 0;
+  bool central() const { return back == forth; }
+};
+Moves moves(const Setting& setting, const Sensitivity& one, double step) {
+  Moves of{step, step};
+  if (one.parameter == Parameter::tip_radius || one.parameter == Parameter::restitution_mean ||
+      one.parameter == Parameter::friction_mean)
+    of.back = std::min(step, one.value);
+  if (one.parameter == Parameter::restitution_mean) of.forth = std::min(step, highest_restitution(setting) - one.value);
+  return of;
 }
 
 // Differences of exact rows on nodes that move with the lowest state of a survivor: the densities begin there, and
 // nodes that stood still would lose what lies between.
 class IntegratedRows {
  public:
-  IntegratedRows(const Setting& setting, const ExactRows& rows, std::size_t panels)
-      : setting_(setting), rows_(rows), panels_(panels) {
+  // @param problem  of the setting
+  IntegratedRows(const Setting& setting, const Problem& problem, const ExactRows& rows, std::size_t panels, int threads)
+      : setting_(setting), rows_(rows), panels_(panels), threads_(threads) {
+    for (int p = 0; p < problem.map.phases(); ++p) lowest_.push_back(problem.map.state_interval(p).first);
     const markov::SampledChain here = chain(setting);
     adjoint_ = markov::adjoint(markov::ChainSolver(here.chain), here.launch);
   }
 
-  // Takes d ln M by the central difference of step `step`; forward from a value that cannot be lowered so far.
+  // Takes d ln M by the central difference of step `step`; by one to a side at the end of a range.
   double difference(const Sensitivity& one, double step) const {
-    const double back = room_below(one, step);
-    const markov::SampledChain low = chain(moved(setting_, one, -back)), high = chain(moved(setting_, one, step));
+    const Moves by = moves(setting_, one, step);
+    const markov::SampledChain low = chain(moved(setting_, one, -by.back)),
+                               high = chain(moved(setting_, one, by.forth));
     return markov::steps_change(adjoint_, low.chain, low.launch, high.chain, high.launch) /
-           ((back + step) * adjoint_.steps);
+           ((by.back + by.forth) * adjoint_.steps);
   }
 
  private:
   markov::SampledChain chain(const Setting& near) const {
-    const Problem problem = near.problem();
-    const markov::AnyReturnMap here = setting_.problem().map;
+    const Problem problem = near.problem(threads_);
     std::vector<double> shift;
     for (int p = 0; p < problem.map.phases(); ++p)
-      shift.push_back(problem.map.state_interval(p).first - here.state_interval(p).first);
+      shift.push_back(problem.map.state_interval(p).first - lowest_[static_cast<std::size_t>(p)]);
     return rows_.chain(problem, rows_.space(panels_, shift)).chain;
   }
 
   const Setting& setting_;
   const ExactRows& rows_;
   std::size_t panels_;
+  int threads_;
+  std::vector<double> lowest_;  // state of a survivor, by phase
   markov::Adjoint adjoint_;
 };
 
 std::vector<Sensitivity> by_rows(const Setting& setting, const Metastability& study, const StudyOptions& options) {
-  const Problem problem = setting.problem();
+  const Problem problem = setting.problem(options.threads);
   const ExactRows rows(problem, options.tolerance, options.threads);
   const std::size_t panels = std::max<std::size_t>(2, study.cells / rows.coarsest());
-  const IntegratedRows fine(setting, rows, panels), coarse(setting, rows, panels / 2);
+  const IntegratedRows fine(setting, problem, rows, panels, options.threads),
+      coarse(setting, problem, rows, panels / 2, options.threads);
   std::vector<Sensitivity> list = candidates(setting, !setting.wheel.equal_legs());
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (options.progress)
       options.progress(static_cast<double>(i) / static_cast<double>(list.size()), sensitivity_name(list[i]));
     const double step = integrated_step * width(setting, list[i].parameter);
     const double one = fine.difference(list[i], step), two = fine.difference(list[i], 2 * step);
-    list[i].derivative = one + (one - two) / 3;
-    list[i].error = std::abs(one - two) / 3 + std::abs(one - coarse.difference(list[i], step));
+    const double left = (one - two) / (moves(setting, list[i], 2 * step).central() ? 3 : 1);  // by order of the step
+    list[i].derivative = one + left;
+    list[i].error = std::abs(left) + std::abs(one - coarse.difference(list[i], step));
   }
   return list;
 }
@@ -164,7 +182,8 @@ bool of_contact(Parameter parameter) {
 std::vector<Sensitivity> by_tables(const Setting& setting, const Metastability& study, const StudyOptions& options) {
   const Problem problem = setting.problem(options.threads);
   const ExactRows rows(problem, options.tolerance, options.threads);
-  const IntegratedRows fine(setting, rows, table_panels), coarse(setting, rows, table_panels / 2);
+  const IntegratedRows fine(setting, problem, rows, table_panels, options.threads),
+      coarse(setting, problem, rows, table_panels / 2, options.threads);
   std::vector<Sensitivity> list = candidates(setting, !setting.wheel.equal_legs());
   for (std::size_t i = 0; i < list.size(); ++i) {
     Sensitivity& one = list[i];
@@ -179,7 +198,8 @@ std::vector<Sensitivity> by_tables(const Setting& setting, const Metastability& 
     if (same_table)
       one.error += std::abs(one.derivative - fine.difference(one, 2 * step)) / 3;
     else
-      one.error += std::sqrt(2.0) * study.steps.landing_error / (step + room_below(one, step));
+      one.error += std::sqrt(2.0) * study.steps.landing_error /
+                   (moves(setting, one, step).back + moves(setting, one, step).forth);
   }
   return list;
 }

@@ -100,6 +100,21 @@ TEST(Sensitivity, CoulombAgreesWithDifferencesOfFullSolves) {
   for (const Sensitivity& one : all.ranked) EXPECT_NE(one.parameter, Parameter::ramp_stiffness);
 }
 
+// A mean of 0 cannot be lowered: moved up alone.
+TEST(Sensitivity, AMeanAtTheEndOfItsRange) {
+  Setting setting = paper_setting(7.02, true);
+  setting.restitution = {0, 0.1};
+  setting.friction = {0.4, 0.1};
+  const StudyOptions options{.method = Method::integrated, .tolerance = 1e-6, .brief = true};
+  const auto steps = [&](double mean) {
+    Setting moved = setting;
+    moved.restitution.mean = mean;
+    return study(moved, options).steps.from_start.value;
+  };
+  const Sensitivity one = find(by_adjoint(setting, options), "restitution-mean");
+  EXPECT_NEAR(one.derivative, std::log(steps(0.002) / steps(0)) / 0.002, 0.02 * std::abs(one.derivative));
+}
+
 // All legs longer by one factor: the sum over the legs one by one.
 TEST(Sensitivity, LegsOneByOneAddUpToTheirCommonScale) {
   const Setting setting = paper_setting(9.59, false);
