@@ -320,8 +320,9 @@ Metastability study(const Problem& problem, const StudyOptions& options) {
   }
 }
 
-Metastability study(const Setting& setting, const StudyOptions& options) {
-  if (options.method == Method::integrated && setting.pairs.empty())
+void check_setting(const Setting& setting, Method method) {
+  setting.validate();
+  if (method == Method::integrated && setting.pairs.empty())
     for (const auto& [name, sd] :
          {std::pair("restitution", setting.restitution.sd), std::pair("friction", setting.friction.sd)})
       if (sd > 0 && sd < narrowest_integrated)
@@ -329,6 +330,10 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
             fmt::format("{}: sd {} is too narrow for method integrated, which takes 0 and {} or more; method sampled "
                         "takes any",
                         name, sd, narrowest_integrated));
+}
+
+Metastability study(const Setting& setting, const StudyOptions& options) {
+  check_setting(setting, options.method);
   // A table of landings takes part of the time.
   const bool by_table = setting.law == dynamics::Law::settled && !setting.direct && options.progress;
   constexpr double of_table = 0.3;

@@ -166,9 +166,13 @@ struct Metastability {
 /// contradict each other (consistency.h)
 Metastability study(const Problem& problem, const StudyOptions& options = {});
 
+/// Says whether a setting can be studied so, without studying it.
+/// @throws std::invalid_argument for a setting out of range, and for Method::integrated with an sd of restitution or
+/// friction below 1e-3 that is not 0
+void check_setting(const Setting& setting, Method method);
+
 /// The same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.
-/// @throws std::invalid_argument also for a setting out of range, and for Method::integrated with an sd of restitution
-/// or friction below 1e-4 that is not 0
+/// @throws std::invalid_argument also as check_setting()
 Metastability study(const Setting& setting, const StudyOptions& options = {});
 
 /// "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.

@@ -69,7 +69,13 @@ class Report {
     for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::settled}) {
       for (analysis::Setting setting : request_.settings) {
         setting.law = law;
-        if (law == dynamics::Law::settled && setting.restitution.mean > dynamics::most_settled_restitution) continue;
+        try {
+          analysis::check_setting(setting, request_.study.method);
+        } catch (const std::invalid_argument&) {
+          if (law == request_.settings.front().law) throw;
+          progress_.advance(study_units);
+          continue;  // there is no such wheel under this law
+        }
         analysis::StudyOptions options = request_.study;
         options.progress = study_progress(progress_);
         Studied one{analysis::study(setting, options), {}};

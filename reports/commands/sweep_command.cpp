@@ -62,7 +62,7 @@ std::string row(const analysis::SweepPoint& point) {
 void run_sweep(const SweepRequest& request) {
   const std::size_t size = analysis::sweep_size(request.axes);
   for (std::size_t i = 0; i < size; ++i)  // wrong settings are found before the first is computed
-    analysis::sweep_setting(request.setting, request.axes, i).validate();
+    analysis::check_setting(analysis::sweep_setting(request.setting, request.axes, i), request.study.method);
   SweepFile sweep{
       request.out,
       head(request),

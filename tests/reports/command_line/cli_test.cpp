@@ -107,6 +107,8 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"sweep"}, "no range given"},
       {{"sweep", "--slope", "5:12:0"}, "--slope: range 5:12:0"},
       {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")}, "slope: 25 deg"},
+      {{"sweep", "--method", "integrated", "--friction-sd", "0.0005,0.1", "--out", path("s.csv")},
+       "friction: sd 0.0005 is too narrow for method integrated"},
       {{"sweep", "--slope", "7:8:1", "--initial-speed", "7,0.1", "--out", path("")}, "is a folder"},
       {{"sweep", "--slope", "7:8:1", "--initial-speed", "7,0.1", "--out", path("no/s.csv")}, "no/s.csv"},
       {{"report", "--out", file("report.csv", "")}, "report.csv"},
