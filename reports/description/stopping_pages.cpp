@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace metastable::reports {
 namespace {
@@ -42,6 +43,19 @@ double mean_speed(const Stopping& stopping) {
   return stopping.landings() > 0 ? sum / stopping.landings() : 0;
 }
 
+Figure over_density(const std::string& id, const std::string& title, FigureAxis y, const Stopping& stopping,
+                    const Provenance& provenance) {
+  Figure figure;
+  figure.id = id;
+  figure.title = title;
+  figure.x = friction_axis(stopping);
+  figure.y = std::move(y);
+  figure.legend = Legend::below;
+  figure.height = 560;
+  figure.provenance = provenance;
+  return figure;
+}
+
 }  // namespace
 
 std::string stopping_story(const Stopping& s) {
@@ -63,14 +77,8 @@ std::string stopping_story(const Stopping& s) {
 }
 
 Figure sticking_figure(const Stopping& stopping, const Provenance& provenance) {
-  Figure figure;
-  figure.id = "stopping-sticking";
-  figure.title = "Friction below which a foot slides, μ_c, leg by leg";
-  figure.x = friction_axis(stopping);
-  figure.y = {"longer than the leg before it", "mm"};
-  figure.legend = Legend::below;
-  figure.height = 560;
-  figure.provenance = provenance;
+  Figure figure = over_density("stopping-sticking", "Friction below which a foot slides, μ_c, leg by leg",
+                               {"longer than the leg before it", "mm"}, stopping, provenance);
   double low = 0, high = 0;
   for (const StoppingLeg& leg : stopping.legs) {
     low = std::min(low, 1e3 * leg.longer);
@@ -100,14 +108,10 @@ Figure sticking_figure(const Stopping& stopping, const Provenance& provenance) {
 }
 
 Figure resting_figure(const Stopping& stopping, const Provenance& provenance) {
-  Figure figure;
-  figure.id = "stopping-resting";
-  figure.title = fmt::format("Friction below which the wheel stops, μ_r, at η = {}", stopping.setting.restitution.mean);
-  figure.x = friction_axis(stopping);
-  figure.y = {"speed before the landing, ω−", "rad/s"};
-  figure.legend = Legend::below;
-  figure.height = 560;
-  figure.provenance = provenance;
+  Figure figure = over_density(
+      "stopping-resting",
+      fmt::format("Friction below which the wheel stops, μ_r, at η = {}", stopping.setting.restitution.mean),
+      {"speed before the landing, ω−", "rad/s"}, stopping, provenance);
   double low = 100, high = 0;
   for (const analysis::RestingCurve& curve : stopping.curves) {
     low = std::min(low, *std::ranges::min_element(curve.speed));

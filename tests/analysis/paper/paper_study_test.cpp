@@ -79,11 +79,12 @@ TEST(PaperStudy, ReadingsAndLawsDiffer) {
   EXPECT_EQ(fastest->findings[1].verdict, ClaimVerdict::not_applicable);
   const std::vector<Hypothesis> hypotheses = paper_hypotheses(studies);
   ASSERT_EQ(hypotheses.size(), 3u);
-  for (std::size_t v = 0; v < 4; ++v) {
-    // No share of the steady speed; of the steps hardly one, which `settled` with its few samples may put above 0.1.
-    EXPECT_NE(hypotheses[0].findings[v].verdict, ClaimVerdict::reproduced) << hypotheses[0].findings[v].ours;
+  for (std::size_t v = 0; v < 3; ++v)
+    EXPECT_EQ(hypotheses[0].findings[v].verdict, ClaimVerdict::not_reproduced) << hypotheses[0].findings[v].ours;
+  // The 32 samples that `settled` has here may put the launch's share of the steps anywhere, that of the speed at none.
+  EXPECT_NE(hypotheses[0].findings[3].verdict, ClaimVerdict::reproduced) << hypotheses[0].findings[3].ours;
+  for (std::size_t v = 0; v < 4; ++v)
     EXPECT_EQ(hypotheses[2].findings[v].verdict, ClaimVerdict::reproduced) << hypotheses[2].findings[v].ours;
-  }
 }
 
 TEST(PaperStudy, SameBitsOnAnyNumberOfThreadsAndOwnNumbersForEveryProfile) {
