@@ -159,6 +159,12 @@ void require_positive(double value, const char* name, const char* unit) {
     throw std::invalid_argument(fmt::format("{}: {} is not a positive number [{}]", name, value, unit));
 }
 
+void require_ground(const Ground& ground) {
+  if (!(std::isfinite(ground.slope) && std::isfinite(ground.last_slope)))
+    throw std::invalid_argument(
+        fmt::format("walker: slopes of {} and {} rad are not finite", ground.slope, ground.last_slope));
+}
+
 void require_walkable(const Stride& s) {
   if (!(s.half_angle_rad > 0 && s.half_angle_rad < std::numbers::pi / 2 && std::isfinite(s.stance_rate) &&
         std::isfinite(s.swing_rate)))
@@ -282,6 +288,7 @@ void TwoLinkWalker::step(std::span<const double> states, std::span<const Ground>
       const std::size_t i = first + std::min(k, lanes - 1);
       const Stride begin = stride(states.subspan(i * dimension, dimension));
       require_walkable(begin);
+      require_ground(grounds[i]);
       start(m, k, begin, grounds[i]);
     }
     std::array<std::optional<LegMotion>, width> struck;
@@ -299,6 +306,7 @@ void TwoLinkWalker::step(std::span<const double> states, std::span<const Ground>
 
 std::optional<LegMotion> TwoLinkWalker::before_strike(const Stride& begin, const Ground& ground) const {
   require_walkable(begin);
+  require_ground(ground);
   Motion m;
   for (std::size_t k = 0; k < width; ++k) start(m, k, begin, ground);
   std::array<std::optional<LegMotion>, width> struck;

@@ -18,6 +18,12 @@ void require_map(const BatchMap& map) {
     throw std::invalid_argument("return map: one name for each dimension expected");
 }
 
+void require_start(const BatchMap& map, std::span<const double> start) {
+  require_map(map);
+  if (start.size() != static_cast<std::size_t>(map.dimension))
+    throw std::invalid_argument(fmt::format("return map: a start of {} numbers expected", map.dimension));
+}
+
 std::string describe_state(const BatchMap& map, std::span<const double> state) {
   std::string text;
   for (std::size_t k = 0; k < state.size(); ++k) {

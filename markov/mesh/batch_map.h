@@ -41,6 +41,9 @@ struct BatchMap {
 /// @throws std::invalid_argument naming what is missing or out of range
 void require_map(const BatchMap& map);
 
+/// The same, and a state as long as it has dimensions to start from.
+void require_start(const BatchMap& map, std::span<const double> start);
+
 /// Calls map.step and looks at what comes back.
 /// @throws MapError naming the state from which a landing is not finite or outside the map's section
 void checked_step(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> scores,

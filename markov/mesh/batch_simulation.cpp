@@ -66,11 +66,9 @@ void follow(const BatchMap& map, std::span<const double> start, const Simulation
 
 std::optional<SimulatedSteps> simulate_steps(const BatchMap& map, std::span<const double> start,
                                              const SimulationOptions& options) {
-  require_map(map);
+  require_start(map, start);
   if (options.trials < 2)
     throw std::invalid_argument(fmt::format("simulation: {} trials, 2 or more expected", options.trials));
-  if (start.size() != static_cast<std::size_t>(map.dimension))
-    throw std::invalid_argument(fmt::format("simulation: a start of {} numbers expected", map.dimension));
   SimulatedSteps simulated;
   simulated.trials = options.trials;
   simulated.steps.assign(options.trials, 0);

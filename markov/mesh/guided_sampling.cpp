@@ -122,7 +122,7 @@ class Guided {
 
 GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<const double> start,
                                const GuidedOptions& options) {
-  require_map(map);
+  require_start(map, start);
   if (options.samples < 16 || options.window < 1 || options.burn_in < 0 || options.burn_in >= 0x10000)
     throw std::invalid_argument(fmt::format(
         "guided sampling: {} samples (16 or more), a window of {} steps (1 or more), a burn-in of {} (0 to 65535)",
@@ -145,7 +145,8 @@ GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<
   for (const double w : weight) spread += (w - rate.rate) * (w - rate.rate);
   rate.standard_error = std::sqrt(spread / (n - 1) / n);
   rate.effective_samples = squares > 0 ? rate.rate * n * rate.rate * n / squares : 0;
-  // They have walked on for the window's steps: weights estimate rate (1 - rate)^window.
+  // They have walked on for the window's steps: weights estimate rate (1 - rate)^window,
+  // and of two such rates the smaller is meant.
   const int walked = (options.window + map.phases - 1) / map.phases * map.phases;
   double survive = 1;
   for (int i = 0; i < 100; ++i) survive = std::exp(walked * std::log1p(-std::min(0.5, rate.rate / survive)));

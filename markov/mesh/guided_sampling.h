@@ -12,7 +12,9 @@ namespace metastable::markov {
 struct GuidedOptions {
   std::size_t samples = 2000;  ///< >= 16
   int burn_in = 60;            ///< steps of direct simulation from the start before each sample
-  int window = 12;             ///< steps over which a sample is led to failure, >= 1
+  /// Steps over which a sample is led to failure, >= 1, and well below the expected steps: where more than a third fail
+  /// within it, the rate that comes out is too low.
+  int window = 12;
   std::uint64_t seed = 1;
   double score_spacing = 0.6, score_reach = 8.5;
   int threads = 0;  ///< 0: all cores; the bits do not depend on it

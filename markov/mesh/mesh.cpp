@@ -130,7 +130,9 @@ bool to_lattice(const NoiseFrame& frame, double spacing, const std::array<double
 Mesh::Corners Mesh::corners(int phase, std::span<const double> state) const {
   Corners corners;
   std::array<double, 4> point{};
-  const NoiseFrame& frame = frames_[static_cast<std::size_t>(phase)];
+  const NoiseFrame& frame = frames_.at(static_cast<std::size_t>(phase));
+  if (state.size() != frame.centre.size())
+    throw std::invalid_argument(fmt::format("mesh: a state of {} numbers expected", frame.centre.size()));
   if (!to_lattice(frame, spacing_, shift_, state.data(), point.data())) return corners;
   Simplex simplex;
   find_simplex(point.data(), state.size(), 0, simplex);
@@ -460,7 +462,7 @@ void Mesh::Growth::finish() {
 Mesh::Mesh(const BatchMap& map, std::vector<NoiseFrame> frames, std::span<const double> start,
            const MeshOptions& options)
     : frames_(std::move(frames)), spacing_(options.spacing), cheapest_failure_(infinity) {
-  require_map(map);
+  require_start(map, start);
   if (!(options.spacing > 0 && options.spacing <= 2))
     throw std::invalid_argument(fmt::format("mesh: spacing {} is outside (0, 2]", options.spacing));
   if (frames_.size() != static_cast<std::size_t>(map.phases) || frames_.size() > 15)

@@ -18,8 +18,9 @@ namespace metastable::markov {
 namespace {
 
 constexpr double kNormal95 = 1.959963984540054;
-constexpr double kDisagrees = 1.7;    // joint half-widths: 99.9 % of the normal
-constexpr double kSampledFrom = 100;  // expected steps above which guided samples settle before they fail
+constexpr double kDisagrees = 1.7;     // joint half-widths: 99.9 % of the normal
+constexpr double kSampledWindows = 3;  // of guided samples: within one, failures are still few
+constexpr double kSampledFrom = 100;   // expected steps above which guided samples settle before they fail
 constexpr std::size_t kFewestTrials = 100;
 
 /// Coarsest spacings that the extrapolation was found to bear, by dimension.
@@ -212,11 +213,13 @@ class Run {
     if (options_.guided_samples == 0 || study_.steps.value <= kSampledFrom) return;
     // From the start to where failures keep their share: the time to forget the start, some times over.
     const int forgets = 4 + static_cast<int>(std::ceil(4 * study_.mixing_steps));
-    const Mesh mesh(map_, frames_, start_, mesh_options(std::min<std::size_t>(1, sizes_ - 1), 0));
+    const int window = std::min(forgets, 200);
+    if (study_.steps.value <= kSampledWindows * window) return;
+    const Mesh mesh(map_, frames_, start_, mesh_options(1, 0));
     const GuidedRate guided = guided_failure_rate(map_, mesh, start_,
                                                   {.samples = options_.guided_samples,
                                                    .burn_in = std::min(3 * forgets, 60000),
-                                                   .window = std::min(forgets, 200),
+                                                   .window = window,
                                                    .seed = options_.seed,
                                                    .threads = options_.threads});
     if (!(guided.rate > 0)) return;

@@ -61,11 +61,10 @@ struct MeshStudy {
 /// discretization error; the bracket of what leaves the mesh is added. The discretization error is the difference from
 /// the extrapolation without the coarsest size; with four sizes, at least that between the two triples'.
 ///
-/// Beside it stand importance sampling guided by the coarsest mesh that T > 100 steps makes worth it, and direct
-/// simulation where 100 trials or more fit into `simulated_steps`. Two ways disagree when they lie further apart
-/// than 1.7 times (99.9 %) their joint 95 % half-width.
-/// The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries with them, is
-/// foreseen from it.
+/// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
+/// windows of it, and direct simulation where 100 trials or more fit into `simulated_steps`. Two ways disagree when
+/// they lie further apart than 1.7 times (99.9 %) their joint 95 % half-width. The coarsest mesh comes first: what the
+/// finest will take, nodes by the spacing's power and entries with them, is foreseen from it.
 /// @param start  a state at phase 0
 /// @throws std::length_error before the other meshes are made if they would take more than most_bytes; as Mesh,
 /// noise_frames and mesh_passage do

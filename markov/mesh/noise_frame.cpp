@@ -91,12 +91,10 @@ std::vector<double> row_major(const MatrixXd& m) {
 }  // namespace
 
 std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double> start) {
-  require_map(map);
+  require_start(map, start);
   if (map.scores == 0)
     throw MapError(
         "return map: it draws for itself, so the tails of its noise cannot be weighted; it can be simulated only");
-  if (start.size() != static_cast<std::size_t>(map.dimension))
-    throw std::invalid_argument(fmt::format("return map: a start of {} numbers expected", map.dimension));
   const Probe probe(map);
   const std::vector<VectorXd> orbit = settled_orbit(map, probe, start);
   std::vector<MatrixXd> a, q;

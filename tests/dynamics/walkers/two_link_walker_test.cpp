@@ -131,6 +131,8 @@ TEST(TwoLinkWalker, NamesStatesThatCannotWalk) {
     const std::array ground{Ground{0.009, 0.009}};
     EXPECT_THROW(walker.step(state, ground, next, fell), std::invalid_argument);
   }
+  for (const Ground& ground : {Ground{nan, 0.009}, Ground{0.009, std::numeric_limits<double>::infinity()}})
+    EXPECT_THROW(walker.before_strike({0.2, -0.2, 0}, ground), std::invalid_argument);
   EXPECT_THROW(TwoLinkWalker::compass({.leg_mass = 0}), std::invalid_argument);
 }
 

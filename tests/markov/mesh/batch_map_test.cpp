@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "markov/mesh/batch_simulation.h"
+#include "markov/mesh/guided_sampling.h"
+#include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/mesh_study.h"
 #include "tests/markov/mesh/maps.h"
 #include "tests/markov/message.h"
@@ -37,6 +39,17 @@ TEST(BatchMap, NamesTheStateThatLeavesTheSection) {
   const std::vector<double> start{2};
   const std::string message = message_of<MapError>([&] { mesh_study(map, start); });
   EXPECT_NE(message.find("outside its own section"), std::string::npos) << message;
+}
+
+TEST(BatchMap, StartsOfAnotherLengthAreRefused) {
+  const BatchMap map = linear_batch(0.7);
+  const std::vector<double> good{2}, long_one{2, 1};
+  const Mesh mesh(map, noise_frames(map, good), good, {.spacing = 0.5});
+  EXPECT_THROW(noise_frames(map, long_one), std::invalid_argument);
+  EXPECT_THROW(Mesh(map, noise_frames(map, good), long_one, {.spacing = 0.5}), std::invalid_argument);
+  EXPECT_THROW(mesh_passage(mesh, {}), std::invalid_argument);
+  EXPECT_THROW(guided_failure_rate(map, mesh, long_one, {}), std::invalid_argument);
+  EXPECT_THROW(simulate_steps(map, {}, {}), std::invalid_argument);
 }
 
 TEST(BatchMap, ThatNeverFailsIsNamed) {
