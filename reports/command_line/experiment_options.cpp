@@ -168,9 +168,11 @@ Command coast_down() {
             "Take a log of which more than a tenth of the revolutions is left out, or a loss that is not positive "
             "over its speeds: every verdict will repeat it");
         o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+        o.add_json();
       },
       [](const Options& o, const std::string& line) {
         CoastDownRequest request;
+        request.json = o.text("json");
         request.accept_defects = o.flag("accept-defects");
         request.logs = o.all("LOG");
         request.options.stop = o.number("stop");
@@ -204,9 +206,12 @@ Command collisions() {
         o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision, > 0");
         o.add_threads();
         o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
+        o.add_json();
       },
-      [](const Options& o, const std::string&) {
+      [](const Options& o, const std::string& line) {
         CollisionsRequest request;
+        request.json = o.text("json");
+        request.command = line;
         request.folder = o.text("DIR");
         if (o.given("window")) request.finder.window = o.count("window", 5, 10001);
         request.finder.collisions = o.count("collisions", 1, 100000);
@@ -267,9 +272,11 @@ Command study() {
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "study", "Folder for tables, figures and index.html");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             StudyRequest request;
+            request.json = o.text("json");
             request.data = o.text("data");
             request.out = o.text("out");
             request.options.trials = o.count("trials", 20, 1000000);
@@ -292,7 +299,7 @@ Command diagnose() {
             "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");
         o.add_seed();
         o.add_threads();
-        o.add("json", "FILE|-", "", "Write the results as JSON");
+        o.add_json();
         o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
       },
       [](const Options& o, const std::string& line) {
@@ -316,9 +323,11 @@ Command lessons() {
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "lessons", "Folder for tables, figures and index.html");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             LessonsRequest request;
+            request.json = o.text("json");
             request.data = o.all("data");
             request.out = o.text("out");
             request.options.seed = o.seed();
@@ -330,7 +339,7 @@ Command lessons() {
 
 Command effects() {
   return {"effects", "The catalogue of effects a model may lack: parameters, units, ranges, meaning",
-          [](Options& o) { o.add("json", "FILE|-", "", "Write the catalogue as JSON"); },
+          [](Options& o) { o.add_json(); },
           [](const Options& o, const std::string&) { run_effects({o.text("json")}); }};
 }
 

@@ -42,12 +42,13 @@ class Report {
     page.provenance = provenance_for(request.settings);
   }
 
-  void write() {
+  void write(Answer& answer) {
     ramps();
     for (const analysis::Setting& setting : request_.settings) spreads(setting);
     for (const analysis::Setting& setting : request_.settings) means(setting);
     energies();
     pages_.write_index();
+    pages_.finish(answer);
   }
 
  private:
@@ -207,8 +208,8 @@ class Report {
 }  // namespace
 
 void run_report(const ReportRequest& request) {
-  Report(request).write();
-  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  Answer answer(request.json);
+  Report(request).write(answer);
 }
 
 }  // namespace metastable::reports

@@ -50,6 +50,7 @@ struct SweepRequest {
   analysis::StudyOptions study;
   std::string out = "sweep.csv";  ///< the figure goes beside it, with the ending .svg
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable simulate
@@ -82,6 +83,8 @@ struct CollisionsRequest {
   bool peak = false;  ///< omega_minus is the peak of the smoothed speed instead of the stance fit
   std::string out;    ///< file; "": collisions.csv in the folder, or collisions-from-angle.csv if that is there
   int threads = 0;
+  std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable blind
@@ -107,6 +110,7 @@ struct CoastDownRequest {
   bool accept_defects = false;  ///< of which every verdict then speaks
   std::string out;
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable describe
@@ -125,6 +129,7 @@ struct StudyRequest {
   std::string out = "study";
   analysis::PaperStudyOptions options;
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable diagnose
@@ -143,6 +148,7 @@ struct LessonsRequest {
   analysis::DiagnosisOptions options;  ///< of every diagnosis; seed and threads also of the simulated trials
   int trials = 0;                      ///< simulated, of each condition; 0: as many as the paper has
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable effects
@@ -157,6 +163,7 @@ struct ReportRequest {
   int energy_trials = 1000;  ///< trials behind the energy-loss table
   std::string out = "report";
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 }  // namespace metastable::reports

@@ -9,6 +9,7 @@
 
 #include "analysis/study/verification.h"
 #include "markov/passage/chain_files.h"
+#include "reports/output/answer.h"
 #include "reports/output/output_file.h"
 #include "reports/output/progress.h"
 #include "reports/output/table.h"
@@ -156,6 +157,7 @@ void export_chain(const Checked& checked, const std::filesystem::path& folder) {
 void run_verify(const VerifyRequest& request) {
   for (const std::string& folder : {request.out, request.export_to})  // before any long computation
     if (!folder.empty()) make_folder(folder);
+  Answer answer(request.json);
   const std::vector<analysis::Benchmark> terrain = analysis::rough_terrain_benchmarks(),
                                          wheels = analysis::wheel_benchmarks();
   Progress progress("verify", (terrain.size() + wheels.size()) * (request.seeds > 0 ? 2 : 1) + 1);
@@ -184,10 +186,9 @@ void run_verify(const VerifyRequest& request) {
                               "wheel: law published, eta ~ N(0.4, 0.1^2), the paper's launch, equal legs of 0.1519 m\n"
                               "settled: the paper's legs, r_g = 0.0424094 m",
                               1, version()};
-  const std::size_t width = terminal_width();
-  fmt::print("{}\n", wrapped(peers, "", width));
+  answer.say("{}", wrapped(peers, "", terminal_width()));
   for (Table& table : tables) {
-    fmt::print("{}\n", to_text(table, 1000, width));
+    answer.show(table);
     if (request.out.empty()) continue;
     table.notes.emplace_back(peers);  // a file stands alone
     table.provenance = provenance;
@@ -196,7 +197,8 @@ void run_verify(const VerifyRequest& request) {
     write_file(file.string() + ".md", to_markdown(table));
     write_file(file.string() + ".tex", to_latex(table));
   }
-  for (const std::string& line : provenance_lines(provenance)) fmt::print("{}\n", line);
+  for (const std::string& line : provenance_lines(provenance)) answer.say("{}", line);
+  answer.finish(provenance);
 }
 
 }  // namespace metastable::reports
