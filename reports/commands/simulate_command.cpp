@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
-#include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
 #include "reports/output/output_file.h"
 #include "reports/output/table.h"
@@ -31,12 +31,26 @@ void check_empty(const std::filesystem::path& folder) {
       throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
 }
 
+void write_into(OutputFolder& folder, const SimulatedFiles& made) {
+  if (made.angle_csv) write_file(folder.path() / "angle.csv", *made.angle_csv);
+  write_file(folder.path() / "collisions.csv", made.files.collisions_csv);
+  if (!made.files.trials_csv.empty()) write_file(folder.path() / "trials.csv", made.files.trials_csv);
+  write_file(folder.path() / "experiment.toml", made.files.experiment_toml);
+  folder.commit(is_experiment);
+}
+
+template <typename Request>
+void run_into_folder(const Request& request) {
+  check_empty(request.out);
+  OutputFolder folder(request.out);  // before anything long is computed
+  const SimulatedFiles made = simulated_files(request);
+  write_into(folder, made);
+  for (const std::string& line : made.said) fmt::print("{}: {}\n", request.out, line);
+}
+
 }  // namespace
 
-void run_simulate(const SimulateRequest& request) {
-  const std::filesystem::path folder = request.out;
-  check_empty(folder);
-  OutputFolder whole(folder);
+SimulatedFiles simulated_files(const SimulateRequest& request) {
   const std::vector<analysis::SimulatedCondition> conditions =
       request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
                        : std::vector<analysis::SimulatedCondition>{one_condition(request)};
@@ -46,49 +60,49 @@ void run_simulate(const SimulateRequest& request) {
   const std::string title = request.stand_in
                                 ? "Simulated stand-in of the paper's three experiments (not a measurement)"
                                 : fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg);
-  analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
+  SimulatedFiles made{analysis::experiment_files(conditions, title, provenance_lines(provenance)), {}, {}};
   if (request.camera) {
-    files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
-    write_file(whole.path() / "angle.csv", analysis::angle_csv(conditions, *request.camera));
+    made.files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
+    made.angle_csv = analysis::angle_csv(conditions, *request.camera);
   }
-  write_file(whole.path() / "collisions.csv", files.collisions_csv);
-  write_file(whole.path() / "trials.csv", files.trials_csv);
-  write_file(whole.path() / "experiment.toml", files.experiment_toml);
-  whole.commit(is_experiment);
   for (const auto& [id, setting, trials] : conditions) {
     const auto rested = std::count_if(trials.begin(), trials.end(),
                                       [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
-    fmt::print("{}: {} trials{}, {} of them came to rest\n", request.out, trials.size(),
-               request.stand_in ? " of " + id : "", rested);
+    made.said.push_back(fmt::format("{} trials{}, {} of them came to rest", trials.size(),
+                                    request.stand_in ? " of " + id : "", rested));
   }
+  return made;
 }
 
-void run_reality(const RealityRequest& request) {
-  const std::filesystem::path folder = request.out;
-  check_empty(folder);
-  OutputFolder whole(folder);
+SimulatedFiles simulated_files(const RealityRequest& request) {
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
   const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
-  Provenance provenance{request.command, {}, request.reality.seed, version()};
   analysis::FolderOptions options;
   options.title = "Rimless wheel in the virtual laboratory";
-  options.comment = provenance_lines(provenance);
+  options.comment = provenance_lines({request.command, {}, request.reality.seed, version()});
   options.dropped = request.dropped;
   options.camera = request.camera;
-  const analysis::RealityFiles made = analysis::reality_files(request.conditions, setup, trials, options);
-  if (made.angle_csv) write_file(whole.path() / "angle.csv", *made.angle_csv);
-  write_file(whole.path() / "collisions.csv", made.files.collisions_csv);
-  if (!made.files.trials_csv.empty()) write_file(whole.path() / "trials.csv", made.files.trials_csv);
-  write_file(whole.path() / "experiment.toml", made.files.experiment_toml);
-  whole.commit(is_experiment);
+  analysis::RealityFiles made = analysis::reality_files(request.conditions, setup, trials, options);
   std::size_t collisions = 0, rested = 0, flown = 0;
   for (const dynamics::LaboratoryTrial& trial : trials) {
     collisions += trial.collisions.size();
     rested += trial.outcome == dynamics::Outcome::rest;
     for (const dynamics::LaboratoryCollision& c : trial.collisions) flown += c.flew;
   }
-  fmt::print("{}: {} trials, {} of them came to rest; {} collisions, {} of them after a flight\n", request.out,
-             trials.size(), rested, collisions, flown);
+  return {std::move(made.files),
+          std::move(made.angle_csv),
+          {fmt::format("{} trials, {} of them came to rest; {} collisions, {} of them after a flight", trials.size(),
+                       rested, collisions, flown)}};
 }
+
+void write_experiment(const std::filesystem::path& folder, const SimulatedFiles& made) {
+  check_empty(folder);
+  OutputFolder whole(folder);
+  write_into(whole, made);
+}
+
+void run_simulate(const SimulateRequest& request) { run_into_folder(request); }
+
+void run_reality(const RealityRequest& request) { run_into_folder(request); }
 
 }  // namespace metastable::reports
