@@ -3,19 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <utility>
 #include <vector>
 
+#include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
-#include "reports/output/output_file.h"
+#include "reports/commands/experiment_output.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
 namespace {
-
-constexpr const char* is_experiment = "experiment.toml";  // a folder without it is not an experiment yet
 
 analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
   return {fmt::format("{}", request.setting.slope_deg), request.setting,
@@ -25,32 +22,17 @@ analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
                                                       .threads = request.threads})};
 }
 
-void check_empty(const std::filesystem::path& folder) {
-  for (const char* name : {"experiment.toml", "collisions.csv", "trials.csv", "angle.csv"})
-    if (std::filesystem::exists(folder / name))
-      throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
-}
-
-void write_into(OutputFolder& folder, const SimulatedFiles& made) {
-  if (made.angle_csv) write_file(folder.path() / "angle.csv", *made.angle_csv);
-  write_file(folder.path() / "collisions.csv", made.files.collisions_csv);
-  if (!made.files.trials_csv.empty()) write_file(folder.path() / "trials.csv", made.files.trials_csv);
-  write_file(folder.path() / "experiment.toml", made.files.experiment_toml);
-  folder.commit(is_experiment);
-}
-
 template <typename Request>
 void run_into_folder(const Request& request) {
-  check_empty(request.out);
-  OutputFolder folder(request.out);  // before anything long is computed
-  const SimulatedFiles made = simulated_files(request);
-  write_into(folder, made);
+  ExperimentOutput folder(request.out);
+  const SimulatedExperiment made = simulated_experiment(request);
+  folder.write(made.source);
   for (const std::string& line : made.said) fmt::print("{}: {}\n", request.out, line);
 }
 
 }  // namespace
 
-SimulatedFiles simulated_files(const SimulateRequest& request) {
+SimulatedExperiment simulated_experiment(const SimulateRequest& request) {
   const std::vector<analysis::SimulatedCondition> conditions =
       request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
                        : std::vector<analysis::SimulatedCondition>{one_condition(request)};
@@ -60,11 +42,10 @@ SimulatedFiles simulated_files(const SimulateRequest& request) {
   const std::string title = request.stand_in
                                 ? "Simulated stand-in of the paper's three experiments (not a measurement)"
                                 : fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg);
-  SimulatedFiles made{analysis::experiment_files(conditions, title, provenance_lines(provenance)), {}, {}};
-  if (request.camera) {
-    made.files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
-    made.angle_csv = analysis::angle_csv(conditions, *request.camera);
-  }
+  analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
+  if (request.camera) files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
+  SimulatedExperiment made{analysis::source_of(files, request.out), {}};
+  if (request.camera) made.source.angle_csv = analysis::angle_csv(conditions, *request.camera);
   for (const auto& [id, setting, trials] : conditions) {
     const auto rested = std::count_if(trials.begin(), trials.end(),
                                       [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
@@ -74,7 +55,7 @@ SimulatedFiles simulated_files(const SimulateRequest& request) {
   return made;
 }
 
-SimulatedFiles simulated_files(const RealityRequest& request) {
+SimulatedExperiment simulated_experiment(const RealityRequest& request) {
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
   const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
   analysis::FolderOptions options;
@@ -82,23 +63,18 @@ SimulatedFiles simulated_files(const RealityRequest& request) {
   options.comment = provenance_lines({request.command, {}, request.reality.seed, version()});
   options.dropped = request.dropped;
   options.camera = request.camera;
-  analysis::RealityFiles made = analysis::reality_files(request.conditions, setup, trials, options);
+  const analysis::RealityFiles files = analysis::reality_files(request.conditions, setup, trials, options);
+  SimulatedExperiment made{analysis::source_of(files.files, request.out), {}};
+  made.source.angle_csv = files.angle_csv;
   std::size_t collisions = 0, rested = 0, flown = 0;
   for (const dynamics::LaboratoryTrial& trial : trials) {
     collisions += trial.collisions.size();
     rested += trial.outcome == dynamics::Outcome::rest;
     for (const dynamics::LaboratoryCollision& c : trial.collisions) flown += c.flew;
   }
-  return {std::move(made.files),
-          std::move(made.angle_csv),
-          {fmt::format("{} trials, {} of them came to rest; {} collisions, {} of them after a flight", trials.size(),
-                       rested, collisions, flown)}};
-}
-
-void write_experiment(const std::filesystem::path& folder, const SimulatedFiles& made) {
-  check_empty(folder);
-  OutputFolder whole(folder);
-  write_into(whole, made);
+  made.said = {fmt::format("{} trials, {} of them came to rest; {} collisions, {} of them after a flight",
+                           trials.size(), rested, collisions, flown)};
+  return made;
 }
 
 void run_simulate(const SimulateRequest& request) { run_into_folder(request); }

@@ -14,6 +14,7 @@
 #include "analysis/likelihood/diagnose.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/commands/describe_command.h"
+#include "reports/commands/experiment_output.h"
 #include "reports/commands/simulate_command.h"
 #include "reports/diagnosis/diagnosis_json.h"
 #include "reports/diagnosis/diagnosis_tables.h"
@@ -42,19 +43,13 @@ HeldExperiment held(analysis::ExperimentSource source) {
 
 HeldExperiment read(const std::string& folder) { return held(analysis::read_source(folder)); }
 
-HeldExperiment of_files(SimulatedFiles made, const std::string& name) {
-  analysis::ExperimentSource source = analysis::source_of(made.files, name);
-  source.angle_csv = std::move(made.angle_csv);
-  HeldExperiment experiment = held(std::move(source));
+HeldExperiment of_simulation(SimulatedExperiment made) {
+  HeldExperiment experiment = held(std::move(made.source));
   experiment->said = std::move(made.said);
   return experiment;
 }
 
-void write(const Held& held, const std::string& folder) {
-  const analysis::ExperimentSource& s = held.source;
-  write_experiment(folder,
-                   {{s.experiment_toml, s.collisions_csv.value_or(""), s.trials_csv.value_or("")}, s.angle_csv, {}});
-}
+void write(const Held& held, const std::string& folder) { ExperimentOutput(folder).write(held.source); }
 
 // Columns as they are measured; NaN or -1 where nothing is known.
 struct CollisionRow {
@@ -180,6 +175,7 @@ RealityRequest reality_of(const SimulateRequest& plain, const Arguments& given) 
   reality.threads = plain.threads;
   request.dropped = given.texts("drop");
   request.camera = plain.camera;
+  request.out = plain.out;
   request.command = plain.command;
   return request;
 }
@@ -192,7 +188,7 @@ HeldExperiment simulate(const py::dict& setting, const py::dict& options, const 
                           static_cast<int>(given.whole("collisions", 1, 100000)),
                           given.seed(),
                           given.threads(),
-                          "",
+                          "simulated",
                           command};
   request.stand_in = given.flag("stand_in");
   if (given.given("angle_noise") && !given.given("angle_rate"))
@@ -211,7 +207,7 @@ HeldExperiment simulate(const py::dict& setting, const py::dict& options, const 
   const RealityRequest laboratory = reality ? reality_of(request, given) : RealityRequest{};
   Call call(progress);
   call.run(
-      [&] { experiment = of_files(reality ? simulated_files(laboratory) : simulated_files(request), "simulated"); });
+      [&] { experiment = of_simulation(reality ? simulated_experiment(laboratory) : simulated_experiment(request)); });
   return experiment;
 }
 
