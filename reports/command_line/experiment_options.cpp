@@ -84,6 +84,7 @@ void simulate_reality(const Options& o, const SimulateRequest& plain) {
   if (o.given("drop")) request.dropped = split(o.text("drop"), ',');
   request.camera = plain.camera;
   request.out = plain.out;
+  request.json = plain.json;
   request.command = plain.command;
   run_reality(request);
 }
@@ -109,6 +110,7 @@ Command simulate() {
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
@@ -129,6 +131,7 @@ Command simulate() {
             if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
               throw std::invalid_argument("--angle-noise: needs --angle-rate");
             request.stand_in = stand_in;
+            request.json = o.text("json");
             const bool reality = o.flag("reality");
             for (const char* name :
                  {"effect", "outside", "skewness", "sensor-noise", "smoothing", "drop", "no-flight", "shuffle"})
@@ -240,11 +243,13 @@ Command describe() {
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "", "Folder for tables, figures and index.html (default: tables on the terminal)");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             DescribeRequest request;
             request.folder = o.text("DIR");
             request.out = o.text("out");
+            request.json = o.text("json");
             const std::string transition = o.text("transition");
             if (transition == "collision" || transition == "step")
               request.options.transition =

@@ -64,6 +64,7 @@ struct SimulateRequest {
   std::string command;
   std::optional<analysis::CameraOptions> camera = {};  ///< given: angle.csv too
   bool stand_in = false;  ///< the paper's three conditions instead of `trials` of one (analysis/experiment/stand_in.h)
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable simulate --reality
@@ -74,6 +75,7 @@ struct RealityRequest {
   std::optional<analysis::CameraOptions> camera;
   std::string out;
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable collisions
@@ -97,6 +99,7 @@ struct BlindRequest {
   int threads = 0;
   std::string out;  ///< of open; "": report in the run's folder
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable coast-down
@@ -121,6 +124,7 @@ struct DescribeRequest {
   std::vector<dynamics::Law> against;  ///< laws to compare with
   int trials = 2000;                   ///< simulated trials of that comparison
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable study

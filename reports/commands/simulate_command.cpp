@@ -8,7 +8,7 @@
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
 #include "reports/commands/experiment_output.h"
-#include "reports/output/table.h"
+#include "reports/output/answer.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -25,9 +25,12 @@ analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
 template <typename Request>
 void run_into_folder(const Request& request) {
   ExperimentOutput folder(request.out);
+  Answer answer(request.json);
   const SimulatedExperiment made = simulated_experiment(request);
   folder.write(made.source);
-  for (const std::string& line : made.said) fmt::print("{}: {}\n", request.out, line);
+  for (const std::string& line : made.said) answer.say("{}: {}", request.out, line);
+  answer.fact("folder", request.out);
+  answer.finish(made.provenance);
 }
 
 }  // namespace
@@ -44,7 +47,7 @@ SimulatedExperiment simulated_experiment(const SimulateRequest& request) {
                                 : fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg);
   analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
   if (request.camera) files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
-  SimulatedExperiment made{analysis::source_of(files, request.out), {}};
+  SimulatedExperiment made{analysis::source_of(files, request.out), {}, provenance};
   if (request.camera) made.source.angle_csv = analysis::angle_csv(conditions, *request.camera);
   for (const auto& [id, setting, trials] : conditions) {
     const auto rested = std::count_if(trials.begin(), trials.end(),
@@ -60,11 +63,12 @@ SimulatedExperiment simulated_experiment(const RealityRequest& request) {
   const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
   analysis::FolderOptions options;
   options.title = "Rimless wheel in the virtual laboratory";
-  options.comment = provenance_lines({request.command, {}, request.reality.seed, version()});
+  const Provenance provenance{request.command, {}, request.reality.seed, version()};
+  options.comment = provenance_lines(provenance);
   options.dropped = request.dropped;
   options.camera = request.camera;
   const analysis::RealityFiles files = analysis::reality_files(request.conditions, setup, trials, options);
-  SimulatedExperiment made{analysis::source_of(files.files, request.out), {}};
+  SimulatedExperiment made{analysis::source_of(files.files, request.out), {}, provenance};
   made.source.angle_csv = files.angle_csv;
   std::size_t collisions = 0, rested = 0, flown = 0;
   for (const dynamics::LaboratoryTrial& trial : trials) {

@@ -6,6 +6,7 @@
 
 #include "analysis/experiment/experiment.h"
 #include "reports/commands/request.h"
+#include "reports/output/table.h"
 
 namespace metastable::reports {
 
@@ -16,6 +17,7 @@ void run_reality(const RealityRequest& request);
 struct SimulatedExperiment {
   analysis::ExperimentSource source;
   std::vector<std::string> said;
+  Provenance provenance;
 };
 /// @throws std::invalid_argument as analysis::simulate_trials() and analysis::laboratory_setup()
 SimulatedExperiment simulated_experiment(const SimulateRequest& request);

@@ -115,8 +115,11 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::s
 Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
   const auto split = [](std::string_view line) {
     std::vector<std::string> fields(1);
+    bool quoted = false;
     for (const char c : line)
-      if (c == ',')
+      if (c == '"')
+        quoted = !quoted;
+      else if (c == ',' && !quoted)
         fields.emplace_back();
       else if (c != '\n')
         fields.back() += c;

@@ -14,9 +14,8 @@
 
 namespace metastable::reports {
 
-/// The JSON holds "facts" (by name), "tables" (id, title, columns with name and unit, rows, notes), "files" (paths),
-/// "said" (the lines that would have been printed) and "provenance"; what is empty is left out. A cell is a number, a
-/// text, "infinite", null where it is empty, or {"value", "interval"}.
+/// The JSON holds "facts" (by name), "tables" (as of table_json.h), "files" (paths), "said" (the lines that would have
+/// been printed) and "provenance"; what is empty is left out.
 class Answer {
  public:
   /// @param json  file, "-" for standard output, where nothing else is printed then, "" for none
