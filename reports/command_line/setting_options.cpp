@@ -76,9 +76,11 @@ void add_stated_wheel(Options& options) {
   options.add("inertia", "KGM2", "",
               "About the stance foot [kg m^2], from M (mean L)^2 to ten times that (default: M (mean L)^2; under "
               "the other laws plus M r_g^2)");
-  options.add("radius-of-gyration", "M", "",
-              "About the hub [m], at most three mean legs (default: 0.05 under coulomb and settled, 0 under plastic)",
-              range::radius_of_gyration);
+  options.add(
+      "radius-of-gyration", "M", "",
+      "About the hub [m], at most three mean legs, above 0 under settled (coulomb, plastic, settled; default: 0.05, "
+      "0 under plastic)",
+      range::radius_of_gyration);
   options.add("tip-radius", "M", "0", "Of the legs' round tips [m], at most a twentieth of the shortest leg (settled)",
               range::tip_radius);
 }
@@ -240,7 +242,7 @@ void add_standard_errors(Options& options) {
   options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd");
   options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]");
   options.add("inertia-se", "KGM2", "", "[kg m^2]");
-  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb)");
+  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb, plastic, settled)");
   options.add("ramp-stiffness-se", "N/M", "", "[N/m] (published)");
   options.add("contact-mass-se", "KG", "", "[kg] (published)");
 }
