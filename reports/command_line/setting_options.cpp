@@ -56,14 +56,6 @@ void check_law(const Options& options, dynamics::Law law) {
   });
 }
 
-// Before the launch is asked for: a slope that no launch can save is named as such.
-void check_slope(const analysis::Setting& setting) {
-  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
-  if (!range.holds(setting.slope_deg))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
-                                            setting.slope_deg, range.text()));
-}
-
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
 analysis::Setting checked(analysis::Setting setting) {
   setting.validate();
@@ -143,6 +135,13 @@ void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std
       throw std::invalid_argument(
           fmt::format("--{}: has a meaning under --law {} only", name,
                       fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
+}
+
+void check_slope(const analysis::Setting& setting) {
+  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
+  if (!range.holds(setting.slope_deg))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
+                                            setting.slope_deg, range.text()));
 }
 
 // All but slope and launch speed.

@@ -161,6 +161,7 @@ analysis::Setting setting_of(const Arguments& fields) {
   s.direct = fields.flag("direct");
   if (s.direct && s.law != dynamics::Law::settled)
     throw std::invalid_argument("direct: has a meaning under law settled only");
+  check_slope(s);
   if (fields.given("initial_speed"))
     s.initial_speed = fields.spread("initial_speed");
   else

@@ -163,11 +163,14 @@ py::dict committor(const HeldChain& held, const py::array_t<bool, py::array::c_s
 
 py::array survival(HeldChain& held, const Number& start, const Number& steps, const py::object& progress) {
   const markov::Launch launch = launch_of(held.chain(), start);
+  for (py::ssize_t i = 0; i < steps.size(); ++i)
+    if (!(steps.data()[i] >= 0)) throw std::invalid_argument(fmt::format("steps: {} is below 0", steps.data()[i]));
   std::vector<double> at;
   Call call(progress);
   call.run([&] {
     const markov::Survival survival(held.solver(), held.quasi_stationary(), launch);
-    for (py::ssize_t i = 0; i < steps.size(); ++i) at.push_back(survival.at(steps.data()[i]));
+    // There the launch is a step of its own.
+    for (py::ssize_t i = 0; i < steps.size(); ++i) at.push_back(survival.at(steps.data()[i] + 1));
   });
   return array_of(std::move(at));
 }

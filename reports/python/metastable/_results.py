@@ -90,6 +90,9 @@ def _steps(value, interval):
 class Study(Result):
     """How long one setting of the wheel walks. Fields: `steps --json` of reports/README.md; beside them `regime`."""
 
+    # What is there only where it was asked for, or where there is something to say.
+    message = certificate = sensitivities = how_it_fails = from_standard_errors = None
+
     def __init__(self, answer):
         super().__init__(answer)
         self._regime = tuple(Regime(**leg) for leg in answer["regime"])
@@ -130,6 +133,8 @@ class Comparison(Result):
 
 class WalkerStudy(Result):
     """How long a walker, or a simulator of your own, walks. Fields: `steps --walker --json` of reports/README.md."""
+
+    gait = how_it_fails = None  # where there is a gait to tell of; where it was asked for
 
     def _headline(self):
         return f"{_steps(self.expected_steps.value, self.expected_steps.interval_95)}, {self.status}"

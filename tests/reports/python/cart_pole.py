@@ -9,7 +9,7 @@ import metastable
 
 gravity, length, period, substeps = 9.81, 1.0, 0.05, 5  # m/s^2, m, s
 most = 4.0  # of the cart's acceleration [m/s^2]
-gust = 1.5  # sd of the acceleration by which a gust pushes the pole [m/s^2]
+gust = 6.5  # sd of the acceleration by which a gust pushes the pole [m/s^2]
 
 
 def step(state, noise):

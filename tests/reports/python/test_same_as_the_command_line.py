@@ -9,11 +9,12 @@ from support import command_line, data, told
 class SameAsTheCommandLine(unittest.TestCase):
     def test_study(self):
         setting = metastable.Setting(slope_deg=9.59, restitution=(0.35, 0.1), friction=(0.3, 0.05))
-        study = metastable.study(setting, seed=7, sensitivities=True, standard_errors={"friction_mean": 0.01},
-                                 how_it_fails=True, threads=1)
+        study = metastable.study(setting, seed=7, cells=48, samples=512, replicates=3, how_it_fails=True, threads=1,
+                                 standard_errors={"friction_mean": 0.01})
         self.assertEqual(told(study.to_dict()),
                          command_line("steps", "--slope", "9.59", "--restitution", "0.35,0.1", "--friction",
-                                      "0.3,0.05", "--seed", "7", "--friction-se", "0.01,0", "--how-it-fails"))
+                                      "0.3,0.05", "--seed", "7", "--cells", "48", "--samples", "512", "--replicates",
+                                      "3", "--how-it-fails", "--friction-se", "0.01,0"))
 
     def test_integrated_under_another_law(self):
         setting = metastable.Setting(slope_deg=5, initial_speed=(6, 0.3), law="coulomb", legs=[0.15] * 8)
@@ -24,7 +25,8 @@ class SameAsTheCommandLine(unittest.TestCase):
 
     def test_compare(self):
         settings = [metastable.Setting(slope_deg=slope) for slope in (7.02, 9.59)]
-        self.assertEqual(told(metastable.compare(settings).to_dict()), command_line("compare"))
+        self.assertEqual(told(metastable.compare(settings, cells=48, samples=512).to_dict()),
+                         command_line("compare", "--cells", "48", "--samples", "512"))
 
     def test_walker(self):
         setting = metastable.WalkerSetting("simplest", slope_sd_deg=0.17)
