@@ -3,7 +3,7 @@
 
     check.py --bin FOLDER... [--python FOLDER] PAGE...
 
-Blocks fenced as `console` hold commands behind "$ " (continued lines end with a backslash) and what they print, on
+A PAGE is a page of Markdown or a notebook, whose code is run (exit code 77 without Matplotlib). Blocks fenced as `console` hold commands behind "$ " (continued lines end with a backslash) and what they print, on
 either stream. Blocks fenced as `pycon` hold a Python session. The blocks of a page run in order, in one empty folder
 of their own; a line "..." stands for lines that are left out. Other blocks are not run.
 
@@ -12,10 +12,13 @@ it stands.
 """
 
 import argparse
+import ast
 import code
 import contextlib
 import difflib
+import importlib.util
 import io
+import json
 import os
 import pathlib
 import re
@@ -130,6 +133,26 @@ def check(page, programs, python_folder, write):
     return "" if write else "\n".join(wrong)
 
 
+def check_notebook(page):
+    """Runs the code of a notebook, without Jupyter; what a cell ends with is shown, to nobody. Returns what is wrong."""
+    names = {"__name__": "__notebook__"}
+    for number, cell in enumerate(json.loads(page.read_text())["cells"], 1):
+        if cell["cell_type"] != "code":
+            continue
+        body = ast.parse("".join(cell["source"])).body
+        try:
+            with contextlib.redirect_stdout(io.StringIO()):
+                exec(compile(ast.Module(body[:-1], []), page.name, "exec"), names)
+                if isinstance(body[-1], ast.Expr):
+                    value = eval(compile(ast.Expression(body[-1].value), page.name, "eval"), names)
+                    getattr(value, "_repr_html_", value.__repr__)()
+                else:
+                    exec(compile(ast.Module(body[-1:], []), page.name, "exec"), names)
+        except Exception:
+            return f"{page.name}, cell {number}: {traceback.format_exc()}"
+    return ""
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--bin", required=True, action="append", help="where programs are; may be repeated")
@@ -138,7 +161,16 @@ def main():
     asked = arguments.parse_args()
     programs = ":".join(os.path.abspath(folder) for folder in asked.bin)
     write = os.environ.get("METASTABLE_WRITE_PAGES") == "1"
-    wrong = [text for text in (check(page, programs, asked.python and os.path.abspath(asked.python), write) for page in asked.pages) if text]
+    python = asked.python and os.path.abspath(asked.python)
+    if any(page.suffix == ".ipynb" for page in asked.pages):
+        os.environ["MPLBACKEND"] = "Agg"
+        sys.path.insert(0, python)
+        if importlib.util.find_spec("matplotlib") is None:
+            print("skipped: python3-matplotlib is not there")
+            sys.exit(77)
+    wrong = [check_notebook(page) if page.suffix == ".ipynb" else check(page, programs, python, write)
+             for page in asked.pages]
+    wrong = [text for text in wrong if text]
     print("\n\n".join(wrong) if wrong else f"{len(asked.pages)} page(s) say what comes out")
     sys.exit(1 if wrong else 0)
 
