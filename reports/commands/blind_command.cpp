@@ -31,6 +31,7 @@
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
 #include "reports/output/seal.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 
@@ -205,7 +206,7 @@ void run_blind_make(const BlindRequest& request) {
     write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
     progress.advance();
   });
-  fmt::print("{}: {} cases; truths sealed in {}\n", request.folder, plan.size(), places.sealed.string());
+  say("{}: {} cases; truths sealed in {}\n", request.folder, plan.size(), places.sealed.string());
 }
 
 void run_blind_answer(const BlindRequest& request) {
@@ -259,9 +260,8 @@ void run_blind_answer(const BlindRequest& request) {
     }
     progress.advance();
   });
-  fmt::print("{}: {} of {} cases answered", request.folder, record.size(), numbers.size());
-  if (failed > 0) fmt::print("; {} failed, see {}/*.err", failed.load(), places.answers.string());
-  fmt::print("\n");
+  say("{}: {} of {} cases answered{}\n", request.folder, record.size(), numbers.size(),
+      failed > 0 ? fmt::format("; {} failed, see {}/*.err", failed.load(), places.answers.string()) : "");
 }
 
 void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
@@ -341,8 +341,8 @@ void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
   const std::vector<Table> tables = blind_tables(grades, reached, answers, provenance);
   for (const Table& table : tables) folder.section(table.id + "-section", table.title, "", {}, {table});
   folder.write_index();
-  fmt::print("{}", to_text(tables.front(), 1000, terminal_width()));
-  fmt::print("\n{}\n", (out / "index.html").string());
+  say("{}", to_text(tables.front(), 1000, terminal_width()));
+  say("\n{}\n", (out / "index.html").string());
 }
 
 }  // namespace metastable::reports

@@ -6,6 +6,7 @@
 #include "analysis/sensitivity/propagation.h"
 #include "analysis/sensitivity/sensitivity.h"
 #include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 #include "reports/study/study_json.h"
 #include "reports/study/study_progress.h"
@@ -65,16 +66,16 @@ void run_compare(const CompareRequest& request) {
   }
   if (request.json == "-") return;
   for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
-    fmt::print("{}", study_text(comparison.studies[i], thresholds[i]));
+    say("{}", study_text(comparison.studies[i], thresholds[i]));
     if (!extras.steps.empty())
-      fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(extras.steps[i]));
-    fmt::print("\n");
+      say("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(extras.steps[i]));
+    say("\n");
   }
   for (std::size_t i = 0; i < comparison.contrasts.size(); ++i) {
     const analysis::Contrast& contrast = comparison.contrasts[i];
-    fmt::print("{}\n{}", contrast.sentence, trials_text(contrast, request.collisions));
+    say("{}\n{}", contrast.sentence, trials_text(contrast, request.collisions));
     if (!extras.ratios.empty())
-      fmt::print("  95 % interval of the ratio from standard errors: {}\n", propagated_text(extras.ratios[i]));
+      say("  95 % interval of the ratio from standard errors: {}\n", propagated_text(extras.ratios[i]));
   }
 }
 

@@ -12,6 +12,7 @@
 #include "reports/description/describe_tables.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 
@@ -41,7 +42,7 @@ void run_describe(const DescribeRequest& request) {
   if (laws) tables.push_back(laws_table(*laws, provenance));
   if (laws && !laws->legs.empty()) tables.push_back(landings_table(laws->legs, provenance));
   if (!pages) {
-    for (const Table& table : tables) fmt::print("{}\n", to_text(table, 1000, terminal_width()));
+    for (const Table& table : tables) say("{}\n", to_text(table, 1000, terminal_width()));
     return;
   }
 
@@ -86,7 +87,7 @@ void run_describe(const DescribeRequest& request) {
                    std::move(beside));
   }
   pages->write_index();
-  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 
 }  // namespace metastable::reports

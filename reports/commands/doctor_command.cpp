@@ -8,6 +8,7 @@
 #include <string>
 #include <thread>
 
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -26,20 +27,19 @@ std::string first_line(const char* command) {
 }  // namespace
 
 void run_doctor() {
-  fmt::print("{}\n", version_text());
-  fmt::print("cores: {}; every answer is the same bits on any number of them\n", std::thread::hardware_concurrency());
+  say("{}\n", version_text());
+  say("cores: {}; every answer is the same bits on any number of them\n", std::thread::hardware_concurrency());
 #if defined(__x86_64__)
-  fmt::print("vectors: {}\n", __builtin_cpu_supports("avx2")
-                                  ? "AVX2, which the sampled chain, walkers and densities use"
-                                  : "SSE2 (a machine with AVX2 takes some two thirds of the time, for the same bits)");
+  say("vectors: {}\n", __builtin_cpu_supports("avx2")
+                           ? "AVX2, which the sampled chain, walkers and densities use"
+                           : "SSE2 (a machine with AVX2 takes some two thirds of the time, for the same bits)");
 #endif
   const std::string gnuplot = first_line("gnuplot --version 2>/dev/null");
   if (gnuplot.empty())
-    fmt::print(
-        "gnuplot: missing; figures (report, study, sweep, describe and diagnose --out) need it: install "
+    say("gnuplot: missing; figures (report, study, sweep, describe and diagnose --out) need it: install "
         "gnuplot-nox\n");
   else
-    fmt::print("gnuplot: {}, which draws the figures\n", gnuplot);
+    say("gnuplot: {}, which draws the figures\n", gnuplot);
 }
 
 }  // namespace metastable::reports

@@ -9,6 +9,7 @@
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
 #include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
 
@@ -58,8 +59,8 @@ void run_simulate(const SimulateRequest& request) {
   for (const auto& [id, setting, trials] : conditions) {
     const auto rested = std::count_if(trials.begin(), trials.end(),
                                       [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
-    fmt::print("{}: {} trials{}, {} of them came to rest\n", request.out, trials.size(),
-               request.stand_in ? " of " + id : "", rested);
+    say("{}: {} trials{}, {} of them came to rest\n", request.out, trials.size(), request.stand_in ? " of " + id : "",
+        rested);
   }
 }
 
@@ -87,8 +88,8 @@ void run_reality(const RealityRequest& request) {
     rested += trial.outcome == dynamics::Outcome::rest;
     for (const dynamics::LaboratoryCollision& c : trial.collisions) flown += c.flew;
   }
-  fmt::print("{}: {} trials, {} of them came to rest; {} collisions, {} of them after a flight\n", request.out,
-             trials.size(), rested, collisions, flown);
+  say("{}: {} trials, {} of them came to rest; {} collisions, {} of them after a flight\n", request.out, trials.size(),
+      rested, collisions, flown);
 }
 
 }  // namespace metastable::reports

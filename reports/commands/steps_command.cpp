@@ -8,6 +8,7 @@
 #include "analysis/study/consistency.h"
 #include "analysis/study/how_it_fails.h"
 #include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
@@ -55,14 +56,13 @@ void run_steps(const StepsRequest& request) {
     json->commit();
   }
   if (request.json == "-") return;
-  fmt::print("{}", study_text(study, thresholds));
-  if (extras.certified) fmt::print("  {:<38}{}\n", "certificate", analysis::certificate_text(*extras.certified));
-  if (extras.propagated)
-    fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
-  if (extras.sensitivities) fmt::print("\n{}", sensitivities_text(*extras.sensitivities));
-  if (extras.last_moments) fmt::print("\n{}", last_moments_text(*extras.last_moments, "leg", terminal_width()));
+  say("{}", study_text(study, thresholds));
+  if (extras.certified) say("  {:<38}{}\n", "certificate", analysis::certificate_text(*extras.certified));
+  if (extras.propagated) say("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
+  if (extras.sensitivities) say("\n{}", sensitivities_text(*extras.sensitivities));
+  if (extras.last_moments) say("\n{}", last_moments_text(*extras.last_moments, "leg", terminal_width()));
   if (study.status != analysis::Status::rest_unresolved)
-    fmt::print("\n{}", words_text(study, request.explain, terminal_width()));
+    say("\n{}", words_text(study, request.explain, terminal_width()));
 }
 
 }  // namespace metastable::reports

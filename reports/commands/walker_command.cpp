@@ -14,6 +14,7 @@
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
 #include "reports/output/page_folder.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
@@ -87,7 +88,7 @@ void write_walker_json(OutputFile& file, WalkerJson json, const WalkerRequest& r
   file.commit();
 }
 
-void print_line(const std::string& name, const std::string& what) { fmt::print("  {:<38}{}\n", name, what); }
+void print_line(const std::string& name, const std::string& what) { say("  {:<38}{}\n", name, what); }
 
 std::string with_interval(const MeshEstimate& e) {
   const DecimalEstimate text = to_decimal(estimate_of(e), NumberFormat::general, 12);
@@ -97,7 +98,7 @@ std::string with_interval(const MeshEstimate& e) {
 
 void print_walker(const WalkerSetting& setting, const WalkerStudy& study) {
   const markov::MeshStudy& s = study.passage;
-  fmt::print("{}\n\n", setting.describe());
+  say("{}\n\n", setting.describe());
   print_line("expected steps before failure", with_interval(s.steps));
   print_line("  by guided sampling", s.guided ? with_interval(*s.guided) : "not asked: failures are too frequent");
   print_line("  by direct simulation", s.simulated ? with_interval(*s.simulated) : "out of reach");
@@ -143,7 +144,7 @@ void run_walker_steps(const WalkerRequest& request) {
   }
   if (request.json == "-") return;
   print_walker(setting, study);
-  if (falls) fmt::print("\n{}", last_moments_text(falls->moments, "phase", terminal_width()));
+  if (falls) say("\n{}", last_moments_text(falls->moments, "phase", terminal_width()));
 }
 
 void run_walker_compare(const WalkerRequest& request) {
@@ -168,12 +169,11 @@ void run_walker_compare(const WalkerRequest& request) {
   if (request.json == "-") return;
   for (std::size_t i = 0; i < studies.size(); ++i) {
     print_walker(request.settings[i], studies[i]);
-    fmt::print("\n");
+    say("\n");
   }
   for (std::size_t i = 0; i < ratios.size(); ++i)
-    fmt::print("{}: {} times the steps of {}\n", request.settings[i + 1].describe(),
-               format_estimate(estimate_of(ratios[i]), NumberFormat::significant, 4),
-               request.settings.front().describe());
+    say("{}: {} times the steps of {}\n", request.settings[i + 1].describe(),
+        format_estimate(estimate_of(ratios[i]), NumberFormat::significant, 4), request.settings.front().describe());
 }
 
 void run_walker_sweep(const WalkerRequest& request) {
@@ -237,7 +237,7 @@ void run_walker_simulate(const WalkerRequest& request) {
   write_file(whole.path() / "walks.csv", head + steps);
   write_file(whole.path() / "trials.csv", head + trials);
   whole.commit("trials.csv");
-  fmt::print("{}: {} trials, {} of them fell\n", request.out, walks.size(), fallen);
+  say("{}: {} trials, {} of them fell\n", request.out, walks.size(), fallen);
 }
 
 void run_walker_report(const WalkerRequest& request) {
@@ -276,7 +276,7 @@ void run_walker_report(const WalkerRequest& request) {
         {last_moments_table(walkers[i].falls.moments, id + "-last-steps", provenance)});
   }
   pages.write_index();
-  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 
 }  // namespace metastable::reports
