@@ -25,9 +25,11 @@ dynamics::Wheel wheel(const Options& options) {
   if (options.given("inertia")) wheel.inertia = options.number("inertia");
   if (options.given("radius-of-gyration")) wheel.radius_of_gyration = options.number("radius-of-gyration");
   wheel.tip_radius = options.number("tip-radius");
-  wheel.ramp_stiffness = options.number("ramp-stiffness");
-  if (options.given("contact-mass")) wheel.contact_mass = options.number("contact-mass");
-  wheel.gravity = options.number("gravity");
+  if (options.has("gravity")) {
+    wheel.ramp_stiffness = options.number("ramp-stiffness");
+    if (options.given("contact-mass")) wheel.contact_mass = options.number("contact-mass");
+    wheel.gravity = options.number("gravity");
+  }
   wheel.validate();
   for (const auto& [name, objection] : {std::pair("inertia", dynamics::inertia_objection(wheel)),
                                         std::pair("radius-of-gyration", dynamics::gyration_objection(wheel))})
@@ -49,7 +51,7 @@ constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
 
 void check_law(const Options& options, dynamics::Law law) {
   for (const auto& [name, quantity] : of_some_laws) {
-    if (!options.given(name) || dynamics::uses(law, quantity)) continue;
+    if (!options.has(name) || !options.given(name) || dynamics::uses(law, quantity)) continue;
     // A folder states the wheel's r_g under any law: the effect slip_reversal takes it.
     if (quantity == dynamics::LawQuantity::radius_of_gyration && options.has("reality")) continue;
     throw std::invalid_argument(
@@ -78,7 +80,7 @@ void add_slope(Options& options) {
   options.add("slope", "DEG", "7.02", "Ramp slope [deg], from 0.001 to below half the angle between legs");
 }
 
-void add_wheel(Options& options) {
+void add_stated_wheel(Options& options) {
   options.add("legs", "paper|L|L1,L2,...", "paper",
               "Leg lengths [m]: the paper's, one for all, or a list in landing order", range::leg_length);
   options.add("leg-count", "N", "8", "Number of legs when --legs is one length, 3..1000");
@@ -91,18 +93,26 @@ void add_wheel(Options& options) {
               range::radius_of_gyration);
   options.add("tip-radius", "M", "0", "Of the legs' round tips [m], at most a twentieth of the shortest leg (settled)",
               range::tip_radius);
+}
+
+void add_wheel(Options& options) {
+  add_stated_wheel(options);
   options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m] (published)", range::ramp_stiffness);
   options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (published; default: the hub mass)",
               range::mass);
   options.add("gravity", "M/S2", "9.81", "g [m/s^2]", range::gravity);
 }
 
-void add_contact(Options& options) {
+void add_stated_contact(Options& options) {
   options.add("law", "published|coulomb|plastic|settled", "published", "Contact law");
-  options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops, 0..1 (coulomb)");
   options.add("restitution", "MEAN,SD", "0.4,0.1", "eta, normal truncated to [0, 1]; SD 0 or MEAN alone: constant",
               range::restitution);
   options.add("friction", "MEAN,SD", "0.4,0.1", "mu, normal truncated to [0, inf)", range::friction);
+}
+
+void add_contact(Options& options) {
+  add_stated_contact(options);
+  options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops, 0..1 (coulomb)");
   options.add("correlation", "RHO", "0", "Of the normal scores of eta and mu, (-1, 1)");
   options.add("contact-list", "FILE", "", "CSV 'restitution,friction': draw pairs from a list instead");
 }
@@ -135,11 +145,14 @@ analysis::Setting common_setting(const Options& options) {
   setting.wheel = wheel(options);
   setting.law = dynamics::law_from_name(options.text("law"));
   check_law(options, setting.law);
-  setting.rebound_lost = options.number("rebound-lost");
-  setting.restitution = options.spread("restitution");
-  setting.friction = options.spread("friction");
-  setting.correlation = options.number("correlation");
-  if (options.given("contact-list")) {
+  for (const auto& [name, member] :
+       {std::pair("restitution", &analysis::Setting::restitution), std::pair("friction", &analysis::Setting::friction)})
+    setting.*member = options.text(name).empty() ? analysis::Spread{} : options.spread(name);
+  if (options.has("correlation")) {
+    setting.rebound_lost = options.number("rebound-lost");
+    setting.correlation = options.number("correlation");
+  }
+  if (options.has("contact-list") && options.given("contact-list")) {
     if (options.given("restitution") || options.given("friction") || options.given("correlation"))
       throw std::invalid_argument("--contact-list: excludes --restitution, --friction and --correlation");
     setting.pairs = contact_list(options.text("contact-list"));

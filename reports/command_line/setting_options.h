@@ -14,13 +14,16 @@
 namespace metastable::reports {
 
 void add_slope(Options& options);
+/// What experiment.toml can state of a wheel and its contact, and the rest.
+void add_stated_wheel(Options& options);
+void add_stated_contact(Options& options);
 void add_wheel(Options& options);
 void add_contact(Options& options);
 void add_course(Options& options);
 void add_study(Options& options);
 void add_standard_errors(Options& options);
 
-/// What the options above say, all but slope and launch speed.
+/// What the options above say, as far as the command has them: all but slope and launch speed.
 analysis::Setting common_setting(const Options& options);
 /// `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
 analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "reports/commands/experiment_output.h"
 #include "reports/output/input_file.h"
-#include "reports/output/output_file.h"
 #include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
@@ -39,10 +39,7 @@ void accept(const std::string& objection, const CoastDownRequest& request, analy
 }  // namespace
 
 void run_coast_down(const CoastDownRequest& request) {
-  const std::filesystem::path folder = request.out;
-  for (const char* name : {"experiment.toml", "collisions.csv"})
-    if (std::filesystem::exists(folder / name))
-      throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
+  ExperimentOutput folder(request.out);
   std::vector<analysis::CoastDownRun> runs;
   for (const std::string& path : request.logs) {
     analysis::CounterLog log = analysis::parse_counter_log(path, read_file(path));
@@ -69,8 +66,7 @@ void run_coast_down(const CoastDownRequest& request) {
     if (runs.size() > 1) nominal.run_to_run = analysis::run_to_run_of(runs, linear);
     origin = "nominal loss fitted robustly to these runs";
     say("loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}{} + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; "
-        "{} of "
-        "{} transitions beyond five of those\n",
+        "{} of {} transitions beyond five of those\n",
         nominal.constant, fit.constant_error,
         linear ? fmt::format(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error) : "", nominal.quadratic,
         fit.quadratic_error, nominal.noise_sd, fit.outliers, fit.transitions);
@@ -93,9 +89,7 @@ void run_coast_down(const CoastDownRequest& request) {
   Provenance provenance{request.command, origin, 0, version()};
   const analysis::ExperimentFiles files = analysis::coast_down_files(
       runs, nominal, request.rotor_inertia, "Coast-down of " + runs.front().name, provenance_lines(provenance));
-  make_folder(folder);
-  write_file(folder / "collisions.csv", files.collisions_csv);
-  write_file(folder / "experiment.toml", files.experiment_toml);
+  folder.write(analysis::source_of(files, request.out));
 }
 
 }  // namespace metastable::reports

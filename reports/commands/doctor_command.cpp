@@ -8,6 +8,7 @@
 #include <string>
 #include <thread>
 
+#include "reports/import/mat_rows.h"
 #include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 
@@ -40,6 +41,10 @@ void run_doctor() {
         "gnuplot-nox\n");
   else
     say("gnuplot: {}, which draws the figures\n", gnuplot);
+  if (const std::string matio = mat_library(); matio.empty())
+    say("libmatio: not built in; `import` reads CSV only: install libmatio-dev and build again for MAT files\n");
+  else
+    say("libmatio: {}, with which `import` reads MAT files\n", matio);
 }
 
 }  // namespace metastable::reports
