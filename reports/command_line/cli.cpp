@@ -62,8 +62,8 @@ Command steps() {
             request.sensitivities = o.flag("sensitivities");
             request.explain = o.flag("explain");
             request.how_it_fails = o.flag("how-it-fails");
-            request.setting.direct = o.flag("direct");
-            if (request.setting.direct && request.setting.law != dynamics::Law::settled)
+            request.study.direct = o.flag("direct");
+            if (request.study.direct && request.setting.law != dynamics::Law::settled)
               throw std::invalid_argument("--direct: has a meaning under --law settled only");
             request.standard_errors = standard_errors(o, request.setting);
             run_steps(request);

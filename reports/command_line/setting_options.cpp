@@ -50,22 +50,10 @@ constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
     {"contact-mass", dynamics::LawQuantity::contact_mass}};
 
 void check_law(const Options& options, dynamics::Law law) {
-  for (const auto& [name, quantity] : of_some_laws) {
-    if (!options.has(name) || !options.given(name) || dynamics::uses(law, quantity)) continue;
+  refuse_what_law_lacks(law, [&](const std::string& name) {
     // A folder states the wheel's r_g under any law: the effect slip_reversal takes it.
-    if (quantity == dynamics::LawQuantity::radius_of_gyration && options.has("reality")) continue;
-    throw std::invalid_argument(
-        fmt::format("--{}: has a meaning under --law {} only", name,
-                    fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
-  }
-}
-
-// Before the launch is asked for: a slope that no launch can save is named as such.
-void check_slope(const analysis::Setting& setting) {
-  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
-  if (!range.holds(setting.slope_deg))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
-                                            setting.slope_deg, range.text()));
+    return options.has(name) && options.given(name) && !(name == "radius-of-gyration" && options.has("reality"));
+  });
 }
 
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
@@ -88,9 +76,11 @@ void add_stated_wheel(Options& options) {
   options.add("inertia", "KGM2", "",
               "About the stance foot [kg m^2], from M (mean L)^2 to ten times that (default: M (mean L)^2; under "
               "the other laws plus M r_g^2)");
-  options.add("radius-of-gyration", "M", "",
-              "About the hub [m], at most three mean legs (default: 0.05 under coulomb and settled, 0 under plastic)",
-              range::radius_of_gyration);
+  options.add(
+      "radius-of-gyration", "M", "",
+      "About the hub [m], at most three mean legs, above 0 under settled (coulomb, plastic, settled; default: 0.05, "
+      "0 under plastic)",
+      range::radius_of_gyration);
   options.add("tip-radius", "M", "0", "Of the legs' round tips [m], at most a twentieth of the shortest leg (settled)",
               range::tip_radius);
 }
@@ -137,6 +127,21 @@ void add_study(Options& options) {
   options.add("eigenvalues", "K", "6", "How many eigenvalue moduli to report, 1..64");
   options.add_seed();
   options.add_threads();
+}
+
+void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std::string&)>& given) {
+  for (const auto& [name, quantity] : of_some_laws)
+    if (given(name) && !dynamics::uses(law, quantity))
+      throw std::invalid_argument(
+          fmt::format("--{}: has a meaning under --law {} only", name,
+                      fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
+}
+
+void check_slope(const analysis::Setting& setting) {
+  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
+  if (!range.holds(setting.slope_deg))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
+                                            setting.slope_deg, range.text()));
 }
 
 // All but slope and launch speed.
@@ -237,7 +242,7 @@ void add_standard_errors(Options& options) {
   options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd");
   options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]");
   options.add("inertia-se", "KGM2", "", "[kg m^2]");
-  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb)");
+  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb, plastic, settled)");
   options.add("ramp-stiffness-se", "N/M", "", "[N/m] (published)");
   options.add("contact-mass-se", "KG", "", "[kg] (published)");
 }
