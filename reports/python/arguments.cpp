@@ -158,9 +158,6 @@ analysis::Setting setting_of(const Arguments& fields) {
   if (fields.given("first_leg"))
     s.first_landing_leg =
         static_cast<int>(fields.whole("first_leg", 0, static_cast<std::uint64_t>(s.wheel.legs()) - 1));
-  s.direct = fields.flag("direct");
-  if (s.direct && s.law != dynamics::Law::settled)
-    throw std::invalid_argument("direct: has a meaning under law settled only");
   check_slope(s);
   if (fields.given("initial_speed"))
     s.initial_speed = fields.spread("initial_speed");

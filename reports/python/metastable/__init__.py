@@ -72,7 +72,6 @@ class Setting:
     gravity             [m/s^2]; None: 9.81
     ramp_length         [m]; None: 3.66; math.inf for a ramp without end
     first_leg           that lands at collision 1, counted from 0
-    direct              settled: follow every landing instead of reading a table, hundreds of times slower
 
     Raises InputError naming the quantity and its range.
     """
@@ -95,7 +94,6 @@ class Setting:
     gravity: Optional[float] = None
     ramp_length: Optional[float] = None
     first_leg: int = 0
-    direct: bool = False
 
     def __post_init__(self):
         _metastable.describe_setting(_fields(self))
@@ -163,7 +161,7 @@ def _repr(setting):
 
 
 def study(setting, *, method=None, cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None,
-          replicates=None, mixing_distance=None, eigenvalues=None, certify=False, sensitivities=False,
+          replicates=None, mixing_distance=None, eigenvalues=None, direct=False, certify=False, sensitivities=False,
           standard_errors=None, spacing=None, simulated_steps=None, memory_gb=None, how_it_fails=False, seed=1,
           threads=0, progress=None):
     """How many steps before it fails, with its 95 % interval, and what goes with that: `metastable steps`.
@@ -178,6 +176,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     replicates       independent randomisations behind the interval, 2 to 64; None: 8
     mixing_distance  total variation distance that counts as mixed, (0, 1); None: 0.05
     eigenvalues      how many moduli, 1 to 64; None: 6
+    direct           every landing followed instead of read from a table, hundreds of times slower (law "settled")
     certify          guaranteed bounds as well (law "published")
     sensitivities    how ln(expected steps) responds to each parameter, ranked
     standard_errors  of parameters by name, {"friction_mean": 0.01}: an interval from them is given apart
@@ -194,7 +193,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     """
     wheel = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
                  tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
-                 certify=certify, sensitivities=sensitivities, standard_errors=standard_errors)
+                 direct=direct, certify=certify, sensitivities=sensitivities, standard_errors=standard_errors)
     mesh = dict(spacing=spacing, simulated_steps=simulated_steps, memory_gb=memory_gb)
     every = dict(how_it_fails=how_it_fails, seed=seed, threads=threads)
     is_wheel = isinstance(setting, Setting)

@@ -227,7 +227,6 @@ class Setting:
     gravity: Optional[float]
     ramp_length: Optional[float]
     first_leg: int
-    direct: bool
     def __init__(self, slope_deg: float = 7.02, initial_speed: Optional[Spread] = None, law: str = "published",
                  restitution: Optional[Spread] = None, friction: Optional[Spread] = None,
                  correlation: Optional[float] = None, contact_list: Optional[ArrayLike] = None,
@@ -235,7 +234,7 @@ class Setting:
                  inertia: Optional[float] = None, radius_of_gyration: Optional[float] = None,
                  tip_radius: Optional[float] = None, ramp_stiffness: Optional[float] = None,
                  contact_mass: Optional[float] = None, gravity: Optional[float] = None,
-                 ramp_length: Optional[float] = None, first_leg: int = 0, direct: bool = False) -> None: ...
+                 ramp_length: Optional[float] = None, first_leg: int = 0) -> None: ...
     @property
     def launch(self) -> Tuple[float, float]: ...
     def describe(self) -> str: ...
@@ -335,7 +334,7 @@ def version_text() -> str: ...
 def study(setting: Setting, *, method: Optional[str] = None, cells: Optional[int] = None,
           samples: Optional[int] = None, tolerance: Optional[float] = None, sequence: Optional[str] = None,
           draws: Optional[str] = None, tail: Optional[float] = None, replicates: Optional[int] = None,
-          mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None, certify: bool = False,
+          mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None, direct: bool = False, certify: bool = False,
           sensitivities: bool = False, standard_errors: Optional[Mapping[str, float]] = None,
           how_it_fails: bool = False, seed: int = 1, threads: int = 0, progress: Progress = None) -> Study: ...
 @overload
