@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -287,7 +288,14 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   const bool ever = dot(met_rolling, met_rolling) > 0;
   result.phases = space.phases();
 
-  const std::vector<double> stationary = markov::stationary(sampled.chain, ever ? met_rolling : rolling);
+  std::vector<double> stationary;
+  try {
+    stationary = markov::stationary(sampled.chain, ever ? met_rolling : rolling);
+  } catch (const std::domain_error& error) {  // a speed that noise hardly moves, between two cells that both keep it
+    throw markov::ConvergenceError(
+        "rolling for ever", 1,
+        fmt::format("{}: {} cells are too coarse to tell at which speed; take more", error.what(), space.size()));
+  }
   std::vector<std::uint32_t> recurrent;
   for (std::size_t i = 0; i < stationary.size(); ++i)
     if (stationary[i] > 0) recurrent.push_back(static_cast<std::uint32_t>(i));
