@@ -33,7 +33,8 @@ set(ROOMS
   "reports/study: markov/rows dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
   "reports/import: dynamics/wheel analysis/experiment analysis/motion_capture reports/output"
   "reports/commands: markov markov/passage dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/likelihood analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity analysis/walkers reports/output reports/description reports/diagnosis reports/study reports/import"
-  "reports/command_line: markov/chain dynamics/wheel analysis/walkers analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands")
+  "reports/command_line: markov/chain dynamics/wheel analysis/walkers analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands"
+  "reports/python: markov/chain markov/passage markov/mesh dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/likelihood analysis/sensitivity reports/output reports/diagnosis reports/study reports/commands reports/command_line")
 
 # Where less than a whole room may be seen: who (a pattern of files), which room, which of its headers.
 set(NARROW

@@ -50,22 +50,10 @@ constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
     {"contact-mass", dynamics::LawQuantity::contact_mass}};
 
 void check_law(const Options& options, dynamics::Law law) {
-  for (const auto& [name, quantity] : of_some_laws) {
-    if (!options.has(name) || !options.given(name) || dynamics::uses(law, quantity)) continue;
+  refuse_what_law_lacks(law, [&](const std::string& name) {
     // A folder states the wheel's r_g under any law: the effect slip_reversal takes it.
-    if (quantity == dynamics::LawQuantity::radius_of_gyration && options.has("reality")) continue;
-    throw std::invalid_argument(
-        fmt::format("--{}: has a meaning under --law {} only", name,
-                    fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
-  }
-}
-
-// Before the launch is asked for: a slope that no launch can save is named as such.
-void check_slope(const analysis::Setting& setting) {
-  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
-  if (!range.holds(setting.slope_deg))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
-                                            setting.slope_deg, range.text()));
+    return options.has(name) && options.given(name) && !(name == "radius-of-gyration" && options.has("reality"));
+  });
 }
 
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
@@ -139,6 +127,21 @@ void add_study(Options& options) {
   options.add("eigenvalues", "K", "6", "How many eigenvalue moduli to report, 1..64");
   options.add_seed();
   options.add_threads();
+}
+
+void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std::string&)>& given) {
+  for (const auto& [name, quantity] : of_some_laws)
+    if (given(name) && !dynamics::uses(law, quantity))
+      throw std::invalid_argument(
+          fmt::format("--{}: has a meaning under --law {} only", name,
+                      fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
+}
+
+void check_slope(const analysis::Setting& setting) {
+  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
+  if (!range.holds(setting.slope_deg))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
+                                            setting.slope_deg, range.text()));
 }
 
 // All but slope and launch speed.

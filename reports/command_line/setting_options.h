@@ -2,6 +2,7 @@
 // Options that several commands share: wheel, contact, course, study.
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "analysis/sensitivity/propagation.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/setting.h"
+#include "dynamics/wheel/contact_law.h"
 #include "reports/command_line/options.h"
 
 namespace metastable::reports {
@@ -23,6 +25,11 @@ void add_course(Options& options);
 void add_study(Options& options);
 void add_standard_errors(Options& options);
 
+/// @param given  by the name of the option
+/// @throws std::invalid_argument for the first one given that has no meaning under the law
+void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std::string&)>& given);
+/// Before the launch is asked for: a slope that no launch can save is named as such. @throws std::invalid_argument
+void check_slope(const analysis::Setting& setting);
 /// What the options above say, as far as the command has them: all but slope and launch speed.
 analysis::Setting common_setting(const Options& options);
 /// `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise

@@ -22,10 +22,17 @@ analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
                                                       .threads = request.threads})};
 }
 
+template <typename Request>
+void run_into_folder(const Request& request) {
+  ExperimentOutput folder(request.out);
+  const SimulatedExperiment made = simulated_experiment(request);
+  folder.write(made.source);
+  for (const std::string& line : made.said) fmt::print("{}: {}\n", request.out, line);
+}
+
 }  // namespace
 
-void run_simulate(const SimulateRequest& request) {
-  ExperimentOutput folder(request.out);
+SimulatedExperiment simulated_experiment(const SimulateRequest& request) {
   const std::vector<analysis::SimulatedCondition> conditions =
       request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
                        : std::vector<analysis::SimulatedCondition>{one_condition(request)};
@@ -37,39 +44,41 @@ void run_simulate(const SimulateRequest& request) {
                                 : fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg);
   analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
   if (request.camera) files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
-  analysis::ExperimentSource source = analysis::source_of(files, request.out);
-  if (request.camera) source.angle_csv = analysis::angle_csv(conditions, *request.camera);
-  folder.write(source);
+  SimulatedExperiment made{analysis::source_of(files, request.out), {}};
+  if (request.camera) made.source.angle_csv = analysis::angle_csv(conditions, *request.camera);
   for (const auto& [id, setting, trials] : conditions) {
     const auto rested = std::count_if(trials.begin(), trials.end(),
                                       [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
-    fmt::print("{}: {} trials{}, {} of them came to rest\n", request.out, trials.size(),
-               request.stand_in ? " of " + id : "", rested);
+    made.said.push_back(fmt::format("{} trials{}, {} of them came to rest", trials.size(),
+                                    request.stand_in ? " of " + id : "", rested));
   }
+  return made;
 }
 
-void run_reality(const RealityRequest& request) {
-  ExperimentOutput folder(request.out);
+SimulatedExperiment simulated_experiment(const RealityRequest& request) {
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
   const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
-  Provenance provenance{request.command, {}, request.reality.seed, version()};
   analysis::FolderOptions options;
   options.title = "Rimless wheel in the virtual laboratory";
-  options.comment = provenance_lines(provenance);
+  options.comment = provenance_lines({request.command, {}, request.reality.seed, version()});
   options.dropped = request.dropped;
   options.camera = request.camera;
-  const analysis::RealityFiles made = analysis::reality_files(request.conditions, setup, trials, options);
-  analysis::ExperimentSource source = analysis::source_of(made.files, request.out);
-  source.angle_csv = made.angle_csv;
-  folder.write(source);
+  const analysis::RealityFiles files = analysis::reality_files(request.conditions, setup, trials, options);
+  SimulatedExperiment made{analysis::source_of(files.files, request.out), {}};
+  made.source.angle_csv = files.angle_csv;
   std::size_t collisions = 0, rested = 0, flown = 0;
   for (const dynamics::LaboratoryTrial& trial : trials) {
     collisions += trial.collisions.size();
     rested += trial.outcome == dynamics::Outcome::rest;
     for (const dynamics::LaboratoryCollision& c : trial.collisions) flown += c.flew;
   }
-  fmt::print("{}: {} trials, {} of them came to rest; {} collisions, {} of them after a flight\n", request.out,
-             trials.size(), rested, collisions, flown);
+  made.said = {fmt::format("{} trials, {} of them came to rest; {} collisions, {} of them after a flight",
+                           trials.size(), rested, collisions, flown)};
+  return made;
 }
+
+void run_simulate(const SimulateRequest& request) { run_into_folder(request); }
+
+void run_reality(const RealityRequest& request) { run_into_folder(request); }
 
 }  // namespace metastable::reports
