@@ -45,6 +45,13 @@ void run_doctor() {
     say("libmatio: not built in; `import` reads CSV only: install libmatio-dev and build again for MAT files\n");
   else
     say("libmatio: {}, with which `import` reads MAT files\n", matio);
+  const std::string module = first_line(
+      "python3 -c 'import metastable, sys; print(metastable.__version__, \"for\", sys.executable)' 2>/dev/null");
+  if (module.empty())
+    say("Python module: python3 does not find it; with it settings, trials, chains and simulators of your own are "
+        "asked from NumPy: ./run python (needs pybind11-dev, python3-dev and python3-numpy)\n");
+  else
+    say("Python module: {}\n", module);
 }
 
 }  // namespace metastable::reports
