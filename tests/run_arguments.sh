@@ -17,6 +17,7 @@ refused() {  # arguments: what the message must hold, then those of ./run
 
 refused "unknown command 'nonsense'" nonsense
 refused "'all' is no argument of it" build all
+refused "'here' is no argument of it" docs here
 refused "'here' is none of its arguments" install here
 refused '--prefix needs a folder' install --prefix
 refused '--prefix needs a folder' python --prefix=
