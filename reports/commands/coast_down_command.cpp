@@ -70,8 +70,7 @@ void run_coast_down(const CoastDownRequest& request) {
     const std::string term = linear ? fmt::format(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error) : "";
     answer.say(
         "loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}{} + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; "
-        "{} "
-        "of {} transitions beyond five of those",
+        "{} of {} transitions beyond five of those",
         nominal.constant, fit.constant_error, term, nominal.quadratic, fit.quadratic_error, nominal.noise_sd,
         fit.outliers, fit.transitions);
   } else {

@@ -52,6 +52,15 @@ void run_doctor(const std::string& json) {
   else
     answer.say("libmatio: {}, with which `import` reads MAT files", matio);
   answer.fact("libmatio", matio);
+  const std::string module = first_line(
+      "python3 -c 'import metastable, sys; print(metastable.__version__, \"for\", sys.executable)' 2>/dev/null");
+  if (module.empty())
+    answer.say(
+        "Python module: python3 does not find it; with it settings, trials, chains and simulators of your own are "
+        "asked from NumPy: ./run python (needs pybind11-dev, python3-dev and python3-numpy)");
+  else
+    answer.say("Python module: {}", module);
+  answer.fact("python_module", module);
   answer.finish({"metastable doctor", {}, 0, version()});
 }
 

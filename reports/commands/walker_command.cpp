@@ -11,6 +11,7 @@
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
 #include "reports/output/page_folder.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
@@ -76,7 +77,7 @@ void run_walker(const WalkerRequest& request, WalkerAnswer answer_of(const Walke
     json->stream() << walker_answer_json(request, answer);
     json->commit();
   }
-  if (request.json != "-") fmt::print("{}", walker_answer_text(request, answer, terminal_width()));
+  if (request.json != "-") say("{}", walker_answer_text(request, answer, terminal_width()));
 }
 
 }  // namespace

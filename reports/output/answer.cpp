@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "reports/output/standard_output.h"
 #include "reports/output/table_json.h"
 #include "reports/output/text_table.h"
 
@@ -19,12 +20,12 @@ Answer::Answer(const std::string& json) : printed_(json != "-") {
 }
 
 void Answer::line(const std::string& text) {
-  if (printed_) fmt::print("{}\n", text);
+  if (printed_) say_text(text + '\n');
   said_.push_back(text);
 }
 
 void Answer::show(const Table& one) {
-  if (printed_) fmt::print("{}\n", to_text(one, most_rows, terminal_width()));
+  if (printed_) say_text(to_text(one, most_rows, terminal_width()) + '\n');
   table(one);
 }
 

@@ -211,6 +211,11 @@ markov::MeshStudyOptions mesh_options_of(const Arguments& options) {
   study.threads = options.threads();
   if (options.given("spacing")) study.spacing = options.number("spacing");
   if (options.given("simulated_steps")) study.simulated_steps = options.whole("simulated_steps", 0, 1000000000000);
+  if (options.given("guided_samples")) {
+    study.guided_samples = options.whole("guided_samples", 0, 100000000);
+    if (study.guided_samples > 0 && study.guided_samples < 16)
+      throw std::invalid_argument(fmt::format("guided_samples: {}, 0 or 16 and more expected", study.guided_samples));
+  }
   if (options.given("memory_gb")) {
     const double gigabytes = options.number("memory_gb");
     if (!(gigabytes >= 0.001 && gigabytes <= 1e6))

@@ -10,9 +10,7 @@ pages = pathlib.Path(__file__).parent  # the staged copy of this folder
 project = "metastable"
 author = "the authors of metastable"
 version = re.search(r"project\(metastable VERSION ([\d.]+)", (root / "CMakeLists.txt").read_text()).group(1)
-extensions = ["myst_parser", "breathe"]
-if (pages / "python-reference.md").exists():
-    extensions.append("sphinx.ext.autodoc")
+extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc"]
 html_theme = "furo"
 html_title = f"metastable {version}"
 html_static_path = ["static"]
