@@ -37,7 +37,7 @@ TEST_F(JsonOfEveryCommand, IsOffered) {
     offered = offered || row[1] == "--json";
   }
   for (const auto& [command, offered] : offers) EXPECT_TRUE(offered) << command;
-  EXPECT_GE(offers.size(), 19u);
+  EXPECT_GE(offers.size(), 18u);
 }
 
 TEST_F(JsonOfEveryCommand, IsAllOfStandardOutput) {
@@ -54,6 +54,7 @@ TEST_F(JsonOfEveryCommand, IsAllOfStandardOutput) {
       {"simulate", "--reality", "--trials", "3", "--out", path("reality")},
       {"simulate", "--walker", "simplest", "--slope-sd", "0.1", "--trials", "2", "--out", path("walks")},
       {"collisions", path("plain")},
+      {"describe", path("plain")},
       {"import", path("plain/collisions.csv"), "--description", path("plain/experiment.toml"), "--out", path("import")},
       {"blind", "make", path("run"), "--seed", "1", "--per-effect", "0", "--none", "1", "--pairs", "0", "--outside",
        "0", "--left-out", "0"}};
@@ -64,6 +65,17 @@ TEST_F(JsonOfEveryCommand, IsAllOfStandardOutput) {
     const Json told = answer(words);
     EXPECT_TRUE(told.is_object() && (told.contains("provenance") || told.contains("effects"))) << told;
   }
+}
+
+TEST_F(JsonOfEveryCommand, IsAFileBesideWhatIsPrintedOrRefused) {
+  const Ran plain = metastable({"doctor"}), both = metastable({"doctor", "--json", path("doctor.json")});
+  EXPECT_EQ(both.out, plain.out);
+  EXPECT_TRUE(Json::parse(read(path("doctor.json")))["facts"].contains("version"));
+  const Ran full = metastable({"doctor", "--json", "/dev/full"}), none = metastable({"doctor", "--json", ""});
+  EXPECT_EQ(full.code, 2);
+  EXPECT_EQ(full.err, "metastable: cannot write /dev/full: No space left on device\n");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_EQ(none.err, "metastable: --json: what is given is empty\n");
 }
 
 // What is printed without it is told with it, and the files that were written.
