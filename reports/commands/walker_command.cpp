@@ -131,7 +131,12 @@ void run_walker_simulate(const WalkerRequest& request) {
       throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
   OutputFolder whole(folder);
   Answer answer(request.json);
-  const std::vector<analysis::Walk> walks = analysis::simulate_walks(setting, request.walks);
+  const std::vector<analysis::Walk> walks = [&] {
+    ProgressParts progress;
+    analysis::WalkOptions options = request.walks;
+    options.progress = [tell = progress.begin()("simulate")](double share) { tell(share, "simulate"); };
+    return analysis::simulate_walks(setting, options);
+  }();
   const Provenance provenance = walker_provenance(request);
   std::string head, steps = "trial,step", trials = "trial,steps,outcome\n";
   for (const std::string& line : provenance_lines(provenance)) head += "# " + line + "\n";
