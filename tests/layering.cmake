@@ -10,6 +10,7 @@ set(ROOMS
   "markov/passage: markov markov/chain"
   "markov/rows: markov markov/chain markov/passage"
   "markov/mesh: markov markov/chain markov/rows"
+  "markov/ranks: markov markov/chain markov/mesh"
   "dynamics/wheel:"
   "dynamics/laboratory: dynamics/wheel"
   "dynamics/settled: dynamics/wheel"
@@ -34,6 +35,7 @@ set(ROOMS
   "reports/import: dynamics/wheel analysis/experiment analysis/motion_capture reports/output"
   "reports/commands: markov markov/passage dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/likelihood analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity analysis/walkers reports/output reports/description reports/diagnosis reports/study reports/import"
   "reports/command_line: markov/chain dynamics/wheel analysis/walkers analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands"
+  "reports/ranks: markov/mesh markov/ranks analysis/walkers reports/output reports/commands reports/command_line"
   "reports/python: markov/chain markov/passage markov/mesh dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/likelihood analysis/sensitivity reports/output reports/diagnosis reports/study reports/commands reports/command_line")
 
 # Where less than a whole room may be seen: who (a pattern of files), which room, which of its headers.
@@ -46,7 +48,7 @@ set(NARROW
   "analysis/likelihood/diagnose.*:analysis/diagnosis:diagnosis.h"
   "analysis/diagnosis/.*:dynamics/wheel:truncated_normal.h effect_catalogue.h")
 
-set(HEAVY "openssl/|Spectra/|suitesparse/|klu\\.h|matio\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
+set(HEAVY "mpi\\.h|petsc|slepc|openssl/|Spectra/|suitesparse/|klu\\.h|matio\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
 
 set(names "")
 foreach(entry IN LISTS ROOMS)
@@ -162,6 +164,8 @@ set(samples
   "tests/analysis/study/a_test.cpp|dynamics/laboratory/laboratory.h|yes"
   # Heavy headers.
   "reports/output/a.h|kainjow/mustache.hpp|no"         "markov/chain/a.h|Spectra/GenEigsSolver.h|no"
+  "markov/mesh/a.cpp|markov/ranks/ranks.h|no"          "markov/ranks/ranks.h|mpi.h|no"
+  "markov/ranks/a.h|slepceps.h|no"                     "markov/ranks/a.cpp|petscmat.h|yes"
   "markov/chain/a.h|klu.h|no"                          "markov/chain/a.h|suitesparse/klu.h|no"
   "reports/output/a.h|nlohmann/json.hpp|no"            "reports/command_line/a.h|CLI/CLI.hpp|no"
   "analysis/experiment/a.h|toml++/toml.h|no"           "markov/chain/a.cpp|Spectra/GenEigsSolver.h|yes"

@@ -67,14 +67,29 @@ std::string sweep_description(const Setting& base, const std::vector<SweepAxis>&
   return text;
 }
 
-void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t begin, const StudyOptions& options,
-           const std::function<void(std::size_t, const SweepPoint&)>& done) {
-  const std::size_t size = sweep_size(axes);
-  if (begin >= size) return;
+SweepPoint sweep_point(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t index,
+                       const StudyOptions& options) {
   StudyOptions single = options;
   single.threads = 1;
   single.brief = true;
   if (options.progress) single.progress = [&](double, const std::string& what) { options.progress(0, what); };
+  SweepPoint point;
+  const Setting setting = sweep_setting(base, axes, index, &point.at);
+  try {
+    point.study = study(setting, single);
+  } catch (const markov::ConvergenceError& error) {  // the other points are worth having
+    point.study.setting = setting;
+    point.study.status = Status::solver_failed;
+    point.study.message = error.what();
+    point.failure = std::current_exception();
+  }
+  return point;
+}
+
+void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t begin, const StudyOptions& options,
+           const std::function<void(std::size_t, const SweepPoint&)>& done) {
+  const std::size_t size = sweep_size(axes);
+  if (begin >= size) return;
   // The first table of landings is built by all threads together; on one slope it serves all points.
   if (base.law == dynamics::Law::settled) sweep_setting(base, axes, begin).problem({.threads = options.threads});
   std::mutex mutex;
@@ -82,16 +97,7 @@ void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t 
   std::size_t next = begin;
   bool stopped = false;  // done() threw: later points are not reported
   markov::parallel_for(size - begin, options.threads, [&](std::size_t k) {
-    SweepPoint point;
-    const Setting setting = sweep_setting(base, axes, begin + k, &point.at);
-    try {
-      point.study = study(setting, single);
-    } catch (const markov::ConvergenceError& error) {  // the other points are worth having
-      point.study.setting = setting;
-      point.study.status = Status::solver_failed;
-      point.study.message = error.what();
-      point.failure = std::current_exception();
-    }
+    SweepPoint point = sweep_point(base, axes, begin + k, options);
     const std::scoped_lock lock(mutex);
     waiting.emplace(begin + k, std::move(point));
     while (!stopped && !waiting.empty() && waiting.begin()->first == next) {

@@ -39,6 +39,10 @@ Setting sweep_setting(const Setting& base, const std::vector<SweepAxis>& axes, s
 /// Setting::describe() with the word "varies" in place of what the axes vary.
 std::string sweep_description(const Setting& base, const std::vector<SweepAxis>& axes);
 
+/// Studies one point in brief (StudyOptions::brief), single-threaded. A solver that does not converge is no error here.
+SweepPoint sweep_point(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t index,
+                       const StudyOptions& options);
+
 /// Studies points begin .. end-1 in brief (StudyOptions::brief), calling done(index, point) for each in this order, one
 /// call at a time (from whichever thread finished it); done may throw to stop. A point whose solver does not converge
 /// has the status solver_failed and its message, and no numbers. Points run side by side on the options' threads, each

@@ -5,11 +5,11 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "markov/chain/chain.h"
 #include "markov/mesh/batch_map.h"
+#include "markov/mesh/node_lattice.h"
 #include "markov/mesh/noise_frame.h"
 
 namespace metastable::markov {
@@ -44,7 +44,7 @@ class Mesh {
   std::size_t entries() const { return column_.size(); }
   /// What growing it takes at most, rows and nodes.
   std::size_t bytes() const { return bytes_; }
-  int phases() const { return static_cast<int>(frames_.size()); }
+  int phases() const { return lattice_.phases(); }
   double cheapest_failure() const { return cheapest_failure_; }  ///< its action; exp(-action) is its order of rarity
   std::span<const double> kill() const { return kill_; }
   std::span<const double> leave() const { return leave_; }  ///< probability of leaving the mesh
@@ -55,8 +55,8 @@ class Mesh {
     return {value_.data() + row_start_[row], row_start_[row + 1] - row_start_[row]};
   }
   /// Phase and state of a node.
-  int phase(std::size_t node) const;
-  std::vector<double> state(std::size_t node) const;
+  int phase(std::size_t node) const { return NodeLattice::phase(key_[node]); }
+  std::vector<double> state(std::size_t node) const { return lattice_.state(key_[node]); }
 
   /// Nodes around a state with their weights; nodes that are not part of the mesh are left out.
   struct Corners {
@@ -74,27 +74,8 @@ class Mesh {
   Chain chain() const;
 
  private:
-  struct Growth;
-  using Place = std::array<std::int32_t, 4>;
-  std::pair<int, Place> place(std::size_t node) const;
-
-  /// Open addressing from packed places to nodes.
-  class Table {
-   public:
-    static constexpr std::uint32_t none = 0xffffffffU;
-    std::uint32_t find(std::uint64_t key) const;
-    void insert(std::uint64_t key, std::uint32_t node);
-    std::size_t bytes() const { return slot_.capacity() * sizeof(slot_[0]); }
-
-   private:
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> slot_;
-    std::size_t used_ = 0;
-  };
-
-  std::vector<NoiseFrame> frames_;
-  double spacing_ = 0;
-  std::array<double, 4> shift_{};
-  Table table_;
+  NodeLattice lattice_;
+  NodeTable table_;
   std::vector<std::uint64_t> key_;  ///< phase and place of each node
   std::vector<std::size_t> row_start_{0};
   std::vector<std::uint32_t> column_;

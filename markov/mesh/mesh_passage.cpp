@@ -1,26 +1,28 @@
 #include "markov/mesh/mesh_passage.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace metastable::markov {
 namespace {
 
 constexpr int kProducts = 20000;
-constexpr double kSettled = 1e-9;  // relative change of the failures of a revolution
+constexpr double kStill = 1e-6;  // distance between distributions a revolution apart
 constexpr int kInARow = 3;
 
 }  // namespace
 
-MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
-  const std::size_t n = mesh.size();
-  const int phases = mesh.phases();
-  std::vector<double> x(n, 0.0), y(n), before;
-  const Mesh::Corners corners = mesh.corners(0, start);
-  for (int c = 0; c < corners.count; ++c)
-    x[corners.node[static_cast<std::size_t>(c)]] += corners.weight[static_cast<std::size_t>(c)];
-
+MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double settled_change) {
+  const std::size_t n = rows.kill.size();
+  const int phases = rows.phases;
+  std::vector<double> y(n), before;
+  const auto total = [&](std::array<double, 2> own) {
+    if (rows.add_up) rows.add_up(own);
+    return own;
+  };
   MeshPassage passage;
   double alive = 1, alive_lower = 1, steps_lower = 0, last_failures = 0;
   std::vector<double> distances;
@@ -39,13 +41,14 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
     double here = 1, failures = 0, taken = 0, here_lower = 1, failures_lower = 0, taken_lower = 0;
     std::vector<double> distribution(n, 0.0);
     for (int phase = 0; phase < phases; ++phase) {
-      double kill = 0, leave = 0;
+      std::array<double, 2> lost{};
       for (std::size_t i = 0; i < n; ++i) {
-        kill += x[i] * mesh.kill()[i];
-        leave += x[i] * mesh.leave()[i];
+        lost[0] += x[i] * rows.kill[i];
+        lost[1] += x[i] * rows.leave[i];
         distribution[i] += x[i];
         met[i] += here * x[i];
       }
+      const auto [kill, leave] = total(lost);
       taken += here;
       failures += here * kill;
       here *= 1 - kill;
@@ -53,9 +56,9 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
       failures_lower += here_lower * std::min(1.0, kill + leave);
       here_lower *= std::max(0.0, 1 - kill - leave);
       passage.survival.push_back(alive * here);
-      mesh.apply_left(x, y);
+      rows.apply_left(x, y);
       ++passage.products;
-      const double mass = std::accumulate(y.begin(), y.end(), 0.0);
+      const double mass = total({std::accumulate(y.begin(), y.end(), 0.0), 0})[0];
       if (!(mass > 0)) {  // nobody survives
         passage.steps = passage.steps_upper = passage.steps + alive * taken;
         passage.steps_lower = steps_lower + alive_lower * taken_lower;
@@ -66,10 +69,12 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
       }
       for (std::size_t i = 0; i < n; ++i) x[i] = y[i] / mass;
     }
-    double distance = 0;
-    for (std::size_t i = 0; i < n; ++i) distance += 0.5 * std::abs(x[i] - before[i]);
+    double moved = 0;
+    for (std::size_t i = 0; i < n; ++i) moved += 0.5 * std::abs(x[i] - before[i]);
+    const double distance = total({moved, 0})[0];
     distances.push_back(distance);
-    settled = std::abs(failures - last_failures) <= kSettled * failures && distance <= 1e-6 ? settled + 1 : 0;
+    const bool still = std::abs(failures - last_failures) <= settled_change * failures && distance <= kStill;
+    settled = still ? settled + 1 : 0;
     last_failures = failures;
     if (settled == kInARow) {
       passage.steps_upper = passage.steps + alive * taken / failures;
@@ -92,6 +97,16 @@ MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start) {
     passage.mixing_steps = static_cast<double>((last - first) * static_cast<std::size_t>(phases)) /
                            std::log(distances[first] / distances[last]);
   return passage;
+}
+
+MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change) {
+  std::vector<double> x(mesh.size(), 0.0);
+  const Mesh::Corners corners = mesh.corners(0, start);
+  for (int c = 0; c < corners.count; ++c)
+    x[corners.node[static_cast<std::size_t>(c)]] += corners.weight[static_cast<std::size_t>(c)];
+  return follow_survivors(
+      {mesh.phases(), mesh.kill(), mesh.leave(), [&](auto from, auto to) { mesh.apply_left(from, to); }}, std::move(x),
+      settled_change);
 }
 
 std::vector<std::vector<double>> failure_in_step(const Mesh& mesh, int window) {

@@ -1,6 +1,7 @@
 #pragma once
 // What a mesh says of failure, by products of its rows with distributions alone: nothing small is subtracted.
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -20,9 +21,21 @@ struct MeshPassage {
   int products = 0;
 };
 
-/// Follows the distribution of survivors from `start` (a state at phase 0) until it keeps its form.
+/// Rows as far as a process holds them, all of a mesh or a share of it.
+struct MassRows {
+  int phases = 1;
+  std::span<const double> kill, leave;                                             ///< of its own nodes
+  std::function<void(std::span<const double> x, std::span<double> y)> apply_left;  ///< y = x Q
+  std::function<void(std::span<double>)> add_up = {};  ///< over all who share the rows; empty: there are no others
+};
+
+/// Follows the distribution of survivors, from one over the nodes of phase 0 (`start`, own nodes), until it keeps its
+/// form: until the failures of a revolution change by no more than `settled_change` of themselves, three times running.
 /// @throws ConvergenceError if it does not within 20000 products
-MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start);
+MeshPassage follow_survivors(const MassRows& rows, std::vector<double> start, double settled_change = 1e-9);
+
+/// The same from a state at phase 0 of one mesh.
+MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change = 1e-9);
 
 /// Returns u[n][i], n = 0 .. window: the probability that a walker at node i fails in exactly its (n+1)-th step.
 std::vector<std::vector<double>> failure_in_step(const Mesh& mesh, int window);

@@ -41,12 +41,6 @@ double at_zero(const std::vector<double>& by_size, std::size_t first, std::size_
   return row.front();
 }
 
-/// Spacing of the scores: few nodes have few offsets over which its error could average.
-double score_spacing(const BatchMap& map) {
-  constexpr std::array<double, 4> spacing{0.3, 0.4, 0.6, 0.6};
-  return map.scores == 1 ? spacing[static_cast<std::size_t>(map.dimension - 1)] : 0.6;
-}
-
 struct Extrapolated {
   double log_value = 0, shift_error = 0, discretization_error = 0;
 };
@@ -133,7 +127,7 @@ class Run {
             .margin = options_.margin > 0   ? options_.margin
                       : map_.dimension == 4 ? 10.0
                                             : 12.0,
-            .score_spacing = score_spacing(map_),
+            .score_spacing = study_score_spacing(map_),
             .most_bytes = options_.most_bytes / static_cast<std::size_t>(threads_)};
   }
 
@@ -243,6 +237,12 @@ class Run {
 };
 
 }  // namespace
+
+double study_score_spacing(const BatchMap& map) {
+  // Few nodes have few offsets over which its error could average.
+  constexpr std::array<double, 4> spacing{0.3, 0.4, 0.6, 0.6};
+  return map.scores == 1 ? spacing[static_cast<std::size_t>(map.dimension - 1)] : 0.6;
+}
 
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options) {
   if (options.sizes != 0 && (options.sizes < 3 || options.sizes > 4))

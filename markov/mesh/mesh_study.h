@@ -57,6 +57,9 @@ struct MeshStudy {
   std::string disagreement;
 };
 
+/// Spacing of the scores that a study's meshes take.
+double study_score_spacing(const BatchMap& map);
+
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
 /// discretization error; the bracket of what leaves the mesh is added. The discretization error is the difference from

@@ -28,6 +28,7 @@
 #include "reports/commands/request.h"
 #include "reports/commands/steps_command.h"
 #include "reports/commands/sweep_command.h"
+#include "reports/commands/sweep_file.h"
 #include "reports/commands/verify_command.h"
 #include "reports/output/answer.h"
 #include "reports/output/interrupt.h"
@@ -99,7 +100,9 @@ Command compare() {
           }};
 }
 
-Command sweep() {
+}  // namespace
+
+Command sweep_command(const Sharing* sharing) {
   return {
       "sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
       [](Options& o) {
@@ -118,9 +121,15 @@ Command sweep() {
         o.add_json();
         add_walker(o, "RANGE");
       },
-      [](const Options& o, const std::string& line) {
-        if (asks_for_walker(o)) return run_walker_sweep(walker_sweep_request(o, line));
+      [sharing](const Options& o, const std::string& line) {
+        if (asks_for_walker(o)) {
+          WalkerRequest walker = walker_sweep_request(o, line);
+          walker.sharing = sharing;
+          if (sharing) walker.study.threads = 1;
+          return run_walker_sweep(walker);
+        }
         SweepRequest request;
+        request.sharing = sharing;
         request.setting = common_setting(o);
         for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
           if (o.text(name).empty()) continue;
@@ -154,6 +163,8 @@ Command sweep() {
         run_sweep(request);
       }};
 }
+
+namespace {
 
 Command report() {
   return {"report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
@@ -251,7 +262,7 @@ std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
 }
 
 std::vector<Command> commands(const std::vector<ManualCommand>& manual) {
-  std::vector<Command> all{steps(), compare(), sweep()};
+  std::vector<Command> all{steps(), compare(), sweep_command()};
   for (const std::vector<Command>& more :
        {experiment_commands(), std::vector<Command>{report(), verify()}, blind_commands(), help_commands(manual)})
     all.insert(all.end(), more.begin(), more.end());
@@ -281,15 +292,15 @@ std::string command_line(int argc, const char* const* argv) {
   return line;
 }
 
-int parse_and_run(int argc, const char* const* argv) {
-  CLI::App app("Metastability of walking machines: the rimless wheel on a ramp", "metastable");
+// @param manual  is filled with all commands
+int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, int argc, const char* const* argv) {
+  CLI::App app(program.summary, program.name);
   app.require_subcommand(1);
   app.set_version_flag("--version", version_text());
   app.footer(
       "Exit codes: 0 done, 2 wrong option or file (one that cannot be written too), 3 a computation failed, 130 "
       "interrupted, 143 terminated.");
-  std::vector<ManualCommand> manual;
-  const std::vector<Command> all = commands(manual);
+  const std::vector<Command>& all = program.commands;
   std::deque<Options> options;
   std::vector<CLI::App*> subcommands;
   std::deque<std::string> config_files;
@@ -332,7 +343,7 @@ int parse_and_run(int argc, const char* const* argv) {
     if (argv[1][0] == '-')
       throw std::invalid_argument(
           fmt::format("{}: is no option before a subcommand; --help and --version are", argv[1]));
-    throw std::invalid_argument(fmt::format("{}; see 'metastable {} --help'", error.what(), argv[1]));
+    throw std::invalid_argument(fmt::format("{}; see '{} {} --help'", error.what(), program.name, argv[1]));
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!subcommands[i]->parsed()) continue;
@@ -343,16 +354,16 @@ int parse_and_run(int argc, const char* const* argv) {
   return 0;
 }
 
-}  // namespace
-
-int run(int argc, const char* const* argv) {
-  const auto fail = [](const std::string& what, int code) {
-    std::fputs(("metastable: " + what + "\n").c_str(), stderr);  // where even this cannot be written, the code is left
+int run_program(const Program& program, std::vector<ManualCommand>& manual, int argc, const char* const* argv) {
+  const auto fail = [&](const std::string& what, int code) {
+    if (!program.silent)
+      std::fputs((program.name + ": " + what + "\n").c_str(),
+                 stderr);  // where even this cannot be written, the code is left
     return code;
   };
   try {
     catch_interrupts();
-    const int code = parse_and_run(argc, argv);
+    const int code = parse_and_run(program, manual, argc, argv);
     flush_standard_output();
     return code;
   } catch (const Interrupted& interrupted) {
@@ -374,6 +385,20 @@ int run(int argc, const char* const* argv) {
   } catch (...) {
     return fail("a failure without a name", 3);
   }
+}
+
+}  // namespace
+
+int run(int argc, const char* const* argv) {
+  std::vector<ManualCommand> manual;
+  const Program program{"metastable", "Metastability of walking machines: the rimless wheel on a ramp",
+                        commands(manual)};
+  return run_program(program, manual, argc, argv);
+}
+
+int run(const Program& program, int argc, const char* const* argv) {
+  std::vector<ManualCommand> manual;
+  return run_program(program, manual, argc, argv);
 }
 
 }  // namespace metastable::reports

@@ -31,7 +31,7 @@ analysis::WalkerSetting base_setting(const Options& o, const std::vector<std::st
 WalkerRequest base_request(const Options& o, const std::string& command_line) {
   WalkerRequest request;
   request.study.seed = request.walks.seed = o.seed();
-  request.study.threads = request.walks.threads = o.threads();
+  if (o.has("threads")) request.study.threads = request.walks.threads = o.threads();
   if (o.has("memory") && o.given("memory"))
     request.study.most_bytes = static_cast<std::size_t>(o.number("memory") * 0x1p30);
   if (o.has("spacing") && o.given("spacing")) request.study.spacing = o.number("spacing");

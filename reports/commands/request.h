@@ -50,7 +50,8 @@ struct SweepRequest {
   analysis::StudyOptions study;
   std::string out = "sweep.csv";  ///< the figure goes beside it, with the ending .svg
   std::string command;
-  std::string json = {};  ///< as of StepsRequest
+  std::string json = {};                    ///< as of StepsRequest
+  const struct Sharing* sharing = nullptr;  ///< with other processes
 };
 
 /// metastable simulate

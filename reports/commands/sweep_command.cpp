@@ -72,11 +72,15 @@ void run_sweep(const SweepRequest& request) {
   for (const analysis::SweepAxis& axis : request.axes)
     sweep.axes.push_back({std::string(analysis::parameter_label(axis.parameter)),
                           axis.parameter == analysis::Parameter::slope ? "deg" : "", axis.values});
+  analysis::StudyOptions study = request.study;
+  study.progress = [](double, const std::string&) { check_interrupt(); };
+  if (request.sharing)
+    return share_sweep_file(sweep, *request.sharing, [&](std::size_t point) {
+      return row(analysis::sweep_point(request.setting, request.axes, point, study));
+    });
   run_sweep_file(sweep, [&](std::size_t had, const auto& add) {
     Progress progress("sweep", size);
     progress.skip(had);
-    analysis::StudyOptions study = request.study;
-    study.progress = [](double, const std::string&) { check_interrupt(); };
     analysis::sweep(request.setting, request.axes, had, study, [&](std::size_t, const analysis::SweepPoint& point) {
       add(row(point));
       progress.advance();

@@ -111,6 +111,12 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::s
   return figure;
 }
 
+std::size_t size_of(const SweepFile& sweep) {
+  std::size_t size = 1;
+  for (const SweepFileAxis& axis : sweep.axes) size *= axis.values.size();
+  return size;
+}
+
 // The rows as a table; its columns are named by the last line of the head.
 Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
   const auto split = [](std::string_view line) {
@@ -143,8 +149,7 @@ Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
 
 void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   const std::filesystem::path out = sweep.out, partial = sweep.out + ".partial";
-  std::size_t size = 1;
-  for (const SweepFileAxis& axis : sweep.axes) size *= axis.values.size();
+  const std::size_t size = size_of(sweep);
   std::filesystem::path picture = out;
   picture.replace_extension(".svg");
   if (picture == out)
@@ -191,6 +196,33 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   answer.file(out.string());
   if (drawn) answer.file(picture.string());
   answer.finish(sweep.provenance);
+}
+
+void share_sweep_file(const SweepFile& sweep, const Sharing& sharing,
+                      const std::function<std::string(std::size_t)>& row_of) {
+  const std::size_t size = size_of(sweep);
+  const auto turn = [&](std::size_t point, std::size_t had) {
+    return static_cast<int>((point - had) % static_cast<std::size_t>(sharing.ranks));
+  };
+  if (sharing.rank > 0) {
+    const std::size_t had = sharing.first_says(0);
+    for (std::size_t point = had; point < size; ++point)
+      if (turn(point, had) == sharing.rank) sharing.send(row_of(point));
+    return;
+  }
+  bool said = false;  // to the others, where to begin
+  try {
+    run_sweep_file(sweep, [&](std::size_t had, const auto& add) {
+      said = true;
+      sharing.first_says(had);
+      for (std::size_t point = had; point < size; ++point)
+        add(turn(point, had) == 0 ? row_of(point) : sharing.receive(turn(point, had)));
+    });
+  } catch (...) {
+    if (!said) sharing.first_says(size);
+    throw;
+  }
+  if (!said) sharing.first_says(size);
 }
 
 }  // namespace metastable::reports

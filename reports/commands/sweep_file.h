@@ -27,8 +27,21 @@ struct SweepFile {
 /// expected steps and the ends of their interval ("infinite", empty where a solver failed), then anything.
 using SweepRows = std::function<void(std::size_t had, const std::function<void(const std::string& row)>& add)>;
 
+/// Processes that share the points of a sweep. The first of them writes all files.
+struct Sharing {
+  int rank = 0, ranks = 1;
+  std::function<std::size_t(std::size_t)> first_says;  ///< on all: the number that the first one has
+  std::function<void(const std::string& row)> send;    ///< to the first
+  std::function<std::string(int rank)> receive;        ///< on the first: the next one sent by a process
+};
+
 /// Writes rows to `out`.partial as they come, renames it, draws the figure and prints one line.
 /// @throws OutputError for a file of another sweep; Interrupted, saying how many points were kept
 void run_sweep_file(const SweepFile& sweep, const SweepRows& compute);
+
+/// The same, points taken in turns by the processes; the bytes are those of one.
+/// @param row_of  computes a point's row
+void share_sweep_file(const SweepFile& sweep, const Sharing& sharing,
+                      const std::function<std::string(std::size_t point)>& row_of);
 
 }  // namespace metastable::reports

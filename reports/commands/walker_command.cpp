@@ -86,6 +86,27 @@ void run_walker_steps(const WalkerRequest& request) { run_walker(request, answer
 
 void run_walker_compare(const WalkerRequest& request) { run_walker(request, answer_walker_compare); }
 
+namespace {
+
+std::string sweep_row(const WalkerRequest& request, const WalkerSetting& setting, Progress& progress) {
+  const std::string at = fmt::format("{},{},", setting.slope_deg, setting.slope_sd_deg);
+  const auto other = [](const std::optional<MeshEstimate>& e) { return e ? fmt::format("{}", e->value) : ""; };
+  try {
+    const markov::MeshStudy s = walker_study(setting, request, progress).passage;
+    return at + fmt::format("{},{},{},{},{},{},{},{}\n", s.steps.value, s.steps.lower, s.steps.upper,
+                            s.failure_rate.value, s.mixing_steps, other(s.guided), other(s.simulated),
+                            walker_status(s));
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::runtime_error& error) {  // no gait that is stable, or ways that disagree: the others go on
+    return at + fmt::format(",,,,,,,{}\n", csv_field(error.what()));
+  } catch (const std::domain_error& error) {
+    return at + fmt::format(",,,,,,,{}\n", csv_field(error.what()));
+  }
+}
+
+}  // namespace
+
 void run_walker_sweep(const WalkerRequest& request) {
   for (const WalkerSetting& setting : request.settings) setting.map();  // wrong settings before the first is computed
   const WalkerSetting& first = request.settings.front();
@@ -100,26 +121,15 @@ void run_walker_sweep(const WalkerRequest& request) {
                   {{"slope", "deg", request.slopes}, {"sd of the slope", "deg", request.slope_sds}},
                   {request.command, what, request.study.seed, version()},
                   request.json};
+  if (request.sharing)
+    return share_sweep_file(sweep, *request.sharing, [&](std::size_t point) {
+      Progress progress("point", study_units);
+      return sweep_row(request, request.settings[point], progress);
+    });
   run_sweep_file(sweep, [&](std::size_t had, const auto& add) {
     Progress progress("sweep", study_units * request.settings.size());
     progress.skip(study_units * had);
-    for (std::size_t i = had; i < request.settings.size(); ++i) {
-      const WalkerSetting& setting = request.settings[i];
-      std::string row = fmt::format("{},{},", setting.slope_deg, setting.slope_sd_deg);
-      const auto other = [](const std::optional<MeshEstimate>& e) { return e ? fmt::format("{}", e->value) : ""; };
-      try {
-        const markov::MeshStudy s = walker_study(setting, request, progress).passage;
-        row += fmt::format("{},{},{},{},{},{},{},{}", s.steps.value, s.steps.lower, s.steps.upper, s.failure_rate.value,
-                           s.mixing_steps, other(s.guided), other(s.simulated), walker_status(s));
-      } catch (const Interrupted&) {
-        throw;
-      } catch (const std::runtime_error& error) {  // no gait that is stable, or ways that disagree: the others go on
-        row += fmt::format(",,,,,,,{}", csv_field(error.what()));
-      } catch (const std::domain_error& error) {
-        row += fmt::format(",,,,,,,{}", csv_field(error.what()));
-      }
-      add(row + "\n");
-    }
+    for (std::size_t i = had; i < request.settings.size(); ++i) add(sweep_row(request, request.settings[i], progress));
   });
 }
 

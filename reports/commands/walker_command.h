@@ -17,12 +17,13 @@ namespace metastable::reports {
 struct WalkerRequest {
   std::vector<analysis::WalkerSetting> settings;  ///< one or more
   markov::MeshStudyOptions study;
-  std::string json;                       ///< file, "-" for standard output, "" for none
-  std::string out;                        ///< file of a sweep, folder of trials or of a report
-  std::string command;                    ///< the command line, for provenance
-  bool how_it_fails = false;              ///< of steps
-  std::vector<double> slopes, slope_sds;  ///< [deg], the axes of a sweep: settings slope by slope
-  analysis::WalkOptions walks = {};       ///< of simulate
+  std::string json;                         ///< file, "-" for standard output, "" for none
+  std::string out;                          ///< file of a sweep, folder of trials or of a report
+  std::string command;                      ///< the command line, for provenance
+  bool how_it_fails = false;                ///< of steps
+  std::vector<double> slopes, slope_sds;    ///< [deg], the axes of a sweep: settings slope by slope
+  analysis::WalkOptions walks = {};         ///< of simulate
+  const struct Sharing* sharing = nullptr;  ///< of a sweep, with other processes
 };
 
 /// What `steps` and `compare` find; moments where they were asked for.

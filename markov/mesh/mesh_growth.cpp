@@ -1,0 +1,367 @@
+#include "markov/mesh/mesh_growth.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace metastable::markov {
+namespace {
+
+constexpr double kFarthest = 60;                          // action beyond which failures are not looked for
+constexpr double kBucket = 1;                             // of actions, expanded together
+constexpr double kWorthAgain = 0.05;                      // a row speaks again if its node's action falls by this
+constexpr int kHalvings = 9;                              // of a gap between scores, to find where failures begin
+constexpr std::size_t kBatch = 32;                        // nodes whose landings are asked for at once
+constexpr std::uint32_t kTaken = MeshGrowth::no_row - 1;  // not a row yet
+constexpr std::size_t kFewestInChunk = std::size_t{1} << 16, kMostInChunk = std::size_t{1} << 23;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Probability that a normal score lies in (low, high), with relative accuracy in both tails.
+double normal_mass(double low, double high) {
+  const auto tail = [](double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); };
+  return low > 0 ? tail(low) - tail(high) : tail(-high) - tail(-low);
+}
+
+/// One score: the probabilities of failing, from where between neighbouring scores failures begin and end. Bisects all
+/// edges of a batch together. `failed` and `score` hold m entries a node, ascending.
+std::vector<double> masses_of_failure(const BatchMap& map, int phase, std::span<const double> states,
+                                      std::span<const double> score, std::span<const std::uint8_t> failed,
+                                      std::size_t m) {
+  struct Edge {
+    std::size_t node;
+    double low, high;
+    bool failed_below;
+  };
+  const std::size_t nodes = failed.size() / m, d = states.size() / failed.size();
+  std::vector<Edge> edges;
+  for (std::size_t n = 0; n < nodes; ++n)
+    for (std::size_t i = n * m; i + 1 < (n + 1) * m; ++i)
+      if (failed[i] != failed[i + 1]) edges.push_back({n, score[i], score[i + 1], failed[i] != 0});
+  std::vector<double> from(edges.size() * d), at(edges.size()), to(from.size());
+  std::vector<std::uint8_t> fails(edges.size());
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    std::copy_n(states.begin() + static_cast<std::ptrdiff_t>(edges[e].node * m * d), d,
+                from.begin() + static_cast<std::ptrdiff_t>(e * d));
+  for (int halving = 0; halving < kHalvings && !edges.empty(); ++halving) {
+    for (std::size_t e = 0; e < edges.size(); ++e) at[e] = 0.5 * (edges[e].low + edges[e].high);
+    std::fill(fails.begin(), fails.end(), 0);
+    checked_step(map, phase, from, at, to, fails);
+    for (std::size_t e = 0; e < edges.size(); ++e)
+      ((fails[e] != 0) == edges[e].failed_below ? edges[e].low : edges[e].high) = at[e];
+  }
+  std::vector<double> mass(nodes, 0.0);
+  std::size_t e = 0;
+  for (std::size_t n = 0; n < nodes; ++n) {
+    double begin = -infinity;
+    bool failing = failed[n * m] != 0;
+    for (; e < edges.size() && edges[e].node == n; ++e, failing = !failing) {
+      const double edge = 0.5 * (edges[e].low + edges[e].high);
+      if (failing) mass[n] += normal_mass(begin, edge);
+      begin = edge;
+    }
+    if (failing) mass[n] += normal_mass(begin, infinity);
+  }
+  return mass;
+}
+
+}  // namespace
+
+MeshGrowth::MeshGrowth(const BatchMap& map, const NodeLattice& lattice, const MeshOptions& options, Exchange* exchange)
+    : map_(map),
+      lattice_(lattice),
+      options_(options),
+      exchange_(exchange),
+      scores_(map.scores, options.score_spacing, options.score_reach) {}
+
+double MeshGrowth::limit() const { return std::min(kFarthest, cheapest_failure_ + options_.margin); }
+
+int MeshGrowth::owner(std::uint64_t key) const {
+  if (!exchange_) return 0;
+  std::uint64_t hash = NodeLattice::block(key);  // mixed as by splitmix64 (Steele, Lea, Flood 2014)
+  hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebULL;
+  return static_cast<int>((hash >> 33) % static_cast<std::uint64_t>(exchange_->ranks()));
+}
+
+std::uint32_t MeshGrowth::node_at(std::uint64_t key) {
+  std::uint32_t node = table_.find(key);
+  if (node != NodeTable::none) return node;
+  node = static_cast<std::uint32_t>(key_.size());
+  table_.insert(key, node);
+  key_.push_back(key);
+  action_.push_back(infinity);
+  row_of_.push_back(no_row);
+  own_.push_back(!exchange_ || owner(key) == exchange_->rank());
+  return node;
+}
+
+void MeshGrowth::start_from(int phase, std::span<const double> state) {
+  NodeLattice::Point point{};
+  if (!lattice_.locate(phase, state.data(), point))
+    throw MapError(fmt::format("mesh: the start {} is too far from the noise-free orbit", describe_state(map_, state)));
+  NodeSimplex simplex;
+  lattice_.find_simplex(phase, point, 0, simplex);
+  for (std::size_t i = 0; i <= state.size(); ++i) {
+    const std::uint32_t node = node_at(simplex.key[i]);
+    if (own_[node]) lower(node, 0);
+  }
+}
+
+void MeshGrowth::grow_from(std::span<const double> start) {
+  start_from(0, start);
+  for (int phase = 0; phase < map_.phases; ++phase) start_from(phase, lattice_.frame(phase).centre);
+  grow();
+}
+
+void MeshGrowth::lower(std::uint32_t node, double to) {
+  if (!(to < action_[node])) return;
+  if (!own_[node]) {
+    // `row_of_` of such a node says whether it waits to be told.
+    if (row_of_[node] == no_row) {
+      to_others_.push_back(node);
+      row_of_[node] = 0;
+    }
+    action_[node] = to;
+    return;
+  }
+  action_[node] = to;
+  if (row_of_[node] != no_row) {
+    Row& row = row_[row_of_[node]];
+    if (row.again || !(to < row.said - kWorthAgain)) return;
+    row.again = true;
+    again_.push_back(row_of_[node]);
+    return;
+  }
+  const auto place = std::max(current_, static_cast<std::size_t>(to / kBucket));
+  if (place >= bucket_.size()) bucket_.resize(place + 1);
+  bucket_[place].push_back(node);
+}
+
+void MeshGrowth::relax(const Row& row) {
+  const double scale = row.said + std::log(row.largest);
+  if (row.kill > 0) cheapest_failure_ = std::min(cheapest_failure_, scale - std::log(row.kill));
+  const Chunk& chunk = chunk_[row.chunk];
+  for (std::size_t e = row.first; e < row.last; ++e) {
+    const std::uint32_t to = chunk.column[e];
+    if (action_[to] > row.said) lower(to, scale - std::log(chunk.value[e]));
+  }
+}
+
+/// Tells the owners of nodes how far their actions fell, and hears of one's own.
+void MeshGrowth::tell() {
+  if (!exchange_) return;
+  std::vector<std::vector<Exchange::Note>> notes(static_cast<std::size_t>(exchange_->ranks()));
+  for (const std::uint32_t node : to_others_) {
+    notes[static_cast<std::size_t>(owner(key_[node]))].push_back({key_[node], action_[node]});
+    row_of_[node] = no_row;
+  }
+  to_others_.clear();
+  for (const auto& from_rank : exchange_->swap(notes))
+    for (const Exchange::Note& note : from_rank) lower(node_at(note.key), note.value);
+}
+
+void MeshGrowth::follow(std::vector<std::uint32_t> rows) {
+  while (sum(static_cast<double>(rows.size())) > 0) {
+    for (const std::uint32_t r : rows) {
+      row_[r].said = action_[row_[r].node];
+      row_[r].again = false;
+    }
+    for (const std::uint32_t r : rows) relax(row_[r]);
+    tell();
+    rows.clear();
+    rows.swap(again_);
+  }
+  cheapest_failure_ = -largest(-cheapest_failure_);
+}
+
+void MeshGrowth::store(std::uint32_t node, Parts& parts, double failed, double away) {
+  std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::size_t used = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (used > 0 && parts[used - 1].first == parts[i].first)
+      parts[used - 1].second += parts[i].second;
+    else
+      parts[used++] = parts[i];
+  }
+  parts.resize(used);
+  if (chunk_.empty() || chunk_.back().column.size() + used > chunk_.back().column.capacity()) {
+    const std::size_t size = std::max(used, std::clamp(entries_, kFewestInChunk, kMostInChunk));
+    chunk_.emplace_back();
+    chunk_.back().column.reserve(size);
+    chunk_.back().value.reserve(size);
+  }
+  Chunk& chunk = chunk_.back();
+  Row row{.node = node, .chunk = static_cast<std::uint32_t>(chunk_.size() - 1), .largest = failed, .kill = failed};
+  row.leave = away;
+  for (const auto& part : parts) row.largest = std::max(row.largest, part.second);
+  const double least = row.largest * std::exp(action_[node] - limit());
+  row.first = static_cast<std::uint32_t>(chunk.column.size());
+  for (const auto& [key, value] : parts) {
+    if (value >= least) {
+      chunk.column.push_back(node_at(key));
+      chunk.value.push_back(value);
+    } else {
+      row.leave += value;
+    }
+  }
+  row.last = static_cast<std::uint32_t>(chunk.column.size());
+  entries_ += row.last - row.first;
+  row_of_[node] = static_cast<std::uint32_t>(row_.size());
+  row_.push_back(row);
+}
+
+void MeshGrowth::expand(std::span<const std::uint32_t> nodes) {
+  const auto s = static_cast<std::size_t>(map_.scores);
+  const std::size_t m = scores_.size();
+  std::vector<double> states, scores(m * s * nodes.size()), weights(m * nodes.size());
+  std::vector<std::uint32_t> inside;
+  const int phase = NodeLattice::phase(key_[nodes.front()]);
+  Parts none;
+  for (const std::uint32_t node : nodes) {
+    const std::vector<double> state = lattice_.state(key_[node]);
+    if (map_.inside && !map_.inside(phase, state)) {
+      none.clear();
+      store(node, none, 1, 0);
+      continue;
+    }
+    std::vector<double> offset;
+    for (std::size_t k = 0; k < s; k += 4) {
+      const auto u = uniforms(options_.seed, 1 + k / 4, key_[node], options_.shift);
+      offset.insert(offset.end(), u.begin(), u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, s - k)));
+    }
+    const std::size_t place = inside.size();
+    scores_.place(offset, std::span(scores).subspan(place * m * s, m * s), std::span(weights).subspan(place * m, m));
+    for (std::size_t i = 0; i < m; ++i) states.insert(states.end(), state.begin(), state.end());
+    inside.push_back(node);
+  }
+  if (!inside.empty()) land(inside, scores, weights, states);
+}
+
+/// Lands all scores from nodes of one phase that lie in the section.
+void MeshGrowth::land(const std::vector<std::uint32_t>& inside, const std::vector<double>& scores,
+                      const std::vector<double>& weights, const std::vector<double>& states) {
+  const auto d = static_cast<std::size_t>(map_.dimension), s = static_cast<std::size_t>(map_.scores);
+  const std::size_t m = scores_.size();
+  const int phase = NodeLattice::phase(key_[inside.front()]), to_phase = (phase + 1) % map_.phases;
+  std::vector<double> next(states.size());
+  std::vector<std::uint8_t> failed(inside.size() * m, 0);
+  const std::span<const double> used_scores = std::span<const double>(scores).first(inside.size() * m * s);
+  checked_step(map_, phase, states, used_scores, next, failed);
+  const std::vector<double> masses =
+      s == 1 ? masses_of_failure(map_, phase, states, used_scores, failed, m) : std::vector<double>();
+  NodeLattice::Point point{};
+  NodeSimplex simplex;
+  Parts parts;
+  for (std::size_t n = 0; n < inside.size(); ++n) {
+    const auto turn = random_words(options_.seed, 0x1000, key_[inside[n]], options_.shift);
+    auto orientation = static_cast<unsigned>(turn[0]);
+    double sum = 0, survive = 0, failing = 0;
+    for (std::size_t i = n * m; i < (n + 1) * m; ++i) {
+      sum += weights[i];
+      (failed[i] ? failing : survive) += weights[i];
+    }
+    const double fails = s == 1 ? masses[n] : failing / sum;
+    double away = 0;
+    parts.clear();
+    for (std::size_t i = n * m; i < (n + 1) * m; ++i) {
+      orientation = orientation * 5 + 3;  // another one for every score
+      if (failed[i]) continue;
+      const double weight = weights[i] / survive * (1 - fails);
+      if (!lattice_.locate(to_phase, &next[i * d], point)) {
+        away += weight;
+        continue;
+      }
+      lattice_.find_simplex(to_phase, point, orientation >> 4, simplex);
+      for (std::size_t c = 0; c <= d; ++c)
+        if (weight * simplex.weight[c] > 0) parts.emplace_back(simplex.key[c], weight * simplex.weight[c]);
+    }
+    store(inside[n], parts, survive > 0 ? fails : 1, away);
+  }
+}
+
+std::size_t MeshGrowth::bytes() const {
+  return entries_ * entry_bytes + table_.bytes() + row_.size() * sizeof(Row) +
+         key_.size() * (sizeof(std::uint64_t) + sizeof(double) + sizeof(std::uint32_t) + sizeof(std::uint8_t));
+}
+
+void MeshGrowth::require_memory() {
+  if (largest(static_cast<double>(bytes())) > static_cast<double>(options_.most_bytes))
+    throw std::length_error(
+        fmt::format("mesh: spacing {:.3g} takes more than {:.1f} GB, {} nodes and {} entries so far", options_.spacing,
+                    static_cast<double>(options_.most_bytes) / 0x1p30, sum(static_cast<double>(rows())),
+                    sum(static_cast<double>(entries_))));
+}
+
+std::vector<std::uint32_t> MeshGrowth::take_wave() {
+  std::vector<std::uint32_t> wave;
+  if (current_ >= bucket_.size()) return wave;
+  wave.swap(bucket_[current_]);
+  std::erase_if(wave, [&](std::uint32_t node) {  // it may have been landed, or come twice
+    const bool fresh = row_of_[node] == no_row;
+    if (fresh) row_of_[node] = kTaken;
+    return !fresh;
+  });
+  return wave;
+}
+
+void MeshGrowth::expand_wave(std::vector<std::uint32_t>& wave) {
+  std::stable_sort(wave.begin(), wave.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return NodeLattice::phase(key_[a]) < NodeLattice::phase(key_[b]);
+  });
+  std::string broken;
+  try {
+    for (std::size_t first = 0; first < wave.size();) {
+      std::size_t last = first + 1;
+      const int phase = NodeLattice::phase(key_[wave[first]]);
+      while (last < wave.size() && last - first < kBatch && NodeLattice::phase(key_[wave[last]]) == phase) ++last;
+      expand(std::span(wave).subspan(first, last - first));
+      first = last;
+    }
+  } catch (const MapError& error) {
+    if (!exchange_) throw;
+    broken = error.what();
+  }
+  if (exchange_) broken = exchange_->first_text(broken);
+  if (!broken.empty()) throw MapError(broken);
+}
+
+void MeshGrowth::grow() {
+  while (static_cast<double>(current_) < largest(static_cast<double>(bucket_.size())) &&
+         static_cast<double>(current_) * kBucket <= limit()) {
+    std::vector<std::uint32_t> wave = take_wave();
+    if (sum(static_cast<double>(wave.size())) == 0) {
+      ++current_;
+      continue;
+    }
+    expand_wave(wave);
+    require_memory();
+    std::vector<std::uint32_t> spoken;
+    for (const std::uint32_t node : wave) spoken.push_back(row_of_[node]);
+    follow(std::move(spoken));
+  }
+  if (!(cheapest_failure_ < kFarthest))
+    throw MapError(
+        fmt::format("return map: it never fails within reach of its noise (none of {} nodes around {} leads to a "
+                    "failure within an action of {})",
+                    sum(static_cast<double>(nodes())), describe_state(map_, lattice_.frame(0).centre), kFarthest));
+}
+
+std::span<const std::uint32_t> MeshGrowth::columns(std::size_t row) const {
+  const Row& r = row_[row];
+  return std::span(chunk_[r.chunk].column).subspan(r.first, r.last - r.first);
+}
+
+std::span<const double> MeshGrowth::values(std::size_t row) const {
+  const Row& r = row_[row];
+  return std::span(chunk_[r.chunk].value).subspan(r.first, r.last - r.first);
+}
+
+void MeshGrowth::forget_entries_before(std::size_t row) {
+  const std::size_t chunk = row < row_.size() ? row_[row].chunk : chunk_.size();
+  for (; forgotten_ < chunk; ++forgotten_) chunk_[forgotten_] = {};
+}
+
+}  // namespace metastable::markov

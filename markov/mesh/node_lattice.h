@@ -1,0 +1,61 @@
+#pragma once
+// The nodes of a mesh: a lattice in the principal axes of the noise, phase by phase, each node with a key of its own.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "markov/mesh/noise_frame.h"
+
+namespace metastable::markov {
+
+/// The corners of a simplex of nodes and what share of a point inside each of them takes; the first dimension + 1
+/// count.
+struct NodeSimplex {
+  std::array<std::uint64_t, 5> key{};
+  std::array<double, 5> weight{};
+};
+
+class NodeLattice {
+ public:
+  /// A landing in units of the spacing; coordinates beyond the dimension are 0.
+  using Point = std::array<double, 4>;
+
+  NodeLattice() = default;
+  /// @param shift  of the lattice, in units of the spacing
+  NodeLattice(std::vector<NoiseFrame> frames, double spacing, const Point& shift);
+
+  int phases() const { return static_cast<int>(frames_.size()); }
+  std::size_t dimension() const { return frames_.front().centre.size(); }
+  const NoiseFrame& frame(int phase) const { return frames_.at(static_cast<std::size_t>(phase)); }
+  static int phase(std::uint64_t key);
+  /// Edges of 8 nodes: keys of one block of them have this in common.
+  static std::uint64_t block(std::uint64_t key);
+  std::vector<double> state(std::uint64_t key) const;
+  /// Returns whether nodes reach as far as this state of a phase.
+  bool locate(int phase, const double* state, Point& point) const;
+  /// Kuhn's simplex around a point; bit k of `flips` turns axis k around.
+  void find_simplex(int phase, const Point& point, unsigned flips, NodeSimplex& out) const;
+
+ private:
+  std::vector<NoiseFrame> frames_;
+  double spacing_ = 0;
+  Point shift_{};
+};
+
+/// Open addressing from keys to numbers of nodes.
+class NodeTable {
+ public:
+  static constexpr std::uint32_t none = 0xffffffffU;
+  std::uint32_t find(std::uint64_t key) const;
+  void insert(std::uint64_t key, std::uint32_t node);
+  std::size_t bytes() const { return slot_.capacity() * sizeof(slot_[0]); }
+
+ private:
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> slot_;
+  std::size_t used_ = 0;
+};
+
+}  // namespace metastable::markov
