@@ -37,9 +37,12 @@ class SpeedFilter {
   /// omega+ is seen: the collision.
   Out collision(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
   /// Then the next omega- is seen: the stance.
-  Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
+  /// @param slide  of the foot, where it was seen [m]; `settled` only
+  Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
+             std::optional<double> slide = {});
   /// Only the next omega- is seen: collision and stance together.
-  Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
+  Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
+           std::optional<double> slide = {});
   /// After the last measured speed omega+ was below `bound` (or there was none, the foot jammed), or it was not.
   Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound, bool rested);
   /// How likely omega+ is to be below `bound` after the last measured speed.
@@ -49,6 +52,9 @@ class SpeedFilter {
   double conditional(double below) const;
   Out transition(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus, double rate,
                  double blur);
+  Out weighed(double density, double below, double rate);
+  Out settled_step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
+                   std::optional<double> slide);
   void update(const Out& out, double seen);
 
   const dynamics::Extension& extension_;
@@ -58,6 +64,11 @@ class SpeedFilter {
   bool blurred_;
   double mean_ = 0, variance_ = 0;
   std::optional<double> previous_;  // collision's score
+  // Under `settled`, of the speed before the collision whose omega+ the mean now is; nothing: it is that speed's.
+  struct Before {
+    double mean, variance;
+  };
+  std::optional<Before> before_;
 };
 
 }  // namespace metastable::analysis

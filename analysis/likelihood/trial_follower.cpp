@@ -78,9 +78,9 @@ SpeedFilter::Out TrialFollower::seen_by(SpeedFilter& filter, const Event& event,
     case EventKind::collision:
       return filter.collision(wheel_, here, *m.after);
     case EventKind::stance:
-      return filter.stance(wheel_, here, run_.collisions[k + 1].before);
+      return filter.stance(wheel_, here, run_.collisions[k + 1].before, m.slide);
     case EventKind::step:
-      return filter.step(wheel_, here, run_.collisions[k + 1].before);
+      return filter.step(wheel_, here, run_.collisions[k + 1].before, m.slide);
     case EventKind::rest:
     case EventKind::survival:
       return filter.rest(wheel_, here, m.after ? jam_bound(measured_) : wheel_.barrier(here),
@@ -93,6 +93,7 @@ SpeedFilter::Out TrialFollower::see(const Event& event) {
   come_to(event);
   next_.reset();
   if (event.kind == EventKind::launch) next_ = 0;
+  if (event.kind == EventKind::collision) next_ = collision_of(event);  // whether it rested may follow
   if (event.kind == EventKind::stance || event.kind == EventKind::step) next_ = collision_of(event) + 1;
   if (nodes_ == 1) return seen_by(filters_[0], event, 0);
   // The density is averaged over the nodes, which are weighed anew by it.

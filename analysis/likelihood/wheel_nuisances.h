@@ -13,8 +13,8 @@
 
 namespace metastable::analysis {
 
-/// Where each nuisance stands in the list. Spreads and the noise are refitted by their logarithms; log_noise_sd is
-/// there only where the noise is refitted.
+/// Where each nuisance stands in the list. Spreads and ratios are refitted by their logarithms; log_noise_sd is there
+/// only where the noise is refitted, the last two only under `settled`, where it always is.
 struct WheelSlot {
   enum : std::size_t {
     restitution_mean,
@@ -23,12 +23,15 @@ struct WheelSlot {
     log_friction_sd,
     skew,
     tails,
-    log_noise_sd
+    log_noise_sd,
+    log_hub_inertia_ratio,
+    log_next_ratio
   };
 };
 
 /// @param noise  sd of reported speeds to start from, where it is refitted [rad/s]
-std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise);
+/// @param noise_stated  whether that is the sensor's own
+std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise, bool noise_stated);
 
 /// What these values of the nuisances suppose of the wheel, without effects.
 WheelHypothesis hypothesis_at(std::span<const double> nuisance);
