@@ -14,4 +14,11 @@ int thread_count(int requested);
 /// started are then skipped.
 void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& work);
 
+/// The same as a function to hand on, for those who know no threads.
+inline auto on_threads(int threads) {
+  return [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
+    parallel_for(count, threads, work);
+  };
+}
+
 }  // namespace metastable::markov

@@ -31,8 +31,10 @@ set(ROOMS
   "reports/description: dynamics/wheel analysis/statistics analysis/description analysis/paper reports/output"
   "reports/diagnosis: dynamics/wheel analysis/statistics analysis/diagnosis analysis/blind reports/output"
   "reports/study: markov/rows dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
-  "reports/commands: markov markov/passage dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/likelihood analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity analysis/walkers reports/output reports/description reports/diagnosis reports/study"
-  "reports/command_line: markov/chain dynamics/wheel analysis/walkers analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands")
+  "reports/import: dynamics/wheel analysis/experiment analysis/motion_capture reports/output"
+  "reports/commands: markov markov/passage dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/likelihood analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity analysis/walkers reports/output reports/description reports/diagnosis reports/study reports/import"
+  "reports/command_line: markov/chain dynamics/wheel analysis/walkers analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands"
+  "reports/python: markov/chain markov/passage markov/mesh dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/likelihood analysis/sensitivity reports/output reports/diagnosis reports/study reports/commands reports/command_line")
 
 # Where less than a whole room may be seen: who (a pattern of files), which room, which of its headers.
 set(NARROW
@@ -44,7 +46,7 @@ set(NARROW
   "analysis/likelihood/diagnose.*:analysis/diagnosis:diagnosis.h"
   "analysis/diagnosis/.*:dynamics/wheel:truncated_normal.h effect_catalogue.h")
 
-set(HEAVY "openssl/|Spectra/|suitesparse/|klu\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
+set(HEAVY "openssl/|Spectra/|suitesparse/|klu\\.h|matio\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
 
 set(names "")
 foreach(entry IN LISTS ROOMS)

@@ -23,8 +23,14 @@ bool parse(std::string_view text, double& value) {
 
 }  // namespace
 
-CsvReader::CsvReader(std::string file, std::string_view text, std::span<const CsvColumn> columns, Defects& defects)
-    : file_(std::move(file)), text_(text), columns_(columns), defects_(defects), position_(columns.size()) {
+CsvReader::CsvReader(std::string file, std::string_view text, std::span<const CsvColumn> columns, Defects& defects,
+                     char separator)
+    : file_(std::move(file)),
+      text_(text),
+      columns_(columns),
+      defects_(defects),
+      separator_(separator),
+      position_(columns.size()) {
   if (text_.starts_with(byte_order_mark)) text_.remove_prefix(byte_order_mark.size());
   if (!record()) {
     defects_.add(file_, {1, 1}, "the file is empty; a header with the names of the columns is expected");
@@ -49,6 +55,14 @@ CsvReader::CsvReader(std::string file, std::string_view text, std::span<const Cs
     report(begin_, fmt::format("missing column '{}'", columns_[c].name));
     usable_ = false;
   }
+}
+
+std::vector<std::string> CsvReader::names(std::string_view text, char separator) {
+  Defects unknown;  // all of them are
+  const CsvReader header("", text, {}, unknown, separator);
+  std::vector<std::string> names;
+  for (const Field& field : header.fields_) names.emplace_back(field.text);
+  return names;
 }
 
 bool CsvReader::next() {
@@ -82,10 +96,10 @@ bool CsvReader::record() {
     Field field{.text = {}, .offset = at_};
     if (at_ < text_.size() && text_[at_] == '"') {
       if (!quoted_field(field)) return true;
-      if (at_ < text_.size() && text_[at_] != ',' && text_[at_] != '\n' && text_[at_] != '\r')
+      if (at_ < text_.size() && text_[at_] != separator_ && text_[at_] != '\n' && text_[at_] != '\r')
         return give_up(at_, "text after a closing quote");
     } else {
-      while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) >= ' ' && text_[at_] != ',' &&
+      while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) >= ' ' && text_[at_] != separator_ &&
              text_[at_] != '"')
         ++at_;
       field.text = text_.substr(field.offset, at_ - field.offset);
@@ -93,7 +107,7 @@ bool CsvReader::record() {
     fields_.push_back(field);
     if (at_ >= text_.size()) return true;
     const char stop = text_[at_];
-    if (stop == ',') {
+    if (stop == separator_) {
       ++at_;
       continue;
     }

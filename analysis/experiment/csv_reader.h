@@ -29,7 +29,13 @@ class CsvReader {
  public:
   /// Reads the header. @param file name for messages; @param text, defects must outlive the reader
   /// @param columns  all columns the file may have; members below name them by their index
-  CsvReader(std::string file, std::string_view text, std::span<const CsvColumn> columns, Defects& defects);
+  /// @param separator  between fields
+  CsvReader(std::string file, std::string_view text, std::span<const CsvColumn> columns, Defects& defects,
+            char separator = ',');
+
+  /// Returns the names in the header of a file whose columns are not known; empty where the constructor finds a defect
+  /// in the record.
+  static std::vector<std::string> names(std::string_view text, char separator);
 
   bool has(std::size_t column) const { return position_[column].has_value(); }
   /// Goes to the next record that has as many fields as the header; defective ones are reported and skipped. False at
@@ -64,6 +70,7 @@ class CsvReader {
   std::string_view text_;
   std::span<const CsvColumn> columns_;
   Defects& defects_;
+  char separator_;
   std::vector<std::optional<std::size_t>> position_;  // of each column among the fields
   std::size_t width_ = 0;
   bool usable_ = false, complete_ = true;

@@ -158,6 +158,7 @@ void read_wheel(Keys& root, dynamics::Wheel& wheel, const Defects& defects) {
   if (defects.count() == before) {
     object("inertia_kg_m2", dynamics::inertia_objection(wheel));
     object("radius_of_gyration_m", dynamics::gyration_objection(wheel));
+    object("tip_radius_m", dynamics::tip_objection(wheel));
   }
   keys->finish();
 }

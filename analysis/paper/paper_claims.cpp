@@ -242,7 +242,7 @@ Finding failures(const VariantStudy& s) {
 
 // Holds the largest total index of a source over the frictions, and where it is.
 struct Influence {
-  double steady = 0, steps = 0;
+  Estimate steady, steps;
   bool steps_vary = false;
   double friction = 0;
 };
@@ -250,23 +250,27 @@ Influence largest(const VariantStudy& s, const std::vector<VarianceSource>& sour
   Influence share;
   for (const VarianceRun& run : s.variance) {
     const auto largest_total = [&](const SobolResult& result) {
-      double total = 0;
+      Estimate total;
       for (const VarianceSource source : sources)
-        if (!result.group.empty()) total = std::max(total, index_of(result, source).total.value);
+        if (!result.group.empty() && index_of(result, source).total.value > total.value)
+          total = index_of(result, source).total;
       return total;
     };
-    const double steady = largest_total(run.shares.steady_speed);
-    if (steady > share.steady) share.steady = steady, share.friction = run.friction;
-    share.steps = std::max(share.steps, largest_total(run.shares.steps));
+    const Estimate steady = largest_total(run.shares.steady_speed), steps = largest_total(run.shares.steps);
+    if (steady.value > share.steady.value) share.steady = steady, share.friction = run.friction;
+    if (steps.value > share.steps.value) share.steps = steps;
     share.steps_vary = share.steps_vary || !run.shares.steps.group.empty();
   }
   return share;
 }
 
 std::string share_words(const Influence& share) {
-  return fmt::format("largest total index: steady speed {:.3f}{}, steps {}", share.steady,
-                     share.steady > 0.01 ? fmt::format(" (μ mean {})", share.friction) : "",
-                     share.steps_vary ? fmt::format("{:.3f}", share.steps) : "do not vary");
+  const auto words = [](const Estimate& e) {
+    return fmt::format("{:.3f} ({:.3f} to {:.3f})", e.value, e.lower, e.upper);
+  };
+  return fmt::format("largest total index (95 %): steady speed {}{}, steps {}", words(share.steady),
+                     share.steady.value > 0.01 ? fmt::format(" (μ mean {})", share.friction) : "",
+                     share.steps_vary ? words(share.steps) : "do not vary");
 }
 
 // Judges the trials at 7.02 deg; there is no verdict where outcomes were not noted.
@@ -360,7 +364,7 @@ std::vector<Claim> paper_claims(const std::vector<VariantStudy>& studies, const 
 std::vector<Hypothesis> paper_hypotheses(const std::vector<VariantStudy>& studies) {
   constexpr double matters = 0.1;
   const auto judge = [](const Influence& share) {
-    const bool steady = share.steady > matters, steps = share.steps_vary && share.steps > matters;
+    const bool steady = share.steady.value > matters, steps = share.steps_vary && share.steps.value > matters;
     return Finding{steady  ? ClaimVerdict::reproduced
                    : steps ? ClaimVerdict::partly
                            : ClaimVerdict::not_reproduced,

@@ -138,7 +138,7 @@ class IntegratedRows {
 
  private:
   markov::SampledChain chain(const Setting& near) const {
-    const Problem problem = near.problem(threads_);
+    const Problem problem = near.problem({.threads = threads_});
     std::vector<double> shift;
     for (int p = 0; p < problem.map.phases(); ++p)
       shift.push_back(problem.map.state_interval(p).first - lowest_[static_cast<std::size_t>(p)]);
@@ -154,7 +154,7 @@ class IntegratedRows {
 };
 
 std::vector<Sensitivity> by_rows(const Setting& setting, const Metastability& study, const StudyOptions& options) {
-  const Problem problem = setting.problem(options.threads);
+  const Problem problem = setting.problem({.threads = options.threads});
   const ExactRows rows(problem, options.tolerance, options.threads);
   const std::size_t panels = std::max<std::size_t>(2, study.cells / rows.coarsest());
   const IntegratedRows fine(setting, problem, rows, panels, options.threads),
@@ -180,7 +180,7 @@ bool of_contact(Parameter parameter) {
 // Under `settled`: differences of rows, whatever the study was made with; a table each for a wheel or slope moved to
 // either side. Error: of the nodes, and of two tables where there are two.
 std::vector<Sensitivity> by_tables(const Setting& setting, const Metastability& study, const StudyOptions& options) {
-  const Problem problem = setting.problem(options.threads);
+  const Problem problem = setting.problem({.threads = options.threads});
   const ExactRows rows(problem, options.tolerance, options.threads);
   const IntegratedRows fine(setting, problem, rows, table_panels, options.threads),
       coarse(setting, problem, rows, table_panels / 2, options.threads);
@@ -219,7 +219,7 @@ Sensitivities sensitivities(const Metastability& study, const StudyOptions& opti
       noise.is_empirical() ? noise.pairs().size() == 1 : noise.restitution().constant() && noise.friction().constant();
   if (constant || setting.law == dynamics::Law::plastic)
     return {{}, "without noise the steps are a staircase in every parameter"};
-  if (setting.law == dynamics::Law::settled && setting.direct)
+  if (setting.law == dynamics::Law::settled && options.direct)
     return {{}, "landings that are all followed would take hours for them; leave out --direct"};
   if (setting.law == dynamics::Law::settled && (!setting.pairs.empty() || setting.correlation != 0))
     return {{}, "under settled they are taken from integrated rows, which need independent normals"};

@@ -76,7 +76,7 @@ void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t 
   single.brief = true;
   if (options.progress) single.progress = [&](double, const std::string& what) { options.progress(0, what); };
   // The first table of landings is built by all threads together; on one slope it serves all points.
-  if (base.law == dynamics::Law::settled) sweep_setting(base, axes, begin).problem(options.threads);
+  if (base.law == dynamics::Law::settled) sweep_setting(base, axes, begin).problem({.threads = options.threads});
   std::mutex mutex;
   std::map<std::size_t, SweepPoint> waiting;  // finished before an earlier point
   std::size_t next = begin;

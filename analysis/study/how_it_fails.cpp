@@ -198,7 +198,7 @@ LastMoments how_it_fails(const Setting& setting, const Metastability& study, con
   const bool constant =
       noise.is_empirical() ? noise.pairs().size() == 1 : noise.restitution().constant() && noise.friction().constant();
   if (constant || setting.law == dynamics::Law::plastic) return nothing("without noise every step is the same");
-  const Problem problem = setting.problem(options.threads);
+  const Problem problem = setting.problem({options.direct, options.threads});
   const StudyOptions own = deep_enough(options, study.spectrum.failure_rate.value);
   const bool beside = study.steps.safe_state.has_value();
   const std::optional<Pilot> pilot = solve_pilot(problem, own, beside);

@@ -42,21 +42,24 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
   markov::SampledChain chain = rows.chain(problem, space).chain;
   const markov::Reachability reach = markov::classify(chain.chain);
   if (std::find(reach.must_rest.begin(), reach.must_rest.end(), 0) != reach.must_rest.end()) return std::nullopt;
+  std::optional<SolvedChain> solved;
   try {
-    SolvedChain solved(chain);
-    Level level{space, std::move(chain), std::move(solved)};
-    const std::vector<double>& mean = level.solved.mean;
-    int worst = 0;
-    for (int p = 1; p < space.phases(); ++p)
-      if (mean[static_cast<std::size_t>(p) * space.nodes()] < mean[static_cast<std::size_t>(worst) * space.nodes()])
-        worst = p;
-    const double lowest = problem.map.state_interval(worst).first;
-    level.worst_start = 1 + inner(rows.row(problem, space, lowest, worst).after, mean);
-    if (level.from_start() >= 1 && level.worst_start >= 1 && level.failure_rate() > 0) return level;
+    solved.emplace(chain);
   } catch (const markov::ConvergenceError&) {
     if (!rows.collocated()) throw;
+    return std::nullopt;
   } catch (const std::domain_error&) {  // from some node no entry leads to rest
+    return std::nullopt;
   }
+  Level level{space, std::move(chain), *std::move(solved)};
+  const std::vector<double>& mean = level.solved.mean;
+  int worst = 0;
+  for (int p = 1; p < space.phases(); ++p)
+    if (mean[static_cast<std::size_t>(p) * space.nodes()] < mean[static_cast<std::size_t>(worst) * space.nodes()])
+      worst = p;
+  const double lowest = problem.map.state_interval(worst).first;
+  level.worst_start = 1 + inner(rows.row(problem, space, lowest, worst).after, mean);
+  if (level.from_start() >= 1 && level.worst_start >= 1 && level.failure_rate() > 0) return level;
   return std::nullopt;
 }
 

@@ -3,19 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <functional>
 #include <numeric>
+#include <utility>
 #include <vector>
 
+#include "analysis/statistics/t_interval.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
 namespace {
 
-constexpr std::size_t replicates = 4;
-constexpr std::size_t draws_a_replicate = 256;
+constexpr std::size_t replicates = 8;
+constexpr std::size_t draws_a_replicate = 128;
 constexpr std::uint32_t of_landings = 1u << 20;  // the first of their randomisations
+constexpr double spread = 2;                     // [sd] of the scores by which memory is looked for
 
 // Expected steps between the states of a phase: straight lines.
 class Between {
@@ -32,68 +35,144 @@ class Between {
   std::span<const double> states_, mean_;
 };
 
-}  // namespace
-
-double landing_error(const Problem& problem, int phases, std::span<const double> states,
-                     const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options) {
-  const markov::AnyReturnMap& map = problem.map;
-  const auto dimension = static_cast<std::size_t>(map.noise_dimension());
-  const std::vector<double> no_noise(dimension, 0.0);
-  if (!map.landing_defect(states[0], 0, no_noise, [](double) { return 1.0; })) return 0;
-  const std::size_t per_phase = states.size() / static_cast<std::size_t>(phases);
-  const auto defect = [&](double state, int phase, std::span<const double> score) {
-    const std::size_t next = static_cast<std::size_t>((phase + 1) % phases) * per_phase;
-    return *map.landing_defect(
-        state, phase, score,
-        Between(states.subspan(next, per_phase), std::span<const double>(solved.mean).subspan(next, per_phase)));
-  };
-  std::vector<double> visits = solved.solver.solve_left(sampled.launch.after);
-  std::partial_sum(visits.begin(), visits.end(), visits.begin());
-  const double all_visits = visits.back();
-  // Half of the tasks are of the launch; every draw is written to its place, so that threads change no bit.
-  std::vector<double> part(2 * replicates * draws_a_replicate);
-  std::vector<markov::Draws> draws;
-  for (std::size_t r = 0; r < 2 * replicates; ++r)
-    draws.push_back(markov::make_draws(map.noise_dimension(), {.count = draws_a_replicate,
-                                                               .seed = options.seed,
-                                                               .replicate = static_cast<std::uint32_t>(of_landings + r),
-                                                               .tail = options.tail}));
-  markov::parallel_for(part.size(), options.threads, [&](std::size_t task) {
-    const std::size_t k = task % draws_a_replicate;
-    const markov::Draws& of = draws[task / draws_a_replicate];
-    const auto score = std::span(of.score).subspan(k * dimension, dimension);
-    if (task < replicates * draws_a_replicate) {
-      const auto at = std::upper_bound(visits.begin(), visits.end(), of.offset[k] * all_visits) - visits.begin();
-      const auto i = std::min(static_cast<std::size_t>(at), visits.size() - 1);
-      part[task] = of.weight[k] * all_visits * defect(states[i], static_cast<int>(i / per_phase), score);
-    } else {
-      const double state = problem.launch.state(markov::normal_score(of.offset[k]));
-      part[task] = of.weight[k] * defect(state, problem.launch.phase, score);
+// Plain draws spread wider, with the weights that belong to that.
+markov::Draws spread_draws(int dimension, markov::DrawOptions options) {
+  options.weighting = markov::Weighting::plain;
+  markov::Draws draws = markov::make_draws(dimension, options);
+  double total = 0;
+  for (std::size_t k = 0; k < draws.count(); ++k) {
+    double squares = 0;
+    for (int d = 0; d < dimension; ++d) {
+      double& score = draws.score[k * static_cast<std::size_t>(dimension) + static_cast<std::size_t>(d)];
+      squares += score * score;
+      score *= spread;
     }
-  });
-  std::array<double, replicates> change{};
-  for (std::size_t task = 0; task < part.size(); ++task)
-    change[task / draws_a_replicate % replicates] += part[task] / solved.from_start;
-  const double mean = std::accumulate(change.begin(), change.end(), 0.0) / replicates;
-  double squares = 0;
-  for (const double one : change) squares += (one - mean) * (one - mean);
-  return std::abs(mean) + 2 * std::sqrt(squares / (replicates * (replicates - 1)));
+    total += draws.weight[k] = std::exp(-0.5 * (spread * spread - 1) * squares);
+  }
+  for (double& weight : draws.weight) weight /= total;
+  return draws;
 }
 
-void add_landing_error(Metastability& result, double error, double tolerance) {
-  result.steps.landing_error = error;
-  if (error == 0) return;
+// Sums a defect over all events from the launch on: half of the draws are of the launch.
+class Events {
+ public:
+  using Worth = std::function<double(double state)>;
+  using Defect = std::function<double(double state, int phase, std::span<const double> score)>;
+
+  Events(const Problem& problem, int phases, std::span<const double> states, const markov::SampledChain& sampled,
+         const SolvedChain& solved)
+      : problem_(problem),
+        states_(states),
+        solved_(solved),
+        phases_(phases),
+        per_phase_(states.size() / static_cast<std::size_t>(phases)),
+        visits_(solved.solver.solve_left(sampled.launch.after)) {
+    std::partial_sum(visits_.begin(), visits_.end(), visits_.begin());
+  }
+
+  // Of the states at a phase, in steps.
+  Worth worth(int phase) const {
+    const std::size_t first = static_cast<std::size_t>(phase % phases_) * per_phase_;
+    return Between(states_.subspan(first, per_phase_),
+                   std::span<const double>(solved_.mean).subspan(first, per_phase_));
+  }
+
+  // Of every randomisation, relative to the expected steps from the launch; every draw is written to its place, so that
+  // threads change no bit.
+  std::vector<double> sum(const std::vector<markov::Draws>& draws, int threads, const Defect& defect) const {
+    const auto dimension = static_cast<std::size_t>(draws.front().dimension);
+    std::vector<double> part(draws.size() * draws_a_replicate);
+    const double all_visits = visits_.back();
+    markov::parallel_for(part.size(), threads, [&](std::size_t task) {
+      const std::size_t k = task % draws_a_replicate, r = task / draws_a_replicate;
+      const markov::Draws& of = draws[r];
+      const auto score = std::span(of.score).subspan(k * dimension, dimension);
+      if (r < replicates) {
+        const auto at = std::upper_bound(visits_.begin(), visits_.end(), of.offset[k] * all_visits) - visits_.begin();
+        const auto i = std::min(static_cast<std::size_t>(at), visits_.size() - 1);
+        part[task] = of.weight[k] * all_visits * defect(states_[i], static_cast<int>(i / per_phase_), score);
+      } else {
+        const double state = problem_.launch.state(markov::normal_score(of.offset[k]));
+        part[task] = of.weight[k] * defect(state, problem_.launch.phase, score);
+      }
+    });
+    std::vector<double> change(replicates);
+    for (std::size_t task = 0; task < part.size(); ++task)
+      change[task / draws_a_replicate % replicates] += part[task] / solved_.from_start;
+    return change;
+  }
+
+ private:
+  const Problem& problem_;
+  std::span<const double> states_;
+  const SolvedChain& solved_;
+  int phases_;
+  std::size_t per_phase_;
+  std::vector<double> visits_;  // summed up
+};
+
+}  // namespace
+
+LandingError landing_error(const Problem& problem, int phases, std::span<const double> states,
+                           const markov::SampledChain& sampled, const SolvedChain& solved,
+                           const StudyOptions& options) {
+  const markov::AnyReturnMap& map = problem.map;
+  const int dimension = map.noise_dimension();
+  const std::vector<double> no_noise(static_cast<std::size_t>(2 * dimension), 0.0);
+  const auto nothing = [](double) { return 0.0; };
+  const auto draws = [&](auto&& make, int scores) {
+    std::vector<markov::Draws> all;
+    for (std::size_t r = 0; r < 2 * replicates; ++r)
+      all.push_back(make(scores, markov::DrawOptions{.count = draws_a_replicate,
+                                                     .seed = options.seed,
+                                                     .replicate = static_cast<std::uint32_t>(of_landings + r),
+                                                     .tail = options.tail}));
+    return all;
+  };
+  const Events events(problem, phases, states, sampled, solved);
+  LandingError error;
+  if (map.landing_defect(states[0], 0, std::span(no_noise).first(static_cast<std::size_t>(dimension)), nothing)) {
+    const TInterval change =
+        t_interval(events.sum(draws(markov::make_draws, dimension), options.threads,
+                              [&](double state, int phase, std::span<const double> score) {
+                                return *map.landing_defect(state, phase, score, events.worth(phase + 1));
+                              }));
+    error.table = std::abs(change.mean) + change.half_width;
+  }
+  if (map.memory_defect(states[0], 0, no_noise, nothing)) {
+    const TInterval change =
+        t_interval(events.sum(draws(spread_draws, 2 * dimension), options.threads,
+                              [&](double state, int phase, std::span<const double> score) {
+                                return *map.memory_defect(state, phase, score, events.worth(phase + 2));
+                              }));
+    const double half = change.half_width + change.mean * change.mean;
+    error.memory = {change.mean, change.mean - half, change.mean + half};
+  }
+  return error;
+}
+
+void add_landing_error(Metastability& result, const LandingError& error, double tolerance) {
+  result.steps.landing_error = error.table;
+  result.steps.memory = error.memory;
+  const double less = error.table - std::min(0.0, error.memory.lower),
+               more = error.table + std::max(0.0, error.memory.upper);
+  const double memory = std::max(std::abs(error.memory.lower), std::abs(error.memory.upper));
+  if (less == 0 && more == 0) return;
   for (Estimate* steps : {&result.steps.from_start, &result.steps.from_quasi_stationary, &result.steps.worst_start}) {
-    steps->lower = std::min(steps->value, std::max(1.0, steps->lower * std::exp(-error)));
-    steps->upper *= std::exp(error);
+    steps->lower = std::min(steps->value, std::max(1.0, steps->lower * std::exp(-less)));
+    steps->upper *= std::exp(more);
   }
   Estimate& rate = result.spectrum.failure_rate;
-  rate.lower *= std::exp(-error);
-  rate.upper = std::max(rate.value, std::min(1.0, rate.upper * std::exp(error)));
-  if (error <= tolerance || result.status != Status::converged) return;
+  rate.lower *= std::exp(-more);
+  rate.upper = std::max(rate.value, std::min(1.0, rate.upper * std::exp(less)));
+  if (std::max(less, more) <= tolerance || result.status != Status::converged) return;
   result.status = Status::tolerance_not_met;
   result.message = fmt::format("tolerance {} not met: landings read from a table may move the expected steps by {:.2g}",
-                               tolerance, error);
+                               tolerance, error.table);
+  if (memory > 0)
+    result.message +=
+        fmt::format(", and what the state of the chain leaves out moves them by {:.2g} to {:.2g} (in the interval)",
+                    error.memory.lower, error.memory.upper);
 }
 
 }  // namespace metastable::analysis

@@ -1,5 +1,5 @@
 #pragma once
-// What reading landings from a table does to the expected steps.
+// What the expected steps owe to landings that are read from a table, and to states that do not tell all.
 
 #include <span>
 
@@ -7,15 +7,23 @@
 
 namespace metastable::analysis {
 
-/// Relative error of the expected steps from the launch, 0 where the map's landings are exact: to first order the
-/// visits to every state times the mean difference in expected steps between the true landing and the one read
-/// (AnyReturnMap::landing_defect), by weighted draws; two standard errors of it over four randomisations are added.
+/// Both relative to the expected steps from the launch; 0 where the map has no such defect.
+struct LandingError {
+  double table = 0;  ///< at least 0: by how much reading landings may move them
+  Estimate memory;   ///< by how much they change by what the state leaves out
+};
+
+/// To first order the visits to every state times the mean difference in expected steps: between the true landing and
+/// the one read (AnyReturnMap::landing_defect), and between the landing after it with and without what the state leaves
+/// out (AnyReturnMap::memory_defect). By draws in eight randomisations: Student's 95 % half-width is part of
+/// `table`, and of the interval of `memory`, which is wider by its square for the second order.
 /// Cost: some thousand landings followed.
 /// @param states as in summarize()
-double landing_error(const Problem& problem, int phases, std::span<const double> states,
-                     const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options);
+LandingError landing_error(const Problem& problem, int phases, std::span<const double> states,
+                           const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options);
 
-/// Takes it into the intervals of the expected steps and of the failure rate, and into the status.
-void add_landing_error(Metastability& result, double error, double tolerance);
+/// Takes them into the intervals of the expected steps and of the failure rate, and into the status. The values stay
+/// the chain's; the intervals reach to what `memory` makes of them.
+void add_landing_error(Metastability& result, const LandingError& error, double tolerance);
 
 }  // namespace metastable::analysis

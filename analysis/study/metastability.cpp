@@ -335,7 +335,7 @@ void check_setting(const Setting& setting, Method method) {
 Metastability study(const Setting& setting, const StudyOptions& options) {
   check_setting(setting, options.method);
   // A table of landings takes part of the time.
-  const bool by_table = setting.law == dynamics::Law::settled && !setting.direct && options.progress;
+  const bool by_table = setting.law == dynamics::Law::settled && !options.direct && options.progress;
   constexpr double of_table = 0.3;
   StudyOptions own = options;
   std::function<void(double)> table_progress;
@@ -345,7 +345,7 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
       options.progress(of_table + (1 - of_table) * share, what);
     };
   }
-  Metastability result = study(setting.problem(options.threads, table_progress), own);
+  Metastability result = study(setting.problem({options.direct, options.threads, table_progress}), own);
   result.setting = setting;
   return result;
 }

@@ -44,8 +44,9 @@ struct StudyOptions {
   std::size_t samples = 0;  ///< draws per cell and replicate, 16 .. 2^24; 0: raised until the tolerance is met
   double tolerance = 0.01;  ///< wanted relative half-width of the 95 % interval of the expected steps, (0, 1)
   std::uint64_t seed = 1;
-  int threads = 0;     ///< 0: all cores. Results do not depend on it
-  int replicates = 8;  ///< independent randomisations behind the interval, 2 .. 64
+  int threads = 0;      ///< 0: all cores. Results do not depend on it
+  int replicates = 8;   ///< independent randomisations behind the interval, 2 .. 64
+  bool direct = false;  ///< of a setting under `settled`: every landing followed (LandingOptions)
   markov::Sequence sequence = markov::Sequence::sobol;
   markov::Weighting weighting = markov::Weighting::weighted;
   double tail = 1e-30;  ///< tail probability the weighted draws reach; deepened by itself where failures are that rare
@@ -104,6 +105,7 @@ struct StepsToRest {
   double discretization_error = 0;     ///< relative, of from_start: a third of the extrapolation's last change
   double sampling_error = 0;           ///< relative 95 % half-width of from_start over replicates
   double landing_error = 0;            ///< relative, where landings are read from a table (landing_error.h)
+  Estimate memory;                     ///< relative change of from_start by what states leave out (landing_error.h)
   double solver_disagreement = 0;      ///< relative difference of the launch's expected steps, elimination against KLU
   std::vector<double> replicate_logs;  ///< ln(expected steps from the launch) of each replicate, extrapolated
   Accumulated distribution;            ///< from the launch, the last step counted

@@ -39,8 +39,7 @@ dynamics::ContactNoise Setting::noise() const {
 }
 
 dynamics::SettledMotion Setting::motion() const {
-  return dynamics::SettledMotion(
-      dynamics::settled_wheel(wheel, slope_deg * std::numbers::pi / 180.0, wheel.tip_radius));
+  return dynamics::SettledMotion(dynamics::settled_wheel(wheel, slope_deg * std::numbers::pi / 180.0));
 }
 
 dynamics::TruncatedNormal Setting::launch() const {
@@ -96,7 +95,7 @@ void Setting::validate() const {
         fmt::format("first landing leg: {} is outside 0..{}", first_landing_leg, wheel.legs() - 1));
 }
 
-Problem Setting::problem(int threads, const std::function<void(double)>& progress) const {
+Problem Setting::problem(const LandingOptions& landings) const {
   validate();
   const dynamics::TruncatedNormal speed = launch();
   const auto state = [speed](double score) {
@@ -113,11 +112,9 @@ Problem Setting::problem(int threads, const std::function<void(double)>& progres
   };
   if (law != dynamics::Law::settled) return problem_of(map());
   dynamics::SettledMapOptions options;
-  options.direct = direct;
-  options.progress = progress;
-  options.executor = [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
-    markov::parallel_for(count, threads, work);
-  };
+  options.direct = landings.direct;
+  options.progress = landings.progress;
+  options.executor = markov::on_threads(landings.threads);
   return problem_of(dynamics::SettledReturnMap(wheel, slope_deg * std::numbers::pi / 180.0, noise(),
                                                speed.at_score(launch_reach), std::move(options)));
 }
@@ -139,7 +136,6 @@ std::string Setting::describe() const {
   if (law == dynamics::Law::coulomb && rebound_lost != 0) law_text += fmt::format(", rebound lost {}", rebound_lost);
   std::string text = fmt::format("{} deg, {}, {}, {}, omega_0 ~ N({}, {}^2) rad/s", slope_deg, legs, law_text, contact,
                                  initial_speed.mean, initial_speed.sd);
-  if (direct) text += ", every landing followed";
   // The rest where it is not the paper's.
   const Setting paper;
   if (wheel.hub_mass != paper.wheel.hub_mass) text += fmt::format(", M = {} kg", wheel.hub_mass);

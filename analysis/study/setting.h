@@ -18,6 +18,13 @@ struct Spread {
   double sd = 0;
 };
 
+/// Where landings under `settled` come from.
+struct LandingOptions {
+  bool direct = false;  ///< every landing followed instead of read from a table, hundreds of times slower
+  int threads = 0;      ///< of the table, 0: all cores
+  std::function<void(double share)> progress = {};  ///< of the table, from any thread
+};
+
 /// Everything that fixes the chain of one wheel on one ramp.
 struct Setting {
   dynamics::Wheel wheel;
@@ -31,7 +38,6 @@ struct Setting {
   std::vector<dynamics::Contact> pairs;  ///< not empty: an empirical list instead of the normals
   Spread initial_speed{7.35, 0.19};      ///< omega_0 just before collision 1 [rad/s], truncated at 0
   int first_landing_leg = 0;
-  bool direct = false;  ///< `settled`: every landing followed instead of read from a table, hundreds of times slower
 
   dynamics::ContactNoise noise() const;
   dynamics::TruncatedNormal launch() const;
@@ -45,8 +51,7 @@ struct Setting {
   void validate() const;
   /// The generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on the
   /// ramp. Under `settled` a table of landings is built, at most once for wheel and slope (SettledMap::of).
-  /// @param threads of the table, 0: all cores; @param progress of the table: its share done, from any thread
-  Problem problem(int threads = 0, const std::function<void(double)>& progress = {}) const;
+  Problem problem(const LandingOptions& landings = {}) const;
   /// One line that names every quantity, for captions and provenance.
   std::string describe() const;
 };

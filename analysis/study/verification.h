@@ -42,11 +42,12 @@ Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes 
 
 /// The table that `settled` is read from, held against landings that are followed (SettledMapError).
 struct VerifiedTable {
+  std::string wheel;
   double slope_deg = 0;
   dynamics::SettledMapError error;
 };
-/// Of the paper's wheel with J = 0.0025 kg m^2 on a slope [deg].
-VerifiedTable verify_table(double slope_deg, int threads);
+/// Of the paper's wheel with J = 0.0025 kg m^2 at 7.02 deg, and of one with equal legs, an eighth of the work, at 9.59.
+std::vector<VerifiedTable> verify_tables(int threads);
 
 /// How often the sampled study's 95 % interval holds a value.
 struct Coverage {

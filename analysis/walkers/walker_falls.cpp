@@ -4,7 +4,10 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <stdexcept>
 
+#include "markov/mesh/batch_map.h"
 #include "markov/mesh/mesh.h"
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/noise_frame.h"
@@ -17,36 +20,35 @@ namespace {
 
 constexpr int steps_of_a_fall = 6;
 constexpr double node_of_no_weight = 1e-6;  // share of a step's falls
-constexpr double slope_spacing = 0.2, slope_reach = 8.5;
-constexpr std::uint64_t offsets_of_slopes = 0x6000;
+constexpr double score_spacing = 0.2, score_spacing_of_several = 0.6, score_reach = 8.5;
+constexpr std::uint64_t offsets_of_scores = 0x6000;
 
-/// Slopes tried from a node, where they lead, and what they are worth as the slope of step k before the fall.
+/// Scores tried from a node, where they lead, and what they are worth as the noise of step k before the fall.
 struct Tried {
   std::vector<double> score, next;
   std::vector<std::uint8_t> falls;
-  std::vector<std::vector<double>> weight;  ///< [k][score]
+  std::vector<std::vector<double>> weight;  ///< [k][row of score]
 };
 
 class Falls {
  public:
-  Falls(const WalkerSetting& setting, const markov::MeshOptions& options, int threads)
-      : setting_(setting),
-        batch_(batch_map(setting.map())),
+  Falls(const markov::BatchMap& map, std::span<const double> start, const std::vector<NamedNoise>& noises,
+        const markov::MeshOptions& options, int threads)
+      : map_(map),
+        noises_(noises),
         threads_(threads),
-        lattice_(1, slope_spacing, slope_reach) {
-    const std::vector<double> start =
-        gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
-    const auto frames = markov::noise_frames(batch_, start);
-    frame_ = frames.front();
-    mesh_.emplace(batch_, frames, start, options);
-    passage_ = markov::mesh_passage(*mesh_, start);
-    for (std::size_t i = 0; i < mesh_->size(); ++i) state_.push_back(mesh_->state(i));
-    const markov::Chain chain = mesh_->chain();
+        lattice_(map.scores, map.scores == 1 ? score_spacing : score_spacing_of_several, score_reach),
+        frames_(markov::noise_frames(map, start)),
+        mesh_(map, frames_, start, options),
+        passage_(markov::mesh_passage(mesh_, start)) {
+    const markov::Chain chain = mesh_.chain();
     last_ = markov::last_steps(chain, passage_.visits, steps_of_a_fall);
     std::vector<std::uint8_t> near_gait;
-    for (std::size_t i = 0; i < mesh_->size(); ++i) {
+    for (std::size_t i = 0; i < mesh_.size(); ++i) {
+      state_.push_back(mesh_.state(i));
+      phase_.push_back(mesh_.phase(i));
       double square = 0;
-      for (const double u : place(state_[i])) square += u * u;
+      for (const double u : place(phase_[i], state_[i])) square += u * u;
       near_gait.push_back(square <= 1);
     }
     bound_ = markov::passage_to(chain, near_gait).fail;
@@ -54,27 +56,33 @@ class Falls {
 
   WalkerFalls tell() {
     WalkerFalls falls;
-    falls.moments.state_names = setting_.map().names();
-    falls.moments.noise_names = {"slope [deg]"};
-    falls.moments.by_phase = {1};
-    tried_.resize(mesh_->size());
-    markov::parallel_for(mesh_->size(), threads_, [&](std::size_t i) {
-      if (matters(i)) tried_[i] = slopes_from(i);
+    falls.moments.state_names = map_.names;
+    for (std::size_t k = falls.moments.state_names.size(); k < static_cast<std::size_t>(map_.dimension); ++k)
+      falls.moments.state_names.push_back("x" + std::to_string(k + 1));
+    for (const NamedNoise& noise : noises_) falls.moments.noise_names.push_back(noise.name);
+    falls.moments.by_phase.assign(static_cast<std::size_t>(map_.phases), 0.0);
+    tried_.resize(mesh_.size());
+    markov::parallel_for(mesh_.size(), threads_, [&](std::size_t i) {
+      if (matters(i)) tried_[i] = noise_from(i);
     });
     for (std::size_t k = 0; k < last_.share.size(); ++k) falls.moments.last.push_back(profile(last_.share[k], k));
     falls.moments.regime = profile(passage_.distribution, {});
     for (std::size_t k = last_.likeliest.size(); k-- > 0;) falls.moments.likeliest.push_back(path_step(k));
-    for (std::size_t i = 0; i < mesh_->size(); ++i)
-      falls.section.push_back({state_[i], place(state_[i]), passage_.distribution[i], last_.share[0][i], bound_[i]});
+    for (std::size_t i = 0; i < mesh_.size(); ++i) {
+      falls.moments.by_phase[static_cast<std::size_t>(phase_[i])] += last_.share[0][i];
+      falls.section.push_back(
+          {state_[i], place(phase_[i], state_[i]), passage_.distribution[i], last_.share[0][i], bound_[i]});
+    }
     return falls;
   }
 
  private:
-  std::vector<double> place(std::span<const double> state) const {
+  std::vector<double> place(int phase, std::span<const double> state) const {
+    const markov::NoiseFrame& frame = frames_[static_cast<std::size_t>(phase)];
     const std::size_t d = state.size();
     std::vector<double> u(d, 0.0);
     for (std::size_t k = 0; k < d; ++k)
-      for (std::size_t i = 0; i < d; ++i) u[k] += frame_.inverse[k * d + i] * (state[i] - frame_.centre[i]);
+      for (std::size_t i = 0; i < d; ++i) u[k] += frame.inverse[k * d + i] * (state[i] - frame.centre[i]);
     return u;
   }
 
@@ -84,25 +92,30 @@ class Falls {
                        [&](const auto& share) { return share[i] > node_of_no_weight; });
   }
 
-  Tried slopes_from(std::size_t i) const {
-    const std::size_t m = lattice_.size(), d = state_[i].size();
-    Tried tried{std::vector<double>(m), std::vector<double>(m * d), std::vector<std::uint8_t>(m, 0), {}};
-    std::vector<double> weight(m), states;
-    const std::array<double, 1> offset{markov::uniforms(1, offsets_of_slopes, i, 0)[0]};
+  Tried noise_from(std::size_t i) const {
+    const std::size_t m = lattice_.size(), d = state_[i].size(), scores = noises_.size();
+    Tried tried{std::vector<double>(m * scores), std::vector<double>(m * d), std::vector<std::uint8_t>(m, 0), {}};
+    std::vector<double> weight(m), states, offset;
+    for (std::size_t k = 0; k < scores; k += 4) {
+      const auto u = markov::uniforms(1, offsets_of_scores + k / 4, i, 0);
+      offset.insert(offset.end(), u.begin(),
+                    u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, scores - k)));
+    }
     lattice_.place(offset, tried.score, weight);
     for (std::size_t n = 0; n < m; ++n) states.insert(states.end(), state_[i].begin(), state_[i].end());
-    if (batch_.inside(0, state_[i]))
-      markov::checked_step(batch_, 0, states, tried.score, tried.next, tried.falls);
+    if (!map_.inside || map_.inside(phase_[i], state_[i]))
+      markov::checked_step(map_, phase_[i], states, tried.score, tried.next, tried.falls);
     else
       std::fill(tried.falls.begin(), tried.falls.end(), 1);
     tried.weight.assign(last_.share.size(), std::vector<double>(m, 0.0));
+    const int landing_phase = (phase_[i] + 1) % map_.phases;
     for (std::size_t n = 0; n < m; ++n) {
       const double met = passage_.visits[i] * weight[n];
       if (tried.falls[n]) {
         tried.weight[0][n] = met;
         continue;
       }
-      const auto corners = mesh_->corners(0, std::span(tried.next).subspan(n * d, d));
+      const auto corners = mesh_.corners(landing_phase, std::span(tried.next).subspan(n * d, d));
       for (std::size_t c = 0; c < static_cast<std::size_t>(corners.count); ++c)
         for (std::size_t k = 1; k < last_.share.size(); ++k)
           tried.weight[k][n] += met * corners.weight[c] * last_.fails_in[k - 1][corners.node[c]];
@@ -110,7 +123,7 @@ class Falls {
     return tried;
   }
 
-  double slope(double score) const { return setting_.slope_deg + setting_.slope_sd_deg * score; }
+  double noise(std::size_t which, double score) const { return noises_[which].mean + noises_[which].sd * score; }
 
   /// Of step k before the fall, or of all steps.
   StepProfile profile(const std::vector<double>& share, std::optional<std::size_t> k) const {
@@ -126,46 +139,57 @@ class Falls {
       for (const std::vector<double>& state : state_) values.push_back(state[number]);
       told.state.push_back(middle_90(values, share));
     }
-    std::vector<double> slopes, weights;
-    for (std::size_t i = 0; k && i < tried_.size(); ++i)
-      for (std::size_t n = 0; n < tried_[i].score.size(); ++n) {
-        if (!(tried_[i].weight[*k][n] > 0)) continue;
-        slopes.push_back(slope(tried_[i].score[n]));
-        weights.push_back(tried_[i].weight[*k][n]);
-      }
-    constexpr double normal_90 = 1.6448536269514722;
-    told.noise.push_back(k ? middle_90(slopes, weights) : Estimate{slope(0), slope(-normal_90), slope(normal_90)});
+    for (std::size_t which = 0; which < noises_.size(); ++which) told.noise.push_back(noise_profile(which, k));
     return told;
   }
 
+  Estimate noise_profile(std::size_t which, std::optional<std::size_t> k) const {
+    constexpr double normal_90 = 1.6448536269514722;
+    if (!k) return {noise(which, 0), noise(which, -normal_90), noise(which, normal_90)};
+    std::vector<double> values, weights;
+    for (const Tried& tried : tried_)
+      for (std::size_t n = 0; n < tried.falls.size(); ++n) {
+        if (!(tried.weight[*k][n] > 0)) continue;
+        values.push_back(noise(which, tried.score[n * noises_.size() + which]));
+        weights.push_back(tried.weight[*k][n]);
+      }
+    return middle_90(values, weights);
+  }
+
   PathStep path_step(std::size_t k) const {
-    const std::size_t i = last_.likeliest[k], d = state_[i].size();
-    PathStep step{0, state_[i], {}};
+    const std::size_t i = last_.likeliest[k], d = state_[i].size(), scores = noises_.size();
+    PathStep step{phase_[i], state_[i], {}};
     const Tried& tried = tried_[i];
     double least = std::numeric_limits<double>::infinity();
-    for (std::size_t n = 0; n < tried.score.size(); ++n) {
+    for (std::size_t n = 0; n < tried.falls.size(); ++n) {
       if ((tried.falls[n] != 0) != (k == 0)) continue;
-      double far = std::abs(tried.score[n]);
-      if (k > 0) {
-        far = 0;
-        const auto at = place(std::span(tried.next).subspan(n * d, d)), to = place(state_[last_.likeliest[k - 1]]);
+      const std::span<const double> score = std::span(tried.score).subspan(n * scores, scores);
+      double far = 0;
+      if (k == 0) {
+        for (const double z : score) far += z * z;
+      } else {
+        const std::size_t next = last_.likeliest[k - 1];
+        const auto at = place(phase_[next], std::span(tried.next).subspan(n * d, d)),
+                   to = place(phase_[next], state_[next]);
         for (std::size_t axis = 0; axis < d; ++axis) far += (at[axis] - to[axis]) * (at[axis] - to[axis]);
       }
       if (far >= least) continue;
       least = far;
-      step.noise = {slope(tried.score[n])};
+      step.noise.clear();
+      for (std::size_t which = 0; which < scores; ++which) step.noise.push_back(noise(which, score[which]));
     }
     return step;
   }
 
-  WalkerSetting setting_;
-  markov::BatchMap batch_;
+  const markov::BatchMap& map_;
+  const std::vector<NamedNoise>& noises_;
   int threads_;
   markov::ScoreLattice lattice_;
-  markov::NoiseFrame frame_;
-  std::optional<markov::Mesh> mesh_;
+  std::vector<markov::NoiseFrame> frames_;
+  markov::Mesh mesh_;
   markov::MeshPassage passage_;
   std::vector<std::vector<double>> state_;
+  std::vector<int> phase_;
   std::vector<double> bound_;
   markov::LastSteps last_;
   std::vector<Tried> tried_;
@@ -173,14 +197,26 @@ class Falls {
 
 }  // namespace
 
-WalkerFalls how_it_falls(const WalkerSetting& setting, const WalkerStudy& study,
+WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> start,
+                         const std::vector<NamedNoise>& noises, const markov::MeshStudy& study,
                          const markov::MeshStudyOptions& options) {
-  const double spacing = study.passage.sizes.at(1).spacing;
+  if (noises.size() != static_cast<std::size_t>(map.scores))
+    throw std::invalid_argument("how it falls: one noise for each score expected");
+  const double spacing = study.sizes.at(1).spacing;
   WalkerFalls falls =
-      Falls(setting, {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes}, options.threads)
+      Falls(map, start, noises, {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes},
+            options.threads)
           .tell();
   falls.spacing = spacing;
   return falls;
+}
+
+WalkerFalls how_it_falls(const WalkerSetting& setting, const WalkerStudy& study,
+                         const markov::MeshStudyOptions& options) {
+  const dynamics::WalkerMap map = setting.map();
+  const dynamics::Gait gait = dynamics::find_gait(map.walker(), setting.slope_deg * degree);
+  return how_it_falls(batch_map(map), gait_state(setting, gait),
+                      {{"slope [deg]", setting.slope_deg, setting.slope_sd_deg}}, study.passage, options);
 }
 
 }  // namespace metastable::analysis

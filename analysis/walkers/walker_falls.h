@@ -1,6 +1,8 @@
 #pragma once
 // How a walker falls: its last steps and the slopes it meets in them, and where in the section it is bound to fall.
 
+#include <span>
+#include <string>
 #include <vector>
 
 #include "analysis/statistics/last_moments.h"
@@ -23,10 +25,23 @@ struct WalkerFalls {
   double spacing = 0;  ///< of the nodes [stationary sds]
 };
 
-/// The last six steps of a walker that starts in its gait, on the middle one of the study's meshes: states by nodes,
-/// slopes by a lattice of scores 0.2 apart. The most likely path goes through nodes; its slopes are those that lead
-/// nearest to the next node, and the one nearest to the mean that fails.
-/// @throws as study_walker
+/// A noise by its name and unit, mean + sd z at the normal score z.
+struct NamedNoise {
+  std::string name;
+  double mean = 0, sd = 1;
+};
+
+/// The last six steps of what starts at `start` (a state at phase 0), on the middle one of the study's meshes: states
+/// by nodes, noise by a lattice of scores 0.2 apart (of several scores, 0.6). The most likely path goes through nodes;
+/// its noise is that which leads nearest to the next node, and the least that fails. "The gait" is the noise-free
+/// orbit.
+/// @param noises  one for each score
+/// @throws std::invalid_argument for another number of noises; as markov::Mesh and markov::mesh_passage
+WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> start,
+                         const std::vector<NamedNoise>& noises, const markov::MeshStudy& study,
+                         const markov::MeshStudyOptions& options);
+
+/// The same for a walker that starts in its gait. @throws as study_walker
 WalkerFalls how_it_falls(const WalkerSetting& setting, const WalkerStudy& study,
                          const markov::MeshStudyOptions& options);
 

@@ -30,6 +30,8 @@ struct WalkerSetting {
 
 /// "simplest", "compass"
 const char* walker_name(Walker walker);
+/// The slope of the paper that it comes from: 0.009 rad, 3 deg.
+double walker_slope_deg(Walker walker);
 /// "fresh", "facets"
 const char* terrain_name(dynamics::Terrain terrain);
 /// @throws std::invalid_argument for a name that is none of "simplest", "compass"; of "fresh", "facets"

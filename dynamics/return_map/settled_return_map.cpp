@@ -51,7 +51,7 @@ SettledReturnMap::SettledReturnMap(const Wheel& wheel, double slope, ContactNois
                                    SettledMapOptions options)
     : geometry_(wheel, slope, Law::settled, std::move(noise)) {
   options = widened(std::move(options), highest_speed);
-  landings_ = SettledMap::of(settled_wheel(wheel, slope, wheel.tip_radius), options);
+  landings_ = SettledMap::of(settled_wheel(wheel, slope), options);
   highest_state_ = landings_->range().omega_high * landings_->range().omega_high;
   for (int p = 0; p < phases(); ++p) advance_.push_back(landings_->motion().foot(p).pace() + mean_slide(p));
 }
@@ -318,6 +318,62 @@ std::optional<double> SettledReturnMap::landing_defect(double state, int phase, 
   const TruncatedNormal& friction = noise().friction();
   const double between = (friction.cdf(read) - friction.cdf(followed)) * f(state_interval(phase + 1).first);
   return contact.friction >= low && contact.friction < high ? between : between + difference();
+}
+
+double SettledReturnMap::worth(int phase, const Landing& landing, const std::function<double(double)>& f) const {
+  if (landing.end == LandingEnd::rest || landing.end == LandingEnd::given_up) return 0;
+  return f(arrival(phase, {landing.carried_squared, landing.displacement, false}));
+}
+
+// mu_r of the landing that a rolling wheel is about to make.
+double SettledReturnMap::resting_friction(const SettledRoll& roll, double restitution, double guess) const {
+  const auto rests_at = [&](double mu) {
+    SettledRoll one = roll;
+    one.set_contact({restitution, mu});
+    const LandingEnd end = one.land().end;
+    return end == LandingEnd::rest || end == LandingEnd::given_up;
+  };
+  constexpr double first_step = 1e-4, widest = 2, width = 1e-6;
+  double step = first_step, low = guess, high = guess;
+  if (rests_at(guess)) {
+    do {
+      if (high > widest) return std::numeric_limits<double>::infinity();
+      low = high, high += step, step *= 3;
+    } while (rests_at(high));
+  } else {
+    do {
+      if (low <= 0) return 0;
+      high = low, low = std::max(0.0, low - step), step *= 3;
+    } while (!rests_at(low));
+  }
+  while (high - low > width) {
+    const double middle = 0.5 * (low + high);
+    (rests_at(middle) ? low : high) = middle;
+  }
+  return high;
+}
+
+std::optional<double> SettledReturnMap::memory_defect(double state, int phase, std::span<const double> score,
+                                                      const std::function<double(double)>& f) const {
+  const std::size_t dimension = score.size() / 2;
+  const Contact contact = noise().draw(score.first(dimension)), second = noise().draw(score.subspan(dimension));
+  const SettledMotion& motion = landings_->motion();
+  SettledRoll roll(motion, phase, std::sqrt(state), contact, contact);
+  const Step step = roll.step();
+  if (!step.touched || (step.landing.end == LandingEnd::settled && !step.landing.slips_late)) return 0;
+  const int next = (phase + 1) % phases();
+  const double omega = std::sqrt(arrival(phase, {step.landing.carried_squared, 0, false}));
+  SettledRoll on = roll;
+  on.set_contact(second);
+  const double moving = worth(next, on.land(), f), standing = worth(next, motion.land(next, omega, second), f);
+  if (noise().is_empirical() || noise().correlation() != 0 || noise().friction().constant()) return moving - standing;
+  const double stands = landings_->followed_resting_friction(next, omega, second.restitution,
+                                                             resting_friction(next, omega, second.restitution));
+  const double moves = resting_friction(roll, second.restitution, std::min(stands, landings_->sticking_friction(next)));
+  const TruncatedNormal& friction = noise().friction();
+  const auto resting = [&](double mu) { return std::isfinite(mu) ? friction.cdf(mu) : 1.0; };
+  const double between = (resting(stands) - resting(moves)) * f(state_interval(next + 1).first);
+  return between + (moving > 0 && standing > 0 ? moving - standing : 0);
 }
 
 std::vector<std::string> SettledReturnMap::assumptions() const { return {"foot lifts", "foot unsettled"}; }

@@ -53,6 +53,11 @@ class SettledReturnMap {
   /// table does to E f. Nothing where landings are followed anyway.
   std::optional<double> landing_defect(double state, int phase, std::span<const double> score,
                                        const std::function<double(double next)>& f) const;
+  /// What the motion of a foot that has not settled when the next leg touches does to f after the next landing, f(rest)
+  /// being 0; 0 where the foot stands. The scores are those of both landings. Of what lies between the frictions below
+  /// which the wheel rests, on a moving foot and on a standing one, nothing is left to chance.
+  std::optional<double> memory_defect(double state, int phase, std::span<const double> score,
+                                      const std::function<double(double after_next)>& f) const;
   /// "foot lifts" as under the other laws, just before the collision; "foot unsettled": the next leg touches while the
   /// landed foot still hops or slides.
   std::vector<std::string> assumptions() const;
@@ -86,6 +91,8 @@ class SettledReturnMap {
   double resting_friction(int phase, double omega, double eta) const;
   double next_state(int phase, double omega, const Contact& contact) const;  // rest_landing's value at rest
   double arrival(int phase, const MappedLanding& landed) const;
+  double worth(int phase, const Landing& landing, const std::function<double(double)>& f) const;
+  double resting_friction(const SettledRoll& roll, double restitution, double guess) const;
   std::vector<EtaPoint> restitutions(double omega, int phase) const;
   double mean_slide(int phase) const;
 

@@ -7,10 +7,10 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "dynamics/wheel/contact_law.h"
+
 namespace metastable::dynamics {
 namespace {
-
-constexpr double assumed_gyration = 0.05;  // [m], as under `coulomb`
 
 // Angle past the normal of the leg `first` with both it and `second` on the plane, `between` ahead of it [rad].
 double both_down(double first, double second, double between) {
@@ -57,23 +57,15 @@ void SettledWheel::validate() const {
   require(max_events > 0, "max_events", max_events, "[1, inf)");
 }
 
-SettledWheel settled_wheel(const Wheel& wheel, double slope, double tip_radius) {
+SettledWheel settled_wheel(const Wheel& wheel, double slope) {
   wheel.validate();
   SettledWheel settled;
   settled.leg_length = wheel.leg_length;
   settled.mass = wheel.hub_mass;
   settled.gravity = wheel.gravity;
   settled.slope_rad = slope;
-  settled.tip_radius = tip_radius;
-  settled.radius_of_gyration = wheel.radius_of_gyration.value_or(assumed_gyration);
-  if (!wheel.radius_of_gyration && wheel.inertia) {
-    const double mean = wheel.mean_leg_length();
-    const double squared = *wheel.inertia / wheel.hub_mass - mean * mean;
-    if (!(squared > 0))
-      throw std::invalid_argument(fmt::format("settled: inertia: {} kg m^2 is not above M (mean L)^2 = {:.6g} kg m^2",
-                                              *wheel.inertia, wheel.hub_mass * mean * mean));
-    settled.radius_of_gyration = std::sqrt(squared);
-  }
+  settled.tip_radius = wheel.tip_radius;
+  settled.radius_of_gyration = contact_model(wheel, Law::settled).radius_of_gyration;
   settled.validate();
   return settled;
 }

@@ -38,9 +38,9 @@ struct SettledWheel {
   void validate() const;
 };
 
-/// The wheel as the other laws have it: r_g as given, else from its inertia about the mean leg, else 0.05 m as under
-/// `coulomb`. @param slope gamma [rad]; @param tip_radius r [m] @throws std::invalid_argument as validate()
-SettledWheel settled_wheel(const Wheel& wheel, double slope, double tip_radius = 0);
+/// The wheel as the other laws have it, r_g as of contact_model(). @param slope gamma [rad]
+/// @throws std::invalid_argument as validate() and contact_model()
+SettledWheel settled_wheel(const Wheel& wheel, double slope);
 
 /// A foot that stands, seen along its leg's angle a past the normal of the plane [rad]; energies per unit mass.
 class StandingFoot {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace metastable::dynamics {
@@ -42,6 +43,12 @@ std::string gyration_objection(const Wheel& wheel) {
   const double most = most_gyration * wheel.mean_leg_length();
   if (!wheel.radius_of_gyration || *wheel.radius_of_gyration <= most) return "";
   return fmt::format("{} m is outside [0, {:.4g}] m ({} mean legs)", *wheel.radius_of_gyration, most, most_gyration);
+}
+
+std::string tip_objection(const Wheel& wheel) {
+  const double most = *std::min_element(wheel.leg_length.begin(), wheel.leg_length.end()) / 20;
+  if (wheel.tip_radius >= 0 && wheel.tip_radius <= most) return "";
+  return fmt::format("{} m is outside [0, {:.6g}] m (a twentieth of the shortest leg)", wheel.tip_radius, most);
 }
 
 }  // namespace metastable::dynamics

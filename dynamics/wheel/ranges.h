@@ -24,7 +24,7 @@ inline constexpr Range leg_length{.low = 0.001, .high = 100};       ///< [m]
 inline constexpr Range mass{.low = 1e-6, .high = 1e6};              ///< of the hub or the contact [kg]
 inline constexpr Range inertia{.low = 0, .low_open = true};         ///< about a foot [kg m^2]; and inertia_objection()
 inline constexpr Range radius_of_gyration{.low = 0, .high = 1000};  ///< [m]; and gyration_objection()
-inline constexpr Range tip_radius{.low = 0, .high = 5};             ///< [m]; and a twentieth of the shortest leg
+inline constexpr Range tip_radius{.low = 0, .high = 5};             ///< [m]; and tip_objection()
 inline constexpr Range ramp_stiffness{.low = 1, .high = 1e12};      ///< [N/m]
 inline constexpr Range gravity{.low = 0.001, .high = 1000};         ///< [m/s^2]
 inline constexpr Range ramp_length{.low = 0.001, .high = 100000};   ///< [m]
@@ -51,5 +51,7 @@ Range slope_range(int legs);
 std::string inertia_objection(const Wheel& wheel);
 /// Likewise the radius of gyration: at most three mean legs.
 std::string gyration_objection(const Wheel& wheel);
+/// Likewise the tips' radius: in [0, shortest leg / 20].
+std::string tip_objection(const Wheel& wheel);
 
 }  // namespace metastable::dynamics

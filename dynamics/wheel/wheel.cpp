@@ -8,6 +8,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "dynamics/wheel/ranges.h"
+
 namespace metastable::dynamics {
 namespace {
 
@@ -42,10 +44,8 @@ void Wheel::validate() const {
   require_positive("gravity", gravity, "m/s^2");
   if (radius_of_gyration && !(*radius_of_gyration >= 0 && std::isfinite(*radius_of_gyration)))
     throw std::invalid_argument(fmt::format("radius_of_gyration: {} m is outside [0, inf)", *radius_of_gyration));
-  const double most_tip = *std::min_element(leg_length.begin(), leg_length.end()) / 20;
-  if (!(tip_radius >= 0 && tip_radius <= most_tip))
-    throw std::invalid_argument(fmt::format(
-        "tip_radius: {} m is outside [0, {:.6g}] m (a twentieth of the shortest leg)", tip_radius, most_tip));
+  if (const std::string objection = tip_objection(*this); !objection.empty())
+    throw std::invalid_argument("tip_radius: " + objection);
 }
 
 Triangle triangle(double first, double second, double leg_angle) {

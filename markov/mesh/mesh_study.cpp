@@ -252,4 +252,8 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
   return Run(map, start, options).run();
 }
 
+void require_agreement(const MeshStudy& study, const std::string& what) {
+  if (!study.disagreement.empty()) throw Disagreement(fmt::format("{}: {}", what, study.disagreement));
+}
+
 }  // namespace metastable::markov

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -69,5 +70,14 @@ struct MeshStudy {
 /// @throws std::length_error before the other meshes are made if they would take more than most_bytes; as Mesh,
 /// noise_frames and mesh_passage do
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options = {});
+
+/// Ways that share little contradict each other: there is no number to give.
+class Disagreement : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+/// @param what  was studied, for the message
+/// @throws Disagreement with MeshStudy::disagreement, unless that is empty
+void require_agreement(const MeshStudy& study, const std::string& what);
 
 }  // namespace metastable::markov

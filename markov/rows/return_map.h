@@ -55,8 +55,8 @@ inline constexpr double rest_landing = -std::numeric_limits<double>::infinity();
 ///   landing(state, phase, noise)   the next state, or nothing when the system comes to rest
 ///
 /// Members used when present (see AnyReturnMap for their meaning): rest_probability, landing_range,
-/// landing_density, landing_points, landing_defect, states_of_extremes, tabulate, duration, advance, assumptions,
-/// violates.
+/// landing_density, landing_points, landing_defect, memory_defect, states_of_extremes, tabulate, duration, advance,
+/// assumptions, violates.
 template <class M>
 concept ReturnMap = requires(const M& map, double state, int phase, std::span<const double> noise) {
   { map.state_interval(phase) } -> std::convertible_to<std::pair<double, double>>;
@@ -122,6 +122,12 @@ class AnyReturnMap {
                                        const std::function<double(double next)>& f) const {
     return self_->landing_defect(state, phase, noise, f);
   }
+  /// Where the state does not tell all that the next event depends on: one draw of what the rest does to E[f(state two
+  /// events on)], f(rest) being 0. `noise` holds the scores of both events. Returns nothing if the state tells all.
+  std::optional<double> memory_defect(double state, int phase, std::span<const double> noise,
+                                      const std::function<double(double after_next)>& f) const {
+    return self_->memory_defect(state, phase, noise, f);
+  }
   /// Lists states at `phase`, ascending, with an extreme landing among `next`: expectations of a function that is
   /// not smooth at `next` are not smooth there. The list is empty if the map does not tell.
   std::vector<double> states_of_extremes(int phase, std::span<const double> next) const {
@@ -156,6 +162,8 @@ class AnyReturnMap {
                                                  std::vector<std::pair<double, double>>&) const = 0;
     virtual std::optional<double> landing_defect(double, int, std::span<const double>,
                                                  const std::function<double(double)>&) const = 0;
+    virtual std::optional<double> memory_defect(double, int, std::span<const double>,
+                                                const std::function<double(double)>&) const = 0;
     virtual std::vector<double> states_of_extremes(int, std::span<const double>) const = 0;
     virtual std::unique_ptr<NoiseTable> tabulate(int, std::span<const double>) const = 0;
     virtual std::optional<double> duration(double, int) const = 0;
@@ -240,6 +248,13 @@ class AnyReturnMap {
                                          const std::function<double(double)>& f) const override {
       if constexpr (requires { map.landing_defect(state, phase, noise, f); })
         return map.landing_defect(state, phase, noise, f);
+      else
+        return std::nullopt;
+    }
+    std::optional<double> memory_defect(double state, int phase, std::span<const double> noise,
+                                        const std::function<double(double)>& f) const override {
+      if constexpr (requires { map.memory_defect(state, phase, noise, f); })
+        return map.memory_defect(state, phase, noise, f);
       else
         return std::nullopt;
     }

@@ -35,7 +35,7 @@ std::vector<Command> blind_commands() {
              request.size.pairs = o.count("pairs", 0, 5000);
              request.size.outside = o.count("outside", 0, 5000);
              request.size.left_out_per_effect = o.count("left-out", 0, 1000);
-             request.tool = o.text("tool");
+             if (!o.text("tool").empty()) request.tool = {o.text("tool")};
              request.threads = o.threads();
              request.out = o.text("out");
              request.command = line;

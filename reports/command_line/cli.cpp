@@ -62,8 +62,8 @@ Command steps() {
             request.sensitivities = o.flag("sensitivities");
             request.explain = o.flag("explain");
             request.how_it_fails = o.flag("how-it-fails");
-            request.setting.direct = o.flag("direct");
-            if (request.setting.direct && request.setting.law != dynamics::Law::settled)
+            request.study.direct = o.flag("direct");
+            if (request.study.direct && request.setting.law != dynamics::Law::settled)
               throw std::invalid_argument("--direct: has a meaning under --law settled only");
             request.standard_errors = standard_errors(o, request.setting);
             run_steps(request);
@@ -191,7 +191,8 @@ Command verify() {
 std::vector<ManualCommand> manual_of(const std::vector<CLI::App*>& subcommands) {
   std::vector<ManualCommand> manual;
   for (const CLI::App* sub : subcommands) {
-    ManualCommand& command = manual.emplace_back(ManualCommand{sub->get_name(), sub->get_description(), {}});
+    ManualCommand& command =
+        manual.emplace_back(ManualCommand{sub->get_name(), sub->get_description(), {}, sub->get_footer()});
     for (const CLI::Option* option : sub->get_options()) {
       const bool place = option->get_positional();
       command.options.push_back({place ? option->get_single_name() : "--" + option->get_lnames().front(),
@@ -263,6 +264,7 @@ int parse_and_run(int argc, const char* const* argv) {
   std::deque<std::string> config_files;
   for (const Command& command : all) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
+    sub->footer(command.details);
     options.emplace_back(*sub);
     command.declare(options.back());
     sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")

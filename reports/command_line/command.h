@@ -13,7 +13,11 @@ struct Command {
   std::string name, summary;
   std::function<void(Options&)> declare;
   std::function<void(const Options&, const std::string& command_line)> run;
+  std::string details = {};  ///< below the options in --help and on the manual page
 };
+
+/// import
+Command import_command();
 
 /// blind
 std::vector<Command> blind_commands();

@@ -337,7 +337,8 @@ Command effects() {
 }  // namespace
 
 std::vector<Command> experiment_commands() {
-  return {simulate(), coast_down(), collisions(), describe(), study(), diagnose(), lessons(), effects()};
+  return {simulate(), import_command(), coast_down(), collisions(), describe(),
+          study(),    diagnose(),       lessons(),    effects()};
 }
 
 }  // namespace metastable::reports

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <iterator>
 #include <ranges>
+#include <sstream>
 #include <stdexcept>
 
 namespace metastable::reports {
@@ -170,6 +171,12 @@ std::string manual_page(const std::vector<ManualCommand>& commands, std::string_
     page += "\n" + troff(o.help);
     if (!o.fallback.empty()) page += troff(fmt::format(" (default: {})", o.fallback));
     page += ".\n";
+  }
+  if (!found->details.empty()) {
+    page += ".SH DETAILS\n.nf\n";
+    std::istringstream lines(found->details);
+    for (std::string line; std::getline(lines, line);) page += troff(line) + "\n";
+    page += ".fi\n";
   }
   return page + std::string(exit_codes) + ".SH SEE ALSO\n\\fBmetastable\\fR(1)\n";
 }

@@ -19,6 +19,7 @@ struct ManualOption {
 struct ManualCommand {
   std::string name, summary;
   std::vector<ManualOption> options;
+  std::string details = {};
 };
 
 inline constexpr std::string_view shells[] = {"bash", "zsh", "fish"};

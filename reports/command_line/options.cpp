@@ -30,6 +30,11 @@ void Options::add(const std::string& name, const std::string& value, const std::
   ranges_[name] = range;
 }
 
+void Options::drop_default(const std::string& name) {
+  command_.get_option("--" + name)->default_str("");
+  fallback_.erase(name);
+}
+
 void Options::add_flag(const std::string& name, const std::string& help) {
   std::vector<std::string>& texts = texts_[name];
   command_.add_flag_callback(

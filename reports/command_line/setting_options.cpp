@@ -25,9 +25,11 @@ dynamics::Wheel wheel(const Options& options) {
   if (options.given("inertia")) wheel.inertia = options.number("inertia");
   if (options.given("radius-of-gyration")) wheel.radius_of_gyration = options.number("radius-of-gyration");
   wheel.tip_radius = options.number("tip-radius");
-  wheel.ramp_stiffness = options.number("ramp-stiffness");
-  if (options.given("contact-mass")) wheel.contact_mass = options.number("contact-mass");
-  wheel.gravity = options.number("gravity");
+  if (options.has("gravity")) {
+    wheel.ramp_stiffness = options.number("ramp-stiffness");
+    if (options.given("contact-mass")) wheel.contact_mass = options.number("contact-mass");
+    wheel.gravity = options.number("gravity");
+  }
   wheel.validate();
   for (const auto& [name, objection] : {std::pair("inertia", dynamics::inertia_objection(wheel)),
                                         std::pair("radius-of-gyration", dynamics::gyration_objection(wheel))})
@@ -48,22 +50,10 @@ constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
     {"contact-mass", dynamics::LawQuantity::contact_mass}};
 
 void check_law(const Options& options, dynamics::Law law) {
-  for (const auto& [name, quantity] : of_some_laws) {
-    if (!options.given(name) || dynamics::uses(law, quantity)) continue;
+  refuse_what_law_lacks(law, [&](const std::string& name) {
     // A folder states the wheel's r_g under any law: the effect slip_reversal takes it.
-    if (quantity == dynamics::LawQuantity::radius_of_gyration && options.has("reality")) continue;
-    throw std::invalid_argument(
-        fmt::format("--{}: has a meaning under --law {} only", name,
-                    fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
-  }
-}
-
-// Before the launch is asked for: a slope that no launch can save is named as such.
-void check_slope(const analysis::Setting& setting) {
-  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
-  if (!range.holds(setting.slope_deg))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
-                                            setting.slope_deg, range.text()));
+    return options.has(name) && options.given(name) && !(name == "radius-of-gyration" && options.has("reality"));
+  });
 }
 
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
@@ -78,7 +68,7 @@ void add_slope(Options& options) {
   options.add("slope", "DEG", "7.02", "Ramp slope [deg], from 0.001 to below half the angle between legs");
 }
 
-void add_wheel(Options& options) {
+void add_stated_wheel(Options& options) {
   options.add("legs", "paper|L|L1,L2,...", "paper",
               "Leg lengths [m]: the paper's, one for all, or a list in landing order", range::leg_length);
   options.add("leg-count", "N", "8", "Number of legs when --legs is one length, 3..1000");
@@ -86,23 +76,33 @@ void add_wheel(Options& options) {
   options.add("inertia", "KGM2", "",
               "About the stance foot [kg m^2], from M (mean L)^2 to ten times that (default: M (mean L)^2; under "
               "the other laws plus M r_g^2)");
-  options.add("radius-of-gyration", "M", "",
-              "About the hub [m], at most three mean legs (default: 0.05 under coulomb and settled, 0 under plastic)",
-              range::radius_of_gyration);
+  options.add(
+      "radius-of-gyration", "M", "",
+      "About the hub [m], at most three mean legs, above 0 under settled (coulomb, plastic, settled; default: 0.05, "
+      "0 under plastic)",
+      range::radius_of_gyration);
   options.add("tip-radius", "M", "0", "Of the legs' round tips [m], at most a twentieth of the shortest leg (settled)",
               range::tip_radius);
+}
+
+void add_wheel(Options& options) {
+  add_stated_wheel(options);
   options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m] (published)", range::ramp_stiffness);
   options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (published; default: the hub mass)",
               range::mass);
   options.add("gravity", "M/S2", "9.81", "g [m/s^2]", range::gravity);
 }
 
-void add_contact(Options& options) {
+void add_stated_contact(Options& options) {
   options.add("law", "published|coulomb|plastic|settled", "published", "Contact law");
-  options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops, 0..1 (coulomb)");
   options.add("restitution", "MEAN,SD", "0.4,0.1", "eta, normal truncated to [0, 1]; SD 0 or MEAN alone: constant",
               range::restitution);
   options.add("friction", "MEAN,SD", "0.4,0.1", "mu, normal truncated to [0, inf)", range::friction);
+}
+
+void add_contact(Options& options) {
+  add_stated_contact(options);
+  options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops, 0..1 (coulomb)");
   options.add("correlation", "RHO", "0", "Of the normal scores of eta and mu, (-1, 1)");
   options.add("contact-list", "FILE", "", "CSV 'restitution,friction': draw pairs from a list instead");
 }
@@ -129,17 +129,35 @@ void add_study(Options& options) {
   options.add_threads();
 }
 
+void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std::string&)>& given) {
+  for (const auto& [name, quantity] : of_some_laws)
+    if (given(name) && !dynamics::uses(law, quantity))
+      throw std::invalid_argument(
+          fmt::format("--{}: has a meaning under --law {} only", name,
+                      fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
+}
+
+void check_slope(const analysis::Setting& setting) {
+  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
+  if (!range.holds(setting.slope_deg))
+    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
+                                            setting.slope_deg, range.text()));
+}
+
 // All but slope and launch speed.
 analysis::Setting common_setting(const Options& options) {
   analysis::Setting setting;
   setting.wheel = wheel(options);
   setting.law = dynamics::law_from_name(options.text("law"));
   check_law(options, setting.law);
-  setting.rebound_lost = options.number("rebound-lost");
-  setting.restitution = options.spread("restitution");
-  setting.friction = options.spread("friction");
-  setting.correlation = options.number("correlation");
-  if (options.given("contact-list")) {
+  for (const auto& [name, member] :
+       {std::pair("restitution", &analysis::Setting::restitution), std::pair("friction", &analysis::Setting::friction)})
+    setting.*member = options.text(name).empty() ? analysis::Spread{} : options.spread(name);
+  if (options.has("correlation")) {
+    setting.rebound_lost = options.number("rebound-lost");
+    setting.correlation = options.number("correlation");
+  }
+  if (options.has("contact-list") && options.given("contact-list")) {
     if (options.given("restitution") || options.given("friction") || options.given("correlation"))
       throw std::invalid_argument("--contact-list: excludes --restitution, --friction and --correlation");
     setting.pairs = contact_list(options.text("contact-list"));
@@ -224,7 +242,7 @@ void add_standard_errors(Options& options) {
   options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd");
   options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]");
   options.add("inertia-se", "KGM2", "", "[kg m^2]");
-  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb)");
+  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb, plastic, settled)");
   options.add("ramp-stiffness-se", "N/M", "", "[N/m] (published)");
   options.add("contact-mass-se", "KG", "", "[kg] (published)");
 }

@@ -2,6 +2,7 @@
 // Options that several commands share: wheel, contact, course, study.
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,18 +10,27 @@
 #include "analysis/sensitivity/propagation.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/setting.h"
+#include "dynamics/wheel/contact_law.h"
 #include "reports/command_line/options.h"
 
 namespace metastable::reports {
 
 void add_slope(Options& options);
+/// What experiment.toml can state of a wheel and its contact, and the rest.
+void add_stated_wheel(Options& options);
+void add_stated_contact(Options& options);
 void add_wheel(Options& options);
 void add_contact(Options& options);
 void add_course(Options& options);
 void add_study(Options& options);
 void add_standard_errors(Options& options);
 
-/// What the options above say, all but slope and launch speed.
+/// @param given  by the name of the option
+/// @throws std::invalid_argument for the first one given that has no meaning under the law
+void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std::string&)>& given);
+/// Before the launch is asked for: a slope that no launch can save is named as such. @throws std::invalid_argument
+void check_slope(const analysis::Setting& setting);
+/// What the options above say, as far as the command has them: all but slope and launch speed.
 analysis::Setting common_setting(const Options& options);
 /// `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
 analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);

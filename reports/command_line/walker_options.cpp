@@ -13,7 +13,6 @@ namespace {
 constexpr dynamics::Range walker_slopes{.low = 0, .high = 45, .low_open = true, .high_open = true};
 constexpr dynamics::Range spacings{.low = 0.05, .high = 2};
 constexpr dynamics::Range gigabytes{.low = 0.001, .high = 1e6};
-constexpr double garcia_slope_deg = 0.5156620156177409;  // 0.009 rad
 
 analysis::WalkerSetting base_setting(const Options& o, const std::vector<std::string>& own) {
   static const std::vector<std::string> all{"walker",          "slope",   "slopes", "slope-sd", "terrain", "memory",
@@ -24,7 +23,7 @@ analysis::WalkerSetting base_setting(const Options& o, const std::vector<std::st
   if (!o.given("slope-sd")) throw std::invalid_argument("--slope-sd: is needed with --walker");
   analysis::WalkerSetting setting;
   setting.walker = analysis::walker_from_name(o.text("walker"));
-  setting.slope_deg = setting.walker == analysis::Walker::simplest ? garcia_slope_deg : 3;
+  setting.slope_deg = analysis::walker_slope_deg(setting.walker);
   if (o.given("terrain")) setting.terrain = analysis::terrain_from_name(o.text("terrain"));
   return setting;
 }

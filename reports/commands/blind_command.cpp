@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -152,6 +153,7 @@ FileLock lock_answers(const Places& places) {
 // Last line of the errors beside an answer that the tool failed to give; a tool that was killed with this program, or
 // still runs, leaves none.
 constexpr std::string_view failed_line = "exit code ";
+constexpr int interrupted_code = 128 + SIGINT;
 
 bool tool_failed(const Places& places, int number) {
   return file_text(places.errors(number)).value_or("").find(failed_line) != std::string::npos;
@@ -164,7 +166,7 @@ std::string trimmed(std::string text) {
 
 }  // namespace
 
-void run_blind_make(const BlindRequest& request) {
+BlindMade make_blind(const BlindRequest& request, const CaseProgress& progress) {
   const Places places(request);
   const fs::path inside = fs::weakly_canonical(places.sealed).lexically_relative(fs::weakly_canonical(places.run));
   if (!inside.empty() && *inside.begin() != "..")
@@ -192,10 +194,9 @@ void run_blind_make(const BlindRequest& request) {
   std::vector<std::size_t> open;
   for (std::size_t i = 0; i < plan.size(); ++i)
     if (!made_before(i)) open.push_back(i);
-  Progress progress("making cases", plan.size());
-  progress.skip(plan.size() - open.size());
+  progress.begin(plan.size(), plan.size() - open.size());
   markov::parallel_for(open.size(), request.threads, [&](std::size_t k) {
-    check_interrupt();
+    progress.check();
     const std::size_t i = open[k];
     const int number = static_cast<int>(i) + 1;
     analysis::BlindCase made = analysis::blind_case(plan[i], number, seed, [](const auto& design, const auto& effects) {
@@ -203,12 +204,12 @@ void run_blind_make(const BlindRequest& request) {
     });
     analysis::complete_truth(made);
     write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
-    progress.advance();
+    progress.done();
   });
-  fmt::print("{}: {} cases; truths sealed in {}\n", request.folder, plan.size(), places.sealed.string());
+  return {plan.size(), places.sealed.string()};
 }
 
-void run_blind_answer(const BlindRequest& request) {
+BlindAnswered answer_blind(const BlindRequest& request, const CaseProgress& progress) {
   const Places places(request);
   const std::vector<int> numbers = case_numbers(places);
   if (fs::exists(places.marker))
@@ -221,25 +222,27 @@ void run_blind_answer(const BlindRequest& request) {
   std::vector<int> open;
   for (const int number : numbers)
     if (!answered.contains(number)) open.push_back(number);
-  const std::string tool = request.tool.empty() ? fs::read_symlink("/proc/self/exe").string() : request.tool;
+  const std::vector<std::string> tool =
+      request.tool.empty() ? std::vector{fs::read_symlink("/proc/self/exe").string()} : request.tool;
   std::mutex mutex;
-  std::atomic<int> failed = 0;
-  Progress progress("answering", std::max<std::size_t>(1, open.size()));
-  progress.skip(0);
+  std::atomic<std::size_t> failed = 0;
+  progress.begin(open.size(), 0);
   markov::parallel_for(open.size(), request.threads, [&](std::size_t i) {
-    check_interrupt();
+    progress.check();
     const int number = open[i];
     const fs::path folder = places.case_folder(number), answer = places.answer(number);
     const fs::path fresh = answer.string() + ".new", errors = places.errors(number);
-    std::vector<std::string> words{tool, "diagnose", folder.string(), "--json", fresh.string(), "--threads", "1"};
+    std::vector<std::string> words = tool;
+    words.insert(words.end(), {"diagnose", folder.string(), "--json", fresh.string(), "--threads", "1"});
     if (const std::optional<std::string> catalogue = file_text(folder / "catalogue.txt")) {
       words.emplace_back("--catalogue");
       words.push_back(trimmed(*catalogue));
     }
     const int code = run_program(words, errors);
     try {
-      check_interrupt();
-    } catch (const Interrupted&) {
+      progress.check();
+      if (code == interrupted_code) throw Interrupted(SIGINT);  // Ctrl-C reached the tool first
+    } catch (...) {
       fs::remove(errors);
       throw;
     }
@@ -257,14 +260,12 @@ void run_blind_answer(const BlindRequest& request) {
       for (const RecordedAnswer& entry : record) lines += record_line(entry);
       write_file(places.record, lines);
     }
-    progress.advance();
+    progress.done();
   });
-  fmt::print("{}: {} of {} cases answered", request.folder, record.size(), numbers.size());
-  if (failed > 0) fmt::print("; {} failed, see {}/*.err", failed.load(), places.answers.string());
-  fmt::print("\n");
+  return {numbers.size(), record.size(), failed, places.answers.string()};
 }
 
-void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
+BlindOpened open_blind(const BlindRequest& request, Unanswered unanswered) {
   const Places places(request);
   const std::vector<int> numbers = case_numbers(places);
   std::vector<analysis::BlindTruth> truths;
@@ -338,11 +339,45 @@ void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
       "Cases from the virtual laboratory, which shares no formula with the models. Truths were sealed before "
       "the diagnosis saw the folders; seals and the record of answers were checked."};
   page.provenance = provenance;
-  const std::vector<Table> tables = blind_tables(grades, reached, answers, provenance);
+  std::vector<Table> tables = blind_tables(grades, reached, answers, provenance);
   for (const Table& table : tables) folder.section(table.id + "-section", table.title, "", {}, {table});
   folder.write_index();
-  fmt::print("{}", to_text(tables.front(), 1000, terminal_width()));
-  fmt::print("\n{}\n", (out / "index.html").string());
+  return {std::move(tables), provenance, (out / "index.html").string()};
+}
+
+namespace {
+
+// On the progress line; the first of Ctrl-C and SIGTERM stops.
+CaseProgress shown_progress(const std::string& label, std::optional<Progress>& line) {
+  return {[&line, label](std::size_t all, std::size_t had) {
+            line.emplace(label, all);
+            line->skip(had);
+          },
+          check_interrupt, [&line] { line->advance(); }};
+}
+
+}  // namespace
+
+void run_blind_make(const BlindRequest& request) {
+  std::optional<Progress> line;
+  const BlindMade made = make_blind(request, shown_progress("making cases", line));
+  line.reset();
+  fmt::print("{}: {} cases; truths sealed in {}\n", request.folder, made.cases, made.sealed);
+}
+
+void run_blind_answer(const BlindRequest& request) {
+  std::optional<Progress> line;
+  const BlindAnswered told = answer_blind(request, shown_progress("answering", line));
+  line.reset();
+  fmt::print("{}: {} of {} cases answered", request.folder, told.answered, told.cases);
+  if (told.failed > 0) fmt::print("; {} failed, see {}/*.err", told.failed, told.answers);
+  fmt::print("\n");
+}
+
+void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
+  const BlindOpened opened = open_blind(request, unanswered);
+  fmt::print("{}", to_text(opened.tables.front(), 1000, terminal_width()));
+  fmt::print("\n{}\n", opened.page);
 }
 
 }  // namespace metastable::reports

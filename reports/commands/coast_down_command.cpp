@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "reports/commands/experiment_output.h"
 #include "reports/output/input_file.h"
-#include "reports/output/output_file.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
 
@@ -38,10 +38,7 @@ void accept(const std::string& objection, const CoastDownRequest& request, analy
 }  // namespace
 
 void run_coast_down(const CoastDownRequest& request) {
-  const std::filesystem::path folder = request.out;
-  for (const char* name : {"experiment.toml", "collisions.csv"})
-    if (std::filesystem::exists(folder / name))
-      throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
+  ExperimentOutput folder(request.out);
   std::vector<analysis::CoastDownRun> runs;
   for (const std::string& path : request.logs) {
     analysis::CounterLog log = analysis::parse_counter_log(path, read_file(path));
@@ -91,9 +88,7 @@ void run_coast_down(const CoastDownRequest& request) {
   Provenance provenance{request.command, origin, 0, version()};
   const analysis::ExperimentFiles files = analysis::coast_down_files(
       runs, nominal, request.rotor_inertia, "Coast-down of " + runs.front().name, provenance_lines(provenance));
-  make_folder(folder);
-  write_file(folder / "collisions.csv", files.collisions_csv);
-  write_file(folder / "experiment.toml", files.experiment_toml);
+  folder.write(analysis::source_of(files, request.out));
 }
 
 }  // namespace metastable::reports

@@ -2,13 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "analysis/sensitivity/comparison.h"
 #include "analysis/sensitivity/propagation.h"
 #include "analysis/sensitivity/sensitivity.h"
 #include "reports/output/output_file.h"
 #include "reports/output/version.h"
-#include "reports/study/study_json.h"
-#include "reports/study/study_progress.h"
 #include "reports/study/study_text.h"
 
 namespace metastable::reports {
@@ -22,13 +19,14 @@ std::string trials_text(const analysis::Contrast& contrast, int collisions) {
 }
 
 // Empty without standard errors, and where some side has no sensitivities.
-CompareExtras from_standard_errors(const CompareRequest& request, const analysis::Comparison& comparison) {
+CompareExtras from_standard_errors(const CompareRequest& request, const analysis::Comparison& comparison,
+                                   const BeginPart& begin) {
   if (request.standard_errors.empty()) return {};
-  Progress progress("sensitivities", comparison.studies.size());
   std::vector<analysis::Sensitivities> all;
-  for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
-    all.push_back(analysis::sensitivities(comparison.studies[i], request.study));
-    progress.advance();
+  for (const analysis::Metastability& study : comparison.studies) {
+    analysis::StudyOptions options = request.study;
+    options.progress = begin("sensitivities");
+    all.push_back(analysis::sensitivities(study, options));
     if (!all.back().reason.empty()) return {};
   }
   CompareExtras extras;
@@ -43,39 +41,54 @@ CompareExtras from_standard_errors(const CompareRequest& request, const analysis
 
 }  // namespace
 
-void run_compare(const CompareRequest& request) {
-  std::optional<OutputFile> json;
-  if (!request.json.empty()) json.emplace(request.json);
-  const analysis::Comparison comparison = [&] {
-    Progress progress("compare", study_units);
-    analysis::StudyOptions options = request.study;
-    options.progress = study_progress(progress);
-    return analysis::compare(request.settings, options, request.collisions);
-  }();
-  const CompareExtras extras = from_standard_errors(request, comparison);
-  std::vector<analysis::RestThresholds> thresholds;
-  for (std::size_t i = 0; i < comparison.studies.size(); ++i)
-    thresholds.push_back(analysis::rest_thresholds(comparison.studies[i]));
-  if (json) {
-    std::string settings;
-    for (const analysis::Setting& setting : request.settings) settings += setting.describe() + "\n";
-    json->stream() << compare_json(comparison, thresholds, {request.command, settings, request.study.seed, version()},
-                                   extras);
-    json->commit();
-  }
-  if (request.json == "-") return;
+CompareAnswer answer_compare(const CompareRequest& request, const BeginPart& begin) {
+  analysis::StudyOptions options = request.study;
+  options.progress = begin("compare");
+  CompareAnswer answer{analysis::compare(request.settings, options, request.collisions), {}, {}};
+  answer.extras = from_standard_errors(request, answer.comparison, begin);
+  for (const analysis::Metastability& study : answer.comparison.studies)
+    answer.thresholds.push_back(analysis::rest_thresholds(study));
+  return answer;
+}
+
+std::string compare_answer_json(const CompareRequest& request, const CompareAnswer& answer) {
+  std::string settings;
+  for (const analysis::Setting& setting : request.settings) settings += setting.describe() + "\n";
+  return compare_json(answer.comparison, answer.thresholds, {request.command, settings, request.study.seed, version()},
+                      answer.extras);
+}
+
+std::string compare_answer_text(const CompareRequest& request, const CompareAnswer& answer) {
+  const analysis::Comparison& comparison = answer.comparison;
+  const CompareExtras& extras = answer.extras;
+  std::string text;
   for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
-    fmt::print("{}", study_text(comparison.studies[i], thresholds[i]));
+    text += study_text(comparison.studies[i], answer.thresholds[i]);
     if (!extras.steps.empty())
-      fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(extras.steps[i]));
-    fmt::print("\n");
+      text += fmt::format("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(extras.steps[i]));
+    text += "\n";
   }
   for (std::size_t i = 0; i < comparison.contrasts.size(); ++i) {
     const analysis::Contrast& contrast = comparison.contrasts[i];
-    fmt::print("{}\n{}", contrast.sentence, trials_text(contrast, request.collisions));
+    text += contrast.sentence + "\n" + trials_text(contrast, request.collisions);
     if (!extras.ratios.empty())
-      fmt::print("  95 % interval of the ratio from standard errors: {}\n", propagated_text(extras.ratios[i]));
+      text += fmt::format("  95 % interval of the ratio from standard errors: {}\n", propagated_text(extras.ratios[i]));
   }
+  return text;
+}
+
+void run_compare(const CompareRequest& request) {
+  std::optional<OutputFile> json;
+  if (!request.json.empty()) json.emplace(request.json);
+  const CompareAnswer answer = [&] {
+    ProgressParts progress;
+    return answer_compare(request, progress.begin());
+  }();
+  if (json) {
+    json->stream() << compare_answer_json(request, answer);
+    json->commit();
+  }
+  if (request.json != "-") fmt::print("{}", compare_answer_text(request, answer));
 }
 
 }  // namespace metastable::reports

@@ -6,8 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include "analysis/description/law_comparison.h"
-#include "analysis/experiment/experiment.h"
 #include "reports/description/describe_figures.h"
 #include "reports/description/describe_tables.h"
 #include "reports/output/page_folder.h"
@@ -17,29 +15,33 @@
 
 namespace metastable::reports {
 
+DescribeAnswer answer_describe(const analysis::Experiment& experiment, const DescribeRequest& request,
+                               const Provenance& provenance) {
+  DescribeAnswer answer{analysis::describe(experiment, request.options), {}, {}};
+  if (!request.against.empty())
+    answer.laws = analysis::compare_laws(experiment, request.against, request.trials, request.options.seed,
+                                         request.options.threads, request.options.progress);
+  answer.tables.push_back(conditions_table(answer.description, provenance));
+  if (!answer.description.comparisons.empty()) answer.tables.push_back(tests_table(answer.description, provenance));
+  if (!answer.description.fits.empty()) answer.tables.push_back(fits_table(answer.description, provenance));
+  if (answer.laws) answer.tables.push_back(laws_table(*answer.laws, provenance));
+  if (answer.laws && !answer.laws->legs.empty()) answer.tables.push_back(landings_table(answer.laws->legs, provenance));
+  return answer;
+}
+
 void run_describe(const DescribeRequest& request) {
   const analysis::Experiment experiment = analysis::read_experiment(request.folder);
   std::optional<PageFolder> pages;
   if (!request.out.empty()) pages.emplace(request.out);
   const Provenance provenance{request.command, "experiment: " + experiment.title, request.options.seed, version()};
 
-  // A fit takes some 500 to 1000 evaluations of its likelihood.
-  const std::size_t fits = experiment.conditions.size() + 1 + request.against.size();
-  std::optional<Progress> progress(std::in_place, "describe", 1000 * fits);
-  analysis::DescriptionOptions options = request.options;
-  options.progress = [&] { progress->advance(); };
-  const analysis::Description description = analysis::describe(experiment, options);
-  std::optional<analysis::LawComparison> laws;
-  if (!request.against.empty())
-    laws = analysis::compare_laws(experiment, request.against, request.trials, options.seed, options.threads,
-                                  options.progress);
-  progress.reset();
-
-  std::vector<Table> tables{conditions_table(description, provenance)};
-  if (!description.comparisons.empty()) tables.push_back(tests_table(description, provenance));
-  if (!description.fits.empty()) tables.push_back(fits_table(description, provenance));
-  if (laws) tables.push_back(laws_table(*laws, provenance));
-  if (laws && !laws->legs.empty()) tables.push_back(landings_table(laws->legs, provenance));
+  const auto [description, laws, tables] = [&] {
+    // A fit takes some 500 to 1000 evaluations of its likelihood.
+    Progress progress("describe", 1000 * (experiment.conditions.size() + 1 + request.against.size()));
+    DescribeRequest told = request;
+    told.options.progress = [&] { progress.advance(); };
+    return answer_describe(experiment, told, provenance);
+  }();
   if (!pages) {
     for (const Table& table : tables) fmt::print("{}\n", to_text(table, 1000, terminal_width()));
     return;

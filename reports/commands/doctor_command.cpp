@@ -8,6 +8,7 @@
 #include <string>
 #include <thread>
 
+#include "reports/import/mat_rows.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -40,6 +41,10 @@ void run_doctor() {
         "gnuplot-nox\n");
   else
     fmt::print("gnuplot: {}, which draws the figures\n", gnuplot);
+  if (const std::string matio = mat_library(); matio.empty())
+    fmt::print("libmatio: not built in; `import` reads CSV only: install libmatio-dev and build again for MAT files\n");
+  else
+    fmt::print("libmatio: {}, with which `import` reads MAT files\n", matio);
 }
 
 }  // namespace metastable::reports

@@ -90,7 +90,7 @@ struct BlindRequest {
   std::string sealed;                 ///< folder of the truths; "": beside the run, with "-sealed" added
   std::optional<std::uint64_t> seed;  ///< nothing: from the system's entropy
   analysis::BlindSize size;
-  std::string tool;  ///< program that answers; "": this one
+  std::vector<std::string> tool;  ///< program that answers, with its first arguments; none: this one
   int threads = 0;
   std::string out;  ///< of open; "": report in the run's folder
   std::string command;

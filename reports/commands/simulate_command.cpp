@@ -3,19 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <vector>
 
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
-#include "reports/output/output_file.h"
+#include "reports/commands/experiment_output.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
 namespace {
-
-constexpr const char* is_experiment = "experiment.toml";  // a folder without it is not an experiment yet
 
 analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
   return {fmt::format("{}", request.setting.slope_deg), request.setting,
@@ -25,18 +22,17 @@ analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
                                                       .threads = request.threads})};
 }
 
-void check_empty(const std::filesystem::path& folder) {
-  for (const char* name : {"experiment.toml", "collisions.csv", "trials.csv", "angle.csv"})
-    if (std::filesystem::exists(folder / name))
-      throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
+template <typename Request>
+void run_into_folder(const Request& request) {
+  ExperimentOutput folder(request.out);
+  const SimulatedExperiment made = simulated_experiment(request);
+  folder.write(made.source);
+  for (const std::string& line : made.said) fmt::print("{}: {}\n", request.out, line);
 }
 
 }  // namespace
 
-void run_simulate(const SimulateRequest& request) {
-  const std::filesystem::path folder = request.out;
-  check_empty(folder);
-  OutputFolder whole(folder);
+SimulatedExperiment simulated_experiment(const SimulateRequest& request) {
   const std::vector<analysis::SimulatedCondition> conditions =
       request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
                        : std::vector<analysis::SimulatedCondition>{one_condition(request)};
@@ -47,48 +43,42 @@ void run_simulate(const SimulateRequest& request) {
                                 ? "Simulated stand-in of the paper's three experiments (not a measurement)"
                                 : fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg);
   analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
-  if (request.camera) {
-    files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
-    write_file(whole.path() / "angle.csv", analysis::angle_csv(conditions, *request.camera));
-  }
-  write_file(whole.path() / "collisions.csv", files.collisions_csv);
-  write_file(whole.path() / "trials.csv", files.trials_csv);
-  write_file(whole.path() / "experiment.toml", files.experiment_toml);
-  whole.commit(is_experiment);
+  if (request.camera) files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
+  SimulatedExperiment made{analysis::source_of(files, request.out), {}};
+  if (request.camera) made.source.angle_csv = analysis::angle_csv(conditions, *request.camera);
   for (const auto& [id, setting, trials] : conditions) {
     const auto rested = std::count_if(trials.begin(), trials.end(),
                                       [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
-    fmt::print("{}: {} trials{}, {} of them came to rest\n", request.out, trials.size(),
-               request.stand_in ? " of " + id : "", rested);
+    made.said.push_back(fmt::format("{} trials{}, {} of them came to rest", trials.size(),
+                                    request.stand_in ? " of " + id : "", rested));
   }
+  return made;
 }
 
-void run_reality(const RealityRequest& request) {
-  const std::filesystem::path folder = request.out;
-  check_empty(folder);
-  OutputFolder whole(folder);
+SimulatedExperiment simulated_experiment(const RealityRequest& request) {
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
   const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
-  Provenance provenance{request.command, {}, request.reality.seed, version()};
   analysis::FolderOptions options;
   options.title = "Rimless wheel in the virtual laboratory";
-  options.comment = provenance_lines(provenance);
+  options.comment = provenance_lines({request.command, {}, request.reality.seed, version()});
   options.dropped = request.dropped;
   options.camera = request.camera;
-  const analysis::RealityFiles made = analysis::reality_files(request.conditions, setup, trials, options);
-  if (made.angle_csv) write_file(whole.path() / "angle.csv", *made.angle_csv);
-  write_file(whole.path() / "collisions.csv", made.files.collisions_csv);
-  if (!made.files.trials_csv.empty()) write_file(whole.path() / "trials.csv", made.files.trials_csv);
-  write_file(whole.path() / "experiment.toml", made.files.experiment_toml);
-  whole.commit(is_experiment);
+  const analysis::RealityFiles files = analysis::reality_files(request.conditions, setup, trials, options);
+  SimulatedExperiment made{analysis::source_of(files.files, request.out), {}};
+  made.source.angle_csv = files.angle_csv;
   std::size_t collisions = 0, rested = 0, flown = 0;
   for (const dynamics::LaboratoryTrial& trial : trials) {
     collisions += trial.collisions.size();
     rested += trial.outcome == dynamics::Outcome::rest;
     for (const dynamics::LaboratoryCollision& c : trial.collisions) flown += c.flew;
   }
-  fmt::print("{}: {} trials, {} of them came to rest; {} collisions, {} of them after a flight\n", request.out,
-             trials.size(), rested, collisions, flown);
+  made.said = {fmt::format("{} trials, {} of them came to rest; {} collisions, {} of them after a flight",
+                           trials.size(), rested, collisions, flown)};
+  return made;
 }
+
+void run_simulate(const SimulateRequest& request) { run_into_folder(request); }
+
+void run_reality(const RealityRequest& request) { run_into_folder(request); }
 
 }  // namespace metastable::reports

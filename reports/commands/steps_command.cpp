@@ -11,58 +11,68 @@
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
-#include "reports/study/study_json.h"
-#include "reports/study/study_progress.h"
 #include "reports/study/study_text.h"
 
 namespace metastable::reports {
 
-void run_steps(const StepsRequest& request) {
-  std::optional<OutputFile> json;
-  if (!request.json.empty()) json.emplace(request.json);
-  const analysis::Metastability study = [&] {
-    Progress progress("steps", study_units);
-    analysis::StudyOptions options = request.study;
-    options.progress = study_progress(progress);
-    return analysis::study(request.setting, options);
-  }();
-  const analysis::RestThresholds thresholds = analysis::rest_thresholds(study);
-  StepsExtras extras;
+StepsAnswer answer_steps(const StepsRequest& request, const BeginPart& begin) {
+  analysis::StudyOptions options = request.study;
+  options.progress = begin("steps");
+  StepsAnswer answer{analysis::study(request.setting, options), {}, {}};
+  const analysis::Metastability& study = answer.study;
+  StepsExtras& extras = answer.extras;
+  answer.thresholds = analysis::rest_thresholds(study);
   if (request.certify) {
-    Progress progress("certificate", study_units);
     extras.certified = analysis::certify(
         request.setting,
-        {.tolerance = request.study.tolerance, .threads = request.study.threads, .progress = study_progress(progress)});
+        {.tolerance = request.study.tolerance, .threads = request.study.threads, .progress = begin("certificate")});
     analysis::require_consistent(study, *extras.certified);
   }
   if (request.sensitivities || !request.standard_errors.empty()) {
-    Progress progress("sensitivities", study_units);
-    analysis::StudyOptions options = request.study;
-    options.progress = study_progress(progress);
+    options.progress = begin("sensitivities");
     extras.sensitivities = analysis::sensitivities(study, options);
     if (!request.standard_errors.empty() && extras.sensitivities->reason.empty())
       extras.propagated =
           analysis::propagate(study.steps.from_start.value, *extras.sensitivities, request.standard_errors);
   }
   if (request.how_it_fails) {
-    analysis::StudyOptions options = request.study;
-    options.progress = {};
+    options.progress = begin("how it fails");
     extras.last_moments = analysis::how_it_fails(request.setting, study, options);
   }
+  return answer;
+}
+
+std::string steps_answer_json(const StepsRequest& request, const StepsAnswer& answer) {
+  return steps_json(answer.study, answer.thresholds,
+                    {request.command, request.setting.describe(), request.study.seed, version()}, answer.extras);
+}
+
+std::string steps_answer_text(const StepsRequest& request, const StepsAnswer& answer, std::size_t width) {
+  const StepsExtras& extras = answer.extras;
+  std::string text = study_text(answer.study, answer.thresholds);
+  if (extras.certified)
+    text += fmt::format("  {:<38}{}\n", "certificate", analysis::certificate_text(*extras.certified));
+  if (extras.propagated)
+    text += fmt::format("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
+  if (extras.sensitivities) text += "\n" + sensitivities_text(*extras.sensitivities);
+  if (extras.last_moments) text += "\n" + last_moments_text(*extras.last_moments, "leg", width);
+  if (answer.study.status != analysis::Status::rest_unresolved)
+    text += "\n" + words_text(answer.study, request.explain, width);
+  return text;
+}
+
+void run_steps(const StepsRequest& request) {
+  std::optional<OutputFile> json;
+  if (!request.json.empty()) json.emplace(request.json);
+  const StepsAnswer answer = [&] {
+    ProgressParts progress;
+    return answer_steps(request, progress.begin());
+  }();
   if (json) {
-    const Provenance provenance{request.command, request.setting.describe(), request.study.seed, version()};
-    json->stream() << steps_json(study, thresholds, provenance, extras);
+    json->stream() << steps_answer_json(request, answer);
     json->commit();
   }
-  if (request.json == "-") return;
-  fmt::print("{}", study_text(study, thresholds));
-  if (extras.certified) fmt::print("  {:<38}{}\n", "certificate", analysis::certificate_text(*extras.certified));
-  if (extras.propagated)
-    fmt::print("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
-  if (extras.sensitivities) fmt::print("\n{}", sensitivities_text(*extras.sensitivities));
-  if (extras.last_moments) fmt::print("\n{}", last_moments_text(*extras.last_moments, "leg", terminal_width()));
-  if (study.status != analysis::Status::rest_unresolved)
-    fmt::print("\n{}", words_text(study, request.explain, terminal_width()));
+  if (request.json != "-") fmt::print("{}", steps_answer_text(request, answer, terminal_width()));
 }
 
 }  // namespace metastable::reports

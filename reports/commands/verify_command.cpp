@@ -91,7 +91,8 @@ Table settled_table(const std::vector<analysis::VerifiedTable>& rows) {
            "beyond sticking. Landings: error of the ω² that a standing foot would have, over ω² before the landing; "
            "where feet settle, and rough ones, where some do not before the next leg lands. Threshold: error of the "
            "friction below which the wheel rests."},
-      .columns = {{"slope", "deg"},
+      .columns = {{"wheel"},
+                  {"slope", "deg"},
                   {"landings"},
                   {"rms error", "", NumberFormat::significant, 2},
                   {"largest", "", NumberFormat::significant, 2},
@@ -102,9 +103,10 @@ Table settled_table(const std::vector<analysis::VerifiedTable>& rows) {
                   {"rough landings"},
                   {"rms error, rough", "", NumberFormat::significant, 2},
                   {"rests misjudged, rough"}}};
-  for (const auto& [slope, e] : rows)
-    table.rows.push_back({slope, e.landings, e.settled_rms, e.settled_max, e.misjudged_rests, e.resting_friction_median,
-                          e.resting_friction_max, e.displacement_max, e.rough, e.rough_rms, e.rough_misjudged_rests});
+  for (const auto& [wheel, slope, e] : rows)
+    table.rows.push_back({wheel, slope, e.landings, e.settled_rms, e.settled_max, e.misjudged_rests,
+                          e.resting_friction_median, e.resting_friction_max, e.displacement_max, e.rough, e.rough_rms,
+                          e.rough_misjudged_rests});
   return table;
 }
 
@@ -176,7 +178,7 @@ void run_verify(const VerifyRequest& request) {
                             accuracy_table("verify-wheel", "The paper's wheel by integrated rows",
                                            "collocation to 1e-8, which needs no density of the landing", paper),
                             solver_table(all)};
-  tables.push_back(settled_table({analysis::verify_table(7.02, request.threads)}));
+  tables.push_back(settled_table(analysis::verify_tables(request.threads)));
   progress.advance();
   if (request.seeds > 0) tables.push_back(coverage_table(all, request, progress));
   const Provenance provenance{request.command,

@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <ostream>
 #include <stdexcept>
 
 #include "analysis/walkers/walker_falls.h"
@@ -17,8 +14,8 @@
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
-#include "reports/study/study_progress.h"
 #include "reports/study/walker_figures.h"
+#include "reports/study/walker_text.h"
 
 namespace metastable::reports {
 namespace {
@@ -27,16 +24,9 @@ using analysis::WalkerFalls;
 using analysis::WalkerSetting;
 using analysis::WalkerStudy;
 using markov::MeshEstimate;
-using WalkerJson = nlohmann::ordered_json;
 
 WalkerStudy walker_study(const WalkerSetting& setting, const WalkerRequest& request, Progress& progress) {
-  markov::MeshStudyOptions options = request.study;
-  options.progress = [told = study_progress(progress)](double share) { told(share, ""); };
-  WalkerStudy study = analysis::study_walker(setting, options);
-  options.progress(1);
-  if (!study.passage.disagreement.empty())
-    throw std::runtime_error(fmt::format("{}: {}", setting.describe(), study.passage.disagreement));
-  return study;
+  return agreed_walker(setting, request.study, study_progress(progress));
 }
 
 Provenance walker_provenance(const WalkerRequest& request) {
@@ -46,135 +36,54 @@ Provenance walker_provenance(const WalkerRequest& request) {
   return provenance;
 }
 
-Estimate estimate_of(const MeshEstimate& e) { return {e.value, e.lower, e.upper}; }
+}  // namespace
 
-WalkerJson mesh_estimate_json(const MeshEstimate& e) {
-  return {{"value", e.value}, {"interval_95", {e.lower, e.upper}}};
+WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& begin) {
+  const WalkerSetting& setting = request.settings.front();
+  WalkerAnswer answer{{agreed_walker(setting, request.study, begin("steps"))}, {}};
+  if (request.how_it_fails)
+    answer.moments = analysis::how_it_falls(setting, answer.studies.front(), request.study).moments;
+  return answer;
 }
 
-const char* walker_status(const markov::MeshStudy& study) {
-  return study.guided || study.simulated ? "agreed" : "mesh_alone";
+WalkerAnswer answer_walker_compare(const WalkerRequest& request, const BeginPart& begin) {
+  WalkerAnswer answer;
+  for (const WalkerSetting& setting : request.settings)
+    answer.studies.push_back(agreed_walker(setting, request.study, begin("compare")));
+  return answer;
 }
 
-WalkerJson walker_json(const WalkerSetting& setting, const WalkerStudy& study) {
-  const markov::MeshStudy& s = study.passage;
-  WalkerJson eigenvalues = WalkerJson::array(), sizes = WalkerJson::array();
-  for (const auto& value : study.gait.eigenvalues) eigenvalues.push_back({value.real(), value.imag()});
-  for (const markov::MeshSize& size : s.sizes)
-    sizes.push_back(
-        {{"spacing", size.spacing}, {"nodes", size.nodes}, {"entries", size.entries}, {"steps", size.steps}});
-  return {{"setting", setting.describe()},
-          {"status", walker_status(s)},
-          {"expected_steps", mesh_estimate_json(s.steps)},
-          {"failure_rate_per_step", mesh_estimate_json(s.failure_rate)},
-          {"mixing_steps", s.mixing_steps},
-          {"relative_errors",
-           {{"shifts", s.shift_error}, {"discretization", s.discretization_error}, {"leaving_mesh", s.bracket}}},
-          {"guided_sampling", s.guided ? mesh_estimate_json(*s.guided) : WalkerJson(nullptr)},
-          {"direct_simulation", s.simulated ? mesh_estimate_json(*s.simulated) : WalkerJson(nullptr)},
-          {"gait", {{"names", setting.map().names()}, {"state", study.gait.state}, {"eigenvalues", eigenvalues}}},
-          {"meshes", sizes},
-          {"memory_bytes", s.expected_bytes}};
+std::string walker_answer_json(const WalkerRequest& request, const WalkerAnswer& answer) {
+  if (request.settings.size() > 1) return walkers_json(request.settings, answer.studies, walker_provenance(request));
+  return walker_json(request.settings.front(), answer.studies.front(), answer.moments, walker_provenance(request));
 }
 
-void write_walker_json(OutputFile& file, WalkerJson json, const WalkerRequest& request) {
-  const Provenance provenance = walker_provenance(request);
-  json["provenance"] = {{"command", provenance.command},
-                        {"settings", provenance.settings},
-                        {"seed", provenance.seed},
-                        {"version", provenance.version}};
-  file.stream() << json.dump(2) << '\n';
-  file.commit();
+std::string walker_answer_text(const WalkerRequest& request, const WalkerAnswer& answer, std::size_t width) {
+  if (request.settings.size() > 1) return walkers_text(request.settings, answer.studies);
+  return walker_text(request.settings.front(), answer.studies.front(), answer.moments, width);
 }
 
-void print_line(const std::string& name, const std::string& what) { fmt::print("  {:<38}{}\n", name, what); }
+namespace {
 
-std::string with_interval(const MeshEstimate& e) {
-  const DecimalEstimate text = to_decimal(estimate_of(e), NumberFormat::general, 12);
-  return fmt::format("{} (95 % interval {} to {})", plain_text(text.value), plain_text(text.lower),
-                     plain_text(text.upper));
-}
-
-void print_walker(const WalkerSetting& setting, const WalkerStudy& study) {
-  const markov::MeshStudy& s = study.passage;
-  fmt::print("{}\n\n", setting.describe());
-  print_line("expected steps before failure", with_interval(s.steps));
-  print_line("  by guided sampling", s.guided ? with_interval(*s.guided) : "not asked: failures are too frequent");
-  print_line("  by direct simulation", s.simulated ? with_interval(*s.simulated) : "out of reach");
-  print_line("status", s.guided || s.simulated ? "agreed: the independent ways lie within their joint intervals"
-                                               : "the mesh alone");
-  print_line("failure rate per step", with_interval(s.failure_rate));
-  print_line("mixing", fmt::format("{:.3g} steps", s.mixing_steps));
-  const std::vector<std::string> names = setting.map().names();
-  for (std::size_t k = 0; k < study.gait.state.size(); ++k)
-    print_line("gait: " + names[k], fmt::format("{:.9f}", study.gait.state[k]));
-  print_line("gait: eigenvalues", eigenvalues_text(study.gait));
-  print_line("relative errors", fmt::format("shifts {:.2g}, discretization {:.2g}, leaving the mesh {:.2g}",
-                                            s.shift_error, s.discretization_error, s.bracket));
-  for (const markov::MeshSize& size : s.sizes)
-    print_line(fmt::format("mesh of spacing {:.3g} sd", size.spacing),
-               fmt::format("{} nodes, {} entries", size.nodes, size.entries));
-  print_line("memory", fmt::format("{:.2g} GB foreseen", s.expected_bytes / 0x1p30));
-}
-
-/// The ratio of b's expected steps to a's; the errors of the two are taken as independent.
-MeshEstimate ratio(const MeshEstimate& a, const MeshEstimate& b) {
-  const double value = b.value / a.value;
-  return {value, value * std::exp(-std::hypot(std::log(b.value / b.lower), std::log(a.upper / a.value))),
-          value * std::exp(std::hypot(std::log(b.upper / b.value), std::log(a.value / a.lower)))};
+void run_walker(const WalkerRequest& request, WalkerAnswer answer_of(const WalkerRequest&, const BeginPart&)) {
+  std::optional<OutputFile> json;
+  if (!request.json.empty()) json.emplace(request.json);
+  const WalkerAnswer answer = [&] {
+    ProgressParts progress;
+    return answer_of(request, progress.begin());
+  }();
+  if (json) {
+    json->stream() << walker_answer_json(request, answer);
+    json->commit();
+  }
+  if (request.json != "-") fmt::print("{}", walker_answer_text(request, answer, terminal_width()));
 }
 
 }  // namespace
 
-void run_walker_steps(const WalkerRequest& request) {
-  const WalkerSetting& setting = request.settings.front();
-  std::optional<OutputFile> json;
-  if (!request.json.empty()) json.emplace(request.json);
-  const WalkerStudy study = [&] {
-    Progress progress("steps", study_units);
-    return walker_study(setting, request, progress);
-  }();
-  std::optional<WalkerFalls> falls;
-  if (request.how_it_fails) falls = analysis::how_it_falls(setting, study, request.study);
-  if (json) {
-    WalkerJson answer = walker_json(setting, study);
-    if (falls) answer["how_it_fails"] = WalkerJson::parse(last_moments_json(falls->moments));
-    write_walker_json(*json, std::move(answer), request);
-  }
-  if (request.json == "-") return;
-  print_walker(setting, study);
-  if (falls) fmt::print("\n{}", last_moments_text(falls->moments, "phase", terminal_width()));
-}
+void run_walker_steps(const WalkerRequest& request) { run_walker(request, answer_walker_steps); }
 
-void run_walker_compare(const WalkerRequest& request) {
-  std::optional<OutputFile> json;
-  if (!request.json.empty()) json.emplace(request.json);
-  std::vector<WalkerStudy> studies;
-  {
-    Progress progress("compare", study_units * request.settings.size());
-    for (const WalkerSetting& setting : request.settings) studies.push_back(walker_study(setting, request, progress));
-  }
-  std::vector<MeshEstimate> ratios;
-  for (std::size_t i = 1; i < studies.size(); ++i)
-    ratios.push_back(ratio(studies.front().passage.steps, studies[i].passage.steps));
-  if (json) {
-    WalkerJson answer = {{"settings", WalkerJson::array()}, {"contrasts", WalkerJson::array()}};
-    for (std::size_t i = 0; i < studies.size(); ++i)
-      answer["settings"].push_back(walker_json(request.settings[i], studies[i]));
-    for (std::size_t i = 0; i < ratios.size(); ++i)
-      answer["contrasts"].push_back({{"of", i + 1}, {"against", 0}, {"ratio", mesh_estimate_json(ratios[i])}});
-    write_walker_json(*json, std::move(answer), request);
-  }
-  if (request.json == "-") return;
-  for (std::size_t i = 0; i < studies.size(); ++i) {
-    print_walker(request.settings[i], studies[i]);
-    fmt::print("\n");
-  }
-  for (std::size_t i = 0; i < ratios.size(); ++i)
-    fmt::print("{}: {} times the steps of {}\n", request.settings[i + 1].describe(),
-               format_estimate(estimate_of(ratios[i]), NumberFormat::significant, 4),
-               request.settings.front().describe());
-}
+void run_walker_compare(const WalkerRequest& request) { run_walker(request, answer_walker_compare); }
 
 void run_walker_sweep(const WalkerRequest& request) {
   for (const WalkerSetting& setting : request.settings) setting.map();  // wrong settings before the first is computed

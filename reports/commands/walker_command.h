@@ -1,11 +1,15 @@
 #pragma once
 // steps, compare, sweep, simulate and report with --walker.
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "analysis/statistics/last_moments.h"
 #include "analysis/walkers/walker_study.h"
 #include "analysis/walkers/walker_trials.h"
+#include "reports/study/study_progress.h"
 
 namespace metastable::reports {
 
@@ -21,9 +25,21 @@ struct WalkerRequest {
   analysis::WalkOptions walks = {};       ///< of simulate
 };
 
+/// What `steps` and `compare` find; moments where they were asked for.
+struct WalkerAnswer {
+  std::vector<analysis::WalkerStudy> studies;  ///< a setting each
+  std::optional<analysis::LastMoments> moments;
+};
+/// @throws as agreed_walker()
+WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& begin);
+WalkerAnswer answer_walker_compare(const WalkerRequest& request, const BeginPart& begin);
+std::string walker_answer_json(const WalkerRequest& request, const WalkerAnswer& answer);
+/// @param width  of a line [characters]
+std::string walker_answer_text(const WalkerRequest& request, const WalkerAnswer& answer, std::size_t width);
+
 /// Prints gait, expected steps, rate, mixing and what stands behind them.
-/// @throws std::runtime_error with one sentence where independent ways disagree: then no number is given (all but
-///         simulate do)
+/// @throws markov::Disagreement where independent ways contradict each other: then no number is given (all but simulate
+///         do)
 void run_walker_steps(const WalkerRequest& request);
 
 /// Every setting, and the ratio of the later ones' expected steps to the first one's.

@@ -170,7 +170,7 @@ Table hypotheses_table(const std::vector<analysis::Hypothesis>& hypotheses, cons
       "share of "
       "the variance that would go if everything but this source were known; shares with interactions may add up to "
       "more "
-      "than one.",
+      "than one. Brackets: 95 %, from an eighth of the samples under settled.",
       variants_note};
   return table;
 }

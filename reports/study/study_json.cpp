@@ -123,6 +123,9 @@ Json study_json(const analysis::Metastability& study, const analysis::RestThresh
   json["error"] = {{"discretization", number(study.steps.discretization_error)},
                    {"sampling", number(study.steps.sampling_error)}};
   if (study.steps.landing_error > 0) json["error"]["landings"] = study.steps.landing_error;
+  if (study.steps.memory.upper > study.steps.memory.lower)
+    json["error"]["moving_feet"] = {{"value", study.steps.memory.value},
+                                    {"interval_95", {study.steps.memory.lower, study.steps.memory.upper}}};
   json["resolution"] = {{"cells", study.cells},
                         {"samples", study.samples},
                         {"replicates", study.replicates},

@@ -14,4 +14,11 @@ std::function<void(double, const std::string&)> study_progress(Progress& progres
   };
 }
 
+BeginPart ProgressParts::begin() {
+  return [this](const std::string& name) {
+    line_.reset();
+    return study_progress(line_.emplace(name, study_units));
+  };
+}
+
 }  // namespace metastable::reports

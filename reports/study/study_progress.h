@@ -2,6 +2,7 @@
 // A study's progress callback on a progress line.
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "reports/output/progress.h"
@@ -14,5 +15,19 @@ inline constexpr std::size_t study_units = 1000;
 /// A callback for analysis::StudyOptions::progress that moves `progress` by up to study_units over the study. The
 /// callback refers to `progress`; it throws Interrupted after Ctrl-C.
 std::function<void(double, const std::string&)> study_progress(Progress& progress);
+
+/// Told the share of the work done and what is being done; may throw to stop. As analysis::StudyOptions::progress.
+using Tell = std::function<void(double, const std::string&)>;
+/// Begins to show a part of the work under this name, and ends with the part before it.
+using BeginPart = std::function<Tell(const std::string& name)>;
+
+/// The parts of a command on one progress line after another, of study_units each.
+class ProgressParts {
+ public:
+  BeginPart begin();
+
+ private:
+  std::optional<Progress> line_;
+};
 
 }  // namespace metastable::reports

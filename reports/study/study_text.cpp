@@ -176,6 +176,10 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
       text +=
           line("landings", fmt::format("read from a table, which moves the steps by {:.2g} at most (in the interval)",
                                        study.steps.landing_error));
+    if (study.steps.memory.upper > study.steps.memory.lower)
+      text += line("feet still moving at the next touch",
+                   fmt::format("move the steps by {:.2g} ({:.2g} to {:.2g}, in the interval)", study.steps.memory.value,
+                               study.steps.memory.lower, study.steps.memory.upper));
     text +=
         line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.steps.solver_disagreement));
     if (!study.message.empty()) text += "\n" + study.message + "\n";

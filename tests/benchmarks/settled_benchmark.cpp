@@ -26,9 +26,7 @@ analysis::Setting engine_wheel() {
 
 dynamics::SettledMapOptions on_threads(int threads) {
   dynamics::SettledMapOptions options;
-  options.executor = [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
-    markov::parallel_for(count, threads, work);
-  };
+  options.executor = markov::on_threads(threads);
   return options;
 }
 

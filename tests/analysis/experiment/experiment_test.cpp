@@ -170,6 +170,9 @@ TEST(Experiment, RefusesWhatNoWheelCanHave) {
             "experiment.toml:2:17: wheel.inertia_kg_m2: 1000000 kg m^2 is above 0.3138 kg m^2");
   EXPECT_EQ(of("hub_mass_kg = 1.39\n", "radius_of_gyration_m = 2\nhub_mass_kg = 1.39\n"),
             "experiment.toml:2:24: wheel.radius_of_gyration_m: 2 m is outside [0, 0.4507] m (3 mean legs)");
+  EXPECT_EQ(
+      of("hub_mass_kg = 1.39\n", "tip_radius_m = 0.01\nhub_mass_kg = 1.39\n"),
+      "experiment.toml:2:16: wheel.tip_radius_m: 0.01 m is outside [0, 0.0075] m (a twentieth of the shortest leg)");
   EXPECT_EQ(of("1.39", "1.39", "a,1,1,0,1e308\n"),
             "collisions.csv:2:9: omega_minus_rad_s: 1e+308 is outside [0, 1000]");
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "dynamics/return_map/trials.h"
@@ -112,6 +113,35 @@ TEST(SettledReturnMap, DefectIsTheDifferenceToLandingsThatAreFollowed) {
     difference += followed.landing(24, 0, both).value_or(0) - read.landing(24, 0, both).value_or(0);
   }
   EXPECT_NEAR(defect / 300, difference / 300, 2e-3);  // the difference misses what lies between the two thresholds
+}
+
+// At a launch's speed most feet still move when the next leg touches. Rolled on from there, wheels differ from those
+// that land on a standing foot by what the defect says.
+TEST(SettledReturnMap, MemoryDefectIsWhatMovingFeetDo) {
+  const SettledReturnMap map = engine_wheel(engine_noise(), true);
+  const SettledMotion& motion = map.landings().motion();
+  const double state = 7.35 * 7.35;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> score;
+  constexpr int draws = 300;
+  double defect = 0, difference = 0;
+  int moving = 0;
+  for (int k = 0; k < draws; ++k) {
+    const double z[4] = {score(random), score(random), score(random), score(random)};
+    defect += *map.memory_defect(state, 0, z, [](double next) { return next; });
+    const Contact first = map.noise().draw(std::span(z).first(2)), second = map.noise().draw(std::span(z).last(2));
+    SettledRoll roll(motion, 0, 7.35, first, first);
+    const Step step = roll.step();
+    if (!step.touched || (step.landing.end == LandingEnd::settled && !step.landing.slips_late)) continue;
+    ++moving;
+    roll.set_contact(second);
+    const Step rolled = roll.step();
+    const double standing = map.landing(state, 0, std::span(z).first(2)).value_or(0);
+    difference += (rolled.touched ? rolled.omega_minus * rolled.omega_minus : 0) -
+                  map.landing(standing, 0, std::span(z).last(2)).value_or(0);
+  }
+  EXPECT_GT(moving, draws / 2);
+  EXPECT_NEAR(defect / draws, difference / draws, 0.1);
 }
 
 }  // namespace

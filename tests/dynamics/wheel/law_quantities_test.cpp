@@ -13,7 +13,7 @@ namespace {
 // omega^2 after a collision and before the next one; everything a law does to a wheel is in these.
 std::pair<double, double> step(const Wheel& wheel, Law law, const Contact& contact, double rebound_lost) {
   if (law == Law::settled) {
-    const Step of = SettledMotion(settled_wheel(wheel, 7.02 * test::degree, wheel.tip_radius)).step(1, 5, contact);
+    const Step of = SettledMotion(settled_wheel(wheel, 7.02 * test::degree)).step(1, 5, contact);
     return {of.landing.omega_plus, of.omega_minus};
   }
   const WheelMap map(wheel, 7.02 * test::degree, law, ContactNoise::normal(0.4, 0.1, 0.4, 0.1), rebound_lost);

@@ -47,7 +47,7 @@ class BlindRun : public testing::Test {
     request_.folder = (folder_ / "run").string();
     request_.seed = 11;
     request_.size = {.per_effect_and_strength = 0, .none = 2, .pairs = 0, .outside = 1, .left_out_per_effect = 0};
-    request_.tool = tool.string();
+    request_.tool = {tool.string()};
     request_.threads = 1;
     testing::internal::CaptureStdout();
   }
@@ -162,9 +162,9 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
 TEST_F(BlindRun, CountsWhatTheToolFailedOn) {
   run_blind_make(request_);
   const fs::path failing = folder_ / "failing.sh", answers = fs::path(request_.folder) / "answers";
-  write(failing, "#!/bin/sh\ncase $2 in *0002) echo no >&2; exit 3;; esac\nexec " + request_.tool + " \"$@\"\n");
+  write(failing, "#!/bin/sh\ncase $2 in *0002) echo no >&2; exit 3;; esac\nexec " + request_.tool.front() + " \"$@\"\n");
   fs::permissions(failing, fs::perms::owner_all);
-  request_.tool = failing.string();
+  request_.tool = {failing.string()};
   run_blind_answer(request_);
   EXPECT_EQ(read(answers / "0002.json.err"), "no\nexit code 3\n");
   write(answers / "0002.json.err", "");  // as a killed one leaves it

@@ -1,0 +1,38 @@
+#pragma once
+// metastable import: a CSV or MAT file to an experiment folder.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/study/setting.h"
+#include "reports/import/column_map.h"
+#include "reports/import/mat_rows.h"
+
+namespace metastable::reports {
+
+/// metastable import
+struct ImportRequest {
+  std::string file, out;
+  std::string json;  ///< file, "-" for standard output, "" for none
+  std::string command;
+  std::vector<RequestedColumn> columns;
+  char separator = ',';
+  TrialsIn orientation = TrialsIn::not_told;
+  bool number_trials = false;
+  int collisions_from = 1, legs_from = 0;
+  std::map<std::string, std::string> outcomes;  ///< the file's words, and what they stand for
+
+  std::string description;         ///< an experiment.toml to take; "": from what follows
+  analysis::Setting setting = {};  ///< wheel, contact, ramp; its slope is of all conditions but those of `slopes`
+  std::vector<std::pair<std::string, double>> slopes = {};  ///< id and slope [deg] of each condition
+  std::optional<double> sensor_noise = {};                  ///< [rad/s]
+  std::string title;
+};
+
+/// @throws std::invalid_argument and analysis::InputError naming file, line or variable
+void run_import(const ImportRequest& request);
+
+}  // namespace metastable::reports

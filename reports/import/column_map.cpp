@@ -1,0 +1,210 @@
+#include "reports/import/column_map.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+#include "analysis/experiment/input_error.h"
+
+namespace metastable::reports {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180, turn = 2 * std::numbers::pi;
+
+struct Unit {
+  std::string_view name;    // in brackets
+  std::string_view ending;  // of a name, behind _
+  double scale;
+};
+constexpr Unit speeds[] = {
+    {"rad/s", "rad_s", 1}, {"deg/s", "deg_s", degree}, {"rpm", "rpm", turn / 60}, {"rev/s", "rev_s", turn}};
+constexpr Unit times[] = {{"s", "s", 1}, {"ms", "ms", 1e-3}, {"us", "us", 1e-6}, {"min", "min", 60}};
+constexpr Unit lengths[] = {{"m", "m", 1}, {"cm", "cm", 1e-2}, {"mm", "mm", 1e-3}};
+constexpr Unit angles[] = {{"rad", "rad", 1}, {"deg", "deg", degree}, {"rev", "rev", turn}};
+
+struct RoleInfo {
+  Role role;
+  std::string_view name;
+  std::string_view in_folder;   // its column in an experiment folder
+  std::span<const Unit> units;  // empty: none
+};
+const RoleInfo roles[] = {{Role::condition, "condition", "condition", {}},
+                          {Role::trial, "trial", "trial", {}},
+                          {Role::collision, "collision", "collision", {}},
+                          {Role::leg, "leg", "leg", {}},
+                          {Role::time, "time", "time_s", times},
+                          {Role::position, "position", "position_m", lengths},
+                          {Role::omega_minus, "omega_minus", "omega_minus_rad_s", speeds},
+                          {Role::omega_plus, "omega_plus", "omega_plus_rad_s", speeds},
+                          {Role::outcome, "outcome", "outcome", {}},
+                          {Role::angle, "angle", "angle_rad", angles}};
+static_assert(std::size(roles) == role_count);
+
+const RoleInfo& info(Role role) { return roles[static_cast<std::size_t>(role)]; }
+
+std::string known(std::span<const std::string> names) {
+  constexpr std::size_t most = 30;
+  return fmt::format("{}{}", fmt::join(names.first(std::min(names.size(), most)), ", "),
+                     names.size() > most ? ", ..." : "");
+}
+
+// The unit that a name ends with.
+const Unit* unit_of(std::string_view name, std::span<const Unit> units) {
+  if (const std::size_t star = name.rfind('*'); star != std::string_view::npos && star + 1 == name.size()) {
+    name.remove_suffix(1);
+    if (name.ends_with('_')) name.remove_suffix(1);
+  }
+  const auto ends = [&](const Unit& unit) {
+    return name.ends_with(fmt::format("[{}]", unit.name)) || name.ends_with(fmt::format("({})", unit.name)) ||
+           name.ends_with(fmt::format("_{}", unit.ending));
+  };
+  // "omega_rad_s" ends with the second too, hence the longest.
+  const Unit* longest = nullptr;
+  for (const Unit& unit : units)
+    if (ends(unit) && (longest == nullptr || unit.ending.size() > longest->ending.size())) longest = &unit;
+  return longest;
+}
+
+struct Split {
+  std::string_view name, unit;
+};
+
+// "w [deg/s]" as name and unit; the unit is empty where there are no brackets at the end.
+Split split_unit(std::string_view text) {
+  const std::size_t open = text.rfind('[');
+  if (open == std::string_view::npos || !text.ends_with(']')) return {text, {}};
+  std::string_view name = text.substr(0, open);
+  while (name.ends_with(' ')) name.remove_suffix(1);
+  return {name, text.substr(open + 1, text.size() - open - 2)};
+}
+
+// The columns whose names are the pattern with a whole number for its *, in the order of the numbers.
+std::vector<std::size_t> numbered_columns(std::string_view pattern, std::span<const std::string> names,
+                                          int first_collision) {
+  const std::size_t star = pattern.find('*');
+  const std::string_view before = pattern.substr(0, star), after = pattern.substr(star + 1);
+  std::map<int, std::size_t> found;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string_view name = names[i];
+    if (name.size() <= before.size() + after.size() || !name.starts_with(before) || !name.ends_with(after)) continue;
+    const std::string_view digits = name.substr(before.size(), name.size() - before.size() - after.size());
+    int number = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    if (error != std::errc() || end != digits.data() + digits.size() || number < 0) continue;
+    if (!found.emplace(number, i).second)
+      throw std::invalid_argument(fmt::format("--columns: '{}' and '{}' are both number {} of {}", names[found[number]],
+                                              name, number, pattern));
+  }
+  std::vector<std::size_t> columns;
+  for (const auto& [number, index] : found) {
+    if (const int due = first_collision + static_cast<int>(columns.size()); number != due)
+      throw std::invalid_argument(fmt::format("--columns: {}: number {} is not there, but {} is{}", pattern, due,
+                                              number, number == 0 ? " (--first-collision 0)" : ""));
+    columns.push_back(index);
+  }
+  return columns;
+}
+
+MappedColumn found_column(const RequestedColumn& request, std::span<const std::string> names, const std::string& file,
+                          int first_collision) {
+  const RoleInfo& role = info(request.role);
+  MappedColumn column{.role = request.role, .name = request.text, .unit = {}};
+  std::string_view unit;
+  for (int without_unit = 0; without_unit < 2 && column.columns.empty(); ++without_unit) {
+    if (without_unit == 1) {
+      const Split parts = split_unit(request.text);
+      if (parts.unit.empty()) break;
+      column.name = parts.name;
+      unit = parts.unit;
+    }
+    column.numbered = column.name.find('*') != std::string::npos;
+    if (column.numbered)
+      column.columns = numbered_columns(column.name, names, first_collision);
+    else if (const auto at = std::ranges::find(names, column.name); at != names.end())
+      column.columns = {static_cast<std::size_t>(at - names.begin())};
+  }
+  if (column.columns.empty())
+    throw std::invalid_argument(
+        fmt::format("--columns: {} has no '{}' for {} (it has {})", file, column.name, role.name, known(names)));
+  std::vector<std::string_view> of_role;
+  for (const Unit& one : role.units) of_role.push_back(one.name);
+  if (role.units.empty()) {
+    if (!unit.empty()) throw std::invalid_argument(fmt::format("--columns: {}: has no unit", role.name));
+    return column;
+  }
+  const Unit* chosen = unit_of(column.name, role.units);
+  if (!unit.empty()) {
+    const auto named = std::ranges::find(role.units, unit, &Unit::name);
+    if (named == role.units.end())
+      throw std::invalid_argument(
+          fmt::format("--columns: {}: '{}' is none of the units {}", role.name, unit, fmt::join(of_role, ", ")));
+    if (chosen != nullptr && chosen != &*named)
+      throw std::invalid_argument(
+          fmt::format("--columns: {}: the name '{}' says {}, not {}", role.name, column.name, chosen->name, unit));
+    chosen = &*named;
+  }
+  if (chosen == nullptr)
+    throw std::invalid_argument(fmt::format("--columns: {0}: the unit of '{1}' is not told; write {0}={1}[{2}]",
+                                            role.name, column.name, fmt::join(of_role, "] or [")));
+  column.unit = chosen->name;
+  column.scale = chosen->scale;
+  return column;
+}
+
+}  // namespace
+
+std::string_view role_name(Role role) { return info(role).name; }
+
+std::vector<RequestedColumn> column_requests(const std::string& text) {
+  std::vector<RequestedColumn> requests;
+  std::istringstream stream(text);
+  for (std::string entry; std::getline(stream, entry, ',');) {
+    const std::size_t equals = entry.find('=');
+    std::vector<std::string_view> names;
+    for (const RoleInfo& role : roles) names.push_back(role.name);
+    const auto role = std::ranges::find(names, std::string_view(entry).substr(0, equals));
+    if (equals == std::string::npos || equals + 1 == entry.size() || role == names.end())
+      throw std::invalid_argument(
+          fmt::format("--columns: {} is not WHAT=NAME or WHAT=NAME[UNIT], where WHAT is one of {}",
+                      analysis::shown_text(entry), fmt::join(names, ", ")));
+    requests.push_back({roles[role - names.begin()].role, entry.substr(equals + 1)});
+  }
+  return requests;
+}
+
+std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& requests, std::span<const std::string> names,
+                                      const std::string& file, int first_collision) {
+  std::vector<MappedColumn> map;
+  std::vector<bool> used(names.size());
+  const auto take = [&](MappedColumn column) {
+    if (column_of(map, column.role) != nullptr)
+      throw std::invalid_argument(fmt::format("--columns: {} is given twice", role_name(column.role)));
+    for (const std::size_t i : column.columns) {
+      if (used[i]) throw std::invalid_argument(fmt::format("--columns: '{}' is taken twice", names[i]));
+      used[i] = true;
+    }
+    map.push_back(std::move(column));
+  };
+  for (const RequestedColumn& request : requests) take(found_column(request, names, file, first_collision));
+  for (const RoleInfo& role : roles) {
+    const auto at = std::ranges::find(names, role.in_folder);
+    if (at == names.end() || column_of(map, role.role) != nullptr || used[static_cast<std::size_t>(at - names.begin())])
+      continue;
+    take(found_column({role.role, *at}, names, file, first_collision));
+  }
+  return map;
+}
+
+const MappedColumn* column_of(const std::vector<MappedColumn>& map, Role role) {
+  const auto at = std::ranges::find(map, role, &MappedColumn::role);
+  return at == map.end() ? nullptr : &*at;
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,49 @@
+#pragma once
+// Which column or variable of a foreign file tells what, and in which unit.
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace metastable::reports {
+
+/// Says what a column tells, as the files of an experiment folder do.
+enum class Role { condition, trial, collision, leg, time, position, omega_minus, omega_plus, outcome, angle };
+inline constexpr std::size_t role_count = 10;
+
+std::string_view role_name(Role role);
+
+/// Holds one entry of the map that a user gives: ROLE=NAME or ROLE=NAME[UNIT].
+struct RequestedColumn {
+  Role role;
+  std::string text;  ///< behind the equals sign
+};
+
+/// Reads entries with commas between them. @throws std::invalid_argument naming the entry and what is expected
+std::vector<RequestedColumn> column_requests(const std::string& text);
+
+/// Holds where a role is told.
+struct MappedColumn {
+  Role role;
+  std::string name;  ///< as in the file, or as requested with a * for the collision's number
+  std::string unit;  ///< "" of what has none
+  double scale = 1;  ///< to SI
+  /// Indices of the names; of a pattern with * one a collision, in their order.
+  std::vector<std::size_t> columns = {};
+  bool numbered = false;  ///< by a *
+};
+
+/// Finds what was requested among the names of a file, and beside it what bears the names of an experiment folder
+/// (trial, omega_minus_rad_s, ...). A unit stands in the request, or ends the name: omega_deg_s, "omega [deg/s]".
+/// @param first_collision  number that * stands for at first, 0 or 1
+/// @throws std::invalid_argument for a name that is not there, a unit that is not told or of another kind, a role or a
+///         column asked for twice, numbers behind * that skip or repeat
+std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& requests, std::span<const std::string> names,
+                                      const std::string& file, int first_collision);
+
+/// Returns what tells the role, or nullptr.
+const MappedColumn* column_of(const std::vector<MappedColumn>& map, Role role);
+
+}  // namespace metastable::reports

@@ -1,0 +1,119 @@
+#include "reports/import/csv_rows.h"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "analysis/experiment/csv_reader.h"
+
+namespace metastable::reports {
+namespace {
+
+class CsvRows {
+ public:
+  CsvRows(const std::string& file, analysis::CsvReader& csv, const std::vector<MappedColumn>& map)
+      : file_(file), csv_(csv), map_(map) {}
+
+  ImportedRow row() const {
+    ImportedRow row{.place = fmt::format("{}:{}", file_, csv_.line())};
+    row.condition = text(Role::condition);
+    row.trial = text(Role::trial);
+    row.outcome = text(Role::outcome);
+    return row;
+  }
+
+  // Reads the values of one collision. @param number  of a wide row's columns, from 0; 0 in a long row
+  void read(ImportedRow& row, std::size_t number) const {
+    row.collision = value(Role::collision, number);
+    row.leg = value(Role::leg, number);
+    row.time = value(Role::time, number);
+    row.position = value(Role::position, number);
+    row.omega_minus = value(Role::omega_minus, number);
+    row.omega_plus = value(Role::omega_plus, number);
+    row.angle = value(Role::angle, number);
+  }
+
+  // Whether any of the columns of this number is filled.
+  bool any(std::size_t number) const {
+    for (const MappedColumn& column : map_)
+      if (column.numbered && number < column.columns.size() && !unknown(csv_.text(column.columns[number]))) return true;
+    return false;
+  }
+
+ private:
+  static bool unknown(std::string_view text) {
+    return text.empty() || text == "NaN" || text == "nan" || text == "NA" || text == "NAN";
+  }
+
+  std::optional<std::string> text(Role role) const {
+    const MappedColumn* column = column_of(map_, role);
+    if (column == nullptr || csv_.text(column->columns.front()).empty()) return std::nullopt;
+    return std::string(csv_.text(column->columns.front()));
+  }
+
+  std::optional<double> value(Role role, std::size_t number) const {
+    const MappedColumn* column = column_of(map_, role);
+    if (column == nullptr || number >= column->columns.size()) return std::nullopt;
+    const std::size_t at = column->columns[number];
+    std::optional<double> read;
+    if (!unknown(csv_.text(at)) && csv_.read(at, {}, read) && read && column->scale != 1) *read *= column->scale;
+    return read;
+  }
+
+  const std::string& file_;
+  analysis::CsvReader& csv_;
+  const std::vector<MappedColumn>& map_;
+};
+
+}  // namespace
+
+std::vector<ImportedRow> csv_rows(const std::string& file, std::string_view text, char separator,
+                                  const std::vector<MappedColumn>& map, int first_collision,
+                                  analysis::Defects& defects) {
+  const std::vector<std::string> names = analysis::CsvReader::names(text, separator);
+  const std::vector<analysis::CsvColumn> columns = [&] {
+    std::vector<analysis::CsvColumn> all;
+    for (const std::string& name : names) all.push_back({name});
+    return all;
+  }();
+  analysis::CsvReader csv(file, text, columns, defects, separator);
+  const MappedColumn* speed = column_of(map, Role::omega_minus);
+  const bool wide = speed != nullptr && speed->numbered;
+  for (const MappedColumn& column : map) {
+    if (column.numbered && !wide)
+      throw std::invalid_argument(
+          fmt::format("--columns: {}: a * numbers collisions only where omega_minus has one", role_name(column.role)));
+    if (wide && !column.numbered && column.role != Role::condition && column.role != Role::trial &&
+        column.role != Role::outcome)
+      throw std::invalid_argument(fmt::format(
+          "--columns: {}: one column cannot tell it of every collision of a row; number its columns with a *",
+          role_name(column.role)));
+  }
+  const CsvRows reader(file, csv, map);
+  std::vector<ImportedRow> rows;
+  for (std::size_t trial = 1; csv.next(); ++trial) {
+    ImportedRow row = reader.row();
+    if (!wide) {
+      reader.read(row, 0);
+      rows.push_back(std::move(row));
+      continue;
+    }
+    std::size_t last = 0;  // one past the last collision
+    for (const MappedColumn& column : map)
+      for (std::size_t k = last; column.numbered && k < column.columns.size(); ++k)
+        if (reader.any(k)) last = k + 1;
+    if (last == 0) csv.refuse(speed->columns.front(), "the row holds no collision");
+    if (!row.trial && column_of(map, Role::trial) == nullptr) row.trial = fmt::format("{}", trial);
+    for (std::size_t k = 0; k < last; ++k) {
+      ImportedRow& one = rows.emplace_back(row);
+      reader.read(one, k);
+      one.collision = static_cast<double>(k) + first_collision;
+      if (!one.omega_minus && defects.empty())
+        csv.refuse(speed->columns[std::min(k, speed->columns.size() - 1)],
+                   "no speed, although the trial goes on or other columns tell of this collision");
+    }
+  }
+  return rows;
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,198 @@
+#include "reports/import/imported_experiment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "analysis/experiment/csv_field.h"
+#include "analysis/experiment/input_error.h"
+#include "analysis/motion_capture/angle_file.h"
+
+namespace metastable::reports {
+namespace {
+
+using analysis::csv_field;
+using analysis::Defects;
+using analysis::shown_text;
+
+std::optional<long> whole_number(std::string_view text) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || number != std::floor(number) || number < 1 ||
+      number > 1e9)
+    return std::nullopt;
+  return static_cast<long>(number);
+}
+
+using TrialKey = std::pair<std::string, std::string>;  // condition, trial
+
+TrialKey key_of(const ImportedRow& row) { return {row.condition.value_or(""), row.trial.value_or("")}; }
+
+// Gives every row the number of its trial, as the file has it or in the order of the rows.
+std::vector<long> trial_numbers(const std::vector<ImportedRow>& rows, bool renumber, Defects& defects) {
+  std::vector<long> numbers;
+  std::map<TrialKey, long> given;
+  std::map<long, std::string> condition_of;
+  for (const ImportedRow& row : rows) {
+    if (!row.trial) {
+      defects.add(row.place, {}, "trial: is not told");
+      numbers.push_back(0);
+      continue;
+    }
+    if (renumber) {
+      numbers.push_back(given.emplace(key_of(row), static_cast<long>(given.size()) + 1).first->second);
+      continue;
+    }
+    constexpr const char* remedy = "; --number-trials numbers them in the order of their first rows";
+    const std::optional<long> number = whole_number(*row.trial);
+    if (!number)
+      defects.add(row.place, {}, fmt::format("trial: {} is no whole number from 1{}", shown_text(*row.trial), remedy));
+    const std::string& condition = condition_of.emplace(number.value_or(0), row.condition.value_or("")).first->second;
+    if (number && condition != row.condition.value_or(""))
+      defects.add(row.place, {},
+                  fmt::format("trial: {} is of condition {} too, where numbers are of the whole experiment{}", *number,
+                              shown_text(condition), remedy));
+    numbers.push_back(number.value_or(0));
+  }
+  return numbers;
+}
+
+// "rest" or another outcome of each trial, in the order of the trials' first rows; empty if none is told.
+struct Outcomes {
+  std::string csv;
+  std::vector<std::string> places;  // of each line behind the header
+};
+
+Outcomes outcomes_of(const std::vector<ImportedRow>& rows, const std::vector<long>& numbers,
+                     const ImportOptions& options, Defects& defects) {
+  if (std::ranges::none_of(rows, [](const ImportedRow& row) { return row.outcome.has_value(); })) return {};
+  struct Told {
+    std::string condition, outcome, place;
+  };
+  std::map<long, Told> of_trial;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    Told& told = of_trial.try_emplace(numbers[i], rows[i].condition.value_or(""), "", rows[i].place).first->second;
+    if (!rows[i].outcome) continue;
+    const auto word = options.outcomes.find(*rows[i].outcome);
+    const std::string outcome = word == options.outcomes.end() ? *rows[i].outcome : word->second;
+    if (outcome != "rest" && outcome != "end_of_ramp" && outcome != "max_collisions")
+      defects.add(
+          rows[i].place, {},
+          fmt::format("outcome: {0} is none of rest, end_of_ramp, max_collisions; --outcomes rest={1} would say "
+                      "that it is the first",
+                      shown_text(outcome), outcome));
+    else if (!told.outcome.empty() && told.outcome != outcome)
+      defects.add(rows[i].place, {}, fmt::format("outcome: {} after {} of the same trial", outcome, told.outcome));
+    else
+      told.outcome = outcome;
+  }
+  Outcomes outcomes{.csv = "condition,trial,outcome\n", .places = {}};
+  for (const auto& [number, told] : of_trial) {
+    if (told.outcome.empty() && defects.empty())
+      defects.add(told.place, {}, fmt::format("outcome: is not told of trial {}, but of others", number));
+    outcomes.csv += fmt::format("{},{},{}\n", csv_field(told.condition), number, told.outcome);
+    outcomes.places.push_back(told.place);
+  }
+  return outcomes;
+}
+
+// A speed that was scaled shows no digits that it did not have.
+std::string number(const std::optional<double>& value) { return value ? fmt::format("{}", *value) : ""; }
+
+std::string less(const std::optional<double>& value, int first) {
+  return value ? fmt::format("{}", *value - first) : "";
+}
+
+// A defect of the folder's files, said of the line of the foreign file that it comes from.
+std::string in_terms_of(const std::string& defect, const std::string& name, const std::vector<std::string>& places) {
+  if (!defect.starts_with(name + ":")) return defect;
+  std::size_t line = 0;
+  const char* const begin = defect.data() + name.size() + 1;
+  const auto [end, error] = std::from_chars(begin, defect.data() + defect.size(), line);
+  const std::size_t what = defect.find(": ", static_cast<std::size_t>(end - defect.data()));
+  if (error != std::errc() || what == std::string::npos || line < 2 || line - 2 >= places.size()) return defect;
+  return places[line - 2] + defect.substr(what);
+}
+
+// Columns of all rows; one that no row fills is left out.
+std::string collisions_csv(const std::vector<ImportedRow>& rows, const std::vector<long>& numbers,
+                           const ImportOptions& options) {
+  std::string csv = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const ImportedRow& row = rows[i];
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{}\n", csv_field(row.condition.value_or("")),
+                   numbers[i], less(row.collision, options.first_collision - 1), less(row.leg, options.first_leg),
+                   number(row.time), number(row.position), number(row.omega_minus), number(row.omega_plus));
+  }
+  return csv;
+}
+
+std::string angle_csv(const std::vector<ImportedRow>& rows, const std::vector<long>& numbers) {
+  std::string csv = "condition,trial,time_s,angle_rad\n";
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{}\n", csv_field(rows[i].condition.value_or("")), numbers[i],
+                   number(rows[i].time), number(rows[i].angle));
+  return csv;
+}
+
+// Counts the collisions of each trial where the file does not.
+void count_collisions(std::vector<ImportedRow>& rows, const std::vector<long>& numbers, int first) {
+  std::map<long, int> so_far;
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].collision = first + so_far[numbers[i]]++;
+}
+
+}  // namespace
+
+Imported imported_experiment(const std::string& file, std::vector<ImportedRow> rows, const ImportOptions& options) {
+  const auto told = [&](std::optional<double> ImportedRow::*what) {
+    return std::ranges::any_of(rows, [&](const ImportedRow& row) { return (row.*what).has_value(); });
+  };
+  const bool angles = told(&ImportedRow::angle);
+  Defects defects;
+  if (rows.empty()) defects.add(file, {}, "holds no row");
+  defects.check();
+  Imported imported;
+  const std::vector<long> numbers = trial_numbers(rows, options.number_trials, defects);
+  if (options.number_trials)
+    imported.assumed.push_back(
+        "trials are numbered in the order of their first rows, taken as the order they were run");
+  if (!angles && !told(&ImportedRow::collision)) {
+    count_collisions(rows, numbers, options.first_collision);
+    imported.assumed.push_back("collisions are counted in the order of the rows");
+  }
+  const Outcomes outcomes = outcomes_of(rows, numbers, options, defects);
+  defects.check();
+
+  analysis::ExperimentSource& source = imported.source;
+  source.experiment_toml = options.description;
+  if (!outcomes.csv.empty()) source.trials_csv = outcomes.csv;
+  (angles ? source.angle_csv : source.collisions_csv) =
+      angles ? angle_csv(rows, numbers) : collisions_csv(rows, numbers, options);
+  imported.rows = rows.size();
+  std::vector<long> trials = numbers;
+  std::ranges::sort(trials);
+  imported.trials = static_cast<std::size_t>(std::ranges::unique(trials).begin() - trials.begin());
+  try {
+    imported.experiment = angles ? analysis::parse_description(source) : analysis::parse_experiment(source);
+    if (angles) analysis::parse_angles(source, imported.experiment);
+  } catch (const analysis::InputError& error) {
+    std::vector<std::string> places, lines;
+    for (const ImportedRow& row : rows) places.push_back(row.place);
+    for (std::string line : error.lines()) {
+      line = in_terms_of(in_terms_of(line, angles ? "angle.csv" : "collisions.csv", places), "trials.csv",
+                         outcomes.places);
+      constexpr std::string_view description = "experiment.toml";
+      if (line.starts_with(description)) line = options.description_file + line.substr(description.size());
+      lines.push_back(std::move(line));
+    }
+    throw analysis::InputError(std::move(lines));
+  }
+  return imported;
+}
+
+}  // namespace metastable::reports

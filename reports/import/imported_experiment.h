@@ -1,0 +1,34 @@
+#pragma once
+// Rows of a foreign file to the files of an experiment folder.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "analysis/experiment/experiment.h"
+#include "reports/import/imported_rows.h"
+
+namespace metastable::reports {
+
+struct ImportOptions {
+  std::string description;                           ///< experiment.toml
+  std::string description_file;                      ///< for messages
+  bool number_trials = false;                        ///< in the order of their first rows, whatever the file calls them
+  int first_collision = 1;                           ///< what the file calls collision 1, 0 or 1
+  int first_leg = 0;                                 ///< what the file calls leg 0, 0 or 1
+  std::map<std::string, std::string> outcomes = {};  ///< the file's word for an outcome, and the folder's
+};
+
+struct Imported {
+  analysis::ExperimentSource source;  ///< its texts; angle.csv instead of collisions.csv where angles were told
+  analysis::Experiment experiment;    ///< as it will be read back; of angles, their trials without collisions
+  std::size_t trials = 0, rows = 0;
+  std::vector<std::string> assumed;  ///< a sentence each
+};
+
+/// Everything that reading an experiment folder checks is checked here, and said of the place in the foreign file.
+/// @param file  for messages
+/// @throws analysis::InputError with all defects
+Imported imported_experiment(const std::string& file, std::vector<ImportedRow> rows, const ImportOptions& options);
+
+}  // namespace metastable::reports

@@ -1,0 +1,105 @@
+// The blind check of the diagnosis.
+
+#include <fmt/format.h>
+
+#include <atomic>
+
+#include "reports/commands/blind_command.h"
+#include "reports/output/table_json.h"
+#include "reports/output/text_table.h"
+#include "reports/python/answer.h"
+#include "reports/python/arguments.h"
+
+namespace metastable::reports::python {
+namespace {
+
+BlindRequest blind_request_of(const py::dict& options, const std::string& command) {
+  const Arguments given(options);
+  BlindRequest request;
+  request.folder = given.text("folder");
+  while (request.folder.size() > 1 && request.folder.ends_with('/')) request.folder.pop_back();
+  if (given.given("sealed")) request.sealed = given.text("sealed");
+  if (given.given("seed")) request.seed = given.seed();
+  const auto count = [&](const char* name, int& into, std::uint64_t most) {
+    if (given.given(name)) into = static_cast<int>(given.whole(name, 0, most));
+  };
+  count("per_effect", request.size.per_effect_and_strength, 1000);
+  count("none", request.size.none, 5000);
+  count("pairs", request.size.pairs, 5000);
+  count("outside", request.size.outside, 5000);
+  count("left_out", request.size.left_out_per_effect, 1000);
+  request.tool = given.texts("tool");
+  if (given.given("threads")) request.threads = given.threads();
+  if (given.given("out")) request.out = given.text("out");
+  request.command = command;
+  return request;
+}
+
+/// Tells a call of cases.
+class Cases {
+ public:
+  explicit Cases(Call& call) : call_(call) {}
+  CaseProgress progress() {
+    return {[this](std::size_t all, std::size_t had) {
+              all_ = all;
+              done_ = had;
+              tell();
+            },
+            [this] { tell(); },
+            [this] {
+              ++done_;
+              tell();
+            }};
+  }
+
+ private:
+  void tell() { call_.tell(all_ > 0 ? static_cast<double>(done_) / static_cast<double>(all_) : 1, "cases"); }
+  Call& call_;
+  std::atomic<std::size_t> all_ = 0, done_ = 0;
+};
+
+py::dict make(const py::dict& options, const std::string& command, const py::object& progress) {
+  const BlindRequest request = blind_request_of(options, command);
+  BlindMade made;
+  Call call(progress);
+  Cases cases(call);
+  call.run([&] { made = make_blind(request, cases.progress()); });
+  py::dict told;
+  told["cases"] = made.cases;
+  told["sealed"] = made.sealed;
+  return told;
+}
+
+py::dict answer_cases(const py::dict& options, const std::string& command, const py::object& progress) {
+  const BlindRequest request = blind_request_of(options, command);
+  BlindAnswered found;
+  Call call(progress);
+  Cases cases(call);
+  call.run([&] { found = answer_blind(request, cases.progress()); });
+  py::dict told;
+  told["cases"] = found.cases;
+  told["answered"] = found.answered;
+  told["failed"] = found.failed;
+  return told;
+}
+
+py::dict open_cases(const py::dict& options, const std::string& command, const py::object& progress) {
+  const BlindRequest request = blind_request_of(options, command);
+  const Unanswered unanswered = Arguments(options).flag("partial") ? Unanswered::left_out : Unanswered::refused;
+  BlindOpened opened;
+  Call call(progress);
+  call.run([&] { opened = open_blind(request, unanswered); });
+  std::string text;
+  for (const Table& table : opened.tables) text += to_text(table, 1000, line_width) + "\n";
+  return answer(tables_json(opened.tables, opened.provenance), text + opened.page + "\n", tables_html(opened.tables));
+}
+
+}  // namespace
+
+void add_blind(py::module_& module) {
+  module.def("blind_make", make);
+  module.def("blind_answer", answer_cases);
+  module.def("blind_open", open_cases);
+}
+
+}  // namespace metastable::reports::python

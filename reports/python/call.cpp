@@ -1,0 +1,87 @@
+#include "reports/python/call.h"
+
+#include <chrono>
+#include <thread>
+
+namespace metastable::reports::python {
+namespace {
+
+constexpr auto glance = std::chrono::milliseconds(50);  // between two looks at Ctrl-C
+
+}  // namespace
+
+void Call::run(const std::function<void()>& work) {
+  std::exception_ptr failure;
+  std::thread thread([&] {
+    try {
+      work();
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    for_caller_.notify_one();
+  });
+  for (bool over = false; !over;) {
+    Asked* asked = nullptr;
+    {
+      const py::gil_scoped_release released;
+      std::unique_lock lock(mutex_);
+      for_caller_.wait_for(lock, glance, [&] { return ended_ || !asked_.empty(); });
+      over = ended_;
+      if (!asked_.empty()) {
+        asked = asked_.front();
+        asked_.pop_front();
+      }
+    }
+    serve(asked);
+    if (asked == nullptr) continue;
+    const std::lock_guard lock(mutex_);
+    asked->done = true;
+    for_work_.notify_all();
+  }
+  thread.join();
+  if (raised_) std::rethrow_exception(raised_);
+  if (failure) std::rethrow_exception(failure);
+}
+
+// In the caller's thread, holding the lock.
+void Call::serve(const Asked* asked) {
+  if (stopped_) return;
+  try {
+    if (asked != nullptr) (*asked->python)();
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    double share = 0;
+    std::string doing;
+    {
+      const std::lock_guard lock(mutex_);
+      share = share_;
+      doing = doing_;
+    }
+    if (progress_.is_none() || share == shown_) return;
+    shown_ = share;
+    progress_(share, doing);
+  } catch (...) {
+    raised_ = std::current_exception();
+    stopped_ = true;
+  }
+}
+
+void Call::tell(double share, const std::string& doing) {
+  if (stopped_) throw Stopped();
+  const std::lock_guard lock(mutex_);
+  share_ = share;
+  doing_ = doing;
+}
+
+void Call::ask(const std::function<void()>& python) {
+  Asked asked{&python};
+  std::unique_lock lock(mutex_);
+  if (stopped_) throw Stopped();
+  asked_.push_back(&asked);
+  for_caller_.notify_one();
+  for_work_.wait(lock, [&] { return asked.done; });
+  if (stopped_) throw Stopped();
+}
+
+}  // namespace metastable::reports::python

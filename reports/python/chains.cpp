@@ -1,0 +1,191 @@
+// Chains that people bring: a sparse matrix with kill rates.
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "markov/chain/chain.h"
+#include "markov/chain/eigenpairs.h"
+#include "markov/chain/solver.h"
+#include "markov/passage/first_passage.h"
+#include "markov/passage/last_steps.h"
+#include "markov/passage/quasi_stationary.h"
+#include "reports/python/answer.h"
+#include "reports/python/arguments.h"
+
+namespace metastable::reports::python {
+namespace {
+
+using Index = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+using Number = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// A chain with its factors, made at the first question that needs them.
+class HeldChain {
+ public:
+  HeldChain(markov::Chain chain, int threads) : chain_(std::move(chain)), threads_(threads) {}
+  const markov::Chain& chain() const { return chain_; }
+  const markov::ChainSolver& solver() {
+    if (!solver_) solver_ = std::make_unique<markov::ChainSolver>(chain_, threads_);
+    return *solver_;
+  }
+  const markov::QuasiStationary& quasi_stationary() {
+    if (!quasi_) quasi_ = markov::quasi_stationary(solver());
+    return *quasi_;
+  }
+
+ private:
+  markov::Chain chain_;
+  int threads_;
+  std::unique_ptr<markov::ChainSolver> solver_;
+  std::optional<markov::QuasiStationary> quasi_;
+};
+
+// Rows of compressed storage, columns ascending; the diagonal is looked at and left out.
+HeldChain chain_of(const Index& starts, const Index& columns, const Number& values, const Number& kill, int threads) {
+  const auto n = static_cast<std::size_t>(kill.size());
+  std::vector<std::size_t> row_start{0};
+  std::vector<std::uint32_t> column;
+  std::vector<double> value;
+  for (std::size_t i = 0; i < n; ++i) {
+    double sum = kill.data()[i], stay = 0;
+    for (std::int64_t at = starts.data()[i]; at < starts.data()[i + 1]; ++at) {
+      const double p = values.data()[at];
+      sum += p;
+      if (columns.data()[at] == static_cast<std::int64_t>(i)) {
+        stay = p;
+        if (!(p >= 0)) throw std::invalid_argument(fmt::format("chain: row {}: entry {} on the diagonal", i, p));
+        continue;
+      }
+      column.push_back(static_cast<std::uint32_t>(columns.data()[at]));
+      value.push_back(p);
+    }
+    // A diagonal that is given has to be what is left; one that is not given is understood.
+    if (stay != 0 && !(std::abs(sum - 1) <= 1e-9))
+      throw std::invalid_argument(fmt::format(
+          "chain: row {} and its kill rate sum to {:.12g}, 1 expected where the diagonal is given", i, sum));
+    row_start.push_back(column.size());
+  }
+  return {markov::Chain(std::move(row_start), std::move(column), std::move(value),
+                        std::vector<double>(kill.data(), kill.data() + n)),
+          threads};
+}
+
+struct Bounds {
+  std::vector<double> lower, upper;
+};
+
+// Bounds of the expected steps m, (I - Q) m = 1: with v the answer and r = v - Q v, v / max r <= m <= v / min r,
+// because (I - Q)^-1 has no negative entry. r in extended precision, as kill v + sum q (v_i - v_j), with the rounding
+// of that.
+Bounds enclosed(const markov::Chain& chain, const std::vector<double>& v) {
+  constexpr long double eps = std::numeric_limits<long double>::epsilon();
+  long double low = std::numeric_limits<long double>::infinity(), high = 0;
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const long double own = v[i];
+    long double residual = own * chain.kill(i), size = residual;
+    const auto columns = chain.columns(i);
+    const auto values = chain.values(i);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const long double part = values[k] * (own - v[columns[k]]);
+      residual += part;
+      size += std::abs(part);
+    }
+    const long double error = 2 * eps * static_cast<long double>(columns.size() + 2) * size;
+    low = std::min(low, residual - error);
+    high = std::max(high, residual + error);
+  }
+  Bounds bounds;
+  constexpr double out = 4 * std::numeric_limits<double>::epsilon();
+  for (const double value : v) {
+    bounds.lower.push_back(static_cast<double>(value / high) * (1 - out));
+    bounds.upper.push_back(low > 0 ? static_cast<double>(value / low) * (1 + out)
+                                   : std::numeric_limits<double>::infinity());
+  }
+  return bounds;
+}
+
+markov::Launch launch_of(const markov::Chain& chain, const Number& start) {
+  if (static_cast<std::size_t>(start.size()) != chain.size())
+    throw std::invalid_argument(fmt::format("start: {} probabilities given for {} states", start.size(), chain.size()));
+  return {{start.data(), start.data() + start.size()}, 0};
+}
+
+py::dict first_passage(HeldChain& held, const py::object& progress) {
+  std::vector<double> mean, sd;
+  Bounds bounds;
+  Call call(progress);
+  call.run([&] {
+    mean = markov::mean_first_passage(held.solver());
+    const std::vector<double> second = markov::second_moment(held.solver(), mean);
+    for (std::size_t i = 0; i < mean.size(); ++i)  // E T^2 - (E T)^2 with E T (T + 1) / 2 = second
+      sd.push_back(std::sqrt(std::max(0.0, 2 * (second[i] - mean[i] * mean[i]) + mean[i] * (mean[i] - 1))));
+    bounds = enclosed(held.chain(), mean);
+  });
+  py::dict told;
+  told["mean"] = array_of(std::move(mean));
+  told["sd"] = array_of(std::move(sd));
+  told["lower"] = array_of(std::move(bounds.lower));
+  told["upper"] = array_of(std::move(bounds.upper));
+  return told;
+}
+
+py::dict quasi_stationary(HeldChain& held, const py::object& progress) {
+  Call call(progress);
+  markov::QuasiStationary q;
+  call.run([&] { q = held.quasi_stationary(); });
+  py::dict told;
+  told["distribution"] = array_of(std::move(q.distribution));
+  told["survival_weight"] = array_of(std::move(q.survival_weight));
+  told["failure_rate"] = q.failure_rate;
+  told["residual"] = q.residual;
+  told["iterations"] = q.iterations;
+  return told;
+}
+
+py::dict committor(const HeldChain& held, const py::array_t<bool, py::array::c_style | py::array::forcecast>& set,
+                   const py::object& progress) {
+  if (static_cast<std::size_t>(set.size()) != held.chain().size())
+    throw std::invalid_argument(fmt::format("states: {} marks given for {} states", set.size(), held.chain().size()));
+  std::vector<std::uint8_t> marked(set.data(), set.data() + set.size());
+  markov::PassageTo found;
+  Call call(progress);
+  call.run([&] { found = markov::passage_to(held.chain(), marked); });
+  py::dict told;
+  told["reach"] = array_of(std::move(found.reach));
+  told["fail"] = array_of(std::move(found.fail));
+  told["steps"] = array_of(std::move(found.steps));
+  return told;
+}
+
+py::array survival(HeldChain& held, const Number& start, const Number& steps, const py::object& progress) {
+  const markov::Launch launch = launch_of(held.chain(), start);
+  for (py::ssize_t i = 0; i < steps.size(); ++i)
+    if (!(steps.data()[i] >= 0)) throw std::invalid_argument(fmt::format("steps: {} is below 0", steps.data()[i]));
+  std::vector<double> at;
+  Call call(progress);
+  call.run([&] {
+    const markov::Survival survival(held.solver(), held.quasi_stationary(), launch);
+    // There the launch is a step of its own.
+    for (py::ssize_t i = 0; i < steps.size(); ++i) at.push_back(survival.at(steps.data()[i] + 1));
+  });
+  return array_of(std::move(at));
+}
+
+}  // namespace
+
+void add_chains(py::module_& module) {
+  py::class_<HeldChain>(module, "Chain")
+      .def(py::init(&chain_of))
+      .def_property_readonly("size", [](const HeldChain& held) { return held.chain().size(); })
+      .def_property_readonly("entries", [](const HeldChain& held) { return held.chain().entries(); })
+      .def("first_passage", first_passage)
+      .def("quasi_stationary", quasi_stationary)
+      .def("committor", committor)
+      .def("survival", survival);
+}
+
+}  // namespace metastable::reports::python

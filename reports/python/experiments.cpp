@@ -1,0 +1,283 @@
+// Experiments: read, simulated, or made of arrays; described and diagnosed.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+#include "analysis/experiment/experiment.h"
+#include "analysis/experiment/stand_in.h"
+#include "analysis/likelihood/diagnose.h"
+#include "dynamics/wheel/contact_law.h"
+#include "reports/commands/describe_command.h"
+#include "reports/commands/experiment_output.h"
+#include "reports/commands/simulate_command.h"
+#include "reports/diagnosis/diagnosis_json.h"
+#include "reports/diagnosis/diagnosis_tables.h"
+#include "reports/diagnosis/diagnosis_text.h"
+#include "reports/output/table_json.h"
+#include "reports/output/text_table.h"
+#include "reports/output/version.h"
+#include "reports/python/answer.h"
+#include "reports/python/arguments.h"
+
+namespace metastable::reports::python {
+namespace {
+
+/// An experiment with the texts it was read from.
+struct Held {
+  analysis::ExperimentSource source;
+  analysis::Experiment experiment;
+  std::vector<std::string> said;  ///< of a simulation
+};
+using HeldExperiment = std::shared_ptr<Held>;
+
+HeldExperiment held(analysis::ExperimentSource source) {
+  analysis::Experiment experiment = analysis::parse_experiment(source);
+  return std::make_shared<Held>(Held{std::move(source), std::move(experiment), {}});
+}
+
+HeldExperiment read(const std::string& folder) { return held(analysis::read_source(folder)); }
+
+HeldExperiment of_simulation(SimulatedExperiment made) {
+  HeldExperiment experiment = held(std::move(made.source));
+  experiment->said = std::move(made.said);
+  return experiment;
+}
+
+void write(const Held& held, const std::string& folder) { ExperimentOutput(folder).write(held.source); }
+
+// Columns as they are measured; NaN or -1 where nothing is known.
+struct CollisionRow {
+  std::int64_t condition, trial, collision, leg;
+  double time, position, omega_minus, omega_plus;
+};
+
+py::dict collisions_of(const Held& held) {
+  const auto rows = std::make_shared<std::vector<CollisionRow>>();
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  for (const analysis::MeasuredTrial& trial : held.experiment.trials)
+    for (const analysis::MeasuredCollision& c : trial.collisions)
+      rows->push_back({static_cast<std::int64_t>(trial.condition), trial.number, c.number, c.leg.value_or(-1),
+                       c.time.value_or(unknown), c.position.value_or(unknown), c.omega_minus,
+                       c.omega_plus.value_or(unknown)});
+  py::dict columns;
+  const CollisionRow none{};
+  const CollisionRow& first = rows->empty() ? none : rows->front();
+  const auto column = [&](const char* name, const auto& field) {
+    columns[name] = array_view(&field, rows->size(), rows, sizeof(CollisionRow));
+  };
+  column("condition", first.condition);
+  column("trial", first.trial);
+  column("collision", first.collision);
+  column("leg", first.leg);
+  column("time_s", first.time);
+  column("position_m", first.position);
+  column("omega_minus_rad_s", first.omega_minus);
+  column("omega_plus_rad_s", first.omega_plus);
+  return columns;
+}
+
+py::dict trials_of(const Held& held) {
+  std::vector<std::int64_t> condition, number, collisions;
+  std::vector<std::optional<std::string>> outcome;
+  for (const analysis::MeasuredTrial& trial : held.experiment.trials) {
+    condition.push_back(static_cast<std::int64_t>(trial.condition));
+    number.push_back(trial.number);
+    collisions.push_back(static_cast<std::int64_t>(trial.collisions.size()));
+    outcome.push_back(trial.outcome ? std::optional(std::string(analysis::outcome_name(*trial.outcome)))
+                                    : std::nullopt);
+  }
+  py::dict columns;
+  columns["condition"] = array_of(std::move(condition));
+  columns["trial"] = array_of(std::move(number));
+  columns["collisions"] = array_of(std::move(collisions));
+  columns["outcome"] = py::cast(outcome);
+  return columns;
+}
+
+// A field of a CSV file; what is not known is left empty.
+std::string field_of(const py::handle& value) {
+  if (value.is_none()) return "";
+  if (py::isinstance<py::float_>(value)) {
+    const auto number = value.cast<double>();
+    return std::isnan(number) ? "" : fmt::format("{}", number);
+  }
+  return csv_field(py::str(value).cast<std::string>());
+}
+
+std::string csv_of(const py::dict& columns, const char* name) {
+  std::string text;
+  std::vector<py::list> values;
+  for (const auto& [key, column] : columns) {
+    text += (text.empty() ? "" : ",") + csv_field(py::str(key).cast<std::string>());
+    const py::object list = py::hasattr(column, "tolist") ? py::object(column.attr("tolist")())
+                                                          : py::reinterpret_borrow<py::object>(column);
+    values.emplace_back(list);
+    if (values.back().size() != values.front().size())
+      throw std::invalid_argument(fmt::format("{}: column {} has {} values where the first has {}", name,
+                                              std::string(py::str(key)), values.back().size(), values.front().size()));
+  }
+  text += "\n";
+  for (std::size_t row = 0; !values.empty() && row < values.front().size(); ++row) {
+    for (std::size_t k = 0; k < values.size(); ++k) text += (k > 0 ? "," : "") + field_of(values[k][row]);
+    text += "\n";
+  }
+  return text;
+}
+
+HeldExperiment from_arrays(const py::list& ids, const py::list& settings, const py::dict& collisions,
+                           const py::object& trials, const py::dict& options) {
+  const Arguments given(options);
+  analysis::ExperimentSource source;
+  source.folder = "arrays";
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const analysis::Setting setting = setting_of(Arguments(settings[i].cast<py::dict>()));
+    if (i == 0)
+      source.experiment_toml =
+          analysis::wheel_description(setting, setting.restitution, setting.friction, given.text("title"), {});
+    source.experiment_toml += analysis::condition_description(ids[i].cast<std::string>(), setting);
+  }
+  if (given.given("rate_hz") || given.given("noise_sd")) source.experiment_toml += "\n[sensor]\n";
+  if (given.given("rate_hz")) source.experiment_toml += fmt::format("rate_hz = {}\n", given.number("rate_hz"));
+  if (given.given("noise_sd")) source.experiment_toml += fmt::format("noise_sd_rad_s = {}\n", given.number("noise_sd"));
+  source.collisions_csv = csv_of(collisions, "collisions");
+  if (!trials.is_none()) source.trials_csv = csv_of(trials.cast<py::dict>(), "trials");
+  return held(std::move(source));
+}
+
+RealityRequest reality_of(const SimulateRequest& plain, const Arguments& given) {
+  RealityRequest request;
+  const analysis::Setting& s = plain.setting;
+  request.conditions = plain.stand_in
+                           ? analysis::stand_in_conditions(s)
+                           : std::vector<analysis::RealityCondition>{{fmt::format("{}", s.slope_deg), s, plain.trials}};
+  analysis::RealityOptions& reality = request.reality;
+  const dynamics::NominalValues stated = analysis::stated_values(s.restitution, s.friction, s.wheel.leg_length);
+  for (const std::string& text : given.texts("effects"))
+    reality.effects.push_back(dynamics::effect_from_text(text, stated));
+  const Arguments outside = given.part("outside");
+  for (const auto& [key, size] : outside.all()) {
+    const auto name = py::str(key).cast<std::string>();
+    reality.outside.push_back({name, outside.number(name.c_str())});
+  }
+  reality.restitution_skewness = given.number("skewness");
+  reality.sensor_noise = given.number("sensor_noise");
+  reality.smoothing = given.number("smoothing");
+  reality.flight = given.flag("flight");
+  reality.shuffled = given.flag("shuffled");
+  reality.collisions = plain.collisions;
+  reality.seed = plain.seed;
+  reality.threads = plain.threads;
+  request.dropped = given.texts("drop");
+  request.camera = plain.camera;
+  request.out = plain.out;
+  request.command = plain.command;
+  return request;
+}
+
+HeldExperiment simulate(const py::dict& setting, const py::dict& options, const std::string& command,
+                        const py::object& progress) {
+  const Arguments given(options);
+  SimulateRequest request{setting_of(Arguments(setting)),
+                          static_cast<int>(given.whole("trials", 1, 1000000)),
+                          static_cast<int>(given.whole("collisions", 1, 100000)),
+                          given.seed(),
+                          given.threads(),
+                          "simulated",
+                          command};
+  request.stand_in = given.flag("stand_in");
+  if (given.given("angle_noise") && !given.given("angle_rate"))
+    throw std::invalid_argument("angle_noise: needs angle_rate");
+  if (given.given("angle_rate")) {
+    analysis::CameraOptions& camera = request.camera.emplace();
+    camera.rate = given.number("angle_rate");
+    if (request.stand_in) camera.decimals = 5;
+    if (given.given("angle_noise")) camera.noise_sd_rad = given.number("angle_noise");
+    camera.seed = request.seed;
+    camera.threads = request.threads;
+    camera.validate();
+  }
+  HeldExperiment experiment;
+  const bool reality = given.flag("reality");
+  const RealityRequest laboratory = reality ? reality_of(request, given) : RealityRequest{};
+  Call call(progress);
+  call.run(
+      [&] { experiment = of_simulation(reality ? simulated_experiment(laboratory) : simulated_experiment(request)); });
+  return experiment;
+}
+
+py::dict diagnose(const HeldExperiment& held, const py::dict& options, const std::string& command,
+                  const py::object& progress) {
+  const Arguments given(options);
+  analysis::DiagnosisOptions study;
+  study.seed = given.seed();
+  study.threads = given.threads();
+  study.catalogue = given.texts("catalogue");
+  analysis::Diagnosis found;
+  Call call(progress);
+  study.progress = [&](double share, const std::string& doing) { call.tell(share, doing); };
+  call.run([&] { found = analysis::diagnose(held->experiment, study); });
+  const Provenance provenance{command, "experiment: " + held->experiment.title, study.seed, version()};
+  std::vector<Table> tables{gap_table(found),       contact_table(found), where_table(found),     causes_table(found),
+                            shrinkage_table(found), steps_table(found),   visibility_table(found)};
+  std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
+  return answer(diagnosis_json(found, provenance), diagnosis_text(found, line_width),
+                "<p>" + escape_html(fmt::format("{}", fmt::join(found.sentences, " "))) + "</p>" + tables_html(tables));
+}
+
+py::dict describe(const HeldExperiment& held, const py::dict& options, const std::string& command,
+                  const py::object& progress) {
+  const Arguments given(options);
+  DescribeRequest request;
+  const std::string transition = given.text("transition");
+  if (transition == "collision" || transition == "step")
+    request.options.transition = transition == "step" ? analysis::Transition::step : analysis::Transition::collision;
+  else if (transition != "auto")
+    throw std::invalid_argument(fmt::format("transition: '{}' is none of 'auto', 'collision' and 'step'", transition));
+  for (const std::string& law : given.texts("against")) request.against.push_back(dynamics::law_from_name(law));
+  request.trials = static_cast<int>(given.whole("trials", 2, 1000000));
+  request.options.seed = given.seed();
+  request.options.threads = given.threads();
+  const Provenance provenance{command, "experiment: " + held->experiment.title, request.options.seed, version()};
+  Call call(progress);
+  // A fit takes some 500 to 1000 evaluations of its likelihood.
+  const double all = 1000.0 * static_cast<double>(held->experiment.conditions.size() + 1 + request.against.size());
+  std::atomic<int> done = 0;
+  request.options.progress = [&] { call.tell(std::min(1.0, ++done / all), "describe"); };
+  std::optional<DescribeAnswer> found;
+  call.run([&] { found = answer_describe(held->experiment, request, provenance); });
+  std::string text;
+  for (const Table& table : found->tables) text += to_text(table, 1000, line_width) + "\n";
+  return answer(tables_json(found->tables, provenance), text, tables_html(found->tables));
+}
+
+}  // namespace
+
+void add_experiments(py::module_& module) {
+  py::class_<Held, HeldExperiment>(module, "Experiment")
+      .def_property_readonly("title", [](const Held& h) { return h.experiment.title; })
+      .def_property_readonly("notes", [](const Held& h) { return h.experiment.notes; })
+      .def_property_readonly("conditions",
+                             [](const Held& h) {
+                               std::vector<std::string> ids;
+                               for (const auto& condition : h.experiment.conditions) ids.push_back(condition.id);
+                               return ids;
+                             })
+      .def_property_readonly("said", [](const Held& h) { return h.said; })
+      .def("collisions", collisions_of)
+      .def("trials", trials_of)
+      .def("write", write);
+  module.def("read_experiment", read);
+  module.def("experiment_from_arrays", from_arrays);
+  module.def("simulate", simulate);
+  module.def("diagnose", diagnose);
+  module.def("describe", describe);
+  module.def("effects_json", effects_json);
+}
+
+}  // namespace metastable::reports::python

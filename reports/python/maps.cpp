@@ -1,0 +1,249 @@
+// Walkers of the library, and any simulator that takes its noise as normal scores, on meshes.
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+
+#include "analysis/walkers/walker_falls.h"
+#include "analysis/walkers/walker_study.h"
+#include "analysis/walkers/walker_trials.h"
+#include "markov/mesh/batch_simulation.h"
+#include "reports/commands/walker_command.h"
+#include "reports/output/text_table.h"
+#include "reports/output/version.h"
+#include "reports/python/answer.h"
+#include "reports/python/arguments.h"
+#include "reports/study/walker_text.h"
+
+namespace metastable::reports::python {
+namespace {
+
+py::array survival_array(const markov::MeshStudy& study) {
+  std::vector<double> survival{1};
+  survival.insert(survival.end(), study.survival.begin(), study.survival.end());
+  return array_of(std::move(survival));
+}
+
+WalkerRequest walker_request_of(const py::list& settings, const Arguments& given, const std::string& command) {
+  WalkerRequest request;
+  for (const py::handle& fields : settings)
+    request.settings.push_back(walker_setting_of(Arguments(fields.cast<py::dict>())));
+  request.study = mesh_options_of(given);
+  request.command = command;
+  request.how_it_fails = given.flag("how_it_fails");
+  return request;
+}
+
+// One setting: `steps --walker`; several: `compare --walker`.
+py::dict study_walkers(const py::list& settings, const py::dict& options, const std::string& command,
+                       const py::object& progress) {
+  const WalkerRequest request = walker_request_of(settings, Arguments(options), command);
+  WalkerAnswer found;
+  Call call(progress);
+  call.run([&] {
+    found = request.settings.size() > 1 ? answer_walker_compare(request, parts_of(call))
+                                        : answer_walker_steps(request, parts_of(call));
+  });
+  std::vector<Table> tables;
+  for (std::size_t i = 0; i < found.studies.size(); ++i)
+    tables.push_back(mesh_table(request.settings[i].describe(), found.studies[i].passage,
+                                {command, {}, request.study.seed, version()}));
+  py::dict arrays;
+  if (request.settings.size() == 1) arrays["survival"] = survival_array(found.studies.front().passage);
+  return answer(walker_answer_json(request, found), walker_answer_text(request, found, line_width), tables_html(tables),
+                arrays);
+}
+
+// States of one kind in rows; Python may keep them.
+py::array_t<double> rows_of(std::span<const double> values, std::size_t rows) {
+  py::array_t<double> array({rows, values.size() / rows});
+  std::memcpy(array.mutable_data(), values.data(), values.size_bytes());
+  return array;
+}
+
+std::string shape_of(const py::array& array) { return py::str(array.attr("shape")).cast<std::string>(); }
+
+[[noreturn]] void refuse(const std::string& what) { throw py::type_error("step: " + what); }
+
+// Copies what `step` returned for the next states.
+void take_next(const py::object& returned, std::size_t rows, std::span<double> next) {
+  const py::array array = py::array::ensure(returned);
+  if (!array || std::strchr("fiu", array.dtype().kind()) == nullptr)
+    refuse(fmt::format("the next states are no array of real numbers, but {}",
+                       array ? "of dtype " + py::str(array.dtype()).cast<std::string>()
+                             : std::string(py::str(py::type::of(returned).attr("__name__")))));
+  const std::size_t dimension = next.size() / rows;
+  const bool flat = dimension == 1 && array.ndim() == 1 && static_cast<std::size_t>(array.shape(0)) == rows;
+  const bool full = array.ndim() == 2 && static_cast<std::size_t>(array.shape(0)) == rows &&
+                    static_cast<std::size_t>(array.shape(1)) == dimension;
+  if (!flat && !full)
+    throw py::value_error(
+        fmt::format("step: next states of shape {}, ({}, {}) expected", shape_of(array), rows, dimension));
+  const py::array_t<double, py::array::c_style | py::array::forcecast> numbers(array);
+  std::memcpy(next.data(), numbers.data(), next.size_bytes());
+}
+
+void take_failed(const py::object& returned, std::span<std::uint8_t> failed) {
+  const py::array array = py::array::ensure(returned);
+  if (!array || array.dtype().kind() != 'b')
+    refuse(fmt::format("whether each state failed is no array of booleans, but {}",
+                       array ? "of dtype " + py::str(array.dtype()).cast<std::string>()
+                             : std::string(py::str(py::type::of(returned).attr("__name__")))));
+  if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != failed.size())
+    throw py::value_error(fmt::format("step: failed of shape {}, ({},) expected", shape_of(array), failed.size()));
+  const py::array_t<bool, py::array::c_style | py::array::forcecast> flags(array);
+  for (std::size_t i = 0; i < failed.size(); ++i) failed[i] = flags.data()[i] ? 1 : 0;
+}
+
+/// A simulator written in Python.
+struct PythonMap {
+  py::object step;
+  std::string name;
+  int dimension = 1, scores = 1, phases = 1;
+  std::vector<std::string> names, noise_names;
+  std::vector<double> start;
+};
+
+PythonMap map_of(const py::dict& fields) {
+  const Arguments given(fields);
+  PythonMap map;
+  map.step = fields["step"];
+  map.name = given.text("name");
+  map.dimension = static_cast<int>(given.whole("dimension", 1, 4));
+  map.scores = static_cast<int>(given.whole("noise", 1, 16));
+  map.phases = static_cast<int>(given.whole("phases", 1, 64));
+  map.names = given.texts("names");
+  map.noise_names = given.texts("noise_names");
+  if (map.noise_names.empty())
+    for (int k = 0; k < map.scores; ++k) map.noise_names.push_back(fmt::format("noise {} [sd]", k + 1));
+  if (map.noise_names.size() != static_cast<std::size_t>(map.scores))
+    throw std::invalid_argument(fmt::format("noise_names: {} given, one for each of the {} numbers expected",
+                                            map.noise_names.size(), map.scores));
+  map.start = given.numbers("start");
+  return map;
+}
+
+// The map as the library takes it: Python is asked through `call`.
+markov::BatchMap batch_of(const PythonMap& python, Call& call) {
+  markov::BatchMap map;
+  map.dimension = python.dimension;
+  map.scores = python.scores;
+  map.phases = python.phases;
+  map.names = python.names;
+  map.step = [&python, &call](int phase, auto states, auto scores, auto next, auto failed) {
+    call.ask([&] {
+      const std::size_t rows = failed.size();
+      const py::object state = rows_of(states, rows), noise = rows_of(scores, rows);
+      const py::object result = python.phases > 1 ? python.step(state, noise, phase) : python.step(state, noise);
+      if (!py::isinstance<py::tuple>(result) || py::len(result) != 2)
+        refuse(fmt::format("(next states, failed) is to be returned, not {}",
+                           std::string(py::str(py::type::of(result).attr("__name__")))));
+      const auto both = result.cast<py::tuple>();
+      take_next(both[0], rows, next);
+      take_failed(both[1], failed);
+    });
+  };
+  markov::require_start(map, python.start);
+  return map;
+}
+
+py::dict study_map(const py::dict& fields, const py::dict& options, const std::string& command,
+                   const py::object& progress) {
+  const PythonMap python = map_of(fields);
+  const Arguments given(options);
+  markov::MeshStudyOptions study = mesh_options_of(given);
+  const bool how_it_fails = given.flag("how_it_fails");
+  MapStudy found{python.name, {}};
+  std::optional<analysis::LastMoments> moments;
+  Call call(progress);
+  const markov::BatchMap map = batch_of(python, call);
+  study.progress = [&](double share) { call.tell(share, "steps"); };
+  call.run([&] {
+    found.passage = markov::mesh_study(map, python.start, study);
+    markov::require_agreement(found.passage, python.name);
+    if (!how_it_fails) return;
+    std::vector<analysis::NamedNoise> noises;
+    for (const std::string& name : python.noise_names) noises.push_back({name});
+    moments = analysis::how_it_falls(map, python.start, noises, found.passage, study).moments;
+  });
+  const Provenance provenance{command, python.name, study.seed, version()};
+  py::dict arrays;
+  arrays["survival"] = survival_array(found.passage);
+  return answer(map_json(found, moments, provenance), map_text(found, moments, line_width),
+                to_html(mesh_table(python.name, found.passage, provenance)), arrays);
+}
+
+py::dict simulate_map(const py::dict& fields, const py::dict& options, const py::object& progress) {
+  const PythonMap python = map_of(fields);
+  const Arguments given(options);
+  const markov::SimulationOptions simulation{.trials = given.whole("trials", 2, 100000000),
+                                             .seed = given.seed(),
+                                             .threads = given.threads(),
+                                             .most_steps = given.whole("most_steps", 1, 1ULL << 62)};
+  std::optional<markov::SimulatedSteps> found;
+  Call call(progress);
+  const markov::BatchMap map = batch_of(python, call);
+  call.run([&] { found = markov::simulate_steps(map, python.start, simulation); });
+  if (!found)
+    throw std::runtime_error(fmt::format("{}: {} steps do not suffice for {} trials to fail", python.name,
+                                         simulation.most_steps, simulation.trials));
+  py::dict told;
+  told["mean"] = found->mean;
+  told["standard_error"] = found->standard_error;
+  told["steps"] = array_of(std::vector<std::int64_t>(found->steps.begin(), found->steps.end()));
+  return told;
+}
+
+py::dict simulate_walks(const py::dict& fields, const py::dict& options, const py::object& progress) {
+  const analysis::WalkerSetting setting = walker_setting_of(Arguments(fields));
+  const Arguments given(options);
+  const analysis::WalkOptions walking{.trials = given.whole("trials", 1, 1000000),
+                                      .longest = given.whole("most_steps", 1, 1000000),
+                                      .seed = given.seed(),
+                                      .threads = given.threads()};
+  std::vector<analysis::Walk> walks;
+  Call call(progress);
+  call.run([&] { walks = analysis::simulate_walks(setting, walking); });
+  std::vector<std::int64_t> trial, step, steps;
+  std::vector<double> slope;
+  std::vector<bool> fell;
+  const std::vector<std::string> names = setting.map().names();
+  std::vector<std::vector<double>> states(names.size());
+  for (std::size_t t = 0; t < walks.size(); ++t) {
+    steps.push_back(static_cast<std::int64_t>(walks[t].steps.size()));
+    fell.push_back(walks[t].fell);
+    for (std::size_t n = 0; n < walks[t].steps.size(); ++n) {
+      trial.push_back(static_cast<std::int64_t>(t + 1));
+      step.push_back(static_cast<std::int64_t>(n + 1));
+      slope.push_back(walks[t].steps[n].slope_deg);
+      for (std::size_t k = 0; k < names.size(); ++k) states[k].push_back(walks[t].steps[n].state[k]);
+    }
+  }
+  py::dict columns, told;
+  columns["trial"] = array_of(std::move(trial));
+  columns["step"] = array_of(std::move(step));
+  for (std::size_t k = 0; k < names.size(); ++k) columns[names[k].c_str()] = array_of(std::move(states[k]));
+  columns["slope met [deg]"] = array_of(std::move(slope));
+  told["walks"] = columns;
+  told["steps"] = array_of(std::move(steps));
+  told["fell"] = py::array(py::cast(fell));
+  return told;
+}
+
+}  // namespace
+
+void add_maps(py::module_& module) {
+  module.def("describe_walker", [](const py::dict& fields) { return walker_setting_of(Arguments(fields)).describe(); });
+  module.def("study_walkers", study_walkers);
+  module.def("check_map", [](const py::dict& fields) {
+    Call call{py::none()};
+    batch_of(map_of(fields), call);
+  });
+  module.def("study_map", study_map);
+  module.def("simulate_map", simulate_map);
+  module.def("simulate_walks", simulate_walks);
+}
+
+}  // namespace metastable::reports::python

@@ -1,0 +1,590 @@
+"""How long does a walking machine walk? The toolkit metastable from Python.
+
+    import metastable
+
+    setting = metastable.Setting(slope_deg=9.59, friction=(0.3, 0.05))
+    study = metastable.study(setting)
+    study.expected_steps.from_start, study.expected_steps.interval_95
+
+Angles are in degrees where a name ends in `_deg`; everything else is in SI units. The same seed gives the same numbers
+as the command line, to the bit, on any number of threads. Wrong arguments are an InputError (a ValueError), failed
+computations a ComputationError (a RuntimeError).
+"""
+
+import dataclasses
+import json
+import os
+from typing import Optional, Sequence, Tuple, Union
+
+import numpy
+
+from metastable import _metastable, _progress, blind
+from metastable._errors import ComputationError, Contradiction, InputError, MapError
+from metastable._results import (Columns, Comparison, Description, Diagnosis, Record, Regime, Result, Study, Sweep,
+                                 Table, WalkerComparison, WalkerStudy, Walks)
+
+__version__ = _metastable.version
+
+__all__ = [
+    "Chain", "Columns", "Comparison", "ComputationError", "Contradiction", "Description", "Diagnosis", "Experiment",
+    "FirstPassage", "InputError", "MapError", "Passage", "QuasiStationary", "Record", "Regime", "Result", "Setting",
+    "SimulatedSteps", "Study", "Sweep", "Table", "Walker", "WalkerComparison", "WalkerSetting", "WalkerStudy", "Walks",
+    "blind", "chain", "compare", "describe", "diagnose", "effects", "experiment", "read_experiment", "simulate",
+    "study", "sweep", "version_text", "walker",
+]
+
+
+def version_text():
+    """Version, commit, compiler and libraries, as `metastable --version`."""
+    return _metastable.version_text()
+
+
+def _fields(instance):
+    return {field.name: getattr(instance, field.name) for field in dataclasses.fields(instance)}
+
+
+def _called(name, *what, **options):
+    """The call that makes a result again, for its provenance."""
+    words = [repr(each) for each in what]
+    words += [f"{key}={value!r}" for key, value in options.items() if value is not None and value is not False]
+    return f"metastable.{name}({', '.join(words)})"
+
+
+@dataclasses.dataclass(frozen=True, eq=True)
+class Setting:
+    """A rimless wheel on a ramp, with its contact law and its noise. What is None is the paper's; `replace` changes.
+
+    slope_deg           of the ramp [deg], from 0.001 to below half the angle between legs
+    initial_speed       (mean, sd) just before collision 1 [rad/s]; None: the paper's at 7.02 and 9.59 deg
+    law                 "published", "coulomb", "plastic" or "settled"
+    restitution         eta, (mean, sd) of a normal truncated to [0, 1], or a constant; None: (0.4, 0.1)
+    friction            mu, (mean, sd) of a normal truncated to [0, inf), or a constant; None: (0.4, 0.1)
+    correlation         of the normal scores of eta and mu, (-1, 1)
+    contact_list        instead of these three: pairs (eta, mu) to draw from, an array of n rows
+    rebound_lost        share of the rebound's energy lost in hops, 0 to 1 (coulomb)
+    legs                lengths [m] in the order they land, 3 or more; None: the paper's eight
+    mass                of the hub [kg]; None: 1.39
+    inertia             about the stance foot [kg m^2]; None: mass times mean leg squared, and what the law adds
+    radius_of_gyration  about the hub [m] (coulomb, plastic, settled); None: 0.05, under plastic 0
+    tip_radius          of the legs' round tips [m] (settled); None: 0
+    ramp_stiffness      [N/m] (published); None: 9000
+    contact_mass        [kg] (published); None: the hub's
+    gravity             [m/s^2]; None: 9.81
+    ramp_length         [m]; None: 3.66; math.inf for a ramp without end
+    first_leg           that lands at collision 1, counted from 0
+    direct              settled: follow every landing instead of reading a table, hundreds of times slower
+
+    Raises InputError naming the quantity and its range.
+    """
+
+    slope_deg: float = 7.02
+    initial_speed: Union[Tuple[float, float], float, None] = None
+    law: str = "published"
+    restitution: Union[Tuple[float, float], float, None] = None
+    friction: Union[Tuple[float, float], float, None] = None
+    correlation: Optional[float] = None
+    contact_list: Optional[Sequence[Tuple[float, float]]] = None
+    rebound_lost: Optional[float] = None
+    legs: Optional[Sequence[float]] = None
+    mass: Optional[float] = None
+    inertia: Optional[float] = None
+    radius_of_gyration: Optional[float] = None
+    tip_radius: Optional[float] = None
+    ramp_stiffness: Optional[float] = None
+    contact_mass: Optional[float] = None
+    gravity: Optional[float] = None
+    ramp_length: Optional[float] = None
+    first_leg: int = 0
+    direct: bool = False
+
+    def __post_init__(self):
+        _metastable.describe_setting(_fields(self))
+        # Plain numbers and tuples: equal settings compare, hash, print and pickle alike.
+        for name, value in _fields(self).items():
+            if value is not None and not isinstance(value, str):
+                object.__setattr__(self, name, _plain(value))
+
+    @property
+    def launch(self):
+        """(mean, sd) of the speed just before collision 1 [rad/s], the paper's where it was not given."""
+        return _metastable.launch(_fields(self))
+
+    def describe(self):
+        """Every quantity in one line."""
+        return _metastable.describe_setting(_fields(self))
+
+    def replace(self, **changes):
+        """The same setting with other values of some fields."""
+        return dataclasses.replace(self, **changes)
+
+    def __repr__(self):
+        return _repr(self)
+
+
+@dataclasses.dataclass(frozen=True, eq=True)
+class WalkerSetting:
+    """A passive walker on two legs on rough ground.
+
+    walker        "simplest" (Garcia et al. 1998: lengths in legs, times in sqrt(l/g)) or "compass" (Goswami et al. 1998)
+    slope_sd_deg  sd of the slope from step to step [deg], in (0, 45)
+    slope_deg     mean slope [deg], in (0, 45); None: 0.009 rad of the simplest, 3 deg of the compass
+    terrain       "fresh": a plane that tilts anew at every step; "facets": the feet still stand on the last one
+    """
+
+    walker: str
+    slope_sd_deg: float
+    slope_deg: Optional[float] = None
+    terrain: str = "fresh"
+
+    def __post_init__(self):
+        _metastable.describe_walker(_fields(self))
+
+    def describe(self):
+        """Every quantity in one line."""
+        return _metastable.describe_walker(_fields(self))
+
+    def replace(self, **changes):
+        """The same setting with other values of some fields."""
+        return dataclasses.replace(self, **changes)
+
+    def __repr__(self):
+        return _repr(self)
+
+
+def _plain(value):
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return tuple(_plain(each) for each in value) if isinstance(value, (list, tuple)) else value
+
+
+def _repr(setting):
+    given = [f"{f.name}={getattr(setting, f.name)!r}" for f in dataclasses.fields(setting)
+             if f.default is dataclasses.MISSING or getattr(setting, f.name) != f.default]
+    return f"{type(setting).__name__}({', '.join(given)})"
+
+
+def study(setting, *, method=None, cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None,
+          replicates=None, mixing_distance=None, eigenvalues=None, certify=False, sensitivities=False,
+          standard_errors=None, spacing=None, simulated_steps=None, memory_gb=None, how_it_fails=False, seed=1,
+          threads=0, progress=None):
+    """How many steps before it fails, with its 95 % interval, and what goes with that: `metastable steps`.
+
+    setting          a Setting (returns a Study), a WalkerSetting or a Walker (returns a WalkerStudy)
+
+    Of a Setting:
+    tolerance        relative half-width wanted of the interval of the expected steps, (0, 1); None: 0.01
+    method           "sampled", or "integrated" for many digits; None: "sampled"
+    cells, samples   a landing leg, 8 to 4096, and draws a cell, 16 to 2^24; None: refined until the tolerance is met
+    sequence         of the draws, "sobol" or "random"; draws: "weighted" or "plain"; tail: the probability they reach
+    replicates       independent randomisations behind the interval, 2 to 64; None: 8
+    mixing_distance  total variation distance that counts as mixed, (0, 1); None: 0.05
+    eigenvalues      how many moduli, 1 to 64; None: 6
+    certify          guaranteed bounds as well (law "published")
+    sensitivities    how ln(expected steps) responds to each parameter, ranked
+    standard_errors  of parameters by name, {"friction_mean": 0.01}: an interval from them is given apart
+
+    Of a WalkerSetting or a Walker:
+    spacing          of the coarsest mesh, in stationary sds of the noise, 0.05 to 2; None: by dimension
+    simulated_steps  about how many steps the direct simulation beside it takes; None: 2 million, 0: none
+    memory_gb        most memory of the meshes; None: 3
+
+    Of all:
+    how_it_fails     the last steps before failure as well
+    seed             the same seed gives the same numbers, on any number of threads (0: all cores)
+    progress         None: shown on a terminal and in a notebook; True, False, or a function of the share done (0 to 1)
+    """
+    wheel = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
+                 tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
+                 certify=certify, sensitivities=sensitivities, standard_errors=standard_errors)
+    mesh = dict(spacing=spacing, simulated_steps=simulated_steps, memory_gb=memory_gb)
+    every = dict(how_it_fails=how_it_fails, seed=seed, threads=threads)
+    is_wheel = isinstance(setting, Setting)
+    _refuse(mesh if is_wheel else wheel, "a wheel" if is_wheel else "a walker")
+    options = {**(wheel if is_wheel else mesh), **every}
+    command = _called("study", setting, **{key: value for key, value in options.items() if key != "threads"})
+    with _progress.telling(progress, "study") as tell:
+        if is_wheel:
+            return Study(_metastable.study(_fields(setting), options, command, tell))
+        if isinstance(setting, WalkerSetting):
+            return WalkerStudy(_metastable.study_walkers([_fields(setting)], options, command, tell))
+        if isinstance(setting, Walker):
+            return WalkerStudy(_metastable.study_map(_fields(setting), options, command, tell))
+    raise TypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
+
+
+def _refuse(options, who):
+    for name, value in options.items():
+        if value is not None and value is not False:
+            raise InputError(f"{name}: has no meaning for {who}")
+
+
+def compare(settings, *, collisions=16, method=None, cells=None, samples=None, tolerance=None, sequence=None,
+            draws=None, tail=None, replicates=None, standard_errors=None, spacing=None, simulated_steps=None,
+            memory_gb=None, seed=1, threads=0, progress=None):
+    """Expected steps of two or more settings on common random numbers, each compared with the first: `metastable
+    compare`. Settings of the wheel give a Comparison, WalkerSettings a WalkerComparison.
+
+    collisions  of a measured trial, 1 to 63: how many such trials would tell the settings apart
+    The other arguments are those of study().
+    """
+    settings = list(settings)
+    wheel = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
+                 tail=tail, replicates=replicates, standard_errors=standard_errors)
+    mesh = dict(spacing=spacing, simulated_steps=simulated_steps, memory_gb=memory_gb)
+    kinds = {type(setting) for setting in settings}
+    if len(settings) < 2 or len(kinds) > 1 or not kinds <= {Setting, WalkerSetting}:
+        raise InputError("settings: two or more of one kind, Setting or WalkerSetting, expected")
+    is_wheel = kinds == {Setting}
+    _refuse(mesh if is_wheel else wheel, "wheels" if is_wheel else "walkers")
+    options = {**(wheel if is_wheel else mesh), "seed": seed, "threads": threads}
+    if is_wheel:
+        options["collisions"] = collisions
+    command = _called("compare", settings, **{key: value for key, value in options.items() if key != "threads"})
+    fields = [_fields(setting) for setting in settings]
+    with _progress.telling(progress, "compare") as tell:
+        if is_wheel:
+            return Comparison(_metastable.compare(fields, options, command, tell))
+        return WalkerComparison(_metastable.study_walkers(fields, options, command, tell))
+
+
+def sweep(setting, *, slope_deg=None, restitution_mean=None, restitution_sd=None, friction_mean=None, friction_sd=None,
+          leg_length=None, inertia=None, ramp_stiffness=None, radius_of_gyration=None, contact_mass=None,
+          tip_radius=None, method=None, cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None,
+          replicates=None, seed=1, threads=0, progress=None):
+    """Expected steps over the product of ranges, rising values of what varies (units as in Setting): `metastable
+    sweep`. A slope that varies keeps the setting's launch, which then must be given. Returns a Sweep.
+
+    The other arguments are those of study().
+    """
+    axes = dict(slope_deg=slope_deg, restitution_mean=restitution_mean, restitution_sd=restitution_sd,
+                friction_mean=friction_mean, friction_sd=friction_sd, leg_length=leg_length, inertia=inertia,
+                ramp_stiffness=ramp_stiffness, radius_of_gyration=radius_of_gyration, contact_mass=contact_mass,
+                tip_radius=tip_radius)
+    axes = {name: values for name, values in axes.items() if values is not None}
+    options = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
+                   tail=tail, replicates=replicates, seed=seed, threads=threads)
+    if slope_deg is not None and setting.initial_speed is None:
+        raise InputError("initial_speed: must be given when the slope varies")
+    with _progress.telling(progress, "sweep") as tell:
+        return Sweep(_metastable.sweep(_fields(setting), axes, options, tell), "expected steps over " + ", ".join(axes))
+
+
+class Experiment:
+    """Trials of one wheel: measured (read_experiment), simulated (simulate), or from arrays (experiment).
+
+    `collisions` and `trials` are Columns, `conditions` the ids that their column `condition` counts from 0.
+    """
+
+    def __init__(self, held):
+        self._held = held
+
+    @property
+    def title(self):
+        """What it is called."""
+        return self._held.title
+
+    @property
+    def conditions(self):
+        """The ids of the conditions, in order."""
+        return tuple(self._held.conditions)
+
+    @property
+    def notes(self):
+        """What is not known or looks odd, a sentence each."""
+        return tuple(self._held.notes)
+
+    @property
+    def collisions(self):
+        """A row a collision: condition, trial, collision, leg (-1: not known), time_s, position_m, omega_minus_rad_s,
+        omega_plus_rad_s (NaN: not known)."""
+        return Columns(self._held.collisions(), "collisions")
+
+    @property
+    def trials(self):
+        """A row a trial: condition, trial, collisions (how many), outcome ("rest", "end_of_ramp", "max_collisions" or
+        None)."""
+        return Columns(self._held.trials(), "trials")
+
+    def write(self, folder):
+        """As an experiment folder: experiment.toml, collisions.csv, trials.csv. Raises InputError if it holds one."""
+        self._held.write(os.fspath(folder))
+
+    def __repr__(self):
+        trials = self._held.trials()
+        return (f"<metastable.Experiment: {self.title}, {len(trials['trial'])} trials, "
+                f"{int(trials['collisions'].sum())} collisions>")
+
+
+def read_experiment(folder):
+    """An experiment folder (experiment.toml, collisions.csv, trials.csv) as an Experiment. Raises InputError with all
+    that is wrong, each with file, line and column (InputError.lines)."""
+    return Experiment(_metastable.read_experiment(os.fspath(folder)))
+
+
+def experiment(settings, collisions, trials=None, *, title="From arrays", rate_hz=None, noise_sd=None):
+    """Arrays as an Experiment, checked as files are: rows are then lines of arrays/collisions.csv.
+
+    settings    a Setting, or {id: Setting}: wheel and contact of the first, slope, ramp and launch of each
+    collisions  columns by name (a dict, a pandas.DataFrame): trial, collision (from 1) and omega_minus_rad_s; also
+                condition (the id), leg, time_s, position_m, omega_plus_rad_s, as far as they were measured
+    trials      trial, outcome ("rest", "end_of_ramp", "max_collisions"), and condition; None: outcomes are not known
+    rate_hz     of the sensor [Hz]; noise_sd: believed noise of the speeds [rad/s]
+    """
+    if isinstance(settings, Setting):
+        settings = {f"{settings.slope_deg:g}": settings}
+
+    def columns(table):
+        return {str(name): table[name] for name in table.keys()}
+
+    return Experiment(_metastable.experiment_from_arrays(
+        list(settings), [_fields(each) for each in settings.values()], columns(collisions),
+        None if trials is None else columns(trials), dict(title=title, rate_hz=rate_hz, noise_sd=noise_sd)))
+
+
+def simulate(setting, *, trials=50, collisions=16, most_steps=None, stand_in=False, reality=False, effects=(),
+             outside=None, skewness=0, sensor_noise=0, smoothing=0, flight=True, shuffled=False, drop=(),
+             angle_rate=None, angle_noise=None, seed=1, threads=0, progress=None):
+    """Trials, one by one: `metastable simulate`.
+
+    A Setting gives an Experiment of `trials` trials of at most `collisions` collisions:
+    stand_in     the paper's three experiments, 51, 48 and 50 trials, instead
+    reality      in the virtual laboratory, which shares no formula with the model; with it
+      effects      that the model lacks, texts "leg_contact:leg=3,friction_ratio=1.4" (see effects())
+      outside      effects of no catalogue, {"planks": 2.0}
+      skewness     of restitution, (-2, 2); sensor_noise: of every speed [rad/s]; smoothing: over this time [s]
+      flight       False: feet that should lift stay down; shuffled: conditions take turns at random
+      drop         columns and statements left out
+    angle_rate   angles as a camera of this rate [Hz] sees them, with angle_noise [rad]; written with the folder
+
+    A WalkerSetting gives Walks, each of at most `most_steps` steps (None: 1000). A Walker gives SimulatedSteps: every
+    trial is followed until it fails; more than `most_steps` steps of all together (None: no limit) are an error.
+    """
+    common = dict(trials=trials, seed=seed, threads=threads)
+    with _progress.telling(progress, "simulate") as tell:
+        if isinstance(setting, WalkerSetting):
+            told = _metastable.simulate_walks(_fields(setting), {**common, "most_steps": most_steps or 1000}, tell)
+            return Walks(told["walks"], told["steps"], told["fell"])
+        if isinstance(setting, Walker):
+            told = _metastable.simulate_map(_fields(setting), {**common, "most_steps": most_steps or 2**62}, tell)
+            return SimulatedSteps(**told)
+        if not isinstance(setting, Setting):
+            raise TypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
+        laboratory = dict(effects=list(effects), outside=outside, skewness=skewness, sensor_noise=sensor_noise,
+                          smoothing=smoothing, shuffled=shuffled, drop=list(drop))
+        if not reality:
+            for name, value in {**laboratory, "flight": not flight}.items():
+                if value:
+                    raise InputError(f"{name}: needs reality")
+        options = dict(common, collisions=collisions, stand_in=stand_in, reality=reality, flight=flight,
+                       angle_rate=angle_rate, angle_noise=angle_noise, **laboratory)
+        command = _called("simulate", setting, **{k: v for k, v in options.items() if k != "threads" and v})
+        return Experiment(_metastable.simulate(_fields(setting), options, command, tell))
+
+
+def _experiment(what):
+    return what._held if isinstance(what, Experiment) else _metastable.read_experiment(os.fspath(what))
+
+
+def diagnose(experiment, *, catalogue=(), seed=1, threads=0, progress=None):
+    """What the nominal model of an experiment lacks: is there a gap, where, which effect causes it, how far it shrinks.
+
+    experiment  an Experiment, or the path of an experiment folder
+    catalogue   effects to consider, ids of effects(); a pair "a+b" is tried in any case; none: all
+    """
+    options = dict(catalogue=[catalogue] if isinstance(catalogue, str) else list(catalogue), seed=seed, threads=threads)
+    command = _called("diagnose", experiment, catalogue=options["catalogue"] or None, seed=seed)
+    with _progress.telling(progress, "diagnose") as tell:
+        return Diagnosis(_metastable.diagnose(_experiment(experiment), options, command, tell))
+
+
+def describe(experiment, *, transition="auto", against=(), trials=2000, seed=1, threads=0, progress=None):
+    """What the trials of an experiment show by themselves: speeds, tests between conditions, survival, restitution and
+    friction by maximum likelihood. Returns a Description.
+
+    experiment  an Experiment, or the path of an experiment folder
+    transition  that is fitted: "collision" (omega_minus to omega_plus), "step" (to the next omega_minus), or "auto"
+    against     laws to compare with, by `trials` simulated trials each
+    """
+    options = dict(transition=transition, against=[against] if isinstance(against, str) else list(against),
+                   trials=trials, seed=seed, threads=threads)
+    command = _called("describe", experiment, transition=transition, seed=seed)
+    with _progress.telling(progress, "describe") as tell:
+        return Description(_metastable.describe(_experiment(experiment), options, command, tell))
+
+
+def effects():
+    """The catalogue of effects that a model may lack: a Record each of id, summary and parameters."""
+    return tuple(Record(one) for one in json.loads(_metastable.effects_json())["effects"])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Walker:
+    """A simulator of your own as a stochastic return map; see walker()."""
+
+    step: object
+    dimension: int
+    noise: int
+    start: Sequence[float]
+    names: Sequence[str] = ()
+    noise_names: Sequence[str] = ()
+    phases: int = 1
+    name: str = "walker"
+
+    def __post_init__(self):
+        if not callable(self.step):
+            raise TypeError(f"step: a function expected, not {type(self.step).__name__}")
+        object.__setattr__(self, "start", _plain(numpy.atleast_1d(numpy.asarray(self.start, float))))
+        object.__setattr__(self, "names", tuple(self.names))
+        object.__setattr__(self, "noise_names", tuple(self.noise_names))
+        _metastable.check_map(_fields(self))
+
+    def study(self, **options):
+        """study(self, ...)."""
+        return study(self, **options)
+
+    def simulate(self, **options):
+        """simulate(self, ...)."""
+        return simulate(self, **options)
+
+    def __repr__(self):
+        return f"<metastable.Walker: {self.name}, {self.dimension} dimensions, {self.noise} noise>"
+
+
+def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1, name="walker"):
+    """Any simulator as a walker: study() and simulate() then take it.
+
+    step         step(state, noise) -> (next, failed), vectorised: `state` is an (n, dimension) array of states just
+                 after one event (a touchdown, a period), `noise` an (n, noise) array of independent standard normal
+                 numbers, `next` the (n, dimension) states just after the next event, `failed` n booleans. It must be a
+                 function of its arguments alone; states that make no sense have failed. With phases > 1 it is called
+                 as step(state, noise, phase). It runs in the thread that called, one call at a time.
+    dimension    numbers of a state, 1 to 4
+    noise        numbers of noise a step, 1 or more
+    start        a state from which the noise-free map settles into its orbit
+    names        of the numbers of a state, with units; noise_names likewise
+    phases       events after which the map repeats itself
+
+    Raises MapError naming the state where a landing is not finite, and where the orbit fails or is unstable.
+    """
+    return Walker(step, dimension, noise, start, names, noise_names, phases, name)
+
+
+class SimulatedSteps:
+    """Steps before failure by direct simulation: `mean`, its `standard_error`, and `steps` of each trial."""
+
+    def __init__(self, mean, standard_error, steps):
+        self.mean, self.standard_error, self.steps = mean, standard_error, steps
+
+    @property
+    def interval_95(self):
+        """Normal 95 % interval of the mean."""
+        half = 1.959963984540054 * self.standard_error
+        return self.mean - half, self.mean + half
+
+    def __repr__(self):
+        low, high = self.interval_95
+        return f"<metastable.SimulatedSteps: {self.mean:.4g} steps (95 %: {low:.4g} to {high:.4g}), {len(self.steps)} trials>"
+
+
+class FirstPassage:
+    """Steps before failure from each state: `mean` and `sd`, and guaranteed bounds `lower` <= mean <= `upper`."""
+
+    def __init__(self, mean, sd, lower, upper):
+        self.mean, self.sd, self.lower, self.upper = mean, sd, lower, upper
+
+    def __repr__(self):
+        return f"<metastable.FirstPassage: {self.mean.min():.4g} to {self.mean.max():.4g} steps from {len(self.mean)} states>"
+
+
+class QuasiStationary:
+    """What survivors look like once the start is forgotten: their `distribution`, the `survival_weight` of each state
+    (largest 1), and the `failure_rate` per step; `residual` and `iterations` say how it was found."""
+
+    def __init__(self, distribution, survival_weight, failure_rate, residual, iterations):
+        self.distribution, self.survival_weight, self.failure_rate = distribution, survival_weight, failure_rate
+        self.residual, self.iterations = residual, iterations
+
+    def __repr__(self):
+        return f"<metastable.QuasiStationary: failure rate {self.failure_rate:.6g} per step>"
+
+
+class Passage:
+    """First passage to a set of states: the committor `reach` (probability of being there before failing), `fail`
+    (neither is one minus the other), and the expected `steps` until either."""
+
+    def __init__(self, reach, fail, steps):
+        self.reach, self.fail, self.steps = reach, fail, steps
+
+    def __repr__(self):
+        return f"<metastable.Passage: from {len(self.reach)} states>"
+
+
+class Chain:
+    """An absorbing Markov chain; see chain()."""
+
+    def __init__(self, held):
+        self._held = held
+
+    def __len__(self):
+        return self._held.size
+
+    @property
+    def entries(self):
+        """How many transition probabilities are stored."""
+        return self._held.entries
+
+    def first_passage(self, *, progress=None):
+        """Steps before failure from each state, as FirstPassage, by elimination without a subtraction: full relative
+        accuracy however rare failures are. The bounds are proven from the answer's residual."""
+        with _progress.telling(progress, "first passage") as tell:
+            return FirstPassage(**self._held.first_passage(tell))
+
+    def quasi_stationary(self, *, progress=None):
+        """The quasi-stationary distribution, as QuasiStationary."""
+        with _progress.telling(progress, "quasi-stationary") as tell:
+            return QuasiStationary(**self._held.quasi_stationary(tell))
+
+    def committor(self, states, *, progress=None):
+        """First passage to `states`, a list of indices or n booleans, as Passage."""
+        states = numpy.asarray(states)
+        if states.dtype != bool:
+            marks = numpy.zeros(len(self), bool)
+            marks[states.astype(int, casting="same_kind")] = True
+            states = marks
+        with _progress.telling(progress, "committor") as tell:
+            return Passage(**self._held.committor(states, tell))
+
+    def survival(self, start, steps, *, progress=None):
+        """P(no failure within n steps) for each n of `steps`, from a distribution `start` over the states (or the index
+        of one)."""
+        if numpy.ndim(start) == 0:
+            start = numpy.arange(len(self)) == int(start)
+        with _progress.telling(progress, "survival") as tell:
+            return self._held.survival(numpy.asarray(start, float), numpy.atleast_1d(numpy.asarray(steps, float)), tell)
+
+    def __repr__(self):
+        return f"<metastable.Chain: {len(self)} states, {self.entries} entries>"
+
+
+def chain(matrix, kill, *, threads=0):
+    """A Markov chain of your own that may fail, as a Chain.
+
+    matrix  transition probabilities, rows FROM: a NumPy array or any SciPy sparse matrix, n x n. The diagonal may be
+            left out; where it is given, each row and its kill rate have to sum to one (1e-9)
+    kill    n probabilities of failing in the next step. They are asked for because one minus a row's sum has lost the
+            digits that matter where failures are rare
+    """
+    kill = numpy.ascontiguousarray(kill, float)
+    if kill.ndim != 1:
+        raise InputError(f"kill: a vector expected, not an array of shape {kill.shape}")
+    if matrix.ndim != 2 or matrix.shape != (len(kill), len(kill)):
+        raise InputError(f"matrix: shape {matrix.shape}, {(len(kill), len(kill))} expected for {len(kill)} kill rates")
+    if hasattr(matrix, "tocsr"):
+        rows = matrix.tocsr(copy=True)
+        rows.sum_duplicates()  # columns ascend then
+        starts, columns, values = rows.indptr, rows.indices, rows.data
+    else:
+        dense = numpy.ascontiguousarray(matrix, float)
+        i, columns = dense.nonzero()
+        starts, values = numpy.searchsorted(i, numpy.arange(len(kill) + 1)), dense[i, columns]
+    return Chain(_metastable.Chain(starts, columns, values, kill, threads))
+

@@ -1,0 +1,409 @@
+from os import PathLike
+from typing import (Any, Callable, Dict, Iterable, Iterator, KeysView, List, Mapping, Optional, Sequence,
+                    Tuple, Union, overload)
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from metastable import blind as blind
+
+__version__: str
+__all__: List[str]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Interval = Tuple[float, float]
+Spread = Union[Tuple[float, float], float]
+Progress = Union[None, bool, Callable[[float], object]]
+Path = Union[str, PathLike[str]]
+Step = Callable[..., Tuple[ArrayLike, ArrayLike]]
+
+
+class InputError(ValueError):
+    @property
+    def lines(self) -> List[str]: ...
+
+
+class ComputationError(RuntimeError): ...
+class Contradiction(ComputationError): ...
+class MapError(ComputationError): ...
+
+
+class Record:
+    def __init__(self, values: Mapping[str, Any], arrays: Optional[Mapping[str, Any]] = None, path: str = "") -> None: ...
+    def __getitem__(self, name: str) -> Any: ...
+    def __getattr__(self, name: str) -> Any: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def __len__(self) -> int: ...
+    def keys(self) -> List[str]: ...
+
+
+class Result(Record):
+    def __init__(self, answer: Mapping[str, Any]) -> None: ...
+    def to_dict(self) -> Dict[str, Any]: ...
+
+
+class ExpectedSteps(Record):
+    from_start: float
+    interval_95: Interval
+    from_quasi_stationary: float
+    from_quasi_stationary_interval_95: Interval
+    worst_start: float
+    worst_start_interval_95: Interval
+    sd: float
+    median: float
+    quantiles: Record
+
+
+class Provenance(Record):
+    command: str
+    settings: str
+    seed: int
+    version: str
+
+
+class Regime:
+    edges: Floats
+    mass: Floats
+    def __init__(self, edges: Floats, mass: Floats) -> None: ...
+    @property
+    def speed_edges(self) -> Floats: ...
+
+
+class Study(Result):
+    schema: int
+    slope_deg: float
+    law: str
+    method: str
+    status: str
+    message: Optional[str]
+    expected_steps: ExpectedSteps
+    failure_rate_per_step: float
+    failure_rate_interval_95: Interval
+    seconds_before_failure: Any
+    metres_before_failure: Any
+    survival: Floats
+    eigenvalue_moduli: Floats
+    mixing_steps: float
+    total_variation_mixing_steps: Optional[int]
+    quasi_stationary: Record
+    stationary_with_restart: Record
+    reach_ramp_end: Optional[float]
+    outside_assumptions: Record
+    rest_unreachable_above: Record
+    error: Record
+    resolution: Record
+    solver_disagreement: float
+    certificate: Optional[Record]
+    sensitivities: Optional[Any]
+    how_it_fails: Optional[Record]
+    from_standard_errors: Optional[Record]
+    provenance: Provenance
+    @property
+    def regime(self) -> Tuple[Regime, ...]: ...
+
+
+class Comparison(Result):
+    schema: int
+    settings: Tuple[Record, ...]
+    contrasts: Tuple[Record, ...]
+    provenance: Provenance
+
+
+class MeshEstimate(Record):
+    value: float
+    interval_95: Interval
+
+
+class WalkerStudy(Result):
+    setting: str
+    status: str
+    expected_steps: MeshEstimate
+    failure_rate_per_step: MeshEstimate
+    survival: Floats
+    mixing_steps: float
+    relative_errors: Record
+    guided_sampling: Optional[MeshEstimate]
+    direct_simulation: Optional[MeshEstimate]
+    meshes: Tuple[Record, ...]
+    memory_bytes: float
+    gait: Optional[Record]
+    how_it_fails: Optional[Record]
+    provenance: Provenance
+
+
+class WalkerComparison(Result):
+    settings: Tuple[Record, ...]
+    contrasts: Tuple[Record, ...]
+    provenance: Provenance
+
+
+class Diagnosis(Result):
+    schema: int
+    verdict: str
+    sentences: Tuple[str, ...]
+    gap: Record
+    where: Tuple[Record, ...]
+    where_as_given: Tuple[Record, ...]
+    where_left: Tuple[Record, ...]
+    causes: Tuple[Record, ...]
+    cause_set: Tuple[str, ...]
+    not_decided: Tuple[Record, ...]
+    contact: Record
+    shrinkage: Record
+    shrinkage_by_measure: Tuple[Record, ...]
+    steps_before_failure: Record
+    visibility: Tuple[Record, ...]
+    missing_columns: Tuple[Record, ...]
+    not_possible: Tuple[Record, ...]
+    next_experiment: Tuple[Record, ...]
+    data: Record
+    notes: Tuple[str, ...]
+    provenance: Provenance
+
+
+class Table:
+    title: str
+    notes: Tuple[str, ...]
+    units: Dict[str, str]
+    rows: List[Dict[str, Any]]
+    def __init__(self, values: Mapping[str, Any]) -> None: ...
+    def __iter__(self) -> Iterator[Dict[str, Any]]: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, column: str) -> List[Any]: ...
+
+
+class Description(Result):
+    schema: int
+    tables: Dict[str, Table]
+    provenance: Provenance
+
+
+class Columns:
+    def __init__(self, columns: Mapping[str, Any], title: str) -> None: ...
+    def keys(self) -> KeysView[str]: ...
+    def __getitem__(self, name: str) -> Any: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def __len__(self) -> int: ...
+    def __getattr__(self, name: str) -> Any: ...
+    def to_dict(self) -> Dict[str, List[Any]]: ...
+
+
+class Sweep(Columns):
+    expected_steps: Floats
+    expected_steps_low95: Floats
+    expected_steps_high95: Floats
+    expected_steps_quasi_stationary: Floats
+    failure_rate_per_step: Floats
+    quasi_stationary_mean_rad_s: Floats
+    quasi_stationary_sd_rad_s: Floats
+    reach_ramp_end: Floats
+    status: List[str]
+    message: List[str]
+
+
+class Walks(Columns):
+    steps: Integers
+    fell: NDArray[np.bool_]
+    def __init__(self, columns: Mapping[str, Any], steps: Integers, fell: NDArray[np.bool_]) -> None: ...
+
+
+class Setting:
+    slope_deg: float
+    initial_speed: Optional[Spread]
+    law: str
+    restitution: Optional[Spread]
+    friction: Optional[Spread]
+    correlation: Optional[float]
+    contact_list: Any
+    rebound_lost: Optional[float]
+    legs: Any
+    mass: Optional[float]
+    inertia: Optional[float]
+    radius_of_gyration: Optional[float]
+    tip_radius: Optional[float]
+    ramp_stiffness: Optional[float]
+    contact_mass: Optional[float]
+    gravity: Optional[float]
+    ramp_length: Optional[float]
+    first_leg: int
+    direct: bool
+    def __init__(self, slope_deg: float = 7.02, initial_speed: Optional[Spread] = None, law: str = "published",
+                 restitution: Optional[Spread] = None, friction: Optional[Spread] = None,
+                 correlation: Optional[float] = None, contact_list: Optional[ArrayLike] = None,
+                 rebound_lost: Optional[float] = None, legs: Optional[ArrayLike] = None, mass: Optional[float] = None,
+                 inertia: Optional[float] = None, radius_of_gyration: Optional[float] = None,
+                 tip_radius: Optional[float] = None, ramp_stiffness: Optional[float] = None,
+                 contact_mass: Optional[float] = None, gravity: Optional[float] = None,
+                 ramp_length: Optional[float] = None, first_leg: int = 0, direct: bool = False) -> None: ...
+    @property
+    def launch(self) -> Tuple[float, float]: ...
+    def describe(self) -> str: ...
+    def replace(self, **changes: Any) -> Setting: ...
+
+
+class WalkerSetting:
+    walker: str
+    slope_sd_deg: float
+    slope_deg: Optional[float]
+    terrain: str
+    def __init__(self, walker: str, slope_sd_deg: float, slope_deg: Optional[float] = None,
+                 terrain: str = "fresh") -> None: ...
+    def describe(self) -> str: ...
+    def replace(self, **changes: Any) -> WalkerSetting: ...
+
+
+class Walker:
+    step: Step
+    dimension: int
+    noise: int
+    start: Tuple[float, ...]
+    names: Tuple[str, ...]
+    noise_names: Tuple[str, ...]
+    phases: int
+    name: str
+    def __init__(self, step: Step, dimension: int, noise: int, start: ArrayLike, names: Sequence[str] = (),
+                 noise_names: Sequence[str] = (), phases: int = 1, name: str = "walker") -> None: ...
+    def study(self, **options: Any) -> WalkerStudy: ...
+    def simulate(self, **options: Any) -> SimulatedSteps: ...
+
+
+class SimulatedSteps:
+    mean: float
+    standard_error: float
+    steps: Integers
+    def __init__(self, mean: float, standard_error: float, steps: Integers) -> None: ...
+    @property
+    def interval_95(self) -> Interval: ...
+
+
+class Experiment:
+    def __init__(self, held: Any) -> None: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def conditions(self) -> Tuple[str, ...]: ...
+    @property
+    def notes(self) -> Tuple[str, ...]: ...
+    @property
+    def collisions(self) -> Columns: ...
+    @property
+    def trials(self) -> Columns: ...
+    def write(self, folder: Path) -> None: ...
+
+
+class FirstPassage:
+    mean: Floats
+    sd: Floats
+    lower: Floats
+    upper: Floats
+    def __init__(self, mean: Floats, sd: Floats, lower: Floats, upper: Floats) -> None: ...
+
+
+class QuasiStationary:
+    distribution: Floats
+    survival_weight: Floats
+    failure_rate: float
+    residual: float
+    iterations: int
+    def __init__(self, distribution: Floats, survival_weight: Floats, failure_rate: float, residual: float,
+                 iterations: int) -> None: ...
+
+
+class Passage:
+    reach: Floats
+    fail: Floats
+    steps: Floats
+    def __init__(self, reach: Floats, fail: Floats, steps: Floats) -> None: ...
+
+
+class Chain:
+    def __init__(self, held: Any) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def entries(self) -> int: ...
+    def first_passage(self, *, progress: Progress = None) -> FirstPassage: ...
+    def quasi_stationary(self, *, progress: Progress = None) -> QuasiStationary: ...
+    def committor(self, states: ArrayLike, *, progress: Progress = None) -> Passage: ...
+    def survival(self, start: ArrayLike, steps: ArrayLike, *, progress: Progress = None) -> Floats: ...
+
+
+def version_text() -> str: ...
+
+
+@overload
+def study(setting: Setting, *, method: Optional[str] = None, cells: Optional[int] = None,
+          samples: Optional[int] = None, tolerance: Optional[float] = None, sequence: Optional[str] = None,
+          draws: Optional[str] = None, tail: Optional[float] = None, replicates: Optional[int] = None,
+          mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None, certify: bool = False,
+          sensitivities: bool = False, standard_errors: Optional[Mapping[str, float]] = None,
+          how_it_fails: bool = False, seed: int = 1, threads: int = 0, progress: Progress = None) -> Study: ...
+@overload
+def study(setting: Union[WalkerSetting, Walker], *, spacing: Optional[float] = None,
+          simulated_steps: Optional[int] = None, memory_gb: Optional[float] = None, how_it_fails: bool = False,
+          seed: int = 1, threads: int = 0, progress: Progress = None) -> WalkerStudy: ...
+
+
+@overload
+def compare(settings: Iterable[Setting], *, collisions: int = 16, method: Optional[str] = None,
+            cells: Optional[int] = None, samples: Optional[int] = None, tolerance: Optional[float] = None,
+            sequence: Optional[str] = None, draws: Optional[str] = None, tail: Optional[float] = None,
+            replicates: Optional[int] = None, standard_errors: Optional[Mapping[str, float]] = None, seed: int = 1,
+            threads: int = 0, progress: Progress = None) -> Comparison: ...
+@overload
+def compare(settings: Iterable[WalkerSetting], *, spacing: Optional[float] = None,
+            simulated_steps: Optional[int] = None, memory_gb: Optional[float] = None, seed: int = 1, threads: int = 0,
+            progress: Progress = None) -> WalkerComparison: ...
+
+
+def sweep(setting: Setting, *, slope_deg: Optional[ArrayLike] = None, restitution_mean: Optional[ArrayLike] = None,
+          restitution_sd: Optional[ArrayLike] = None, friction_mean: Optional[ArrayLike] = None,
+          friction_sd: Optional[ArrayLike] = None, leg_length: Optional[ArrayLike] = None,
+          inertia: Optional[ArrayLike] = None, ramp_stiffness: Optional[ArrayLike] = None,
+          radius_of_gyration: Optional[ArrayLike] = None, contact_mass: Optional[ArrayLike] = None,
+          tip_radius: Optional[ArrayLike] = None, method: Optional[str] = None, cells: Optional[int] = None,
+          samples: Optional[int] = None, tolerance: Optional[float] = None, sequence: Optional[str] = None,
+          draws: Optional[str] = None, tail: Optional[float] = None, replicates: Optional[int] = None, seed: int = 1,
+          threads: int = 0, progress: Progress = None) -> Sweep: ...
+
+
+@overload
+def simulate(setting: Setting, *, trials: int = 50, collisions: int = 16, stand_in: bool = False,
+             reality: bool = False, effects: Sequence[str] = (), outside: Optional[Mapping[str, float]] = None,
+             skewness: float = 0, sensor_noise: float = 0, smoothing: float = 0, flight: bool = True,
+             shuffled: bool = False, drop: Sequence[str] = (), angle_rate: Optional[float] = None,
+             angle_noise: Optional[float] = None, seed: int = 1, threads: int = 0,
+             progress: Progress = None) -> Experiment: ...
+@overload
+def simulate(setting: WalkerSetting, *, trials: int = 50, most_steps: Optional[int] = None, seed: int = 1,
+             threads: int = 0, progress: Progress = None) -> Walks: ...
+@overload
+def simulate(setting: Walker, *, trials: int = 50, most_steps: Optional[int] = None, seed: int = 1,
+             threads: int = 0, progress: Progress = None) -> SimulatedSteps: ...
+
+
+def read_experiment(folder: Path) -> Experiment: ...
+
+
+def experiment(settings: Union[Setting, Mapping[str, Setting]], collisions: Any, trials: Any = None, *,
+               title: str = "From arrays", rate_hz: Optional[float] = None,
+               noise_sd: Optional[float] = None) -> Experiment: ...
+
+
+def diagnose(experiment: Union[Experiment, Path], *, catalogue: Union[str, Sequence[str]] = (), seed: int = 1,
+             threads: int = 0, progress: Progress = None) -> Diagnosis: ...
+
+
+def describe(experiment: Union[Experiment, Path], *, transition: str = "auto",
+             against: Union[str, Sequence[str]] = (), trials: int = 2000, seed: int = 1, threads: int = 0,
+             progress: Progress = None) -> Description: ...
+
+
+def effects() -> Tuple[Record, ...]: ...
+
+
+def walker(step: Step, dimension: int, noise: int, *, start: ArrayLike, names: Sequence[str] = (),
+           noise_names: Sequence[str] = (), phases: int = 1, name: str = "walker") -> Walker: ...
+
+
+def chain(matrix: Any, kill: ArrayLike, *, threads: int = 0) -> Chain: ...

@@ -1,0 +1,151 @@
+// study, compare and sweep of settings.
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <limits>
+#include <optional>
+
+#include "analysis/sensitivity/sweep.h"
+#include "reports/commands/compare_command.h"
+#include "reports/commands/steps_command.h"
+#include "reports/output/text_table.h"
+#include "reports/output/version.h"
+#include "reports/python/answer.h"
+#include "reports/python/arguments.h"
+#include "reports/study/report_tables.h"
+
+namespace metastable::reports::python {
+namespace {
+
+using Command = std::string;
+
+py::dict study(const py::dict& setting, const py::dict& options, const Command& command, const py::object& progress) {
+  const Arguments given(options);
+  StepsRequest request{setting_of(Arguments(setting)), study_options_of(given), "", command, given.flag("certify")};
+  request.sensitivities = given.flag("sensitivities");
+  request.how_it_fails = given.flag("how_it_fails");
+  request.standard_errors = standard_errors_of(given, request.setting);
+  const auto found = std::make_shared<StepsAnswer>();
+  Call call(progress);
+  call.run([&] { *found = answer_steps(request, parts_of(call)); });
+  const analysis::Metastability& s = found->study;
+  py::dict arrays;
+  arrays["survival"] = array_view(s.steps.survival.data(), s.steps.survival.size(), found);
+  arrays["eigenvalue_moduli"] = array_view(s.spectrum.moduli.data(), s.spectrum.moduli.size(), found);
+  const Provenance provenance{command, request.setting.describe(), request.study.seed, version()};
+  py::dict all = answer(steps_answer_json(request, *found), steps_answer_text(request, *found, line_width),
+                        to_html(ramps_table({{s, found->thresholds}}, provenance)), arrays);
+  py::list regime;
+  for (const analysis::PhaseDistribution& phase : s.survivors.by_phase) {
+    py::dict one;
+    one["edges"] = array_view(phase.edges.data(), phase.edges.size(), found);
+    one["mass"] = array_view(phase.mass.data(), phase.mass.size(), found);
+    regime.append(one);
+  }
+  all["regime"] = regime;
+  return all;
+}
+
+py::dict compare(const py::list& settings, const py::dict& options, const Command& command,
+                 const py::object& progress) {
+  const Arguments given(options);
+  CompareRequest request{{}, study_options_of(given), static_cast<int>(given.whole("collisions", 1, 63)), "", command};
+  for (const py::handle& one : settings) request.settings.push_back(setting_of(Arguments(one.cast<py::dict>())));
+  if (request.settings.size() < 2)
+    throw std::invalid_argument(fmt::format("settings: {} given where at least 2 are needed", request.settings.size()));
+  request.standard_errors = standard_errors_of(given, request.settings.front());
+  CompareAnswer found;
+  Call call(progress);
+  call.run([&] { found = answer_compare(request, parts_of(call)); });
+  std::vector<Studied> columns;
+  std::string described;
+  for (std::size_t i = 0; i < found.comparison.studies.size(); ++i) {
+    columns.push_back({found.comparison.studies[i], found.thresholds[i]});
+    described += request.settings[i].describe() + "\n";
+  }
+  std::string html = to_html(ramps_table(columns, {command, described, request.study.seed, version()}));
+  for (const analysis::Contrast& contrast : found.comparison.contrasts)
+    html += "<p>" + escape_html(contrast.sentence) + "</p>";
+  return answer(compare_answer_json(request, found), compare_answer_text(request, found), html);
+}
+
+// The columns of a sweep, as the command line names them.
+struct Columns {
+  std::vector<std::vector<double>> at;
+  std::vector<double> steps, low, high, quasi, rate, mean, sd, reach_end;
+  std::vector<std::string> status, message;
+};
+
+py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& options, const py::object& progress) {
+  const Arguments given(options), fields(setting), ranges(axes);
+  analysis::StudyOptions study = study_options_of(given);
+  analysis::Setting base = setting_of(fields);
+  std::vector<analysis::SweepAxis> all;
+  std::vector<std::string> names;
+  for (const auto& [key, value] : axes) {
+    names.push_back(py::str(key).cast<std::string>());
+    all.push_back({analysis::parameter_from_name(parameter_of(names.back())), ranges.numbers(names.back().c_str())});
+    const std::vector<double>& values = all.back().values;
+    if (values.empty()) throw std::invalid_argument(fmt::format("{}: holds no value", names.back()));
+    for (std::size_t i = 1; i < values.size(); ++i)
+      if (!(values[i] > values[i - 1])) throw std::invalid_argument(fmt::format("{}: values must rise", names.back()));
+    if (!analysis::matters(base, all.back().parameter))
+      throw std::invalid_argument(fmt::format("{}: has no meaning under this setting", names.back()));
+  }
+  if (all.empty()) throw std::invalid_argument("sweep: no range given");
+  const std::size_t size = analysis::sweep_size(all);
+  for (std::size_t i = 0; i < size; ++i) analysis::check_setting(analysis::sweep_setting(base, all, i), study.method);
+  Columns c;
+  c.at.resize(all.size());
+  Call call(progress);
+  std::atomic<std::size_t> done = 0;
+  study.progress = [&](double, const std::string&) {
+    call.tell(static_cast<double>(done.load()) / static_cast<double>(size), "sweep");
+  };
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  call.run([&] {
+    analysis::sweep(base, all, 0, study, [&](std::size_t, const analysis::SweepPoint& point) {
+      const analysis::Metastability& s = point.study;
+      const bool failed = s.status == analysis::Status::solver_failed;
+      const auto add = [&](std::vector<double>& column, double value) { column.push_back(failed ? unknown : value); };
+      for (std::size_t a = 0; a < all.size(); ++a) c.at[a].push_back(point.at[a]);
+      add(c.steps, s.steps.from_start.value), add(c.low, s.steps.from_start.lower);
+      add(c.high, s.steps.from_start.upper), add(c.quasi, s.steps.from_quasi_stationary.value);
+      add(c.rate, s.spectrum.failure_rate.value), add(c.mean, s.survivors.mean), add(c.sd, s.survivors.sd);
+      add(c.reach_end, s.steps.reach_end.value_or(unknown));
+      c.status.push_back(analysis::status_text(s.status));
+      c.message.push_back(s.message);
+      ++done;
+      study.progress(0, "");
+    });
+  });
+  py::dict columns;
+  for (std::size_t a = 0; a < all.size(); ++a) columns[names[a].c_str()] = array_of(std::move(c.at[a]));
+  columns["expected_steps"] = array_of(std::move(c.steps));
+  columns["expected_steps_low95"] = array_of(std::move(c.low));
+  columns["expected_steps_high95"] = array_of(std::move(c.high));
+  columns["expected_steps_quasi_stationary"] = array_of(std::move(c.quasi));
+  columns["failure_rate_per_step"] = array_of(std::move(c.rate));
+  columns["quasi_stationary_mean_rad_s"] = array_of(std::move(c.mean));
+  columns["quasi_stationary_sd_rad_s"] = array_of(std::move(c.sd));
+  columns["reach_ramp_end"] = array_of(std::move(c.reach_end));
+  columns["status"] = py::cast(c.status);
+  columns["message"] = py::cast(c.message);
+  return columns;
+}
+
+}  // namespace
+
+void add_studies(py::module_& module) {
+  module.def("describe_setting", [](const py::dict& fields) { return setting_of(Arguments(fields)).describe(); });
+  module.def("launch", [](const py::dict& fields) {
+    const analysis::Setting setting = setting_of(Arguments(fields));
+    return std::pair(setting.initial_speed.mean, setting.initial_speed.sd);
+  });
+  module.def("study", study);
+  module.def("compare", compare);
+  module.def("sweep", sweep);
+}
+
+}  // namespace metastable::reports::python

@@ -1,0 +1,192 @@
+#include "reports/study/walker_text.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "reports/study/last_moments_text.h"
+#include "reports/study/walker_figures.h"
+
+namespace metastable::reports {
+namespace {
+
+using analysis::LastMoments;
+using analysis::WalkerSetting;
+using analysis::WalkerStudy;
+using markov::MeshEstimate;
+using WalkerJson = nlohmann::ordered_json;
+using Lines = std::vector<std::pair<std::string, std::string>>;
+
+Estimate estimate_of(const MeshEstimate& e) { return {e.value, e.lower, e.upper}; }
+
+WalkerJson mesh_estimate_json(const MeshEstimate& e) {
+  return {{"value", e.value}, {"interval_95", {e.lower, e.upper}}};
+}
+
+// Where the study's survival begins with the share that survives one step, P(steps > n) begins at n = 0.
+WalkerJson survival_json(const markov::MeshStudy& s) {
+  WalkerJson survival = {1.0};
+  for (const double share : s.survival) survival.push_back(share);
+  return survival;
+}
+
+WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) {
+  WalkerJson sizes = WalkerJson::array();
+  for (const markov::MeshSize& size : s.sizes)
+    sizes.push_back(
+        {{"spacing", size.spacing}, {"nodes", size.nodes}, {"entries", size.entries}, {"steps", size.steps}});
+  return {{"setting", name},
+          {"status", walker_status(s)},
+          {"expected_steps", mesh_estimate_json(s.steps)},
+          {"failure_rate_per_step", mesh_estimate_json(s.failure_rate)},
+          {"survival", survival_json(s)},
+          {"mixing_steps", s.mixing_steps},
+          {"relative_errors",
+           {{"shifts", s.shift_error}, {"discretization", s.discretization_error}, {"leaving_mesh", s.bracket}}},
+          {"guided_sampling", s.guided ? mesh_estimate_json(*s.guided) : WalkerJson(nullptr)},
+          {"direct_simulation", s.simulated ? mesh_estimate_json(*s.simulated) : WalkerJson(nullptr)},
+          {"meshes", sizes},
+          {"memory_bytes", s.expected_bytes}};
+}
+
+WalkerJson walker_study_json(const WalkerSetting& setting, const WalkerStudy& study) {
+  WalkerJson json = mesh_study_json(setting.describe(), study.passage);
+  WalkerJson eigenvalues = WalkerJson::array();
+  for (const auto& value : study.gait.eigenvalues) eigenvalues.push_back({value.real(), value.imag()});
+  json["gait"] = {{"names", setting.map().names()}, {"state", study.gait.state}, {"eigenvalues", eigenvalues}};
+  return json;
+}
+
+std::string finished(WalkerJson json, const std::optional<LastMoments>& moments, const Provenance& provenance) {
+  if (moments) json["how_it_fails"] = WalkerJson::parse(last_moments_json(*moments));
+  json["provenance"] = {{"command", provenance.command},
+                        {"settings", provenance.settings},
+                        {"seed", provenance.seed},
+                        {"version", provenance.version}};
+  return json.dump(2) + "\n";
+}
+
+/// The ratio of b's expected steps to a's; the errors of the two are taken as independent.
+MeshEstimate ratio(const MeshEstimate& a, const MeshEstimate& b) {
+  const double value = b.value / a.value;
+  return {value, value * std::exp(-std::hypot(std::log(b.value / b.lower), std::log(a.upper / a.value))),
+          value * std::exp(std::hypot(std::log(b.upper / b.value), std::log(a.value / a.lower)))};
+}
+
+std::string with_interval(const MeshEstimate& e) {
+  const DecimalEstimate text = to_decimal(estimate_of(e), NumberFormat::general, 12);
+  return fmt::format("{} (95 % interval {} to {})", plain_text(text.value), plain_text(text.lower),
+                     plain_text(text.upper));
+}
+
+Lines head_lines(const markov::MeshStudy& s) {
+  return {{"expected steps before failure", with_interval(s.steps)},
+          {"  by guided sampling", s.guided ? with_interval(*s.guided) : "not asked: failures are too frequent"},
+          {"  by direct simulation", s.simulated ? with_interval(*s.simulated) : "out of reach"},
+          {"status", s.guided || s.simulated ? "agreed: the independent ways lie within their joint intervals"
+                                             : "the mesh alone"},
+          {"failure rate per step", with_interval(s.failure_rate)},
+          {"mixing", fmt::format("{:.3g} steps", s.mixing_steps)}};
+}
+
+Lines mesh_lines(const markov::MeshStudy& s) {
+  Lines lines{{"relative errors", fmt::format("shifts {:.2g}, discretization {:.2g}, leaving the mesh {:.2g}",
+                                              s.shift_error, s.discretization_error, s.bracket)}};
+  for (const markov::MeshSize& size : s.sizes)
+    lines.emplace_back(fmt::format("mesh of spacing {:.3g} sd", size.spacing),
+                       fmt::format("{} nodes, {} entries", size.nodes, size.entries));
+  lines.emplace_back("memory", fmt::format("{:.2g} GB foreseen", s.expected_bytes / 0x1p30));
+  return lines;
+}
+
+std::string lines_text(const std::string& head, const Lines& lines) {
+  std::string text = head + "\n\n";
+  for (const auto& [name, what] : lines) text += fmt::format("  {:<38}{}\n", name, what);
+  return text;
+}
+
+std::string study_lines(const WalkerSetting& setting, const WalkerStudy& study) {
+  Lines lines = head_lines(study.passage);
+  const std::vector<std::string> names = setting.map().names();
+  for (std::size_t k = 0; k < study.gait.state.size(); ++k)
+    lines.emplace_back("gait: " + names[k], fmt::format("{:.9f}", study.gait.state[k]));
+  lines.emplace_back("gait: eigenvalues", eigenvalues_text(study.gait));
+  for (auto& line : mesh_lines(study.passage)) lines.push_back(std::move(line));
+  return lines_text(setting.describe(), lines);
+}
+
+std::string with_moments(std::string text, const std::optional<LastMoments>& moments, std::size_t width) {
+  return moments ? text + "\n" + last_moments_text(*moments, "phase", width) : text;
+}
+
+}  // namespace
+
+analysis::WalkerStudy agreed_walker(const WalkerSetting& setting, const markov::MeshStudyOptions& options,
+                                    const Tell& tell) {
+  markov::MeshStudyOptions told = options;
+  told.progress = [&](double share) { tell(share, ""); };
+  WalkerStudy study = analysis::study_walker(setting, told);
+  tell(1, "");
+  markov::require_agreement(study.passage, setting.describe());
+  return study;
+}
+
+const char* walker_status(const markov::MeshStudy& study) {
+  return study.guided || study.simulated ? "agreed" : "mesh_alone";
+}
+
+std::string walker_json(const WalkerSetting& setting, const WalkerStudy& study,
+                        const std::optional<LastMoments>& moments, const Provenance& provenance) {
+  return finished(walker_study_json(setting, study), moments, provenance);
+}
+
+std::string map_json(const MapStudy& study, const std::optional<LastMoments>& moments, const Provenance& provenance) {
+  return finished(mesh_study_json(study.name, study.passage), moments, provenance);
+}
+
+std::string walkers_json(const std::vector<WalkerSetting>& settings, const std::vector<WalkerStudy>& studies,
+                         const Provenance& provenance) {
+  WalkerJson answer = {{"settings", WalkerJson::array()}, {"contrasts", WalkerJson::array()}};
+  for (std::size_t i = 0; i < studies.size(); ++i) {
+    answer["settings"].push_back(walker_study_json(settings[i], studies[i]));
+    if (i > 0)
+      answer["contrasts"].push_back(
+          {{"of", i},
+           {"against", 0},
+           {"ratio", mesh_estimate_json(ratio(studies.front().passage.steps, studies[i].passage.steps))}});
+  }
+  return finished(std::move(answer), {}, provenance);
+}
+
+std::string walker_text(const WalkerSetting& setting, const WalkerStudy& study,
+                        const std::optional<LastMoments>& moments, std::size_t width) {
+  return with_moments(study_lines(setting, study), moments, width);
+}
+
+std::string map_text(const MapStudy& study, const std::optional<LastMoments>& moments, std::size_t width) {
+  Lines lines = head_lines(study.passage);
+  for (auto& line : mesh_lines(study.passage)) lines.push_back(std::move(line));
+  return with_moments(lines_text(study.name, lines), moments, width);
+}
+
+std::string walkers_text(const std::vector<WalkerSetting>& settings, const std::vector<WalkerStudy>& studies) {
+  std::string text;
+  for (std::size_t i = 0; i < studies.size(); ++i) text += study_lines(settings[i], studies[i]) + "\n";
+  for (std::size_t i = 1; i < studies.size(); ++i)
+    text += fmt::format("{}: {} times the steps of {}\n", settings[i].describe(),
+                        format_estimate(estimate_of(ratio(studies.front().passage.steps, studies[i].passage.steps)),
+                                        NumberFormat::significant, 4),
+                        settings.front().describe());
+  return text;
+}
+
+Table mesh_table(const std::string& name, const markov::MeshStudy& study, const Provenance& provenance) {
+  Table table{.id = "steps", .title = name, .columns = {{"quantity"}, {"value"}}, .provenance = provenance};
+  for (const Lines& lines : {head_lines(study), mesh_lines(study)})
+    for (const auto& [what, value] : lines) table.rows.push_back({what, value});
+  return table;
+}
+
+}  // namespace metastable::reports

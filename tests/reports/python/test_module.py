@@ -1,0 +1,222 @@
+"""Settings, results, errors, progress and interruption."""
+
+import copy
+import io
+import math
+import pickle
+import signal
+import sys
+import tempfile
+import threading
+import types
+import unittest
+import unittest.mock
+from contextlib import redirect_stderr
+from pathlib import Path
+
+import numpy as np
+
+import metastable
+from support import data, refusal
+
+quick = dict(cells=32, samples=256, replicates=2)
+
+
+class Settings(unittest.TestCase):
+    def test_copies_prints_and_pickles_alike(self):
+        setting = metastable.Setting(slope_deg=5, initial_speed=np.array([6, 0.3]), legs=[0.15] * 7, law="coulomb")
+        for other in (copy.deepcopy(setting), pickle.loads(pickle.dumps(setting)),
+                      eval(repr(setting), vars(metastable)), setting.replace(slope_deg=4).replace(slope_deg=5)):
+            self.assertEqual(other, setting)
+            self.assertEqual(hash(other), hash(setting))
+        self.assertIn("7 legs of 0.15 m, law coulomb", setting.describe())
+
+    def test_launches_as_the_paper_does_until_told(self):
+        self.assertEqual(metastable.Setting().launch, (7.35, 0.19))
+        self.assertEqual(metastable.Setting().replace(slope_deg=9.59).launch, (5.83, 0.28))
+        with self.assertRaisesRegex(metastable.InputError, "^initial_speed: must be given at 8 deg"):
+            metastable.Setting(slope_deg=8)
+
+    def test_wrong_ones_are_refused_with_the_command_lines_sentence(self):
+        for fields, words in (
+            (dict(slope_deg=30), ("--slope", "30", "--initial-speed", "7.35,0.19")),
+            (dict(law="sticky"), ("--law", "sticky")),
+            (dict(correlation=2), ("--correlation", "2")),
+            (dict(law="plastic", friction=0.3), ("--law", "plastic", "--friction", "0.3")),
+        ):
+            with self.assertRaises(ValueError) as raised:
+                metastable.Setting(**{"initial_speed": (7.35, 0.19), **fields})
+            self.assertEqual(str(raised.exception), refusal("steps", *words).replace("--", ""))
+        for fields, sentence in ((dict(mass="heavy"), "mass: a number expected, not str"),
+                                 (dict(friction=(1, 2, 3)), r"friction: \(mean, sd\) expected, 3 numbers given"),
+                                 (dict(contact_list=[1, 2]), "contact_list: an array of n rows and two columns"),
+                                 (dict(first_leg=8), r"first_leg: 8 is outside 0\.\.7"),
+                                 (dict(friction=(math.nan, 0.1)), "nan")):
+            with self.assertRaisesRegex((ValueError, TypeError), sentence):
+                metastable.Setting(**fields)
+
+
+class Studies(unittest.TestCase):
+    def test_fields_are_the_keys_and_arrays_the_memory(self):
+        study = metastable.study(metastable.Setting(slope_deg=9.59), **quick)
+        told = study.to_dict()
+        self.assertEqual(set(study.keys()), set(told))
+        self.assertEqual(study.expected_steps.interval_95, tuple(told["expected_steps"]["interval_95"]))
+        self.assertEqual(study.expected_steps.quantiles["0.5"], told["expected_steps"]["quantiles"]["0.5"])
+        self.assertEqual(study.survival.tolist(), told["survival"])
+        self.assertFalse(study.survival.flags.owndata)
+        self.assertFalse(study.survival.flags.writeable)
+        survival, first = study.survival, study.survival[0]
+        for leg in study.regime:
+            self.assertAlmostEqual(leg.mass.sum(), 1, 9)
+            self.assertEqual(len(leg.speed_edges), len(leg.mass) + 1)
+        again = pickle.loads(pickle.dumps(study))
+        self.assertEqual(again, study)
+        del study, leg
+        self.assertEqual(survival[0], first)  # the memory lives as long as a view of it
+        self.assertIn("expected steps before failure", str(again))
+        self.assertIn("<table", again._repr_html_())
+        self.assertRegex(repr(again), r"^<metastable.Study: .* steps \(95 %: ")
+        self.assertIsNone(again.certificate)
+
+    def test_infinity_is_a_number_here(self):
+        study = metastable.study(metastable.Setting(law="coulomb"), **quick)
+        self.assertEqual(study.expected_steps.from_start, math.inf)
+        self.assertEqual(study.to_dict()["expected_steps"]["from_start"], "infinite")
+        self.assertEqual(study.status, "rest_unreachable")
+
+    def test_sweep_is_its_studies(self):
+        setting = metastable.Setting(slope_deg=9.59)
+        sweep = metastable.sweep(setting, friction_mean=[0.35, 0.45], friction_sd=[0.1], **quick)
+        self.assertEqual(len(sweep), 2)
+        alone = metastable.study(setting.replace(friction=(0.45, 0.1)), **quick)
+        self.assertEqual(sweep.expected_steps[1], alone.expected_steps.from_start)
+        self.assertEqual(sweep["friction_mean"].tolist(), [0.35, 0.45])
+        with self.assertRaisesRegex(metastable.InputError, "friction_mean: values must rise"):
+            metastable.sweep(setting, friction_mean=[0.4, 0.3])
+
+    def test_options_that_do_nothing_are_refused(self):
+        setting = metastable.Setting()
+        for options, sentence in ((dict(method="integrated", samples=64), "samples: has a meaning under method sampled"),
+                                  (dict(spacing=0.5), "spacing: has no meaning for a wheel"),
+                                  (dict(tolerance=2), "tolerance"),
+                                  (dict(seed=-1), "seed: -1 is outside"),
+                                  (dict(standard_errors={"mood": 1}), "mood")):
+            with self.assertRaisesRegex(metastable.InputError, sentence):
+                metastable.study(setting, **options)
+        with self.assertRaisesRegex(TypeError, "a Setting, WalkerSetting or Walker expected, not int"):
+            metastable.study(3)
+
+
+class Waiting(unittest.TestCase):
+    def test_ctrl_c_stops_and_leaves_nothing_behind(self):
+        setting = metastable.Setting(slope_deg=9.59, friction=(0.3, 0.05))
+        with self.assertRaises(KeyboardInterrupt):
+            metastable.study(setting, tolerance=1e-6, progress=lambda share: signal.raise_signal(signal.SIGINT))
+        metastable.study(setting, **quick)
+
+    def test_other_threads_run_meanwhile_and_may_study_too(self):
+        setting = metastable.Setting(slope_deg=9.59)
+        turns, found = 0, []
+        threads = [threading.Thread(target=lambda: found.append(metastable.study(setting, seed=3, tolerance=0.003)))
+                   for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            turns += 1
+        self.assertGreater(turns, 1000)
+        self.assertEqual(found[0], found[1])
+
+    def test_progress_is_told_and_its_errors_stop(self):
+        shares = []
+        metastable.study(metastable.Setting(slope_deg=9.59), tolerance=0.002, progress=shares.append)
+        self.assertTrue(shares and all(0 <= share <= 1 for share in shares))
+        with self.assertRaises(ZeroDivisionError):
+            metastable.study(metastable.Setting(slope_deg=9.59), tolerance=1e-5, progress=lambda share: 1 / 0)
+        with self.assertRaisesRegex(TypeError, "progress: None, True, False or a function expected, not str"):
+            metastable.study(metastable.Setting(), progress="loud")
+
+    def test_a_line_on_a_terminal_and_a_bar_in_a_notebook(self):
+        from metastable import _progress
+        shown = []
+
+        class Handle:
+            def update(self, what):
+                shown.append(what)
+
+        notebook = types.ModuleType("IPython.display")
+        notebook.HTML, notebook.display = str, lambda what, display_id: shown.append(what) or Handle()
+        kernel = {"IPython": types.ModuleType("IPython"), "IPython.display": notebook,
+                  "ipykernel": types.ModuleType("ipykernel")}
+        for modules, written in (({}, None), (kernel, shown)):
+            out = io.StringIO()
+            with unittest.mock.patch.dict(sys.modules, modules), redirect_stderr(out), \
+                    unittest.mock.patch("time.monotonic", side_effect=[0, 3, 4]):
+                with _progress.telling(True, "study") as tell:
+                    tell(0.5, "steps")
+                    tell(0.75, "steps")
+            words = " ".join(written) if written else out.getvalue()
+            self.assertIn("study: steps  50 %, about 3 s left", words)
+            self.assertTrue(written[-1] == "" if written else words.endswith("\r\033[K"))
+
+
+class Experiments(unittest.TestCase):
+    def test_simulated_read_and_from_arrays_are_one(self):
+        setting = metastable.Setting(slope_deg=9.59, restitution=(0.54, 0.045), friction=(0.352, 0.043))
+        simulated = metastable.simulate(setting, trials=20, seed=4)
+        with tempfile.TemporaryDirectory() as folder:
+            simulated.write(Path(folder) / "trials")
+            read = metastable.read_experiment(Path(folder) / "trials")
+            with self.assertRaisesRegex(metastable.InputError, "already holds experiment.toml"):
+                simulated.write(Path(folder) / "trials")
+        columns = simulated.collisions
+        measured = {name: columns[name] for name in columns if name != "condition"}
+        arrays = metastable.experiment(setting, measured, {n: simulated.trials[n] for n in ("trial", "outcome")})
+        for other in (read, arrays):
+            self.assertEqual(other.collisions.to_dict(), columns.to_dict())
+            self.assertEqual(other.trials.to_dict(), simulated.trials.to_dict())
+        self.assertFalse(columns.omega_minus_rad_s.flags.owndata)
+
+    def test_defects_have_their_places(self):
+        wrong = dict(trial=[1, 1, 1], collision=[1, 2, 4], omega_minus_rad_s=[5.0, -1, 5])
+        with self.assertRaises(metastable.InputError) as raised:
+            metastable.experiment(metastable.Setting(), wrong)
+        self.assertEqual(len(raised.exception.lines), 2)
+        self.assertIn("arrays/collisions.csv:3:", raised.exception.lines[0])
+        with self.assertRaisesRegex(metastable.InputError, "column leg has 2 values where the first has 3"):
+            metastable.experiment(metastable.Setting(), {**wrong, "leg": [0, 1]})
+        with self.assertRaisesRegex(metastable.InputError, "nowhere"):
+            metastable.diagnose("nowhere")
+
+    def test_description_tells_tables(self):
+        trials = metastable.simulate(metastable.Setting(law="plastic"), trials=12)  # which has no contact to fit
+        description = metastable.describe(trials)
+        conditions = description.tables["conditions"]
+        self.assertEqual([row["trials"] for row in conditions], [12])
+        self.assertEqual(description.to_dict()["tables"]["conditions"]["title"], conditions.title)
+        self.assertIn("<table", description._repr_html_())
+
+    def test_effects_are_the_catalogue(self):
+        self.assertIn("leg_contact", [effect.id for effect in metastable.effects()])
+
+
+class Blind(unittest.TestCase):
+    def test_made_answered_and_opened(self):
+        with tempfile.TemporaryDirectory() as folder:
+            run = Path(folder) / "run"
+            made = metastable.blind.make(run, seed=5, per_effect=0, none=1, pairs=0, outside=0, left_out=0)
+            self.assertEqual(made.cases, 1)
+            tool = Path(folder) / "tool"  # hands in an answer made before: a diagnosis of such a case takes minutes
+            tool.write_text('#!/bin/sh\ntest "$1" = diagnose || exit 9\ncp "$0.json" "$4"\n')
+            tool.chmod(0o755)
+            Path(f"{tool}.json").write_text(metastable.diagnose(data, catalogue=["slope_offset"])._json)
+            self.assertEqual(metastable.blind.answer(run, tool=tool), metastable.blind.Answered(1, 1, 0))
+            grades = metastable.blind.open(run)
+            self.assertTrue((run / "report" / "index.html").is_file())
+            self.assertEqual(len(grades.tables), len(grades.to_dict()["tables"]))
+            with self.assertRaisesRegex(metastable.InputError, "was opened"):
+                metastable.blind.answer(run, tool=tool)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,45 @@
+"""The same seed gives the same numbers as the command line, to the bit."""
+
+import unittest
+
+import metastable
+from support import command_line, data, told
+
+
+class SameAsTheCommandLine(unittest.TestCase):
+    def test_study(self):
+        setting = metastable.Setting(slope_deg=9.59, restitution=(0.35, 0.1), friction=(0.3, 0.05))
+        study = metastable.study(setting, seed=7, cells=48, samples=512, replicates=3, how_it_fails=True, threads=1,
+                                 standard_errors={"friction_mean": 0.01})
+        self.assertEqual(told(study.to_dict()),
+                         command_line("steps", "--slope", "9.59", "--restitution", "0.35,0.1", "--friction",
+                                      "0.3,0.05", "--seed", "7", "--cells", "48", "--samples", "512", "--replicates",
+                                      "3", "--how-it-fails", "--friction-se", "0.01,0"))
+
+    def test_integrated_under_another_law(self):
+        setting = metastable.Setting(slope_deg=5, initial_speed=(6, 0.3), law="coulomb", legs=[0.15] * 8)
+        study = metastable.study(setting, method="integrated")
+        self.assertEqual(told(study.to_dict()),
+                         command_line("steps", "--slope", "5", "--initial-speed", "6,0.3", "--law", "coulomb", "--legs",
+                                      "0.15", "--method", "integrated"))
+
+    def test_compare(self):
+        settings = [metastable.Setting(slope_deg=slope) for slope in (7.02, 9.59)]
+        self.assertEqual(told(metastable.compare(settings, cells=48, samples=512).to_dict()),
+                         command_line("compare", "--cells", "48", "--samples", "512"))
+
+    def test_walker(self):
+        setting = metastable.WalkerSetting("simplest", slope_sd_deg=0.17)
+        study = metastable.study(setting, spacing=0.9, simulated_steps=50000, how_it_fails=True)
+        self.assertEqual(told(study.to_dict()),
+                         command_line("steps", "--walker", "simplest", "--slope-sd", "0.17", "--spacing", "0.9",
+                                      "--simulated-steps", "50000", "--how-it-fails"))
+
+    def test_diagnose(self):
+        catalogue = ["leg_contact", "slope_offset"]
+        self.assertEqual(told(metastable.diagnose(data, catalogue=catalogue).to_dict()),
+                         command_line("diagnose", str(data), "--catalogue", ",".join(catalogue)))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,129 @@
+"""A machine of one's own: against direct simulation that shares nothing with the toolkit but the step."""
+
+import unittest
+
+import numpy as np
+
+import cart_pole
+import metastable
+
+
+def line(step, **more):
+    return metastable.walker(step, 1, 1, start=[0], names=["x [m]"], name="a line", **more)
+
+
+def drift(state, noise):
+    following = 0.6 * state + noise
+    return following, np.abs(following[:, 0]) > 3
+
+
+class CartPole(unittest.TestCase):
+    def test_direct_simulation_confirms_the_interval(self):
+        study = cart_pole.pole.study(spacing=0.8, simulated_steps=0, how_it_fails=True, seed=3)
+        rng = np.random.default_rng(11)
+        steps, alive, state = np.zeros(4000), np.arange(4000), np.zeros((4000, 2))
+        while alive.size:
+            state, failed = cart_pole.step(state, rng.standard_normal((alive.size, 1)))
+            steps[alive] += 1
+            alive, state = alive[~failed], state[~failed]
+        mean, error = steps.mean(), steps.std(ddof=1) / np.sqrt(steps.size)
+        low, high = study.expected_steps.interval_95
+        self.assertLess(high / low, 1.2)
+        # Both 95 % intervals, widened to 99.9 %.
+        self.assertLess(abs(np.log(study.expected_steps.value / mean)),
+                        1.7 * np.hypot(np.log(high / low) / 2, 1.96 * error / mean))
+        self.assertGreater(study.how_it_fails.last_steps[0].bound_to_fail, study.how_it_fails.regime.bound_to_fail)
+        np.testing.assert_allclose(study.survival[:40], [(steps > n).mean() for n in range(40)], atol=0.05)  # one mesh, no limit
+
+
+class Steps(unittest.TestCase):
+    def test_are_told_the_same_on_any_number_of_threads(self):
+        one, two = (line(drift).study(spacing=0.4, simulated_steps=20000, threads=threads) for threads in (1, 2))
+        told = [{**study.to_dict(), "memory_bytes": None} for study in (one, two)]  # of which two threads take twice
+        self.assertEqual(*told)
+        self.assertEqual(one.status, "agreed")
+        simulated = line(drift).simulate(trials=2000, seed=5)
+        self.assertEqual(len(simulated.steps), 2000)
+        self.assertLess(abs(simulated.mean - one.expected_steps.value), 4 * simulated.standard_error + 0.01)
+
+    def test_run_in_the_thread_that_called_and_may_keep_what_they_get(self):
+        import threading
+        kept, threads = [], set()
+
+        def keep(state, noise):
+            kept.append((state, state.copy()))
+            threads.add(threading.get_ident())
+            return drift(state, noise)
+
+        line(keep).simulate(trials=50, threads=2)
+        self.assertEqual(threads, {threading.get_ident()})
+        self.assertTrue(all(np.array_equal(*both) for both in kept))
+
+    def test_of_several_phases_are_told_which(self):
+        def alternate(state, noise, phase):
+            following = (0.3 if phase else 0.9) * state + noise
+            return following, np.abs(following[:, 0]) > 3
+
+        study = line(alternate, phases=2).study(spacing=0.4, simulated_steps=40000, how_it_fails=True)
+        self.assertEqual(study.status, "agreed")
+        self.assertEqual(len(study.how_it_fails.by_phase), 2)
+
+    def test_that_break_their_promises_are_named(self):
+        fine = np.zeros((1, 1)), np.zeros(1, bool)
+        for step, kind, sentence in (
+            (lambda s, z: (np.full_like(s, np.nan), fine[1].repeat(len(s))), metastable.MapError,
+             r"from the state x \[m\] = 0 \(phase 0\) it leads to x \[m\] = nan, which is not finite"),
+            (lambda s, z: s, TypeError, r"step: \(next states, failed\) is to be returned, not ndarray"),
+            (lambda s, z: (s[:, :0], fine[1].repeat(len(s))), ValueError,
+             r"step: next states of shape \(\d+, 0\), \(\d+, 1\) expected"),
+            (lambda s, z: (s, np.zeros((len(s), 1), bool)), ValueError, r"step: failed of shape \(\d+, 1\)"),
+            (lambda s, z: (s * 1j, fine[1].repeat(len(s))), TypeError, "of dtype complex128"),
+            (lambda s, z: (s, np.zeros(len(s))), TypeError, "no array of booleans, but of dtype float64"),
+            (lambda s, z: (None, None), TypeError, "no array of real numbers"),
+            (lambda s, z: 1 / 0, ZeroDivisionError, "division by zero"),
+            (lambda s, z: (2 * s + z, fine[1].repeat(len(s))), metastable.MapError, "unstable"),
+        ):
+            with self.subTest(sentence), self.assertRaisesRegex(kind, sentence):
+                line(step).study(progress=False)
+        with self.assertRaises(KeyboardInterrupt):
+            line(self.interrupting).study()
+        for fields, sentence in ((dict(dimension=5), r"dimension: 5 is outside 1\.\.4"),
+                                 (dict(noise=0), r"noise: 0 is outside 1\.\.16"),
+                                 (dict(start=[0, 0]), "a start of 1 numbers expected"),
+                                 (dict(names=["a", "b"]), "one name for each dimension"),
+                                 (dict(noise_names=["a", "b"]), "noise_names: 2 given")):
+            with self.subTest(sentence), self.assertRaisesRegex(metastable.InputError, sentence):
+                metastable.walker(**{**dict(step=drift, dimension=1, noise=1, start=[0]), **fields})
+        with self.assertRaisesRegex(TypeError, "step: a function expected, not int"):
+            metastable.walker(3, 1, 1, start=[0])
+
+    @staticmethod
+    def interrupting(state, noise):
+        raise KeyboardInterrupt
+
+    def test_contradicting_ways_give_no_number(self):
+        # Failure hangs on hidden memory: what meshes see, a map of the state alone, is not what walks do.
+        calls = [0]
+
+        def moody(state, noise):
+            calls[0] += 1
+            following, failed = drift(state, noise)
+            return following, failed | (np.abs(noise[:, 0]) > (1.0 if calls[0] > self.mood else 9.0))
+
+        counted = line(moody)
+        self.mood = float("inf")
+        counted.study(spacing=0.4, simulated_steps=0, threads=1)
+        self.mood, calls[0] = calls[0], 0  # as many calls as the meshes need
+        with self.assertRaisesRegex(metastable.Contradiction, "a line: .* disagree: no number is given"):
+            counted.study(spacing=0.4, simulated_steps=20000, threads=1)
+
+    def test_of_the_librarys_walkers_are_those_of_their_walks(self):
+        walks = metastable.simulate(metastable.WalkerSetting("simplest", slope_sd_deg=0.17), trials=200, seed=2)
+        self.assertEqual(walks.steps.sum(), len(walks))
+        self.assertTrue(walks.fell.all())
+        with self.assertRaisesRegex(metastable.InputError, "slope_sd: 0 deg|slope-sd: 0 deg"):
+            metastable.WalkerSetting("simplest", slope_sd_deg=0)
+
+
+if __name__ == "__main__":
+    unittest.main()
