@@ -23,8 +23,7 @@ constexpr double promise_margin = 40;       //   this much
 constexpr double overlooked_margin = 12;    // evidence by the scores below the best fitted one, for a fit after all
 constexpr double variant_gain = 8;          // promised by one more variant of an effect that is fitted,
 constexpr double variant_share = 0.8;       //   and this share of the best variant's gain
-constexpr std::size_t most_leaders = 3;     // single effects that are refined, and that pairs are built on
-constexpr double leader_evidence = 2;       // of such an effect
+constexpr double leader_evidence = 2;       // of an effect that is refined, and that pairs are built on
 constexpr double refined_share = 0.7;       // of the best evidence, less
 constexpr double refined_margin = 10;       //   this much, for an effect worth refining
 constexpr double refit_margin = 60;         // evidence below the best, for a fit that did not settle to be tried again
@@ -317,7 +316,7 @@ std::vector<std::size_t> Ranker::leaders(bool to_refine) const {
       all.push_back(i);
   std::sort(all.begin(), all.end(),
             [&](std::size_t a, std::size_t b) { return singles_[a].evidence > singles_[b].evidence; });
-  if (all.size() > most_leaders) all.resize(most_leaders);
+  if (all.size() > effort_.most_leaders) all.resize(effort_.most_leaders);
   return all;
 }
 
@@ -354,7 +353,8 @@ void Ranker::refit_unsettled() {
     if (&cause == &*best || cause.fit.converged || !fitted(cause) || !fitted(*best) ||
         cause.evidence < top_ - refit_margin)
       return;
-    Fit again = fit(model_, best->fit.nuisance, cause.terms);
+    Fit again = fit(model_, best->fit.nuisance, cause.terms,
+                    {.count = {}, .refit_nuisances = true, .most_iterations = effort_.most_iterations});
     if (!(again.penalised > cause.fit.penalised)) return;
     take(cause, std::move(again));
     cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
@@ -469,8 +469,8 @@ const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector
 Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
   constexpr std::size_t many_events = 6000;
   constexpr double far_off = 50;  // rise of the log likelihood that a recalibration has left
-  if (!recalibrated.converged && recalibrated.promised > far_off) return {20, 1, 1, 1, 2, 6};
-  if (model.events().size() > many_events) return {6, 1, 2, 2, 2, 12};
+  if (!recalibrated.converged && recalibrated.promised > far_off) return {20, 1, 1, 1, 1, 2, 6};
+  if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 2, 12};
   return {};
 }
 

@@ -35,6 +35,7 @@ struct CauseRanking {
 struct Effort {
   double least_promise = 2;       ///< gain by the scores, for a fit
   std::size_t most_variants = 3;  ///< of one effect that are fitted
+  std::size_t most_leaders = 3;   ///< single effects that are refined, and that pairs are built on
   std::size_t most_partners = 3;  ///< of one leader that are fitted
   int refinements = 3;            ///< of a variant, each with half the moves
   int refining_steps = 4;         ///< of the fit at each move

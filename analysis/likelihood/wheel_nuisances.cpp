@@ -22,6 +22,7 @@ std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::option
     all[Slot::log_noise_sd] = {"log noise_sd", std::log(*noise), noise_stated ? 0.1 : 0.5, 1e-3, std::log(5e-6), 0};
   if (settled) {
     all[Slot::log_hub_inertia_ratio] = {"log hub_inertia_ratio", 0, 0.1, 1e-3, -0.7, 0.7};
+    all[Slot::log_plus_ratio] = {"log plus_ratio", 0, 0.003, 1e-4, -0.03, 0.03};
     all[Slot::log_next_ratio] = {"log next_ratio", 0, 5e-4, 1e-5, -0.005, 0.005};
   }
   return all;
@@ -36,6 +37,7 @@ WheelHypothesis hypothesis_at(std::span<const double> nuisance) {
   if (nuisance.size() > Slot::log_noise_sd) hypothesis.noise = std::exp(nuisance[Slot::log_noise_sd]);
   if (nuisance.size() > Slot::log_next_ratio) {
     hypothesis.extension.hub_inertia_ratio = std::exp(nuisance[Slot::log_hub_inertia_ratio]);
+    hypothesis.extension.plus_ratio = std::exp(nuisance[Slot::log_plus_ratio]);
     hypothesis.extension.next_ratio = std::exp(nuisance[Slot::log_next_ratio]);
   }
   return hypothesis;

@@ -14,7 +14,7 @@
 namespace metastable::analysis {
 
 /// Where each nuisance stands in the list. Spreads and ratios are refitted by their logarithms; log_noise_sd is there
-/// only where the noise is refitted, the last two only under `settled`, where it always is.
+/// only where the noise is refitted, the last three only under `settled`, where it always is.
 struct WheelSlot {
   enum : std::size_t {
     restitution_mean,
@@ -25,6 +25,7 @@ struct WheelSlot {
     tails,
     log_noise_sd,
     log_hub_inertia_ratio,
+    log_plus_ratio,
     log_next_ratio
   };
 };

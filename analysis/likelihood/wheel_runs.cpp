@@ -232,11 +232,10 @@ void tabulate_landings(WheelRuns& measured) {
     const auto same = std::find_if(measured.conditions.begin(), measured.conditions.begin() + static_cast<long>(c),
                                    [&](const Condition& other) { return other.slope_deg == slope; });
     const auto before = static_cast<std::size_t>(same - measured.conditions.begin());
-    measured.landings.push_back(
-        before < c
-            ? measured.landings[before]
-            : dynamics::share_grid(dynamics::settled_wheel(measured.wheel, slope * degree, measured.wheel.tip_radius),
-                                   low, high, measured.contact));
+    measured.landings.push_back(before < c
+                                    ? measured.landings[before]
+                                    : dynamics::share_grid(dynamics::settled_wheel(measured.wheel, slope * degree), low,
+                                                           high, measured.contact));
   }
 }
 

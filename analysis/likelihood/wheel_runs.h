@@ -56,7 +56,7 @@ std::vector<dynamics::ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, 
 
 /// How good `settled` is as a model of rigid-body engines: an error of every next omega-, which also blurs speeds that
 /// are reported more exactly [rad/s].
-inline constexpr double settled_precision = 0.008;
+inline constexpr double settled_precision = 0.012;
 
 /// Tabulates the landings of every condition anew, under `settled`; under other laws there are none.
 void tabulate_landings(WheelRuns& measured);

@@ -221,7 +221,12 @@ CollisionChange ExtendedWheel::change(const StepContext& context, double omega) 
 SpeedDensity ExtendedWheel::after_collision(const StepContext& context, double omega, double omega_plus) const {
   const Leg& leg = geometry_[index(context.leg)];
   CollisionChange usual = change(context, omega);
-  if (settles()) return after_first_impact(landing(context, omega), this->contact(usual), omega_plus);
+  if (settles()) {
+    SpeedDensity first =
+        after_first_impact(landing(context, omega), this->contact(usual), omega_plus / extension_.plus_ratio);
+    first.density /= extension_.plus_ratio;
+    return first;
+  }
   const Collision at = collision(context, omega);
   SpeedDensity result = density_.at(at, leg.before, leg.inertia, usual, omega_plus);
   if (extension_.outlier_share > 0) {
@@ -247,7 +252,7 @@ std::optional<double> ExtendedWheel::omega_plus(const StepContext& context, doub
   const CollisionChange c = change(context, omega);
   const Contact contact = changed_contact(c, drawn, outlier);
   if (settles()) {
-    const double plus = omega * landing(context, omega).first_impact(contact);
+    const double plus = extension_.plus_ratio * omega * landing(context, omega).first_impact(contact);
     return plus > 0 ? std::optional(plus) : std::nullopt;
   }
   const Loss loss = collide(model_, collision(context, omega), contact);
@@ -296,10 +301,13 @@ SettledContact ExtendedWheel::contact(const CollisionChange& c) const {
 
 NextTouch ExtendedWheel::at_next_touch(const StepContext& context, double omega, const SeenOfLanding& seen, double blur,
                                        double next) const {
-  return dynamics::at_next_touch(landing(context, omega), contact(change(context, omega)), seen, blur, next);
+  SeenOfLanding first = seen;
+  if (first.omega_plus) *first.omega_plus /= extension_.plus_ratio;
+  return dynamics::at_next_touch(landing(context, omega), contact(change(context, omega)), first, blur, next);
 }
 
 double ExtendedWheel::rest_share(const StepContext& context, double omega, std::optional<double> omega_plus) const {
+  if (omega_plus) *omega_plus /= extension_.plus_ratio;
   return dynamics::rest_share(landing(context, omega), contact(change(context, omega)), omega_plus);
 }
 

@@ -30,7 +30,7 @@ Wheel equal_wheel() {
   return wheel;
 }
 
-SettledWheel rigid(const Wheel& wheel, double at = slope) { return settled_wheel(wheel, at, wheel.tip_radius); }
+SettledWheel rigid(const Wheel& wheel, double at = slope) { return settled_wheel(wheel, at); }
 
 std::shared_ptr<const LandingShares> grid() {
   static const std::shared_ptr<const LandingShares> built = share_grid(rigid(equal_wheel()), 4, 6, usual);
