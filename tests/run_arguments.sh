@@ -17,8 +17,11 @@ refused() {  # arguments: what the message must hold, then those of ./run
 
 refused "unknown command 'nonsense'" nonsense
 refused "'all' is no argument of it" build all
+refused "'here' is no argument of it" docs here
 refused "'here' is none of its arguments" install here
 refused '--prefix needs a folder' install --prefix
+refused '--prefix needs a folder' python --prefix=
+refused "python: 'here' is none of its arguments" python here
 refused '--prefix needs a folder' install --prefix=
 refused 'is no folder' install --prefix "$run"
 

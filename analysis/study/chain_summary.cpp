@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -234,8 +235,11 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
   };
   if (!options.brief && !sampled.duration.empty()) result.steps.seconds = reward(sampled.duration);
   if (!options.brief && !sampled.advance.empty()) result.steps.metres = reward(sampled.advance);
+  // The survival of interpolated rows ends where entries of both signs leave nobody or less: true to the rows' error.
+  const double same_sum =
+      result.method == Method::integrated ? std::max(same_chain, result.steps.discretization_error) : same_chain;
   result.agreements.push_back(
-      {"expected steps, solved and summed over survival", result.steps.distribution.mean, survival.mean(), same_chain});
+      {"expected steps, solved and summed over survival", result.steps.distribution.mean, survival.mean(), same_sum});
   result.agreements.push_back({"failure rate of a revolution, and that of its survivors", quasi.revolution_failure_rate,
                                -std::expm1(log_survival_of_a_revolution(solver, quasi)), same_chain});
   const std::size_t shown = survival_steps(problem);
@@ -284,7 +288,14 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   const bool ever = dot(met_rolling, met_rolling) > 0;
   result.phases = space.phases();
 
-  const std::vector<double> stationary = markov::stationary(sampled.chain, ever ? met_rolling : rolling);
+  std::vector<double> stationary;
+  try {
+    stationary = markov::stationary(sampled.chain, ever ? met_rolling : rolling);
+  } catch (const std::domain_error& error) {  // a speed that noise hardly moves, between two cells that both keep it
+    throw markov::ConvergenceError(
+        "rolling for ever", 1,
+        fmt::format("{}: {} cells are too coarse to tell at which speed; take more", error.what(), space.size()));
+  }
   std::vector<std::uint32_t> recurrent;
   for (std::size_t i = 0; i < stationary.size(); ++i)
     if (stationary[i] > 0) recurrent.push_back(static_cast<std::uint32_t>(i));

@@ -23,20 +23,30 @@ constexpr double slowest_launch = 0.1;   // of the slowest survivor's state; slo
 constexpr double speed_steps = 3;        // few tables serve all launches [rad/s]
 constexpr double most_speed = 20;        // of a table [rad/s]
 
-// f(place, weight) at the points of an integral over [from, to]; a square root at either end is smooth to them.
-template <class F>
-void over_panels(double from, double to, double panel, const F& f) {
-  using Rule = boost::math::quadrature::gauss<double, 16>;
-  if (!(to > from)) return;
-  const auto panels = static_cast<std::size_t>(std::ceil(std::numbers::pi / 2 * (to - from) / panel));
+// f(place, weight) at the points of a rule on panels of [from, to]; a square root at either end is smooth to them.
+template <std::size_t order, class F>
+void by_rule(double from, double to, std::size_t panels, const F& f) {
+  using Rule = boost::math::quadrature::gauss<double, order>;
+  constexpr std::size_t half = order / 2;
   for (std::size_t p = 0; p < panels; ++p)
-    for (std::size_t k = 0; k < 16; ++k) {
-      const double place = 0.5 + (k < 8 ? -0.5 : 0.5) * Rule::abscissa()[k % 8];
+    for (std::size_t k = 0; k < order; ++k) {
+      const double place = 0.5 + (k < half ? -0.5 : 0.5) * Rule::abscissa()[k % half];
       const double t = (static_cast<double>(p) + place) / static_cast<double>(panels);
       const double sine = std::sin(std::numbers::pi / 2 * t);
-      f(from + (to - from) * sine * sine, (to - from) * 0.5 * Rule::weights()[k % 8] / static_cast<double>(panels) *
+      f(from + (to - from) * sine * sine, (to - from) * 0.5 * Rule::weights()[k % half] / static_cast<double>(panels) *
                                               std::numbers::pi / 2 * std::sin(std::numbers::pi * t));
     }
+}
+
+// The same on as many panels as are needed, with fewer points where the whole is a small part of one.
+template <class F>
+void over_panels(double from, double to, double panel, const F& f) {
+  constexpr double narrow = 0.04;
+  if (!(to > from)) return;
+  if (to - from < narrow * panel)
+    by_rule<8>(from, to, 1, f);
+  else
+    by_rule<16>(from, to, static_cast<std::size_t>(std::ceil(std::numbers::pi / 2 * (to - from) / panel)), f);
 }
 
 SettledMapOptions widened(SettledMapOptions options, double highest_speed) {
@@ -210,6 +220,9 @@ double SettledReturnMap::landing_points(double state, int phase, std::span<const
               boost::math::tools::eps_tolerance<double>(40), iterations);
           cuts.push_back(0.5 * (bracket.first + bracket.second));
         }
+        if (place)
+          for (const double kink : place->edges())
+            if (kink > low && kink < high) cuts.push_back(kink);
         std::sort(cuts.begin(), cuts.end());
         for (std::size_t c = 0; c + 1 < cuts.size(); ++c)
           over_panels(cuts[c], cuts[c + 1], mu_panel * friction.sd(), [&](double mu, double weight) {

@@ -79,7 +79,6 @@ SettledSlice::SettledSlice(const SettledTable& table, double eta)
                                     : below + (eta - table.smooth_eta) / (table.eta_high - table.smooth_eta) *
                                                   (table.rows - table.smooth_rows);
   row_ = below_smooth ? stencil(place, table.smooth_rows, smooth) : stencil(place, table.rows, straight);
-  rough_row_ = below_smooth ? stencil(place, table.smooth_rows, rough) : row_;
   for (std::size_t j = 0; j < row_.size; ++j) standstill_ += row_.weight[j] * table.standstill[row_.first + j];
   for (std::size_t i = 0; i < rough_.size(); ++i) {
     for (std::size_t j = 0; j < row_.size; ++j) rough_[i] |= table.unsettled[(row_.first + j) * rough_.size() + i];
@@ -100,8 +99,7 @@ SettledSlice::Place SettledSlice::at(double omega) const {
   Place place;
   place.slice_ = this;
   place.omega_ = omega;
-  place.at_ = place_of(omega);
-  const Stencil speed = stencil(place.at_, table_->speeds, smooth);
+  const Stencil speed = place.speed_ = stencil(place_of(omega), table_->speeds, smooth);
   for (std::size_t i = 0; i < speed.size; ++i) place.rough_ |= rough_[speed.first + i];
   for (std::size_t i = 0; i < speed.size; ++i)
     for (std::size_t n = 0; n <= stops; ++n)
@@ -139,14 +137,12 @@ MappedLanding SettledSlice::Place::land(double friction) const {
   const SettledTable& table = *slice_->table_;
   if (friction < resting_friction() && friction < table.sticking) return {0, 0, true};
   const std::size_t n = piece_of(friction);
-  const bool is_rough = (rough_ >> n & 1) != 0;
-  const std::size_t nodes = is_rough ? SettledSlice::rough : smooth;
-  const Stencil& row = is_rough ? slice_->rough_row_ : slice_->row_;
-  const Stencil speed = stencil(at_, table.speeds, nodes);
+  const Stencil& row = slice_->row_;
+  const Stencil& speed = speed_;
   const double high = n == 0 ? table.sticking : edge_[n - 1], low = edge_[n];
   const double part = high > low ? std::clamp((friction - low) / (high - low), 0.0, 1.0) : 1;
-  const Stencil mu = n < stops ? stencil((1 - part) * (piece - 1), piece, nodes)
-                               : stencil(scale_ * std::log1p(part / bend_), table.frictions, nodes);
+  const Stencil mu = n < stops ? stencil((1 - part) * (piece - 1), piece, smooth)
+                               : stencil(scale_ * std::log1p(part / bend_), table.frictions, smooth);
   const std::size_t stride = index(table.places()), first = n * piece + mu.first;
   double kept = 0, displacement = 0;
   for (std::size_t j = 0; j < row.size; ++j)

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace metastable::dynamics {
@@ -24,8 +25,8 @@ struct MappedLanding {
 /// kink, between them it is smooth. Landings are kept on every piece [mu_c, mu_2], ... at a few even places, on the
 /// last one, down to mu_r, spread evenly in log(1 + part / bend), part = (mu - mu_r) / (its width), bend falling
 /// exponentially with omega: steep above mu_r, nearly straight in that scale.
-/// Between the nodes polynomials of degree 5 are read; landings of degree 3 where feet are still unsettled at some of
-/// the nodes (there they have kinks and jumps of their own), and by straight lines in eta above smooth_eta.
+/// Between the nodes polynomials of degree 5 are read, straight lines in eta above smooth_eta. What is read is
+/// continuous, so that chains made of it converge; where feet are still unsettled the landings themselves jump.
 struct SettledTable {
   static constexpr int stops = 8;                // mu_2 to mu_9
   static constexpr int piece = 4;                // places on a piece but the last
@@ -56,6 +57,13 @@ struct SettledTable {
 
 /// The table at one restitution. Refers to the table.
 class SettledSlice {
+  // Neighbouring nodes around a place on an axis and their weights: Lagrange's polynomial through them.
+  static constexpr std::size_t smooth = 6, straight = 2;  // nodes
+  struct Stencil {
+    std::size_t first = 0, size = 0;
+    std::array<double, smooth> weight{};
+  };
+
  public:
   SettledSlice(const SettledTable& table, double eta);
 
@@ -65,6 +73,8 @@ class SettledSlice {
   class Place {
    public:
     double resting_friction() const { return edge_[SettledTable::stops]; }
+    /// mu_2, mu_3, ..., mu_r: where the landing has a kink.
+    std::span<const double> edges() const { return edge_; }
     MappedLanding land(double friction) const;  ///< friction above mu_c is read as mu_c
     /// Are feet unsettled at some of the nodes around?
     bool rough(double friction) const;
@@ -73,7 +83,8 @@ class SettledSlice {
     friend class SettledSlice;
     std::size_t piece_of(double friction) const;
     const SettledSlice* slice_ = nullptr;
-    double omega_ = 0, at_ = 0;  // at_: on the axis of speeds
+    double omega_ = 0;
+    Stencil speed_;
     std::array<double, SettledTable::stops + 1> edge_{};
     double bend_ = 0, scale_ = 0;
     std::uint16_t rough_ = 0;  // of any node around: a bit for each piece
@@ -85,12 +96,6 @@ class SettledSlice {
   double slowest(double friction, double low, double high) const;
 
  private:
-  // Neighbouring nodes around a place on an axis and their weights: Lagrange's polynomial through them.
-  static constexpr std::size_t smooth = 6, rough = 4, straight = 2;  // nodes
-  struct Stencil {
-    std::size_t first = 0, size = 0;
-    std::array<double, smooth> weight{};
-  };
   double place_of(double omega) const;  // on the axis of speeds
   double resting_at(double place) const;
   static Stencil stencil(double place, int count, std::size_t size);
@@ -98,7 +103,7 @@ class SettledSlice {
 
   const SettledTable* table_;
   double eta_, standstill_ = 0;
-  Stencil row_, rough_row_;           // where feet settle, and where not
+  Stencil row_;
   std::vector<double> edges_;         // by speed
   std::vector<std::uint16_t> rough_;  // by speed: of any row around, a bit for each piece
   friend class Place;

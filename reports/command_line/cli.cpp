@@ -286,7 +286,7 @@ int parse_and_run(int argc, const char* const* argv) {
   } catch (const CLI::Success& success) {  // --help, --version
     std::ostringstream text;
     const int code = app.exit(success, text, text);
-    fmt::print("{}", text.view());
+    say("{}", text.view());
     return code;
   } catch (const CLI::ParseError& error) {
     for (std::size_t i = 0; i < all.size(); ++i)  // before what may be missing because of it

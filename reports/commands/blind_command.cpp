@@ -32,6 +32,7 @@
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
 #include "reports/output/seal.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 
@@ -362,22 +363,21 @@ void run_blind_make(const BlindRequest& request) {
   std::optional<Progress> line;
   const BlindMade made = make_blind(request, shown_progress("making cases", line));
   line.reset();
-  fmt::print("{}: {} cases; truths sealed in {}\n", request.folder, made.cases, made.sealed);
+  say("{}: {} cases; truths sealed in {}\n", request.folder, made.cases, made.sealed);
 }
 
 void run_blind_answer(const BlindRequest& request) {
   std::optional<Progress> line;
   const BlindAnswered told = answer_blind(request, shown_progress("answering", line));
   line.reset();
-  fmt::print("{}: {} of {} cases answered", request.folder, told.answered, told.cases);
-  if (told.failed > 0) fmt::print("; {} failed, see {}/*.err", told.failed, told.answers);
-  fmt::print("\n");
+  say("{}: {} of {} cases answered{}\n", request.folder, told.answered, told.cases,
+      told.failed > 0 ? fmt::format("; {} failed, see {}/*.err", told.failed, told.answers) : "");
 }
 
 void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
   const BlindOpened opened = open_blind(request, unanswered);
-  fmt::print("{}", to_text(opened.tables.front(), 1000, terminal_width()));
-  fmt::print("\n{}\n", opened.page);
+  say("{}", to_text(opened.tables.front(), 1000, terminal_width()));
+  say("\n{}\n", opened.page);
 }
 
 }  // namespace metastable::reports

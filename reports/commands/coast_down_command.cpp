@@ -8,6 +8,7 @@
 
 #include "reports/commands/experiment_output.h"
 #include "reports/output/input_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
 
@@ -50,8 +51,7 @@ void run_coast_down(const CoastDownRequest& request) {
       if (other.name == log.name) throw std::invalid_argument(fmt::format("{}: a log named so was there before", path));
     analysis::CoastDownRun& run = runs.emplace_back(analysis::coast_down(log, request.options));
     keep(run, request.blocks);
-    fmt::print(
-        "{}: {} revolutions from {:.4g} to {:.4g} rad/s, {} blocks; ticks missed {}, double {}, displaced {}; "
+    say("{}: {} revolutions from {:.4g} to {:.4g} rad/s, {} blocks; ticks missed {}, double {}, displaced {}; "
         "{} revolutions left out\n",
         run.name, run.revolutions, run.top, request.options.stop, run.blocks.size(), run.missed, run.doubled,
         run.displaced, run.left_out);
@@ -65,10 +65,11 @@ void run_coast_down(const CoastDownRequest& request) {
     nominal = fit.loss;
     if (runs.size() > 1) nominal.run_to_run = analysis::run_to_run_of(runs, linear);
     origin = "nominal loss fitted robustly to these runs";
-    fmt::print("loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}", nominal.constant, fit.constant_error);
-    if (linear) fmt::print(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error);
-    fmt::print(" + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; {} of {} transitions beyond five of those\n",
-               nominal.quadratic, fit.quadratic_error, nominal.noise_sd, fit.outliers, fit.transitions);
+    say("loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}{} + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; "
+        "{} of {} transitions beyond five of those\n",
+        nominal.constant, fit.constant_error,
+        linear ? fmt::format(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error) : "", nominal.quadratic,
+        fit.quadratic_error, nominal.noise_sd, fit.outliers, fit.transitions);
   } else {
     const analysis::Experiment other = analysis::parse_description(analysis::read_source(request.nominal));
     if (other.system != analysis::System::coast_down)
@@ -77,13 +78,13 @@ void run_coast_down(const CoastDownRequest& request) {
     origin = fmt::format("nominal loss of the experiment \"{}\"", other.title);
   }
   if (nominal.run_to_run)
-    fmt::print("from run to run: {:.2g} % of the loss, {}\n", 100 * *nominal.run_to_run,
-               request.nominal.empty() ? fmt::format("from {} runs and one difference of {:.0f} %", runs.size(),
-                                                     100 * analysis::usual_run_to_run)
-                                       : "as the nominal experiment says");
+    say("from run to run: {:.2g} % of the loss, {}\n", 100 * *nominal.run_to_run,
+        request.nominal.empty()
+            ? fmt::format("from {} runs and one difference of {:.0f} %", runs.size(), 100 * analysis::usual_run_to_run)
+            : "as the nominal experiment says");
   else
-    fmt::print("from run to run: {:.0f} % of the loss assumed, because one run does not say (give several)\n",
-               100 * analysis::usual_run_to_run);
+    say("from run to run: {:.0f} % of the loss assumed, because one run does not say (give several)\n",
+        100 * analysis::usual_run_to_run);
   for (const analysis::CoastDownRun& run : runs) accept(analysis::objection(run, nominal), request, nominal);
   Provenance provenance{request.command, origin, 0, version()};
   const analysis::ExperimentFiles files = analysis::coast_down_files(

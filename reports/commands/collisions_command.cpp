@@ -15,6 +15,7 @@
 #include "analysis/motion_capture/collision_comparison.h"
 #include "markov/parallel.h"
 #include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {
@@ -62,12 +63,12 @@ Files write_files(const analysis::Experiment& experiment, const std::vector<anal
 }
 
 void print_comparison(const analysis::CollisionComparison& c) {
-  fmt::print("against the {} collisions of collisions.csv: {} found ({:.2f} %), {} others\n", c.due, c.found,
-             c.due > 0 ? 100.0 * static_cast<double>(c.found) / static_cast<double>(c.due) : 0.0, c.others);
-  fmt::print("  omega_minus as written:  {}\n", text(c.written));
-  fmt::print("  omega_minus, peak:       {}\n", text(c.peak));
-  fmt::print("  omega_minus, stance fit: {}\n", text(c.fit_before));
-  fmt::print("  omega_plus, stance fit:  {}\n", text(c.fit_after));
+  say("against the {} collisions of collisions.csv: {} found ({:.2f} %), {} others\n", c.due, c.found,
+      c.due > 0 ? 100.0 * static_cast<double>(c.found) / static_cast<double>(c.due) : 0.0, c.others);
+  say("  omega_minus as written:  {}\n", text(c.written));
+  say("  omega_minus, peak:       {}\n", text(c.peak));
+  say("  omega_minus, stance fit: {}\n", text(c.fit_before));
+  say("  omega_plus, stance fit:  {}\n", text(c.fit_after));
 }
 
 // Trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two files
@@ -82,7 +83,7 @@ void print_cut_rests(const analysis::ExperimentSource& source, const std::string
   try {
     experiment = analysis::parse_experiment(written);
   } catch (const analysis::InputError& error) {
-    fmt::print("trials.csv does not go with these collisions: {}\n", error.lines().front());
+    say("trials.csv does not go with these collisions: {}\n", error.lines().front());
     return;
   }
   std::map<int, dynamics::Outcome> outcomes;
@@ -95,8 +96,7 @@ void print_cut_rests(const analysis::ExperimentSource& source, const std::string
       early.push_back(angles[t].number);
   }
   if (early.empty()) return;
-  fmt::print(
-      "{} trials that trials.csv lists as rest roll on after collision {}, where they are cut (the first is trial {}): "
+  say("{} trials that trials.csv lists as rest roll on after collision {}, where they are cut (the first is trial {}): "
       "raise --collisions, or list them as max_collisions\n",
       early.size(), limit, early.front());
 }
@@ -170,18 +170,17 @@ void run_collisions(const CollisionsRequest& request) {
     }
     if (trial.collisions.empty()) ++stopped[trial.stopped];
   }
-  fmt::print("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}\n", out.string(), count,
-             angles.size(), bounces, details.string());
-  fmt::print("omega_minus is the {}\n", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
-                                                     : "stance motion extrapolated to the collision");
+  say("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}\n", out.string(), count,
+      angles.size(), bounces, details.string());
+  say("omega_minus is the {}\n", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
+                                              : "stance motion extrapolated to the collision");
   if (unfitted > 0)
-    fmt::print(
-        "{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
+    say("{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
         "empty\n",
         unfitted);
-  for (const auto& [why, trials] : stopped) fmt::print("{} trials without a collision: {}\n", trials, why);
+  for (const auto& [why, trials] : stopped) say("{} trials without a collision: {}\n", trials, why);
   if (const auto trials = std::count(cut.begin(), cut.end(), 1); trials > 0)
-    fmt::print("{} trials roll on after collision {}, where --collisions stops them\n", trials, limit);
+    say("{} trials roll on after collision {}, where --collisions stops them\n", trials, limit);
   print_cut_rests(source, files.collisions, angles, cut, limit);
   if (known)
     print_comparison(analysis::compare_collisions(*known, angles, found, request.peak, request.finder.collisions));

@@ -5,6 +5,7 @@
 #include "analysis/sensitivity/propagation.h"
 #include "analysis/sensitivity/sensitivity.h"
 #include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 #include "reports/study/study_text.h"
 
@@ -88,7 +89,7 @@ void run_compare(const CompareRequest& request) {
     json->stream() << compare_answer_json(request, answer);
     json->commit();
   }
-  if (request.json != "-") fmt::print("{}", compare_answer_text(request, answer));
+  if (request.json != "-") say("{}", compare_answer_text(request, answer));
 }
 
 }  // namespace metastable::reports

@@ -10,6 +10,7 @@
 #include "reports/description/describe_tables.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 
@@ -43,7 +44,7 @@ void run_describe(const DescribeRequest& request) {
     return answer_describe(experiment, told, provenance);
   }();
   if (!pages) {
-    for (const Table& table : tables) fmt::print("{}\n", to_text(table, 1000, terminal_width()));
+    for (const Table& table : tables) say("{}\n", to_text(table, 1000, terminal_width()));
     return;
   }
 
@@ -88,7 +89,7 @@ void run_describe(const DescribeRequest& request) {
                    std::move(beside));
   }
   pages->write_index();
-  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 
 }  // namespace metastable::reports

@@ -13,6 +13,7 @@
 #include "reports/diagnosis/diagnosis_text.h"
 #include "reports/output/output_file.h"
 #include "reports/output/page_folder.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 #include "reports/study/study_progress.h"
 
@@ -117,8 +118,8 @@ void run_diagnose(const DiagnoseRequest& request) {
     json->commit();
   }
   if (request.json == "-") return;
-  fmt::print("{}", diagnosis_text(diagnosis, terminal_width()));
-  if (!request.out.empty()) fmt::print("\n{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  say("{}", diagnosis_text(diagnosis, terminal_width()));
+  if (!request.out.empty()) say("\n{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 
 }  // namespace metastable::reports

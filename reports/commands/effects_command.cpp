@@ -7,6 +7,7 @@
 #include "dynamics/wheel/effect_catalogue.h"
 #include "reports/diagnosis/diagnosis_json.h"
 #include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 
 namespace metastable::reports {
 namespace {
@@ -23,9 +24,9 @@ void run_effects(const EffectsRequest& request) {
   if (!request.json.empty()) write_file(request.json, effects_json());
   if (request.json == "-") return;
   for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
-    fmt::print("{}: {}\n", info.id, info.summary);
+    say("{}: {}\n", info.id, info.summary);
     for (const dynamics::EffectParameter& p : info.parameters)
-      fmt::print("  {:<20}{}{} ({})\n", p.name, p.meaning, p.per_leg ? ", one a leg" : "", range_text(p));
+      say("  {:<20}{}{} ({})\n", p.name, p.meaning, p.per_leg ? ", one a leg" : "", range_text(p));
   }
 }
 

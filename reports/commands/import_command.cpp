@@ -14,6 +14,7 @@
 #include "reports/import/csv_rows.h"
 #include "reports/import/imported_experiment.h"
 #include "reports/output/input_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
 
@@ -133,18 +134,18 @@ std::string import_json(const ImportRequest& request, const ForeignFile& file, c
 
 void print_import(const ImportRequest& request, const ForeignFile& file, const Imported& imported) {
   const bool angles = imported.source.angle_csv.has_value();
-  fmt::print("{}: {} trials, {} {}\n", request.out, imported.trials, imported.rows, angles ? "frames" : "collisions");
+  say("{}: {} trials, {} {}\n", request.out, imported.trials, imported.rows, angles ? "frames" : "collisions");
   if (!angles && imported.experiment.conditions.size() > 1)
     for (const Counted& c : counted(imported.experiment))
-      fmt::print("  {}: {} trials, {} collisions\n", c.id, c.trials, c.collisions);
+      say("  {}: {} trials, {} collisions\n", c.id, c.trials, c.collisions);
   for (const MappedColumn& column : file.map)
-    fmt::print("  {:<12} {}{}\n", role_name(column.role), column.name,
-               column.unit.empty() ? "" : fmt::format(" in {}", column.unit));
-  for (const std::string& sentence : imported.assumed) fmt::print("assumed: {}\n", sentence);
+    say("  {:<12} {}{}\n", role_name(column.role), column.name,
+        column.unit.empty() ? "" : fmt::format(" in {}", column.unit));
+  for (const std::string& sentence : imported.assumed) say("assumed: {}\n", sentence);
   if (const std::vector<std::string> names = unused(file); !names.empty())
-    fmt::print("not used: {}\n", fmt::join(names, ", "));
-  for (const std::string& note : imported.experiment.notes) fmt::print("note: {}\n", note);
-  fmt::print("next: metastable {} {}\n", angles ? "collisions" : "diagnose", request.out);
+    say("not used: {}\n", fmt::join(names, ", "));
+  for (const std::string& note : imported.experiment.notes) say("note: {}\n", note);
+  say("next: metastable {} {}\n", angles ? "collisions" : "diagnose", request.out);
 }
 
 }  // namespace

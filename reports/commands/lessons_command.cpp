@@ -20,6 +20,7 @@
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_tables.h"
 #include "reports/output/page_folder.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 #include "reports/study/study_progress.h"
 
@@ -279,7 +280,7 @@ void run_lessons(const LessonsRequest& request) {
   for (std::size_t i = 0; i < measured.size(); ++i)
     lessons.measured(measured[i], std::filesystem::path(request.data[i]).lexically_normal().filename().string(), i + 1);
   lessons.write_index();
-  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 
 }  // namespace metastable::reports

@@ -11,6 +11,7 @@
 #include "analysis/study/how_it_fails.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/output/page_folder.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
 #include "reports/study/report_figures.h"
@@ -208,7 +209,7 @@ class Report {
 
 void run_report(const ReportRequest& request) {
   Report(request).write();
-  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 
 }  // namespace metastable::reports

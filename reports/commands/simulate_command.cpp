@@ -8,6 +8,7 @@
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
 #include "reports/commands/experiment_output.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
 
@@ -27,7 +28,7 @@ void run_into_folder(const Request& request) {
   ExperimentOutput folder(request.out);
   const SimulatedExperiment made = simulated_experiment(request);
   folder.write(made.source);
-  for (const std::string& line : made.said) fmt::print("{}: {}\n", request.out, line);
+  for (const std::string& line : made.said) say("{}: {}\n", request.out, line);
 }
 
 }  // namespace

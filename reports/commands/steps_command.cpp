@@ -8,6 +8,7 @@
 #include "analysis/study/consistency.h"
 #include "analysis/study/how_it_fails.h"
 #include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
@@ -72,7 +73,7 @@ void run_steps(const StepsRequest& request) {
     json->stream() << steps_answer_json(request, answer);
     json->commit();
   }
-  if (request.json != "-") fmt::print("{}", steps_answer_text(request, answer, terminal_width()));
+  if (request.json != "-") say("{}", steps_answer_text(request, answer, terminal_width()));
 }
 
 }  // namespace metastable::reports

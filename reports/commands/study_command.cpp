@@ -15,6 +15,7 @@
 #include "reports/description/stopping_pages.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -110,7 +111,7 @@ void run_study(const StudyRequest& request) {
                 all_variants(studies, [&](const auto& s) { return fig9_figures(s, experiments, provenance); }),
                 {fig9_table(studies, provenance)});
   pages.write_index();
-  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 
 }  // namespace metastable::reports

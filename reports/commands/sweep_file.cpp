@@ -16,6 +16,7 @@
 #include "reports/output/input_file.h"
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
 
 namespace metastable::reports {
 namespace {
@@ -154,8 +155,8 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   }
   const std::optional<Figure> drawn = figure_of(sweep, rows);
   if (drawn) write_file(picture, render_svg(*drawn));
-  fmt::print("{}: {} points ({} taken over); {}\n", out.string(), size, had,
-             drawn ? picture.string() : "no figure: no point has a finite number of steps");
+  say("{}: {} points ({} taken over); {}\n", out.string(), size, had,
+      drawn ? picture.string() : "no figure: no point has a finite number of steps");
 }
 
 }  // namespace metastable::reports

@@ -11,6 +11,7 @@
 #include "markov/passage/chain_files.h"
 #include "reports/output/output_file.h"
 #include "reports/output/progress.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
@@ -187,9 +188,9 @@ void run_verify(const VerifyRequest& request) {
                               "settled: the paper's legs, r_g = 0.0424094 m",
                               1, version()};
   const std::size_t width = terminal_width();
-  fmt::print("{}\n", wrapped(peers, "", width));
+  say("{}\n", wrapped(peers, "", width));
   for (Table& table : tables) {
-    fmt::print("{}\n", to_text(table, 1000, width));
+    say("{}\n", to_text(table, 1000, width));
     if (request.out.empty()) continue;
     table.notes.emplace_back(peers);  // a file stands alone
     table.provenance = provenance;
@@ -198,7 +199,7 @@ void run_verify(const VerifyRequest& request) {
     write_file(file.string() + ".md", to_markdown(table));
     write_file(file.string() + ".tex", to_latex(table));
   }
-  for (const std::string& line : provenance_lines(provenance)) fmt::print("{}\n", line);
+  for (const std::string& line : provenance_lines(provenance)) say("{}\n", line);
 }
 
 }  // namespace metastable::reports

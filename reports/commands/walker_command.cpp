@@ -11,6 +11,7 @@
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
 #include "reports/output/page_folder.h"
+#include "reports/output/standard_output.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
@@ -76,7 +77,7 @@ void run_walker(const WalkerRequest& request, WalkerAnswer answer_of(const Walke
     json->stream() << walker_answer_json(request, answer);
     json->commit();
   }
-  if (request.json != "-") fmt::print("{}", walker_answer_text(request, answer, terminal_width()));
+  if (request.json != "-") say("{}", walker_answer_text(request, answer, terminal_width()));
 }
 
 }  // namespace
@@ -146,7 +147,7 @@ void run_walker_simulate(const WalkerRequest& request) {
   write_file(whole.path() / "walks.csv", head + steps);
   write_file(whole.path() / "trials.csv", head + trials);
   whole.commit("trials.csv");
-  fmt::print("{}: {} trials, {} of them fell\n", request.out, walks.size(), fallen);
+  say("{}: {} trials, {} of them fell\n", request.out, walks.size(), fallen);
 }
 
 void run_walker_report(const WalkerRequest& request) {
@@ -185,7 +186,7 @@ void run_walker_report(const WalkerRequest& request) {
         {last_moments_table(walkers[i].falls.moments, id + "-last-steps", provenance)});
   }
   pages.write_index();
-  fmt::print("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
 }
 
 }  // namespace metastable::reports

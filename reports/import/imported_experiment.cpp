@@ -23,7 +23,7 @@ using analysis::shown_text;
 std::optional<long> whole_number(std::string_view text) {
   double number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || number != std::floor(number) || number < 1 ||
+  if (error != std::errc() || end != text.data() + text.size() || number != std::floor(number) || number < 0 ||
       number > 1e9)
     return std::nullopt;
   return static_cast<long>(number);
@@ -41,6 +41,7 @@ std::vector<long> trial_numbers(const std::vector<ImportedRow>& rows, bool renum
   for (const ImportedRow& row : rows) {
     if (!row.trial) {
       defects.add(row.place, {}, "trial: is not told");
+      if (std::ranges::none_of(rows, [](const ImportedRow& one) { return one.trial.has_value(); })) return {};
       numbers.push_back(0);
       continue;
     }
@@ -51,7 +52,7 @@ std::vector<long> trial_numbers(const std::vector<ImportedRow>& rows, bool renum
     constexpr const char* remedy = "; --number-trials numbers them in the order of their first rows";
     const std::optional<long> number = whole_number(*row.trial);
     if (!number)
-      defects.add(row.place, {}, fmt::format("trial: {} is no whole number from 1{}", shown_text(*row.trial), remedy));
+      defects.add(row.place, {}, fmt::format("trial: {} is no whole number from 0{}", shown_text(*row.trial), remedy));
     const std::string& condition = condition_of.emplace(number.value_or(0), row.condition.value_or("")).first->second;
     if (number && condition != row.condition.value_or(""))
       defects.add(row.place, {},
@@ -60,6 +61,15 @@ std::vector<long> trial_numbers(const std::vector<ImportedRow>& rows, bool renum
     numbers.push_back(number.value_or(0));
   }
   return numbers;
+}
+
+bool told_of_conditions(const std::vector<ImportedRow>& rows) {
+  return std::ranges::any_of(rows, [](const ImportedRow& row) { return row.condition.has_value(); });
+}
+
+// The fields that every file of a folder begins a row with.
+std::string begin_of(const ImportedRow& row, long trial, bool condition) {
+  return fmt::format("{}{}", condition ? csv_field(row.condition.value_or("")) + "," : "", trial);
 }
 
 // "rest" or another outcome of each trial, in the order of the trials' first rows; empty if none is told.
@@ -91,17 +101,17 @@ Outcomes outcomes_of(const std::vector<ImportedRow>& rows, const std::vector<lon
     else
       told.outcome = outcome;
   }
-  Outcomes outcomes{.csv = "condition,trial,outcome\n", .places = {}};
+  const bool condition = told_of_conditions(rows);
+  Outcomes outcomes{.csv = condition ? "condition,trial,outcome\n" : "trial,outcome\n", .places = {}};
   for (const auto& [number, told] : of_trial) {
     if (told.outcome.empty() && defects.empty())
       defects.add(told.place, {}, fmt::format("outcome: is not told of trial {}, but of others", number));
-    outcomes.csv += fmt::format("{},{},{}\n", csv_field(told.condition), number, told.outcome);
+    outcomes.csv += fmt::format("{}{},{}\n", condition ? csv_field(told.condition) + "," : "", number, told.outcome);
     outcomes.places.push_back(told.place);
   }
   return outcomes;
 }
 
-// A speed that was scaled shows no digits that it did not have.
 std::string number(const std::optional<double>& value) { return value ? fmt::format("{}", *value) : ""; }
 
 std::string less(const std::optional<double>& value, int first) {
@@ -109,33 +119,37 @@ std::string less(const std::optional<double>& value, int first) {
 }
 
 // A defect of the folder's files, said of the line of the foreign file that it comes from.
-std::string in_terms_of(const std::string& defect, const std::string& name, const std::vector<std::string>& places) {
+// @param file  that all of them are from
+std::string in_terms_of(const std::string& defect, const std::string& name, const std::string& file,
+                        const std::vector<std::string>& places) {
   if (!defect.starts_with(name + ":")) return defect;
   std::size_t line = 0;
   const char* const begin = defect.data() + name.size() + 1;
   const auto [end, error] = std::from_chars(begin, defect.data() + defect.size(), line);
   const std::size_t what = defect.find(": ", static_cast<std::size_t>(end - defect.data()));
-  if (error != std::errc() || what == std::string::npos || line < 2 || line - 2 >= places.size()) return defect;
-  return places[line - 2] + defect.substr(what);
+  if (error != std::errc() || what == std::string::npos || line > places.size() + 1) return defect;
+  return (line < 2 ? file : places[line - 2]) + defect.substr(what);
 }
 
-// Columns of all rows; one that no row fills is left out.
 std::string collisions_csv(const std::vector<ImportedRow>& rows, const std::vector<long>& numbers,
                            const ImportOptions& options) {
-  std::string csv = "condition,trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
+  const bool condition = told_of_conditions(rows);
+  std::string csv = condition ? "condition," : "";
+  csv += "trial,collision,leg,time_s,position_m,omega_minus_rad_s,omega_plus_rad_s\n";
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const ImportedRow& row = rows[i];
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{}\n", csv_field(row.condition.value_or("")),
-                   numbers[i], less(row.collision, options.first_collision - 1), less(row.leg, options.first_leg),
-                   number(row.time), number(row.position), number(row.omega_minus), number(row.omega_plus));
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{}\n", begin_of(row, numbers[i], condition),
+                   less(row.collision, options.first_collision - 1), less(row.leg, options.first_leg), number(row.time),
+                   number(row.position), number(row.omega_minus), number(row.omega_plus));
   }
   return csv;
 }
 
 std::string angle_csv(const std::vector<ImportedRow>& rows, const std::vector<long>& numbers) {
-  std::string csv = "condition,trial,time_s,angle_rad\n";
+  const bool condition = told_of_conditions(rows);
+  std::string csv = condition ? "condition,trial,time_s,angle_rad\n" : "trial,time_s,angle_rad\n";
   for (std::size_t i = 0; i < rows.size(); ++i)
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{}\n", csv_field(rows[i].condition.value_or("")), numbers[i],
+    fmt::format_to(std::back_inserter(csv), "{},{},{}\n", begin_of(rows[i], numbers[i], condition),
                    number(rows[i].time), number(rows[i].angle));
   return csv;
 }
@@ -158,6 +172,7 @@ Imported imported_experiment(const std::string& file, std::vector<ImportedRow> r
   defects.check();
   Imported imported;
   const std::vector<long> numbers = trial_numbers(rows, options.number_trials, defects);
+  defects.check();
   if (options.number_trials)
     imported.assumed.push_back(
         "trials are numbered in the order of their first rows, taken as the order they were run");
@@ -184,8 +199,8 @@ Imported imported_experiment(const std::string& file, std::vector<ImportedRow> r
     std::vector<std::string> places, lines;
     for (const ImportedRow& row : rows) places.push_back(row.place);
     for (std::string line : error.lines()) {
-      line = in_terms_of(in_terms_of(line, angles ? "angle.csv" : "collisions.csv", places), "trials.csv",
-                         outcomes.places);
+      line = in_terms_of(line, angles ? "angle.csv" : "collisions.csv", file, places);
+      line = in_terms_of(line, "trials.csv", file, outcomes.places);
       constexpr std::string_view description = "experiment.toml";
       if (line.starts_with(description)) line = options.description_file + line.substr(description.size());
       lines.push_back(std::move(line));

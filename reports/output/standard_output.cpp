@@ -1,13 +1,23 @@
 #include "reports/output/standard_output.h"
 
+#include <unistd.h>
+
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <iostream>
 
 #include "reports/output/output_file.h"
+#include "reports/output/text_table.h"
 
 namespace metastable::reports {
+
+void say_text(std::string_view text) {
+  if (::isatty(STDOUT_FILENO) == 1)
+    fmt::print("{}", fitted(text, terminal_width()));
+  else
+    fmt::print("{}", text);
+}
 
 void flush_standard_output() {
   errno = 0;

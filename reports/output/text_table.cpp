@@ -189,6 +189,42 @@ std::string wrapped(const std::string& text, const std::string& indent, std::siz
   return out + line + "\n";
 }
 
+namespace {
+
+// A line broken at spaces, its text from byte `said` on below itself, `column` characters in.
+std::string hanging(std::string_view line, std::size_t said, std::size_t column, std::size_t width) {
+  const std::string rest = wrapped(std::string(line.substr(said)), std::string(column, ' '), width);
+  return std::string(line.substr(0, said)) + rest.substr(column, rest.size() - column - 1);
+}
+
+}  // namespace
+
+std::string fitted(std::string_view text, std::size_t width) {
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(end);
+    const bool ended = line.back() == '\n';
+    if (ended) line.remove_suffix(1);
+    const std::size_t start = std::min(line.find_first_not_of(' '), line.size());
+    const std::size_t said = line.find_first_not_of(' ', std::min(line.find("  ", start), line.size()));
+    if (length(line) <= width) {
+      out += line;
+    } else if (said == std::string_view::npos) {
+      out += hanging(line, start, start + 2, width);
+    } else if (const std::size_t column = length(line.substr(0, said)); 2 * column <= width) {
+      out += hanging(line, said, column, width);
+    } else {  // beside such a label the text would be squeezed: it stands below
+      const std::string indent(start + 4, ' '), label(line.substr(0, line.find("  ", start)));
+      out += hanging(label, start, start + 2, width) + "\n" +
+             hanging(indent + std::string(line.substr(said)), start + 4, start + 4, width);
+    }
+    if (ended) out += '\n';
+  }
+  return out;
+}
+
 std::string to_text(const Table& table, std::size_t most, std::size_t width) {
   const std::size_t rows = std::min(most, table.rows.size());
   std::vector<Shown> columns;

@@ -158,9 +158,6 @@ analysis::Setting setting_of(const Arguments& fields) {
   if (fields.given("first_leg"))
     s.first_landing_leg =
         static_cast<int>(fields.whole("first_leg", 0, static_cast<std::uint64_t>(s.wheel.legs()) - 1));
-  s.direct = fields.flag("direct");
-  if (s.direct && s.law != dynamics::Law::settled)
-    throw std::invalid_argument("direct: has a meaning under law settled only");
   check_slope(s);
   if (fields.given("initial_speed"))
     s.initial_speed = fields.spread("initial_speed");
@@ -214,6 +211,11 @@ markov::MeshStudyOptions mesh_options_of(const Arguments& options) {
   study.threads = options.threads();
   if (options.given("spacing")) study.spacing = options.number("spacing");
   if (options.given("simulated_steps")) study.simulated_steps = options.whole("simulated_steps", 0, 1000000000000);
+  if (options.given("guided_samples")) {
+    study.guided_samples = options.whole("guided_samples", 0, 100000000);
+    if (study.guided_samples > 0 && study.guided_samples < 16)
+      throw std::invalid_argument(fmt::format("guided_samples: {}, 0 or 16 and more expected", study.guided_samples));
+  }
   if (options.given("memory_gb")) {
     const double gigabytes = options.number("memory_gb");
     if (!(gigabytes >= 0.001 && gigabytes <= 1e6))

@@ -58,12 +58,19 @@ class Cases {
   std::atomic<std::size_t> all_ = 0, done_ = 0;
 };
 
-py::dict make(const py::dict& options, const std::string& command, const py::object& progress) {
+// What `work` (make_blind, answer_blind) tells of the run that the options name.
+template <typename Work>
+auto of_cases(const Work& work, const py::dict& options, const std::string& command, const py::object& progress) {
   const BlindRequest request = blind_request_of(options, command);
-  BlindMade made;
+  decltype(work(request, CaseProgress{})) told;
   Call call(progress);
   Cases cases(call);
-  call.run([&] { made = make_blind(request, cases.progress()); });
+  call.run([&] { told = work(request, cases.progress()); });
+  return told;
+}
+
+py::dict make(const py::dict& options, const std::string& command, const py::object& progress) {
+  const BlindMade made = of_cases(make_blind, options, command, progress);
   py::dict told;
   told["cases"] = made.cases;
   told["sealed"] = made.sealed;
@@ -71,11 +78,7 @@ py::dict make(const py::dict& options, const std::string& command, const py::obj
 }
 
 py::dict answer_cases(const py::dict& options, const std::string& command, const py::object& progress) {
-  const BlindRequest request = blind_request_of(options, command);
-  BlindAnswered found;
-  Call call(progress);
-  Cases cases(call);
-  call.run([&] { found = answer_blind(request, cases.progress()); });
+  const BlindAnswered found = of_cases(answer_blind, options, command, progress);
   py::dict told;
   told["cases"] = found.cases;
   told["answered"] = found.answered;

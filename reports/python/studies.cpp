@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "analysis/sensitivity/sweep.h"
+#include "dynamics/wheel/contact_law.h"
 #include "reports/commands/compare_command.h"
 #include "reports/commands/steps_command.h"
 #include "reports/output/text_table.h"
@@ -23,6 +24,9 @@ using Command = std::string;
 py::dict study(const py::dict& setting, const py::dict& options, const Command& command, const py::object& progress) {
   const Arguments given(options);
   StepsRequest request{setting_of(Arguments(setting)), study_options_of(given), "", command, given.flag("certify")};
+  request.study.direct = given.flag("direct");
+  if (request.study.direct && request.setting.law != dynamics::Law::settled)
+    throw std::invalid_argument("direct: has a meaning under law settled only");
   request.sensitivities = given.flag("sensitivities");
   request.how_it_fails = given.flag("how_it_fails");
   request.standard_errors = standard_errors_of(given, request.setting);

@@ -60,8 +60,9 @@ void landings_read(benchmark::State& state) {
 // Each time on another slope: tables are kept.
 void table(benchmark::State& state) {
   analysis::Setting setting = engine_wheel();
+  static double slope_deg = setting.slope_deg;
   for (auto _ : state) {
-    setting.slope_deg += 0.001;
+    setting.slope_deg = slope_deg += 0.001;
     benchmark::DoNotOptimize(dynamics::SettledMap::of(wheel(setting), on_threads(static_cast<int>(state.range(0)))));
   }
 }

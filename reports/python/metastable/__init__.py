@@ -72,7 +72,6 @@ class Setting:
     gravity             [m/s^2]; None: 9.81
     ramp_length         [m]; None: 3.66; math.inf for a ramp without end
     first_leg           that lands at collision 1, counted from 0
-    direct              settled: follow every landing instead of reading a table, hundreds of times slower
 
     Raises InputError naming the quantity and its range.
     """
@@ -95,7 +94,6 @@ class Setting:
     gravity: Optional[float] = None
     ramp_length: Optional[float] = None
     first_leg: int = 0
-    direct: bool = False
 
     def __post_init__(self):
         _metastable.describe_setting(_fields(self))
@@ -125,7 +123,8 @@ class Setting:
 class WalkerSetting:
     """A passive walker on two legs on rough ground.
 
-    walker        "simplest" (Garcia et al. 1998: lengths in legs, times in sqrt(l/g)) or "compass" (Goswami et al. 1998)
+    walker        "simplest" (Garcia et al. 1998: lengths in legs, times in sqrt(l/g)) or "compass" (Goswami et al.
+                  1998)
     slope_sd_deg  sd of the slope from step to step [deg], in (0, 45)
     slope_deg     mean slope [deg], in (0, 45); None: 0.009 rad of the simplest, 3 deg of the compass
     terrain       "fresh": a plane that tilts anew at every step; "facets": the feet still stand on the last one
@@ -163,9 +162,9 @@ def _repr(setting):
 
 
 def study(setting, *, method=None, cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None,
-          replicates=None, mixing_distance=None, eigenvalues=None, certify=False, sensitivities=False,
-          standard_errors=None, spacing=None, simulated_steps=None, memory_gb=None, how_it_fails=False, seed=1,
-          threads=0, progress=None):
+          replicates=None, mixing_distance=None, eigenvalues=None, direct=False, certify=False, sensitivities=False,
+          standard_errors=None, spacing=None, simulated_steps=None, guided_samples=None, memory_gb=None,
+          how_it_fails=False, seed=1, threads=0, progress=None):
     """How many steps before it fails, with its 95 % interval, and what goes with that: `metastable steps`.
 
     setting          a Setting (returns a Study), a WalkerSetting or a Walker (returns a WalkerStudy)
@@ -178,6 +177,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     replicates       independent randomisations behind the interval, 2 to 64; None: 8
     mixing_distance  total variation distance that counts as mixed, (0, 1); None: 0.05
     eigenvalues      how many moduli, 1 to 64; None: 6
+    direct           every landing followed instead of read from a table, hundreds of times slower (law "settled")
     certify          guaranteed bounds as well (law "published")
     sensitivities    how ln(expected steps) responds to each parameter, ranked
     standard_errors  of parameters by name, {"friction_mean": 0.01}: an interval from them is given apart
@@ -185,6 +185,8 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     Of a WalkerSetting or a Walker:
     spacing          of the coarsest mesh, in stationary sds of the noise, 0.05 to 2; None: by dimension
     simulated_steps  about how many steps the direct simulation beside it takes; None: 2 million, 0: none
+    guided_samples   of the importance sampling beside it, asked above 100 steps; None: 4000, 0: none. It takes some
+                     hundred calls of a Walker's step for each
     memory_gb        most memory of the meshes; None: 3
 
     Of all:
@@ -194,8 +196,8 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     """
     wheel = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
                  tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
-                 certify=certify, sensitivities=sensitivities, standard_errors=standard_errors)
-    mesh = dict(spacing=spacing, simulated_steps=simulated_steps, memory_gb=memory_gb)
+                 direct=direct, certify=certify, sensitivities=sensitivities, standard_errors=standard_errors)
+    mesh = dict(spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples, memory_gb=memory_gb)
     every = dict(how_it_fails=how_it_fails, seed=seed, threads=threads)
     is_wheel = isinstance(setting, Setting)
     _refuse(mesh if is_wheel else wheel, "a wheel" if is_wheel else "a walker")
@@ -219,7 +221,7 @@ def _refuse(options, who):
 
 def compare(settings, *, collisions=16, method=None, cells=None, samples=None, tolerance=None, sequence=None,
             draws=None, tail=None, replicates=None, standard_errors=None, spacing=None, simulated_steps=None,
-            memory_gb=None, seed=1, threads=0, progress=None):
+            guided_samples=None, memory_gb=None, seed=1, threads=0, progress=None):
     """Expected steps of two or more settings on common random numbers, each compared with the first: `metastable
     compare`. Settings of the wheel give a Comparison, WalkerSettings a WalkerComparison.
 
@@ -229,7 +231,7 @@ def compare(settings, *, collisions=16, method=None, cells=None, samples=None, t
     settings = list(settings)
     wheel = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
                  tail=tail, replicates=replicates, standard_errors=standard_errors)
-    mesh = dict(spacing=spacing, simulated_steps=simulated_steps, memory_gb=memory_gb)
+    mesh = dict(spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples, memory_gb=memory_gb)
     kinds = {type(setting) for setting in settings}
     if len(settings) < 2 or len(kinds) > 1 or not kinds <= {Setting, WalkerSetting}:
         raise InputError("settings: two or more of one kind, Setting or WalkerSetting, expected")
@@ -482,7 +484,8 @@ class SimulatedSteps:
 
     def __repr__(self):
         low, high = self.interval_95
-        return f"<metastable.SimulatedSteps: {self.mean:.4g} steps (95 %: {low:.4g} to {high:.4g}), {len(self.steps)} trials>"
+        return (f"<metastable.SimulatedSteps: {self.mean:.4g} steps (95 %: {low:.4g} to {high:.4g}), "
+                f"{len(self.steps)} trials>")
 
 
 class FirstPassage:
@@ -492,7 +495,8 @@ class FirstPassage:
         self.mean, self.sd, self.lower, self.upper = mean, sd, lower, upper
 
     def __repr__(self):
-        return f"<metastable.FirstPassage: {self.mean.min():.4g} to {self.mean.max():.4g} steps from {len(self.mean)} states>"
+        return (f"<metastable.FirstPassage: {self.mean.min():.4g} to {self.mean.max():.4g} steps from "
+                f"{len(self.mean)} states>")
 
 
 class QuasiStationary:

@@ -30,7 +30,8 @@ class MapError(ComputationError): ...
 
 
 class Record:
-    def __init__(self, values: Mapping[str, Any], arrays: Optional[Mapping[str, Any]] = None, path: str = "") -> None: ...
+    def __init__(self, values: Mapping[str, Any], arrays: Optional[Mapping[str, Any]] = None,
+                 path: str = "") -> None: ...
     def __getitem__(self, name: str) -> Any: ...
     def __getattr__(self, name: str) -> Any: ...
     def __iter__(self) -> Iterator[str]: ...
@@ -227,7 +228,6 @@ class Setting:
     gravity: Optional[float]
     ramp_length: Optional[float]
     first_leg: int
-    direct: bool
     def __init__(self, slope_deg: float = 7.02, initial_speed: Optional[Spread] = None, law: str = "published",
                  restitution: Optional[Spread] = None, friction: Optional[Spread] = None,
                  correlation: Optional[float] = None, contact_list: Optional[ArrayLike] = None,
@@ -235,7 +235,7 @@ class Setting:
                  inertia: Optional[float] = None, radius_of_gyration: Optional[float] = None,
                  tip_radius: Optional[float] = None, ramp_stiffness: Optional[float] = None,
                  contact_mass: Optional[float] = None, gravity: Optional[float] = None,
-                 ramp_length: Optional[float] = None, first_leg: int = 0, direct: bool = False) -> None: ...
+                 ramp_length: Optional[float] = None, first_leg: int = 0) -> None: ...
     @property
     def launch(self) -> Tuple[float, float]: ...
     def describe(self) -> str: ...
@@ -335,12 +335,13 @@ def version_text() -> str: ...
 def study(setting: Setting, *, method: Optional[str] = None, cells: Optional[int] = None,
           samples: Optional[int] = None, tolerance: Optional[float] = None, sequence: Optional[str] = None,
           draws: Optional[str] = None, tail: Optional[float] = None, replicates: Optional[int] = None,
-          mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None, certify: bool = False,
-          sensitivities: bool = False, standard_errors: Optional[Mapping[str, float]] = None,
+          mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None, direct: bool = False,
+          certify: bool = False, sensitivities: bool = False, standard_errors: Optional[Mapping[str, float]] = None,
           how_it_fails: bool = False, seed: int = 1, threads: int = 0, progress: Progress = None) -> Study: ...
 @overload
 def study(setting: Union[WalkerSetting, Walker], *, spacing: Optional[float] = None,
-          simulated_steps: Optional[int] = None, memory_gb: Optional[float] = None, how_it_fails: bool = False,
+          simulated_steps: Optional[int] = None, guided_samples: Optional[int] = None,
+          memory_gb: Optional[float] = None, how_it_fails: bool = False,
           seed: int = 1, threads: int = 0, progress: Progress = None) -> WalkerStudy: ...
 
 
@@ -352,7 +353,8 @@ def compare(settings: Iterable[Setting], *, collisions: int = 16, method: Option
             threads: int = 0, progress: Progress = None) -> Comparison: ...
 @overload
 def compare(settings: Iterable[WalkerSetting], *, spacing: Optional[float] = None,
-            simulated_steps: Optional[int] = None, memory_gb: Optional[float] = None, seed: int = 1, threads: int = 0,
+            simulated_steps: Optional[int] = None, guided_samples: Optional[int] = None,
+            memory_gb: Optional[float] = None, seed: int = 1, threads: int = 0,
             progress: Progress = None) -> WalkerComparison: ...
 
 

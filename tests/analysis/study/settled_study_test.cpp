@@ -68,7 +68,7 @@ TEST(SettledStudy, ChainIsTheRolledWheel) {
 // A sixth of the feet still move at the next touch; what that does is measured, and in the interval.
 TEST(SettledStudy, FeetThatStillMoveAreInTheInterval) {
   const Setting setting = settled(7.02, {0.5, 0.1}, {0.4, 0.05}, true);
-  const Metastability study = analysis::study(setting, {.method = Method::integrated, .tolerance = 0.02});
+  const Metastability study = analysis::study(setting, {.method = Method::integrated, .tolerance = 0.05});
   const auto unsettled = std::find_if(study.violations.begin(), study.violations.end(),
                                       [](const ViolationShare& one) { return one.name == "foot unsettled"; });
   EXPECT_GT(unsettled->until_rest, 0.1);
@@ -76,7 +76,7 @@ TEST(SettledStudy, FeetThatStillMoveAreInTheInterval) {
   EXPECT_LT(study.steps.memory.upper, 0.15);
   EXPECT_EQ(study.status, Status::tolerance_not_met);
   EXPECT_GE(study.steps.from_start.upper, study.steps.from_start.value * std::exp(study.steps.memory.upper));
-  expect_alike(study.steps.from_start, roll(setting, 1000));
+  expect_alike(study.steps.from_start, roll(setting, 500));
 }
 
 TEST(SettledStudy, MethodsAgreeWhereFailuresAreRare) {

@@ -123,7 +123,7 @@ TEST(SettledReturnMap, MemoryDefectIsWhatMovingFeetDo) {
   const double state = 7.35 * 7.35;
   std::mt19937_64 random(4);
   std::normal_distribution<double> score;
-  constexpr int draws = 300;
+  constexpr int draws = 200;
   double defect = 0, difference = 0;
   int moving = 0;
   for (int k = 0; k < draws; ++k) {

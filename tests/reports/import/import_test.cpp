@@ -206,16 +206,16 @@ TEST_F(Import, NumbersNamesOfTrialsAndStatesTheWheelByOptions) {
 
   expect_refused(import(stated({"--slope", "9.59"})),
                  csv +
-                     ":2: trial: 'monday' is no whole number from 1; --number-trials numbers them in the order of "
+                     ":2: trial: 'monday' is no whole number from 0; --number-trials numbers them in the order of "
                      "their first rows\nmetastable: " +
                      csv +
-                     ":3: trial: 'monday' is no whole number from 1; --number-trials numbers them in the order "
+                     ":3: trial: 'monday' is no whole number from 0; --number-trials numbers them in the order "
                      "of their first rows\nmetastable: " +
                      csv +
-                     ":4: trial: 'monday' is no whole number from 1; --number-trials numbers them in the order "
+                     ":4: trial: 'monday' is no whole number from 0; --number-trials numbers them in the order "
                      "of their first rows\nmetastable: " +
                      csv +
-                     ":5: trial: 'tuesday' is no whole number from 1; --number-trials numbers them in the order "
+                     ":5: trial: 'tuesday' is no whole number from 0; --number-trials numbers them in the order "
                      "of their first rows");
   expect_refused(import(stated({"--conditions", "fast=9.59", "--number-trials"})),
                  csv + ":4: condition: unknown condition 'slow'");
@@ -244,6 +244,10 @@ TEST_F(Import, NamesWhatIsMissingOrAmbiguous) {
   expect_refused(columns("omega_minus=w[rad/s],omega_plus=w[rad/s]"), "--columns: 'w' is taken twice");
   expect_refused(columns("omega_minus=w2[rad/s],omega_minus=w[rad/s]"), "--columns: omega_minus is given twice");
   expect_refused(columns("omega_minus=w[rad/s]"), csv + ":5:3: w: 'x' is not a finite number");
+  const std::string bare = file("f.csv", "w\n5.1\n4.9\n"), no_condition = file("g.csv", "trial,w\n1,5.1\n1,4.9\n");
+  expect_refused(import({bare, "--columns", "omega_minus=w[rad/s]"}), bare + ":2: trial: is not told");
+  expect_refused(import({no_condition, "--columns", "omega_minus=w[rad/s]"}),
+                 no_condition + ":2: trial: the column 'condition' is missing and experiment.toml has 2 conditions");
   const std::string jump = file("b.csv", "trial,w,leg,condition\n1,5.1,0,fast\n1,4.9,2,fast\n");
   expect_refused(import({jump, "--columns", "omega_minus=w[rad/s]"}),
                  jump + ":3: leg: leg 2 does not land after leg 0");

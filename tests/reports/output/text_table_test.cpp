@@ -103,6 +103,16 @@ TEST(TextTable, MoreColumnsThanTheWindowHoldsGoOnBelow) {
   EXPECT_EQ(to_text(table, 10, 400).find("\n\n"), std::string::npos);
 }
 
+TEST(TextTable, LinesAreFittedUnderWhatTheySay) {
+  const std::string line = "  label          one two three four five six\n", plain = "  no label, but as many words\n";
+  EXPECT_EQ(fitted(line, 44), line);
+  EXPECT_EQ(fitted(line, 36), "  label          one two three four\n                 five six\n");
+  EXPECT_EQ(fitted("a\n" + line + "\nb", 36), "a\n" + fitted(line, 36) + "\nb");
+  EXPECT_EQ(fitted(plain, 20), "  no label, but as\n    many words\n");
+  // A label wider than half a line stands above.
+  EXPECT_EQ(fitted(line, 28), "  label\n      one two three four\n      five six\n");
+}
+
 TEST(TextTable, ANumberThatSaysNothingIsSaidSo) {
   const Table table{.id = "t",
                     .title = "T",

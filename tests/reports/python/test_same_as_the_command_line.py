@@ -29,11 +29,11 @@ class SameAsTheCommandLine(unittest.TestCase):
                          command_line("compare", "--cells", "48", "--samples", "512"))
 
     def test_walker(self):
-        setting = metastable.WalkerSetting("simplest", slope_sd_deg=0.17)
-        study = metastable.study(setting, spacing=0.9, simulated_steps=50000, how_it_fails=True)
+        setting = metastable.WalkerSetting("simplest", slope_sd_deg=0.5)
+        study = metastable.study(setting, spacing=1.2, simulated_steps=20000, how_it_fails=True)
         self.assertEqual(told(study.to_dict()),
-                         command_line("steps", "--walker", "simplest", "--slope-sd", "0.17", "--spacing", "0.9",
-                                      "--simulated-steps", "50000", "--how-it-fails"))
+                         command_line("steps", "--walker", "simplest", "--slope-sd", "0.5", "--spacing", "1.2",
+                                      "--simulated-steps", "20000", "--how-it-fails"))
 
     def test_diagnose(self):
         catalogue = ["leg_contact", "slope_offset"]

@@ -1,0 +1,61 @@
+"""The documentation site: Sphinx with MyST and Furo; Doxygen and Breathe for the reference of the C++ library."""
+
+import os
+import pathlib
+import re
+
+root = pathlib.Path(os.environ["METASTABLE_SOURCE"])  # the source tree
+pages = pathlib.Path(__file__).parent  # the staged copy of this folder
+
+project = "metastable"
+author = "the authors of metastable"
+version = re.search(r"project\(metastable VERSION ([\d.]+)", (root / "CMakeLists.txt").read_text()).group(1)
+extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc"]
+html_theme = "furo"
+html_title = f"metastable {version}"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_copyright = False
+exclude_patterns = ["xml", "static"]
+myst_heading_anchors = 3
+breathe_projects = {"metastable": os.environ["METASTABLE_XML"]}
+breathe_default_project = "metastable"
+breathe_order_parameters_first = True
+# Names of the standard library and of concepts have no page here.
+nitpicky = False
+suppress_warnings = ["cpp.parse_function_declaration", "misc.highlighting_failure"]
+
+
+def public_headers(folder):
+    """What the folder's CMakeLists.txt lists as its public headers, room by room."""
+    listed = re.search(r"FILE_SET HEADERS[^\n]*FILES(.*?)\)", (root / folder / "CMakeLists.txt").read_text(), re.DOTALL)
+    rooms = {}
+    for header in listed.group(1).split():
+        rooms.setdefault(header.rpartition("/")[0], []).append(header)
+    return rooms
+
+
+def summary(path):
+    """The comment at the head of a header."""
+    lines = []
+    for line in path.read_text().splitlines()[1:]:
+        if not line.startswith("//"):
+            break
+        lines.append(line[2:].strip())
+    return " ".join(lines).partition("  ")[0]
+
+
+def write_reference(folder):
+    text = f"# {folder}/\n\n`#include <metastable/{folder}/ROOM/HEADER.h>`\n"
+    for room, headers in public_headers(folder).items():
+        text += f"\n## {room or folder}\n"
+        for header in headers:
+            text += f"\n### {pathlib.Path(header).name}\n\n{summary(root / folder / header)}\n\n"
+            text += f"```{{doxygenfile}} {folder}/{header}\n```\n"
+    (pages / "reference").mkdir(exist_ok=True)
+    (pages / "reference" / f"{folder}.md").write_text(text)
+
+
+for folder in ("markov", "dynamics", "analysis"):
+    write_reference(folder)
