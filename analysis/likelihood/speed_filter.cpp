@@ -33,11 +33,14 @@ double square(double v) { return v * v; }
 
 double score_of_probability(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
 
-SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack)
+SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack,
+                         double law_error, double slide_error)
     : extension_(extension),
       tilt_(tilt),
       noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
       slack2_(slack * slack),
+      law2_(law_error * law_error),
+      slide_error_(slide_error),
       blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
 
 SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {
@@ -113,9 +116,9 @@ SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const Ste
   const double seen = std::max(1e-3, reported - extension_.bias_before);
   const Before before = before_.value_or(Before{mean_, variance_});
   const double rate = carried_on * before.mean / seen;
-  const double blur = std::sqrt(noise2_ + rate * rate * before.variance);
-  const dynamics::NextTouch next =
-      wheel.at_next_touch(context, before.mean, {before_ ? std::optional(mean_) : std::nullopt, slide}, blur, seen);
+  const double blur = std::sqrt(noise2_ + law2_ + rate * rate * before.variance);
+  const dynamics::NextTouch next = wheel.at_next_touch(
+      context, before.mean, {before_ ? std::optional(mean_) : std::nullopt, slide, slide_error_}, blur, seen);
   Out out;
   if (before_) {
     const double density = next.speed.density, z = score_of_probability(next.speed.below);
@@ -124,9 +127,8 @@ SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const Ste
   } else {
     out = weighed(next.speed.density * std::exp(tilt_.log_density(next.speed.below)), tilt_.below(next.speed.below), 1);
   }
-  const double known = noise2_ / std::max(noise2_, out.unit * out.unit);
-  mean_ = std::max(1e-2, seen - known * std::clamp(out.score, -4.0, 4.0) * out.unit);
-  variance_ = noise2_ * (1 - known);
+  mean_ = seen;
+  variance_ = noise2_;
   before_.reset();
   out.log_density = std::max(least_log_density, out.log_density + std::log(std::max(1e-300, next.slide_density)));
   return out;

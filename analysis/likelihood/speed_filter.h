@@ -28,7 +28,11 @@ class SpeedFilter {
   /// Both references must outlive the filter.
   /// @param noise  stated sd of reported speeds [rad/s]
   /// @param slack  sd of the least speed that a next collision can have, where the legs are not known [rad/s]
-  SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0);
+  /// @param law_error  sd of what the law does not know of a next omega-, which the reported one of a stance or step
+  ///        was given, too [rad/s]; `settled` only
+  /// @param slide_error  sd of what the law does not know of a slide [m]; `settled` only
+  SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0,
+              double law_error = 0, double slide_error = 1e-3);
 
   /// The first speed is seen: it is held against the stated launch.
   Out launch(const Condition& condition, double reported);
@@ -60,7 +64,7 @@ class SpeedFilter {
   const dynamics::Extension& extension_;
   const ScoreTilt& tilt_;
   double noise2_;  // variance of a reported speed
-  double slack2_;
+  double slack2_, law2_, slide_error_;
   bool blurred_;
   double mean_ = 0, variance_ = 0;
   std::optional<double> previous_;  // collision's score

@@ -14,7 +14,7 @@
 namespace metastable::analysis {
 
 /// Where each nuisance stands in the list. Spreads and ratios are refitted by their logarithms; log_noise_sd is there
-/// only where the noise is refitted, the last three only under `settled`, where it always is.
+/// only where the noise is refitted, the last four only under `settled`, where it never is.
 struct WheelSlot {
   enum : std::size_t {
     restitution_mean,
@@ -24,15 +24,15 @@ struct WheelSlot {
     skew,
     tails,
     log_noise_sd,
-    log_hub_inertia_ratio,
+    log_hub_inertia_ratio = log_noise_sd,
+    log_sticking_ratio,
     log_plus_ratio,
     log_next_ratio
   };
 };
 
 /// @param noise  sd of reported speeds to start from, where it is refitted [rad/s]
-/// @param noise_stated  whether that is the sensor's own
-std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise, bool noise_stated);
+std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise);
 
 /// What these values of the nuisances suppose of the wheel, without effects.
 WheelHypothesis hypothesis_at(std::span<const double> nuisance);

@@ -168,7 +168,7 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
   }
 }
 
-// Slides from the feet's places; speeds blurred to what the law is good for.
+// Slides from the feet's places; next speeds are blurred to what the law is good for.
 void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
   const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
   std::size_t all = 0, left_out = 0;
@@ -187,18 +187,18 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
         "{} of {} collisions are left out: at their speed the foot does not stand before the next one touches, and "
         "`settled` holds for landings on feet that stand",
         left_out, all));
-  if (measured.noise >= settled_precision) return;
-  const double added = std::sqrt(settled_precision * settled_precision - measured.noise * measured.noise);
-  measured.notes.push_back(fmt::format("speeds are blurred by {:.2g} rad/s, as good as `settled` is", added));
-  measured.noise = settled_precision;
+  // Where stances scatter more than that, the law may know less of this machine.
+  const double root = std::sqrt(std::max(1.0, static_cast<double>(all - left_out))), known = settled_precision * root;
+  measured.law_error = std::clamp(3 * measured.noise_seen, known, std::max(known, 0.03));
+  measured.slide_error = settled_slide_precision * root;
+  measured.notes.push_back(
+      fmt::format("`settled` is held to tell a next speed to {:.2g} rad/s: {:.2g} rad/s, as n "
+                  "touches of it have an error of form in common, times the root of n",
+                  measured.law_error, settled_precision));
   std::uint64_t trial = 0;
   for (WheelRun& run : measured.runs) {
-    const std::vector<double> error = normal_multipliers(1, trial++, DrawStream::blur, 2 * run.collisions.size());
-    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
-      RunCollision& m = run.collisions[k];
-      m.before = std::max(1e-3, m.before + added * error[2 * k]);
-      if (m.after && *m.after > 0) m.after = std::max(1e-6, *m.after + added * error[2 * k + 1]);
-    }
+    const std::vector<double> error = normal_multipliers(1, trial++, DrawStream::blur, run.collisions.size());
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) run.collisions[k].law_error = measured.law_error * error[k];
   }
 }
 

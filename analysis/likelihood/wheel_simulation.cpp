@@ -90,6 +90,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
                                                 : wheel.after_collision(m.context, omega, barrier).below));
     const auto error = uniforms(seed ^ 0x6e6f697365ULL, index, k);
     m.before = std::max(1e-3, omega + e.bias_before + noise * score(error[0]));
+    m.law_error = all.law_error * score(error[2]);
     const bool rests = wheel.settles() ? !landed.next : !plus || *plus < barrier;
     if (like.after && plus) m.after = std::max(1e-3, *plus + e.bias_after + noise * score(error[1]));
     if (like.after && !plus) m.after = 0;

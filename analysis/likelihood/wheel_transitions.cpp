@@ -89,12 +89,11 @@ WheelTransitions::WheelTransitions(const Experiment& experiment)
 
 void WheelTransitions::set_up_parameters() {
   // Where nobody stated the noise, the stances say it only together with the effects that act in them.
-  // Under `settled` it holds what the law does not know.
+  // Under `settled` they say what the law does not know.
   const bool settled = measured_.law == dynamics::Law::settled;
-  const bool refits_noise = settled || (!measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances);
+  const bool refits_noise = !settled && !measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances;
   nuisances_ =
-      wheel_nuisances(experiment_.contact, refits_noise ? std::optional<double>(measured_.noise) : std::nullopt,
-                      measured_.noise_stated);
+      wheel_nuisances(experiment_.contact, refits_noise ? std::optional<double>(measured_.noise) : std::nullopt);
   WheelDesign design;
   design.legs = measured_.wheel.legs();
   design.legs_known = measured_.legs_known;

@@ -8,8 +8,8 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr int speeds = 15, restitutions = 16, places = 20;
-constexpr double sds = 5, least_width = 0.3;  // of the restitutions around their mean; [1]
+constexpr int speeds = 15, restitutions = 13, places = 20;
+constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
 constexpr double just_above = 1e-7;           // mu_r, of the first place
 constexpr double clear_of_sticking = 0.02;    // as in settled_map: here the foot sticks under its weight, too
 

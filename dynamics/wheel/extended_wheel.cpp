@@ -200,7 +200,7 @@ CollisionChange ExtendedWheel::change(const StepContext& context, double omega) 
   CollisionChange change;
   change.friction_shift = context.friction_shift;
   if (omega >= e.hops_from) change.rebound_lost = e.rebound_lost;
-  change.friction_ratio = 1 + e.drift * context.run_share;
+  change.friction_ratio = (1 + e.drift * context.run_share) / e.sticking_ratio;
   if (e.stribeck != 0) change.friction_ratio *= 1 + e.stribeck * std::exp(-omega / e.stribeck_speed);
   if (e.patch_friction != 1 && context.position >= e.patch_from && context.position <= e.patch_to)
     change.friction_ratio *= e.patch_friction;
@@ -282,11 +282,17 @@ SettledLanding ExtendedWheel::landing(const StepContext& context, double omega) 
   at.gyration_sq = leg.inertia / model_.mass - at.ahead * at.ahead - at.height * at.height;
   at.barrier_squared = stated.barrier_squared + climb * climb - leg.stated_barrier * leg.stated_barrier;
   at.loss_ratio = change(context, omega).loss_ratio;
-  at.next = [this, &stated, &leg, way = path(context)](double squared) {
-    const double next = stated.next_rate * squared + stated.next_gain + way.gain - leg.stated_gain -
-                        (drag_ ? leg.drag_ratio * work(way, squared) : 0);
-    return extension_.next_ratio * std::sqrt(std::max(1e-6, next));
-  };
+  const Path way = path(context);
+  at.next_rate = stated.next_rate;
+  at.next_gain = stated.next_gain + way.gain - leg.stated_gain;
+  at.next_ratio = extension_.next_ratio;
+  if (drag_) {  // the parabola through three places between the barrier and a foot that sticks
+    const double low = at.barrier_squared, half = std::max(1.0, stated.plastic * omega * omega - low) / 2;
+    const double first = leg.drag_ratio * work(way, low), middle = leg.drag_ratio * work(way, low + half),
+                 last = leg.drag_ratio * work(way, low + 2 * half);
+    const double bend = (last - 2 * middle + first) / (2 * half * half), rise = (middle - first) / half - bend * half;
+    at.dragged = {first - low * (rise - low * bend), rise - 2 * low * bend, bend};
+  }
   return at;
 }
 

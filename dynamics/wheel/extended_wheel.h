@@ -47,8 +47,9 @@ struct Extension {
   double launch_widening = 0;                    ///< added to its sd [rad/s]
   std::optional<Law> law;                        ///< another contact law
   double hub_inertia_ratio = 1;                  ///< of J about the hub; `settled`
-  double plus_ratio = 1;  ///< of every omega+, which is seen a little after the impact; `settled`
-  double next_ratio = 1;  ///< of every next omega-: how good the law is; `settled`
+  double sticking_ratio = 1;  ///< of every mu_c, a little off in engines that move by time steps; `settled`
+  double plus_ratio = 1;      ///< of every omega+, which is seen a little after the impact; `settled`
+  double next_ratio = 1;      ///< of every next omega-: how good the law is; `settled`
 };
 
 /// Holds what one collision's place in the experiment tells.

@@ -12,7 +12,6 @@ namespace {
 constexpr std::size_t nodes_of_restitution = 12;
 constexpr double far_score = 4.2;
 constexpr double unknown_share = 0.005, unknown_error = 0.2;  // of landings; [rad/s]
-constexpr double slide_error = 1e-3;                          // of the grid's slides [m]
 constexpr double thin = 0.05;                                 // a cell that counts as a point, in blurs
 
 // Weighs restitutions and frictions of one landing.
@@ -97,8 +96,12 @@ class FirstImpact {
 // Adds up what cells of landings say of the next touch.
 class TouchSum {
  public:
-  TouchSum(const SettledLanding& landing, std::optional<double> displacement, double blur, double next)
-      : landing_(landing), displacement_(displacement), blur_(blur), at_(next) {}
+  TouchSum(const SettledLanding& landing, const SeenOfLanding& seen, double blur, double next)
+      : landing_(landing),
+        displacement_(seen.displacement),
+        slide_error_(seen.displacement_error),
+        blur_(blur),
+        at_(next) {}
 
   // Landings that carry omega^2 spread evenly over [first, second], whose feet slide so far.
   void add(double mass, double first, double second, double slide) {
@@ -111,8 +114,8 @@ class TouchSum {
     mass *= 1 - rests;
     if (!(mass > 0)) return;
     if (displacement_) {
-      const double z = (*displacement_ - slide) / slide_error;
-      mass *= slide_density(z) / slide_error;
+      const double z = (*displacement_ - slide) / slide_error_;
+      mass *= slide_density(z) / slide_error_;
     }
     touch_ += mass;
     const double low = landing_.next(std::max(first, barrier)), high = landing_.next(second);
@@ -151,7 +154,7 @@ class TouchSum {
  private:
   const SettledLanding& landing_;
   std::optional<double> displacement_;
-  double blur_, at_;
+  double slide_error_, blur_, at_;
   double all_ = 0, rest_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0;
 };
 
@@ -237,6 +240,11 @@ void add_landings(TouchSum& sum, const SettledLanding& landing, const SettledCon
 
 }  // namespace
 
+double SettledLanding::next(double squared) const {
+  const double taken = dragged[0] + squared * (dragged[1] + squared * dragged[2]);
+  return next_ratio * std::sqrt(std::max(1e-6, next_rate * squared + next_gain - taken));
+}
+
 double SettledLanding::first_impact(const Contact& contact) const {
   const double mu = std::min(contact.friction, sticking());
   const double lost =
@@ -277,13 +285,13 @@ SpeedDensity after_first_impact(const SettledLanding& landing, const SettledCont
 
 NextTouch at_next_touch(const SettledLanding& landing, const SettledContact& contact, const SeenOfLanding& seen,
                         double blur, double next) {
-  TouchSum sum(landing, seen.displacement, blur, next);
+  TouchSum sum(landing, seen, blur, next);
   add_landings(sum, landing, contact, seen.omega_plus);
   return sum.result();
 }
 
 double rest_share(const SettledLanding& landing, const SettledContact& contact, std::optional<double> omega_plus) {
-  TouchSum sum(landing, std::nullopt, 1, 0);
+  TouchSum sum(landing, {}, 1, 0);
   add_landings(sum, landing, contact, omega_plus);
   return sum.rest();
 }

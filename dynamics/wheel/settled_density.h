@@ -3,7 +3,6 @@
 // speed at the next touch.
 
 #include <array>
-#include <functional>
 #include <optional>
 
 #include "dynamics/wheel/collision_density.h"
@@ -20,8 +19,14 @@ struct SettledLanding {
   double gyration_sq = 0;        ///< J / M about the centre of mass [m^2]
   double barrier_squared = 0;    ///< [rad^2/s^2]
   double loss_ratio = 1;         ///< multiplies what is lost of omega^2
-  /// omega- at the next touch from omega_eq^2; rising.
-  std::function<double(double)> next = {};
+  /// omega-^2 of the next touch is next_rate omega_eq^2 + next_gain less what resisting torques take: a parabola, whose
+  /// coefficients these are, of omega_eq^2 [rad^2/s^2].
+  double next_rate = 1, next_gain = 0;
+  std::array<double, 3> dragged{};
+  double next_ratio = 1;  ///< multiplies the next omega-
+
+  /// omega- at the next touch from omega_eq^2 [rad/s]; rising.
+  double next(double omega_eq_squared) const;
 
   double sticking() const { return ahead * height / (gyration_sq + height * height); }  ///< mu_c
   /// omega+ / omega- of the first impact, which starts without slip.
@@ -41,6 +46,7 @@ struct SettledContact {
 struct SeenOfLanding {
   std::optional<double> omega_plus = {};    ///< after the first impact [rad/s]
   std::optional<double> displacement = {};  ///< slide of the foot [m]
+  double displacement_error = 1e-3;         ///< of what the landing says of it [m], > 0
 };
 
 /// Density and distribution function of omega+ of the first impact. Twelve restitutions, mu in closed form.
