@@ -38,4 +38,18 @@ void parallel_for(std::size_t count, int threads, const std::function<void(std::
   if (error) std::rethrow_exception(error);
 }
 
+void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& work, const Share& progress) {
+  if (!progress) return parallel_for(count, threads, work);
+  constexpr std::size_t parts = 1000;
+  std::atomic<std::size_t> done{0};
+  std::mutex telling;
+  parallel_for(count, threads, [&](std::size_t i) {
+    work(i);
+    const std::size_t now = ++done;
+    if (now * parts / count == (now - 1) * parts / count) return;
+    const std::scoped_lock lock(telling);
+    progress(static_cast<double>(now) / static_cast<double>(count));
+  });
+}
+
 }  // namespace metastable::markov

@@ -135,12 +135,13 @@ std::string angle_csv(const std::vector<SimulatedCondition>& conditions, const C
     const dynamics::WheelMap map = condition.setting.map();
     const std::string id = csv_field(condition.id);
     std::vector<std::string> rows(condition.trials.size());
-    markov::parallel_for(rows.size(), options.threads, [&](std::size_t t) {
+    const auto record = [&](std::size_t t) {
       const AngleRecording recording = record_angle(map, condition.trials[t], options, before + t);
       for (std::size_t k = 0; k < recording.time.size(); ++k)
         fmt::format_to(std::back_inserter(rows[t]), "{},{},{:.6f},{:.{}f}\n", id, before + t + 1, recording.time[k],
                        recording.angle_rad[k], options.decimals);
-    });
+    };
+    markov::parallel_for(rows.size(), options.threads, record, options.progress);
     for (const std::string& part : rows) text += part;
     before += rows.size();
   }

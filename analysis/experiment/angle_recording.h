@@ -24,6 +24,7 @@ struct CameraOptions {
   int decimals = 9;              ///< of the angle in angle.csv, 1..15
   std::uint64_t seed = 1;
   int threads = 0;  ///< the same bits on any number
+  markov::Share progress = {};
   /// @throws std::invalid_argument naming the option and its range
   void validate() const;
 };

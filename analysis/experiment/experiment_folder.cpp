@@ -59,10 +59,13 @@ std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const Simul
   std::vector<dynamics::Trial> trials(static_cast<std::size_t>(options.trials));
   const std::optional<dynamics::SettledMotion> motion =
       setting.law == dynamics::Law::settled ? std::optional(setting.motion()) : std::nullopt;
-  markov::parallel_for(trials.size(), options.threads, [&](std::size_t t) {
-    trials[t] = motion ? dynamics::simulate_trial(*motion, map.noise(), launch, trial, options.first + t)
-                       : dynamics::simulate_trial(map, launch, trial, options.first + t);
-  });
+  markov::parallel_for(
+      trials.size(), options.threads,
+      [&](std::size_t t) {
+        trials[t] = motion ? dynamics::simulate_trial(*motion, map.noise(), launch, trial, options.first + t)
+                           : dynamics::simulate_trial(map, launch, trial, options.first + t);
+      },
+      options.progress);
   return trials;
 }
 

@@ -9,6 +9,7 @@
 #include "analysis/experiment/experiment.h"
 #include "analysis/study/setting.h"
 #include "dynamics/return_map/trials.h"
+#include "markov/parallel.h"
 
 namespace metastable::analysis {
 
@@ -19,6 +20,7 @@ struct SimulationOptions {
   int threads = 0;          ///< the same bits on any number
   std::uint64_t first = 0;  ///< index of the first trial: conditions of one experiment take different ones
   bool rest_rule = true;    ///< false: never rest, x' < 0 is set to 0 (dynamics::TrialOptions)
+  markov::Share progress = {};
 };
 
 /// Simulates trials first .. first+trials-1 under `setting`. @throws std::invalid_argument naming option and range, and

@@ -111,10 +111,12 @@ dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& 
   return setup;
 }
 
-std::vector<dynamics::LaboratoryTrial> run_laboratory(const dynamics::LaboratorySetup& setup, int threads) {
+std::vector<dynamics::LaboratoryTrial> run_laboratory(const dynamics::LaboratorySetup& setup, int threads,
+                                                      const markov::Share& progress) {
   const dynamics::Laboratory laboratory(setup);
   std::vector<dynamics::LaboratoryTrial> trials(setup.order.size());
-  markov::parallel_for(trials.size(), threads, [&](std::size_t t) { trials[t] = laboratory.run(t); });
+  markov::parallel_for(
+      trials.size(), threads, [&](std::size_t t) { trials[t] = laboratory.run(t); }, progress);
   return trials;
 }
 
@@ -213,9 +215,12 @@ RealityFiles reality_files(const std::vector<RealityCondition>& conditions, cons
   if (options.camera) {
     options.camera->validate();
     std::vector<std::string> recordings(trials.size());
-    markov::parallel_for(trials.size(), options.camera->threads, [&](std::size_t t) {
-      recordings[t] = angles(conditions[trials[t].condition].id, trials[t], t, *options.camera);
-    });
+    markov::parallel_for(
+        trials.size(), options.camera->threads,
+        [&](std::size_t t) {
+          recordings[t] = angles(conditions[trials[t].condition].id, trials[t], t, *options.camera);
+        },
+        options.camera->progress);
     result.angle_csv = "condition,trial,time_s,angle_rad\n";
     for (const std::string& part : recordings) *result.angle_csv += part;
   }

@@ -45,7 +45,8 @@ struct RealityOptions {
 dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& conditions,
                                            const RealityOptions& options);
 /// Returns all trials in the order they were run. They have the same bits on any number of threads.
-std::vector<dynamics::LaboratoryTrial> run_laboratory(const dynamics::LaboratorySetup& setup, int threads);
+std::vector<dynamics::LaboratoryTrial> run_laboratory(const dynamics::LaboratorySetup& setup, int threads,
+                                                      const markov::Share& progress = {});
 
 /// Says what a folder tells of an experiment.
 struct FolderOptions {

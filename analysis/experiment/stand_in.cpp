@@ -19,15 +19,19 @@ std::vector<RealityCondition> stand_in_conditions(const Setting& base) {
   return conditions;
 }
 
-std::vector<SimulatedCondition> stand_in(const Setting& base, std::uint64_t seed, int threads) {
+std::vector<SimulatedCondition> stand_in(const Setting& base, std::uint64_t seed, int threads,
+                                         const markov::Share& progress) {
   constexpr int collisions = 16;
   std::vector<SimulatedCondition> conditions;
   std::uint64_t first = 0;
   for (const auto& [id, setting, trials] : stand_in_conditions(base)) {
-    conditions.push_back(
-        {id, setting,
-         simulate_trials(
-             setting, {.trials = trials, .collisions = collisions, .seed = seed, .threads = threads, .first = first})});
+    conditions.push_back({id, setting,
+                          simulate_trials(setting, {.trials = trials,
+                                                    .collisions = collisions,
+                                                    .seed = seed,
+                                                    .threads = threads,
+                                                    .first = first,
+                                                    .progress = progress})});
     first += static_cast<std::uint64_t>(trials);
   }
   return conditions;

@@ -20,6 +20,8 @@ std::vector<RealityCondition> stand_in_conditions(const Setting& base);
 /// Simulates the paper's conditions (Sec. III): "fast-9.59" 51 trials launched at N(5.83, 0.28^2) rad/s, "slow-9.59" 48
 /// at N(4.51, 0.36^2), "fast-7.02" 50 at N(7.35, 0.19^2); first 16 collisions each.
 /// @param base  everything but slope and launch
-std::vector<SimulatedCondition> stand_in(const Setting& base, std::uint64_t seed, int threads = 0);
+/// @param progress  told of each condition by itself
+std::vector<SimulatedCondition> stand_in(const Setting& base, std::uint64_t seed, int threads = 0,
+                                         const markov::Share& progress = {});
 
 }  // namespace metastable::analysis

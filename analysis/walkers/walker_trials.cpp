@@ -19,7 +19,7 @@ std::vector<Walk> simulate_walks(const WalkerSetting& setting, const WalkOptions
   const std::vector<double> start =
       gait_state(setting, dynamics::find_gait(setting.map().walker(), setting.slope_deg * degree));
   std::vector<Walk> walks(options.trials);
-  markov::parallel_for(options.trials, options.threads, [&](std::size_t trial) {
+  const auto follow = [&](std::size_t trial) {
     Walk& walk = walks[trial];
     std::vector<double> state = start, next(start.size());
     for (std::uint64_t step = 0; step < options.longest && !walk.fell; ++step) {
@@ -30,7 +30,8 @@ std::vector<Walk> simulate_walks(const WalkerSetting& setting, const WalkOptions
       walk.fell = fell != 0;
       state.swap(next);
     }
-  });
+  };
+  markov::parallel_for(options.trials, options.threads, follow, options.progress);
   return walks;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/walkers/walker_study.h"
+#include "markov/parallel.h"
 
 namespace metastable::analysis {
 
@@ -23,6 +24,7 @@ struct WalkOptions {
   std::uint64_t longest = 1000;  ///< steps of a walk
   std::uint64_t seed = 1;
   int threads = 0;  ///< 0: all cores; the bits do not depend on it
+  markov::Share progress = {};
 };
 
 /// Every walk starts in the gait; slopes by counter (Philox) at trial and step.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -30,80 +31,135 @@ class Guided {
     guide_ = failure_in_step(mesh, window_);
   }
 
-  double sample(std::uint64_t number) const {
-    std::vector<double> state = settled(number);
-    const std::size_t d = state.size(), m = lattice_.size(), s = static_cast<std::size_t>(map_.scores);
-    std::vector<double> states(m * d), scores(m * s), weights(m), next(m * d), worth(m);
-    std::vector<std::uint8_t> failed(m);
-    double weight = 1;
-    for (int left = window_;; --left) {
-      const int phase = (burn_in(number) + window_ - left) % map_.phases;
-      for (std::size_t i = 0; i < m; ++i)
-        std::copy(state.begin(), state.end(), states.begin() + static_cast<std::ptrdiff_t>(i * d));
-      std::vector<double> offset;
-      for (std::size_t k = 0; k < s; k += 4) {
-        const auto u = uniforms(options_.seed, kOffsets + k / 4, number, static_cast<std::uint64_t>(left));
-        offset.insert(offset.end(), u.begin(),
-                      u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, s - k)));
+  /// How many samples go side by side: few steps of many states take a simulator less time than many of one.
+  std::size_t together() const { return std::clamp<std::size_t>(4096 / lattice_.size(), 1, 64); }
+
+  /// Writes the weights of the samples `first`, `first` + phases, ..., which meet the same phase in each step.
+  void sample(std::uint64_t first, std::span<double> weight) const {
+    const std::size_t d = start_.size(), m = lattice_.size(), s = static_cast<std::size_t>(map_.scores);
+    std::vector<double> state = settled(first, weight.size()), states, scores, weights, next;
+    std::vector<std::uint8_t> failed;
+    std::vector<std::size_t> led(weight.size());  // those that the mesh can lead to failure
+    std::iota(led.begin(), led.end(), std::size_t{0});
+    std::fill(weight.begin(), weight.end(), 1.0);
+    for (int left = window_; !led.empty(); --left) {
+      const std::size_t rows = led.size() * m;
+      states.resize(rows * d), scores.resize(rows * s), weights.resize(rows), next.resize(rows * d);
+      failed.assign(rows, 0);
+      for (std::size_t k = 0; k < led.size(); ++k) {
+        for (std::size_t i = k * m; i < (k + 1) * m; ++i) std::copy_n(&state[led[k] * d], d, &states[i * d]);
+        lattice_.place(offset(number(first, led[k]), left), std::span(scores).subspan(k * m * s, m * s),
+                       std::span(weights).subspan(k * m, m));
       }
-      lattice_.place(offset, scores, weights);
-      std::fill(failed.begin(), failed.end(), 0);
-      checked_step(map_, phase, states, scores, next, failed);
-      if (left == 0) {
-        double fails = 0;
-        for (std::size_t i = 0; i < m; ++i) fails += failed[i] ? weights[i] : 0;
-        return weight * fails;
+      checked_step(map_, (burn_in(first) + window_ - left) % map_.phases, states, scores, next, failed);
+      std::size_t kept = 0;
+      for (std::size_t k = 0; k < led.size(); ++k) {
+        const Fan fan{std::span(weights).subspan(k * m, m), std::span(next).subspan(k * m * d, m * d),
+                      std::span(failed).subspan(k * m, m)};
+        double& w = weight[led[k]];
+        w *= left == 0 ? failing(fan) : take(fan, number(first, led[k]), left, std::span(state).subspan(led[k] * d, d));
+        if (w > 0) led[kept++] = led[k];
       }
-      const auto& guide = guide_[static_cast<std::size_t>(left - 1)];
-      double all = 0, mean = 0;
-      for (std::size_t i = 0; i < m; ++i) {
-        worth[i] = 0;
-        if (failed[i]) continue;
-        const auto corners = mesh_.corners((phase + 1) % map_.phases, std::span(next).subspan(i * d, d));
-        for (int c = 0; c < corners.count; ++c)
-          worth[i] += corners.weight[static_cast<std::size_t>(c)] * guide[corners.node[static_cast<std::size_t>(c)]];
-        mean += weights[i] * worth[i];
-        all += weights[i];
-      }
-      if (!(mean > 0)) return 0;  // nothing near leads to failure in time, so far as the mesh knows
-      double total = 0;
-      for (std::size_t i = 0; i < m; ++i) {
-        worth[i] = failed[i] ? 0 : worth[i] + kDefensive * mean / all;
-        total += weights[i] * worth[i];
-      }
-      double at = total * uniforms(options_.seed, kChoices, number, static_cast<std::uint64_t>(left))[0];
-      std::size_t chosen = m;
-      for (std::size_t i = 0; i < m && at >= 0; ++i) {
-        if (worth[i] == 0) continue;
-        chosen = i;
-        at -= weights[i] * worth[i];
-      }
-      weight *= total / worth[chosen];
-      std::copy_n(next.begin() + static_cast<std::ptrdiff_t>(chosen * d), d, state.begin());
+      if (left == 0) return;
+      led.resize(kept);
     }
   }
 
  private:
+  /// Where a lattice of scores leads from one state.
+  struct Fan {
+    std::span<const double> weight, next;
+    std::span<const std::uint8_t> failed;
+  };
+
+  std::uint64_t number(std::uint64_t first, std::size_t k) const {
+    return first + k * static_cast<std::uint64_t>(map_.phases);
+  }
+
   int burn_in(std::uint64_t number) const {
     return options_.burn_in + static_cast<int>(number % static_cast<std::uint64_t>(map_.phases));
   }
 
-  std::vector<double> settled(std::uint64_t number) const {
+  std::vector<double> offset(std::uint64_t number, int left) const {
+    std::vector<double> offset;
     const auto s = static_cast<std::size_t>(map_.scores);
-    std::vector<double> state = start_, next(start_.size()), scores(s);
-    std::uint64_t attempt = 0;
-    for (int step = 0; step < burn_in(number); ++step) {
-      for (std::size_t k = 0; k < s; ++k)
-        scores[k] = normal_score(
-            uniforms(options_.seed, kBurnIn + k, number, attempt * 0x10000 + static_cast<std::uint64_t>(step))[0]);
-      std::uint8_t failed = 0;
-      checked_step(map_, step % map_.phases, state, scores, next, {&failed, 1});
-      if (failed) {
-        if (++attempt > 100000) throw MapError("guided sampling: no walker survives the burn-in");
-        state = start_;
-        step = -1;
-      } else {
-        state.swap(next);
+    for (std::size_t k = 0; k < s; k += 4) {
+      const auto u = uniforms(options_.seed, kOffsets + k / 4, number, static_cast<std::uint64_t>(left));
+      offset.insert(offset.end(), u.begin(), u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, s - k)));
+    }
+    return offset;
+  }
+
+  static double failing(const Fan& fan) {
+    double fails = 0;
+    for (std::size_t i = 0; i < fan.weight.size(); ++i) fails += fan.failed[i] ? fan.weight[i] : 0;
+    return fails;
+  }
+
+  /// Takes one of the landings for the next state. Returns its probability over that with which it was taken; 0 if
+  /// nothing near leads to failure in time, so far as the mesh knows.
+  double take(const Fan& fan, std::uint64_t number, int left, std::span<double> state) const {
+    const std::size_t d = state.size(), m = fan.weight.size();
+    const int phase = (burn_in(number) + window_ - left + 1) % map_.phases;
+    const auto& guide = guide_[static_cast<std::size_t>(left - 1)];
+    std::vector<double> worth(m, 0.0);
+    double all = 0, mean = 0;
+    for (std::size_t i = 0; i < m; ++i) {
+      if (fan.failed[i]) continue;
+      const auto corners = mesh_.corners(phase, fan.next.subspan(i * d, d));
+      for (int c = 0; c < corners.count; ++c)
+        worth[i] += corners.weight[static_cast<std::size_t>(c)] * guide[corners.node[static_cast<std::size_t>(c)]];
+      mean += fan.weight[i] * worth[i];
+      all += fan.weight[i];
+    }
+    if (!(mean > 0)) return 0;
+    double total = 0;
+    for (std::size_t i = 0; i < m; ++i) {
+      worth[i] = fan.failed[i] ? 0 : worth[i] + kDefensive * mean / all;
+      total += fan.weight[i] * worth[i];
+    }
+    double at = total * uniforms(options_.seed, kChoices, number, static_cast<std::uint64_t>(left))[0];
+    std::size_t chosen = m;
+    for (std::size_t i = 0; i < m && at >= 0; ++i) {
+      if (worth[i] == 0) continue;
+      chosen = i;
+      at -= fan.weight[i] * worth[i];
+    }
+    std::copy_n(&fan.next[chosen * d], d, state.begin());
+    return total / worth[chosen];
+  }
+
+  /// The states of these samples after their burn-in; a sample that failed begins again.
+  std::vector<double> settled(std::uint64_t first, std::size_t count) const {
+    const std::size_t d = start_.size(), s = static_cast<std::size_t>(map_.scores);
+    std::vector<double> state, states, scores, next;
+    for (std::size_t k = 0; k < count; ++k) state.insert(state.end(), start_.begin(), start_.end());
+    std::vector<int> step(count, 0);
+    std::vector<std::uint64_t> attempt(count, 0);
+    std::vector<std::uint8_t> failed;
+    std::vector<std::size_t> walking;
+    const int last = burn_in(first);
+    for (int phase = 0; std::any_of(step.begin(), step.end(), [&](int n) { return n < last; });
+         phase = (phase + 1) % map_.phases) {
+      walking.clear(), states.clear(), scores.clear();
+      for (std::size_t k = 0; k < count; ++k) {
+        if (step[k] == last || step[k] % map_.phases != phase) continue;
+        walking.push_back(k);
+        states.insert(states.end(), &state[k * d], &state[k * d] + d);
+        for (std::size_t j = 0; j < s; ++j)
+          scores.push_back(normal_score(uniforms(options_.seed, kBurnIn + j, number(first, k),
+                                                 attempt[k] * 0x10000 + static_cast<std::uint64_t>(step[k]))[0]));
+      }
+      if (walking.empty()) continue;
+      next.resize(states.size());
+      failed.assign(walking.size(), 0);
+      checked_step(map_, phase, states, scores, next, failed);
+      for (std::size_t i = 0; i < walking.size(); ++i) {
+        const std::size_t k = walking[i];
+        const double* const to = failed[i] ? start_.data() : &next[i * d];
+        std::copy_n(to, d, &state[k * d]);
+        step[k] = failed[i] ? 0 : step[k] + 1;
+        if (failed[i] && ++attempt[k] > 100000) throw MapError("guided sampling: no walker survives the burn-in");
       }
     }
     return state;
@@ -128,11 +184,16 @@ GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<
         "guided sampling: {} samples (16 or more), a window of {} steps (1 or more), a burn-in of {} (0 to 65535)",
         options.samples, options.window, options.burn_in));
   const Guided guided(map, mesh, start, options);
+  // Those that meet the same phases stand side by side.
+  const auto phases = static_cast<std::size_t>(map.phases), share = guided.together();
+  const std::size_t shares = (options.samples + share * phases - 1) / (share * phases);
   std::vector<double> weight(options.samples);
-  constexpr std::size_t share = 16;
-  parallel_for((options.samples + share - 1) / share, options.threads, [&](std::size_t part) {
-    for (std::size_t i = part * share; i < std::min(options.samples, (part + 1) * share); ++i)
-      weight[i] = guided.sample(i);
+  parallel_for(shares * phases, options.threads, [&](std::size_t part) {
+    const std::size_t first = part / phases * share * phases + part % phases;
+    if (first >= options.samples) return;
+    std::vector<double> some(std::min(share, (options.samples - first + phases - 1) / phases));
+    guided.sample(first, some);
+    for (std::size_t k = 0; k < some.size(); ++k) weight[first + k * phases] = some[k];
   });
   GuidedRate rate;
   rate.samples = options.samples;

@@ -23,6 +23,7 @@ std::vector<Command> blind_commands() {
              o.add_flag("partial", "open: although some cases are not answered");
              o.add_threads();
              o.add("out", "DIR", "", "open: folder of tables and page (default: report in the run's folder)");
+             o.add_json();
            },
            [](const Options& o, const std::string& line) {
              BlindRequest request;
@@ -39,6 +40,7 @@ std::vector<Command> blind_commands() {
              request.threads = o.threads();
              request.out = o.text("out");
              request.command = line;
+             request.json = o.text("json");
              const std::string action = o.text("ACTION");
              if (action == "make")
                run_blind_make(request);

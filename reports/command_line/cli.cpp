@@ -29,6 +29,7 @@
 #include "reports/commands/steps_command.h"
 #include "reports/commands/sweep_command.h"
 #include "reports/commands/verify_command.h"
+#include "reports/output/answer.h"
 #include "reports/output/interrupt.h"
 #include "reports/output/standard_output.h"
 #include "reports/output/version.h"
@@ -47,7 +48,7 @@ Command steps() {
             o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
             o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
             add_standard_errors(o);
-            o.add("json", "FILE|-", "", "Write the results as JSON");
+            o.add_json();
             o.add_flag("explain", "What stands behind the words of the answer");
             o.add_flag("how-it-fails", "The last steps before failure: which leg, which noise, from where");
             add_walker(o, "DEG");
@@ -81,7 +82,7 @@ Command compare() {
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
             o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
             add_standard_errors(o);
-            o.add("json", "FILE|-", "", "Write the results as JSON");
+            o.add_json();
             add_walker(o, "DEG,DEG,...");
           },
           [](const Options& o, const std::string& line) {
@@ -114,6 +115,7 @@ Command sweep() {
         add_wheel(o), add_contact(o), add_course(o), add_study(o);
         o.add("out", "FILE", "sweep.csv",
               "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
+        o.add_json();
         add_walker(o, "RANGE");
       },
       [](const Options& o, const std::string& line) {
@@ -147,6 +149,7 @@ Command sweep() {
         request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
         request.study = study_options(o);
         request.out = o.text("out");
+        request.json = o.text("json");
         request.command = line;
         run_sweep(request);
       }};
@@ -162,12 +165,13 @@ Command report() {
             add_wheel(o), add_contact(o), add_course(o), add_study(o);
             o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
             o.add("out", "DIR", "report", "Folder for the files");
+            o.add_json();
             add_walker(o, "DEG,DEG,...");
           },
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) return run_walker_report(walker_request(o, line));
-            run_report(
-                {several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000), o.text("out"), line});
+            run_report({several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000), o.text("out"),
+                        line, o.text("json")});
           }};
 }
 
@@ -180,10 +184,11 @@ Command verify() {
             o.add_threads();
             o.add("out", "DIR", "", "Folder for the tables (CSV, Markdown, LaTeX)");
             o.add("export", "DIR", "", "Folder for the default wheel's chain (PRISM .tra, .lab, .srew; MatrixMarket)");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             run_verify({o.count("seeds", 0, 1000), o.whole("nodes", 128, 4096), o.threads(), o.text("out"),
-                        o.text("export"), line});
+                        o.text("export"), o.text("json"), line});
           }};
 }
 
@@ -203,20 +208,46 @@ std::vector<ManualCommand> manual_of(const std::vector<CLI::App*>& subcommands) 
   return manual;
 }
 
+// The options of one command, or of all, as a table.
+void write_options(const std::vector<ManualCommand>& manual, const Options& o, const std::string& line) {
+  Table table{
+      .id = "options", .title = "Options", .columns = {{"command"}, {"option"}, {"value"}, {"default"}, {"help"}}};
+  for (const ManualCommand& command : manual)
+    if (!o.given("COMMAND") || command.name == o.text("COMMAND"))
+      for (const ManualOption& option : command.options)
+        table.rows.push_back({command.name, option.name, option.value, option.fallback, option.help});
+  Answer answer(o.text("json"));
+  answer.table(table);
+  answer.finish({line, {}, 0, version()});
+}
+
 // @param manual  of all commands, known once they are declared
 std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
   return {{"man", "The manual page of the program or of a command, for `man -l -`",
-           [](Options& o) { o.add_optional_place("COMMAND", "One of the commands"); },
-           [&manual](const Options& o, const std::string&) {
-             fmt::print("{}", manual_page(manual, o.text("COMMAND"), version()));
+           [](Options& o) {
+             o.add_optional_place("COMMAND", "One of the commands");
+             o.add_json();
+           },
+           [&manual](const Options& o, const std::string& line) {
+             const std::string page = manual_page(manual, o.text("COMMAND"), version());
+             if (o.text("json") != "-") fmt::print("{}", page);
+             if (o.given("json")) write_options(manual, o, line);
            }},
           {"completion", "A script that completes commands and options: source <(metastable completion bash)",
-           [](Options& o) { o.add_place("SHELL", "bash, zsh or fish"); },
-           [&manual](const Options& o, const std::string&) {
-             fmt::print("{}", completion_script(manual, o.text("SHELL")));
+           [](Options& o) {
+             o.add_place("SHELL", "bash, zsh or fish");
+             o.add_json();
+           },
+           [&manual](const Options& o, const std::string& line) {
+             const std::string script = completion_script(manual, o.text("SHELL"));
+             if (o.text("json") != "-") fmt::print("{}", script);
+             Answer answer(o.text("json"));
+             answer.fact("shell", o.text("SHELL"));
+             answer.fact("script", script);
+             answer.finish({line, {}, 0, version()});
            }},
-          {"doctor", "What is installed, and what each missing piece would add", [](Options&) {},
-           [](const Options&, const std::string&) { run_doctor(); }}};
+          {"doctor", "What is installed, and what each missing piece would add", [](Options& o) { o.add_json(); },
+           [](const Options& o, const std::string&) { run_doctor(o.text("json")); }}};
 }
 
 std::vector<Command> commands(const std::vector<ManualCommand>& manual) {

@@ -84,6 +84,7 @@ void simulate_reality(const Options& o, const SimulateRequest& plain) {
   if (o.given("drop")) request.dropped = split(o.text("drop"), ',');
   request.camera = plain.camera;
   request.out = plain.out;
+  request.json = plain.json;
   request.command = plain.command;
   run_reality(request);
 }
@@ -109,6 +110,7 @@ Command simulate() {
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
@@ -129,6 +131,7 @@ Command simulate() {
             if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
               throw std::invalid_argument("--angle-noise: needs --angle-rate");
             request.stand_in = stand_in;
+            request.json = o.text("json");
             const bool reality = o.flag("reality");
             for (const char* name :
                  {"effect", "outside", "skewness", "sensor-noise", "smoothing", "drop", "no-flight", "shuffle"})
@@ -168,9 +171,11 @@ Command coast_down() {
             "Take a log of which more than a tenth of the revolutions is left out, or a loss that is not positive "
             "over its speeds: every verdict will repeat it");
         o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+        o.add_json();
       },
       [](const Options& o, const std::string& line) {
         CoastDownRequest request;
+        request.json = o.text("json");
         request.accept_defects = o.flag("accept-defects");
         request.logs = o.all("LOG");
         request.options.stop = o.number("stop");
@@ -204,9 +209,12 @@ Command collisions() {
         o.add("fit-span", "S", "0.08", "Stance motion is fitted to this much time on either side of a collision, > 0");
         o.add_threads();
         o.add("out", "FILE|-", "", "Default: DIR/collisions.csv, or DIR/collisions-from-angle.csv if that is there");
+        o.add_json();
       },
-      [](const Options& o, const std::string&) {
+      [](const Options& o, const std::string& line) {
         CollisionsRequest request;
+        request.json = o.text("json");
+        request.command = line;
         request.folder = o.text("DIR");
         if (o.given("window")) request.finder.window = o.count("window", 5, 10001);
         request.finder.collisions = o.count("collisions", 1, 100000);
@@ -235,11 +243,13 @@ Command describe() {
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "", "Folder for tables, figures and index.html (default: tables on the terminal)");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             DescribeRequest request;
             request.folder = o.text("DIR");
             request.out = o.text("out");
+            request.json = o.text("json");
             const std::string transition = o.text("transition");
             if (transition == "collision" || transition == "step")
               request.options.transition =
@@ -267,9 +277,11 @@ Command study() {
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "study", "Folder for tables, figures and index.html");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             StudyRequest request;
+            request.json = o.text("json");
             request.data = o.text("data");
             request.out = o.text("out");
             request.options.trials = o.count("trials", 20, 1000000);
@@ -292,7 +304,7 @@ Command diagnose() {
             "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");
         o.add_seed();
         o.add_threads();
-        o.add("json", "FILE|-", "", "Write the results as JSON");
+        o.add_json();
         o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
       },
       [](const Options& o, const std::string& line) {
@@ -316,9 +328,11 @@ Command lessons() {
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "lessons", "Folder for tables, figures and index.html");
+            o.add_json();
           },
           [](const Options& o, const std::string& line) {
             LessonsRequest request;
+            request.json = o.text("json");
             request.data = o.all("data");
             request.out = o.text("out");
             request.options.seed = o.seed();
@@ -330,7 +344,7 @@ Command lessons() {
 
 Command effects() {
   return {"effects", "The catalogue of effects a model may lack: parameters, units, ranges, meaning",
-          [](Options& o) { o.add("json", "FILE|-", "", "Write the catalogue as JSON"); },
+          [](Options& o) { o.add_json(); },
           [](const Options& o, const std::string&) { run_effects({o.text("json")}); }};
 }
 

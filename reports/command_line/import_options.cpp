@@ -58,7 +58,7 @@ void declare_import(Options& o) {
   o.add("sensor-noise", "SD", "", "Believed noise of the speeds [rad/s]", dynamics::range::speed);
   o.add("title", "TEXT", "", "Of the experiment (default: the file's name)");
   o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
-  o.add("json", "FILE|-", "", "Write as JSON what was read");
+  o.add_json();
 }
 
 char separator_value(const std::string& text) {

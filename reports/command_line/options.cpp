@@ -30,6 +30,10 @@ void Options::add(const std::string& name, const std::string& value, const std::
   ranges_[name] = range;
 }
 
+void Options::add_json() {
+  add("json", "FILE|-", "", "Write what comes out as JSON; on standard output (-) nothing else is printed");
+}
+
 void Options::drop_default(const std::string& name) {
   command_.get_option("--" + name)->default_str("");
   fallback_.erase(name);

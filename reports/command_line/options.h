@@ -30,6 +30,8 @@ class Options {
   /// The options of what draws random numbers (default 1) and of what runs in parallel (default 0: all cores).
   void add_seed();
   void add_threads();
+  /// The option of what can be written as JSON, which is every command.
+  void add_json();
   /// Takes the default off an option that was added: what it says must be given, or is not said.
   void drop_default(const std::string& name);
   /// What the command is about, given by its place on the command line; required.

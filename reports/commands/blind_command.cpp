@@ -32,8 +32,6 @@
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
 #include "reports/output/seal.h"
-#include "reports/output/standard_output.h"
-#include "reports/output/text_table.h"
 #include "reports/output/version.h"
 
 extern char** environ;
@@ -360,24 +358,40 @@ CaseProgress shown_progress(const std::string& label, std::optional<Progress>& l
 }  // namespace
 
 void run_blind_make(const BlindRequest& request) {
+  Answer answer(request.json);
   std::optional<Progress> line;
   const BlindMade made = make_blind(request, shown_progress("making cases", line));
   line.reset();
-  say("{}: {} cases; truths sealed in {}\n", request.folder, made.cases, made.sealed);
+  answer.say("{}: {} cases; truths sealed in {}", request.folder, made.cases, made.sealed);
+  answer.fact("cases", made.cases);
+  answer.fact("sealed", made.sealed);
+  answer.finish({request.command, {}, request.seed.value_or(0), version()});
 }
 
 void run_blind_answer(const BlindRequest& request) {
+  Answer answer(request.json);
   std::optional<Progress> line;
   const BlindAnswered told = answer_blind(request, shown_progress("answering", line));
   line.reset();
-  say("{}: {} of {} cases answered{}\n", request.folder, told.answered, told.cases,
-      told.failed > 0 ? fmt::format("; {} failed, see {}/*.err", told.failed, told.answers) : "");
+  answer.say("{}: {} of {} cases answered{}", request.folder, told.answered, told.cases,
+             told.failed > 0 ? fmt::format("; {} failed, see {}/*.err", told.failed, told.answers) : "");
+  answer.fact("cases", told.cases);
+  answer.fact("answered", told.answered);
+  answer.fact("failed", told.failed);
+  answer.finish({request.command, {}, request.seed.value_or(0), version()});
 }
 
 void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
+  Answer answer(request.json);
   const BlindOpened opened = open_blind(request, unanswered);
-  say("{}", to_text(opened.tables.front(), 1000, terminal_width()));
-  say("\n{}\n", opened.page);
+  for (const Table& table : opened.tables)
+    if (&table == &opened.tables.front())
+      answer.show(table);
+    else
+      answer.table(table);
+  answer.say("{}", opened.page);
+  answer.file(opened.page);
+  answer.finish(opened.provenance);
 }
 
 }  // namespace metastable::reports

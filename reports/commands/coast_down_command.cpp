@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "reports/commands/experiment_output.h"
+#include "reports/output/answer.h"
 #include "reports/output/input_file.h"
-#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 #include "reports/output/version.h"
 
@@ -40,6 +40,7 @@ void accept(const std::string& objection, const CoastDownRequest& request, analy
 
 void run_coast_down(const CoastDownRequest& request) {
   ExperimentOutput folder(request.out);
+  Answer answer(request.json);
   std::vector<analysis::CoastDownRun> runs;
   for (const std::string& path : request.logs) {
     analysis::CounterLog log = analysis::parse_counter_log(path, read_file(path));
@@ -51,8 +52,9 @@ void run_coast_down(const CoastDownRequest& request) {
       if (other.name == log.name) throw std::invalid_argument(fmt::format("{}: a log named so was there before", path));
     analysis::CoastDownRun& run = runs.emplace_back(analysis::coast_down(log, request.options));
     keep(run, request.blocks);
-    say("{}: {} revolutions from {:.4g} to {:.4g} rad/s, {} blocks; ticks missed {}, double {}, displaced {}; "
-        "{} revolutions left out\n",
+    answer.say(
+        "{}: {} revolutions from {:.4g} to {:.4g} rad/s, {} blocks; ticks missed {}, double {}, displaced {}; "
+        "{} revolutions left out",
         run.name, run.revolutions, run.top, request.options.stop, run.blocks.size(), run.missed, run.doubled,
         run.displaced, run.left_out);
   }
@@ -65,11 +67,12 @@ void run_coast_down(const CoastDownRequest& request) {
     nominal = fit.loss;
     if (runs.size() > 1) nominal.run_to_run = analysis::run_to_run_of(runs, linear);
     origin = "nominal loss fitted robustly to these runs";
-    say("loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}{} + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; "
-        "{} of {} transitions beyond five of those\n",
-        nominal.constant, fit.constant_error,
-        linear ? fmt::format(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error) : "", nominal.quadratic,
-        fit.quadratic_error, nominal.noise_sd, fit.outliers, fit.transitions);
+    const std::string term = linear ? fmt::format(" + ({:.4g} +- {:.2g}) omega", nominal.linear, fit.linear_error) : "";
+    answer.say(
+        "loss of omega^2 a revolution [rad^2/s^2]: {:.4g} +- {:.2g}{} + ({:.4g} +- {:.2g}) omega^2, noise sd {:.3g}; "
+        "{} of {} transitions beyond five of those",
+        nominal.constant, fit.constant_error, term, nominal.quadratic, fit.quadratic_error, nominal.noise_sd,
+        fit.outliers, fit.transitions);
   } else {
     const analysis::Experiment other = analysis::parse_description(analysis::read_source(request.nominal));
     if (other.system != analysis::System::coast_down)
@@ -78,18 +81,25 @@ void run_coast_down(const CoastDownRequest& request) {
     origin = fmt::format("nominal loss of the experiment \"{}\"", other.title);
   }
   if (nominal.run_to_run)
-    say("from run to run: {:.2g} % of the loss, {}\n", 100 * *nominal.run_to_run,
-        request.nominal.empty()
-            ? fmt::format("from {} runs and one difference of {:.0f} %", runs.size(), 100 * analysis::usual_run_to_run)
-            : "as the nominal experiment says");
+    answer.say("from run to run: {:.2g} % of the loss, {}", 100 * *nominal.run_to_run,
+               request.nominal.empty() ? fmt::format("from {} runs and one difference of {:.0f} %", runs.size(),
+                                                     100 * analysis::usual_run_to_run)
+                                       : "as the nominal experiment says");
   else
-    say("from run to run: {:.0f} % of the loss assumed, because one run does not say (give several)\n",
-        100 * analysis::usual_run_to_run);
+    answer.say("from run to run: {:.0f} % of the loss assumed, because one run does not say (give several)",
+               100 * analysis::usual_run_to_run);
   for (const analysis::CoastDownRun& run : runs) accept(analysis::objection(run, nominal), request, nominal);
   Provenance provenance{request.command, origin, 0, version()};
   const analysis::ExperimentFiles files = analysis::coast_down_files(
       runs, nominal, request.rotor_inertia, "Coast-down of " + runs.front().name, provenance_lines(provenance));
   folder.write(analysis::source_of(files, request.out));
+  answer.fact("folder", request.out);
+  answer.fact("constant", nominal.constant);
+  answer.fact("linear", nominal.linear);
+  answer.fact("quadratic", nominal.quadratic);
+  answer.fact("noise_sd", nominal.noise_sd);
+  answer.fact("run_to_run", nominal.run_to_run ? Cell(*nominal.run_to_run) : Cell(""));
+  answer.finish(provenance);
 }
 
 }  // namespace metastable::reports

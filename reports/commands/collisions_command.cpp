@@ -14,9 +14,10 @@
 #include "analysis/motion_capture/angle_file.h"
 #include "analysis/motion_capture/collision_comparison.h"
 #include "markov/parallel.h"
+#include "reports/output/answer.h"
 #include "reports/output/output_file.h"
-#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
+#include "reports/output/version.h"
 
 namespace metastable::reports {
 namespace {
@@ -62,20 +63,20 @@ Files write_files(const analysis::Experiment& experiment, const std::vector<anal
   return files;
 }
 
-void print_comparison(const analysis::CollisionComparison& c) {
-  say("against the {} collisions of collisions.csv: {} found ({:.2f} %), {} others\n", c.due, c.found,
-      c.due > 0 ? 100.0 * static_cast<double>(c.found) / static_cast<double>(c.due) : 0.0, c.others);
-  say("  omega_minus as written:  {}\n", text(c.written));
-  say("  omega_minus, peak:       {}\n", text(c.peak));
-  say("  omega_minus, stance fit: {}\n", text(c.fit_before));
-  say("  omega_plus, stance fit:  {}\n", text(c.fit_after));
+void say_comparison(Answer& answer, const analysis::CollisionComparison& c) {
+  answer.say("against the {} collisions of collisions.csv: {} found ({:.2f} %), {} others", c.due, c.found,
+             c.due > 0 ? 100.0 * static_cast<double>(c.found) / static_cast<double>(c.due) : 0.0, c.others);
+  answer.say("  omega_minus as written:  {}", text(c.written));
+  answer.say("  omega_minus, peak:       {}", text(c.peak));
+  answer.say("  omega_minus, stance fit: {}", text(c.fit_before));
+  answer.say("  omega_plus, stance fit:  {}", text(c.fit_after));
 }
 
 // Trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two files
 // would put the rest too early.
-void print_cut_rests(const analysis::ExperimentSource& source, const std::string& collisions,
-                     const std::vector<analysis::MeasuredAngle>& angles, const std::vector<char>& cut,
-                     std::size_t limit) {
+void say_cut_rests(Answer& answer, const analysis::ExperimentSource& source, const std::string& collisions,
+                   const std::vector<analysis::MeasuredAngle>& angles, const std::vector<char>& cut,
+                   std::size_t limit) {
   if (!source.trials_csv) return;
   analysis::ExperimentSource written = source;
   written.collisions_csv = collisions;
@@ -83,7 +84,7 @@ void print_cut_rests(const analysis::ExperimentSource& source, const std::string
   try {
     experiment = analysis::parse_experiment(written);
   } catch (const analysis::InputError& error) {
-    say("trials.csv does not go with these collisions: {}\n", error.lines().front());
+    answer.say("trials.csv does not go with these collisions: {}", error.lines().front());
     return;
   }
   std::map<int, dynamics::Outcome> outcomes;
@@ -96,8 +97,9 @@ void print_cut_rests(const analysis::ExperimentSource& source, const std::string
       early.push_back(angles[t].number);
   }
   if (early.empty()) return;
-  say("{} trials that trials.csv lists as rest roll on after collision {}, where they are cut (the first is trial {}): "
-      "raise --collisions, or list them as max_collisions\n",
+  answer.say(
+      "{} trials that trials.csv lists as rest roll on after collision {}, where they are cut (the first is trial {}): "
+      "raise --collisions, or list them as max_collisions",
       early.size(), limit, early.front());
 }
 
@@ -116,6 +118,9 @@ void run_collisions(const CollisionsRequest& request) {
                        : known              ? folder / "collisions-from-angle.csv"
                                             : folder / "collisions.csv";
   const bool to_terminal = out == "-";
+  if (to_terminal && !request.json.empty())
+    throw std::invalid_argument("--json: there is none with --out -, which prints the collisions themselves");
+  Answer answer(request.json);
   OutputFile collisions_file(out);
   std::optional<OutputFile> details_file;
   fs::path details;
@@ -170,20 +175,28 @@ void run_collisions(const CollisionsRequest& request) {
     }
     if (trial.collisions.empty()) ++stopped[trial.stopped];
   }
-  say("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}\n", out.string(), count,
-      angles.size(), bounces, details.string());
-  say("omega_minus is the {}\n", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
-                                              : "stance motion extrapolated to the collision");
+  answer.say("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}", out.string(), count,
+             angles.size(), bounces, details.string());
+  answer.say("omega_minus is the {}", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
+                                                   : "stance motion extrapolated to the collision");
   if (unfitted > 0)
-    say("{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
-        "empty\n",
+    answer.say(
+        "{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
+        "empty",
         unfitted);
-  for (const auto& [why, trials] : stopped) say("{} trials without a collision: {}\n", trials, why);
+  for (const auto& [why, trials] : stopped) answer.say("{} trials without a collision: {}", trials, why);
   if (const auto trials = std::count(cut.begin(), cut.end(), 1); trials > 0)
-    say("{} trials roll on after collision {}, where --collisions stops them\n", trials, limit);
-  print_cut_rests(source, files.collisions, angles, cut, limit);
+    answer.say("{} trials roll on after collision {}, where --collisions stops them", trials, limit);
+  say_cut_rests(answer, source, files.collisions, angles, cut, limit);
   if (known)
-    print_comparison(analysis::compare_collisions(*known, angles, found, request.peak, request.finder.collisions));
+    say_comparison(answer,
+                   analysis::compare_collisions(*known, angles, found, request.peak, request.finder.collisions));
+  answer.fact("collisions", count);
+  answer.fact("trials", angles.size());
+  answer.fact("bounces", bounces);
+  answer.file(out.string());
+  answer.file(details.string());
+  answer.finish({request.command, {}, 0, version()});
 }
 
 }  // namespace metastable::reports

@@ -10,8 +10,6 @@
 #include "reports/description/describe_tables.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
-#include "reports/output/standard_output.h"
-#include "reports/output/text_table.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -35,6 +33,7 @@ void run_describe(const DescribeRequest& request) {
   std::optional<PageFolder> pages;
   if (!request.out.empty()) pages.emplace(request.out);
   const Provenance provenance{request.command, "experiment: " + experiment.title, request.options.seed, version()};
+  Answer answer(request.json);
 
   const auto [description, laws, tables] = [&] {
     // A fit takes some 500 to 1000 evaluations of its likelihood.
@@ -44,8 +43,8 @@ void run_describe(const DescribeRequest& request) {
     return answer_describe(experiment, told, provenance);
   }();
   if (!pages) {
-    for (const Table& table : tables) say("{}\n", to_text(table, 1000, terminal_width()));
-    return;
+    for (const Table& table : tables) answer.show(table);
+    return answer.finish(provenance);
   }
 
   Page& page = pages->page();
@@ -89,7 +88,7 @@ void run_describe(const DescribeRequest& request) {
                    std::move(beside));
   }
   pages->write_index();
-  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  pages->finish(answer);
 }
 
 }  // namespace metastable::reports

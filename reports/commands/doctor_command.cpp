@@ -1,6 +1,5 @@
 #include "reports/commands/doctor_command.h"
 
-#include <fmt/format.h>
 #include <stdio.h>
 
 #include <array>
@@ -9,7 +8,7 @@
 #include <thread>
 
 #include "reports/import/mat_rows.h"
-#include "reports/output/standard_output.h"
+#include "reports/output/answer.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -27,31 +26,42 @@ std::string first_line(const char* command) {
 
 }  // namespace
 
-void run_doctor() {
-  say("{}\n", version_text());
-  say("cores: {}; every answer is the same bits on any number of them\n", std::thread::hardware_concurrency());
+void run_doctor(const std::string& json) {
+  Answer answer(json);
+  const unsigned cores = std::thread::hardware_concurrency();
+  answer.say("{}", version_text());
+  answer.say("cores: {}; every answer is the same bits on any number of them", cores);
+  answer.fact("version", version());
+  answer.fact("cores", cores);
 #if defined(__x86_64__)
-  say("vectors: {}\n", __builtin_cpu_supports("avx2")
-                           ? "AVX2, which the sampled chain, walkers and densities use"
-                           : "SSE2 (a machine with AVX2 takes some two thirds of the time, for the same bits)");
+  const bool avx2 = __builtin_cpu_supports("avx2");
+  answer.say("vectors: {}", avx2 ? "AVX2, which the sampled chain, walkers and densities use"
+                                 : "SSE2 (a machine with AVX2 takes some two thirds of the time, for the same bits)");
+  answer.fact("vectors", avx2 ? "AVX2" : "SSE2");
 #endif
   const std::string gnuplot = first_line("gnuplot --version 2>/dev/null");
   if (gnuplot.empty())
-    say("gnuplot: missing; figures (report, study, sweep, describe and diagnose --out) need it: install "
-        "gnuplot-nox\n");
+    answer.say(
+        "gnuplot: missing; figures (report, study, sweep, describe and diagnose --out) need it: install gnuplot-nox");
   else
-    say("gnuplot: {}, which draws the figures\n", gnuplot);
-  if (const std::string matio = mat_library(); matio.empty())
-    say("libmatio: not built in; `import` reads CSV only: install libmatio-dev and build again for MAT files\n");
+    answer.say("gnuplot: {}, which draws the figures", gnuplot);
+  answer.fact("gnuplot", gnuplot);
+  const std::string matio = mat_library();
+  if (matio.empty())
+    answer.say("libmatio: not built in; `import` reads CSV only: install libmatio-dev and build again for MAT files");
   else
-    say("libmatio: {}, with which `import` reads MAT files\n", matio);
+    answer.say("libmatio: {}, with which `import` reads MAT files", matio);
+  answer.fact("libmatio", matio);
   const std::string module = first_line(
       "python3 -c 'import metastable, sys; print(metastable.__version__, \"for\", sys.executable)' 2>/dev/null");
   if (module.empty())
-    say("Python module: python3 does not find it; with it settings, trials, chains and simulators of your own are "
-        "asked from NumPy: ./run python (needs pybind11-dev, python3-dev and python3-numpy)\n");
+    answer.say(
+        "Python module: python3 does not find it; with it settings, trials, chains and simulators of your own are "
+        "asked from NumPy: ./run python (needs pybind11-dev, python3-dev and python3-numpy)");
   else
-    say("Python module: {}\n", module);
+    answer.say("Python module: {}", module);
+  answer.fact("python_module", module);
+  answer.finish({"metastable doctor", {}, 0, version()});
 }
 
 }  // namespace metastable::reports

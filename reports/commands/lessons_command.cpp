@@ -20,7 +20,6 @@
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_tables.h"
 #include "reports/output/page_folder.h"
-#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 #include "reports/study/study_progress.h"
 
@@ -246,7 +245,10 @@ class Lessons {
             std::move(figures), std::move(tables));
   }
 
-  void write_index() const { pages_.write_index(); }
+  void finish(Answer& answer) const {
+    pages_.write_index();
+    pages_.finish(answer);
+  }
 
  private:
   Experiment laboratory(const std::vector<dynamics::Effect>& effects) const {
@@ -274,13 +276,13 @@ void run_lessons(const LessonsRequest& request) {
   std::vector<Experiment> measured;
   for (const std::string& folder : request.data) measured.push_back(analysis::read_experiment(folder));
   Lessons lessons(request);
+  Answer answer(request.json);
   lessons.coulomb_wheel();
   lessons.charge();
   lessons.hypotheses();
   for (std::size_t i = 0; i < measured.size(); ++i)
     lessons.measured(measured[i], std::filesystem::path(request.data[i]).lexically_normal().filename().string(), i + 1);
-  lessons.write_index();
-  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  lessons.finish(answer);
 }
 
 }  // namespace metastable::reports

@@ -11,7 +11,6 @@
 #include "analysis/study/how_it_fails.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/output/page_folder.h"
-#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
 #include "reports/study/report_figures.h"
@@ -43,12 +42,13 @@ class Report {
     page.provenance = provenance_for(request.settings);
   }
 
-  void write() {
+  void write(Answer& answer) {
     ramps();
     for (const analysis::Setting& setting : request_.settings) spreads(setting);
     for (const analysis::Setting& setting : request_.settings) means(setting);
     energies();
     pages_.write_index();
+    pages_.finish(answer);
   }
 
  private:
@@ -208,8 +208,8 @@ class Report {
 }  // namespace
 
 void run_report(const ReportRequest& request) {
-  Report(request).write();
-  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  Answer answer(request.json);
+  Report(request).write(answer);
 }
 
 }  // namespace metastable::reports

@@ -50,6 +50,7 @@ struct SweepRequest {
   analysis::StudyOptions study;
   std::string out = "sweep.csv";  ///< the figure goes beside it, with the ending .svg
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable simulate
@@ -63,6 +64,7 @@ struct SimulateRequest {
   std::string command;
   std::optional<analysis::CameraOptions> camera = {};  ///< given: angle.csv too
   bool stand_in = false;  ///< the paper's three conditions instead of `trials` of one (analysis/experiment/stand_in.h)
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable simulate --reality
@@ -73,6 +75,7 @@ struct RealityRequest {
   std::optional<analysis::CameraOptions> camera;
   std::string out;
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable collisions
@@ -82,6 +85,8 @@ struct CollisionsRequest {
   bool peak = false;  ///< omega_minus is the peak of the smoothed speed instead of the stance fit
   std::string out;    ///< file; "": collisions.csv in the folder, or collisions-from-angle.csv if that is there
   int threads = 0;
+  std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable blind
@@ -94,6 +99,7 @@ struct BlindRequest {
   int threads = 0;
   std::string out;  ///< of open; "": report in the run's folder
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable coast-down
@@ -107,6 +113,7 @@ struct CoastDownRequest {
   bool accept_defects = false;  ///< of which every verdict then speaks
   std::string out;
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable describe
@@ -117,6 +124,7 @@ struct DescribeRequest {
   std::vector<dynamics::Law> against;  ///< laws to compare with
   int trials = 2000;                   ///< simulated trials of that comparison
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable study
@@ -125,6 +133,7 @@ struct StudyRequest {
   std::string out = "study";
   analysis::PaperStudyOptions options;
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable diagnose
@@ -143,6 +152,7 @@ struct LessonsRequest {
   analysis::DiagnosisOptions options;  ///< of every diagnosis; seed and threads also of the simulated trials
   int trials = 0;                      ///< simulated, of each condition; 0: as many as the paper has
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 /// metastable effects
@@ -157,6 +167,7 @@ struct ReportRequest {
   int energy_trials = 1000;  ///< trials behind the energy-loss table
   std::string out = "report";
   std::string command;
+  std::string json = {};  ///< as of StepsRequest
 };
 
 }  // namespace metastable::reports

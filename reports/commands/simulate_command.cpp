@@ -8,35 +8,53 @@
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
 #include "reports/commands/experiment_output.h"
-#include "reports/output/standard_output.h"
-#include "reports/output/table.h"
+#include "reports/output/answer.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
 namespace {
 
-analysis::SimulatedCondition one_condition(const SimulateRequest& request) {
+// Begins a part of the work.
+markov::Share begun(const BeginPart& begin, const char* name) {
+  return [tell = begin(name), name](double share) { tell(share, name); };
+}
+
+// As it is given, and tells of its part.
+std::optional<analysis::CameraOptions> filmed(std::optional<analysis::CameraOptions> camera, const BeginPart& begin) {
+  if (camera) camera->progress = begun(begin, "recording angles");
+  return camera;
+}
+
+analysis::SimulatedCondition one_condition(const SimulateRequest& request, const markov::Share& progress) {
   return {fmt::format("{}", request.setting.slope_deg), request.setting,
           analysis::simulate_trials(request.setting, {.trials = request.trials,
                                                       .collisions = request.collisions,
                                                       .seed = request.seed,
-                                                      .threads = request.threads})};
+                                                      .threads = request.threads,
+                                                      .progress = progress})};
 }
 
 template <typename Request>
 void run_into_folder(const Request& request) {
   ExperimentOutput folder(request.out);
-  const SimulatedExperiment made = simulated_experiment(request);
+  Answer answer(request.json);
+  const SimulatedExperiment made = [&] {
+    ProgressParts progress;
+    return simulated_experiment(request, progress.begin());
+  }();
   folder.write(made.source);
-  for (const std::string& line : made.said) say("{}: {}\n", request.out, line);
+  for (const std::string& line : made.said) answer.say("{}: {}", request.out, line);
+  answer.fact("folder", request.out);
+  answer.finish(made.provenance);
 }
 
 }  // namespace
 
-SimulatedExperiment simulated_experiment(const SimulateRequest& request) {
+SimulatedExperiment simulated_experiment(const SimulateRequest& request, const BeginPart& begin) {
+  const markov::Share progress = begun(begin, "simulate");
   const std::vector<analysis::SimulatedCondition> conditions =
-      request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads)
-                       : std::vector<analysis::SimulatedCondition>{one_condition(request)};
+      request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads, progress)
+                       : std::vector<analysis::SimulatedCondition>{one_condition(request, progress)};
   Provenance provenance{request.command, {}, request.seed, version()};
   for (const analysis::SimulatedCondition& condition : conditions)
     provenance.settings += (provenance.settings.empty() ? "" : "\n") + condition.setting.describe();
@@ -45,8 +63,9 @@ SimulatedExperiment simulated_experiment(const SimulateRequest& request) {
                                 : fmt::format("Simulated rimless wheel, {} deg", request.setting.slope_deg);
   analysis::ExperimentFiles files = analysis::experiment_files(conditions, title, provenance_lines(provenance));
   if (request.camera) files.experiment_toml += fmt::format("\n[sensor]\nrate_hz = {}\n", request.camera->rate);
-  SimulatedExperiment made{analysis::source_of(files, request.out), {}};
-  if (request.camera) made.source.angle_csv = analysis::angle_csv(conditions, *request.camera);
+  SimulatedExperiment made{analysis::source_of(files, request.out), {}, provenance};
+  if (const auto camera = filmed(request.camera, begin))
+    made.source.angle_csv = analysis::angle_csv(conditions, *camera);
   for (const auto& [id, setting, trials] : conditions) {
     const auto rested = std::count_if(trials.begin(), trials.end(),
                                       [](const auto& trial) { return trial.outcome == dynamics::Outcome::rest; });
@@ -56,16 +75,18 @@ SimulatedExperiment simulated_experiment(const SimulateRequest& request) {
   return made;
 }
 
-SimulatedExperiment simulated_experiment(const RealityRequest& request) {
+SimulatedExperiment simulated_experiment(const RealityRequest& request, const BeginPart& begin) {
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
-  const std::vector<dynamics::LaboratoryTrial> trials = analysis::run_laboratory(setup, request.reality.threads);
+  const std::vector<dynamics::LaboratoryTrial> trials =
+      analysis::run_laboratory(setup, request.reality.threads, begun(begin, "simulate"));
   analysis::FolderOptions options;
   options.title = "Rimless wheel in the virtual laboratory";
-  options.comment = provenance_lines({request.command, {}, request.reality.seed, version()});
+  const Provenance provenance{request.command, {}, request.reality.seed, version()};
+  options.comment = provenance_lines(provenance);
   options.dropped = request.dropped;
-  options.camera = request.camera;
+  options.camera = filmed(request.camera, begin);
   const analysis::RealityFiles files = analysis::reality_files(request.conditions, setup, trials, options);
-  SimulatedExperiment made{analysis::source_of(files.files, request.out), {}};
+  SimulatedExperiment made{analysis::source_of(files.files, request.out), {}, provenance};
   made.source.angle_csv = files.angle_csv;
   std::size_t collisions = 0, rested = 0, flown = 0;
   for (const dynamics::LaboratoryTrial& trial : trials) {

@@ -6,6 +6,8 @@
 
 #include "analysis/experiment/experiment.h"
 #include "reports/commands/request.h"
+#include "reports/output/table.h"
+#include "reports/study/study_progress.h"
 
 namespace metastable::reports {
 
@@ -16,9 +18,10 @@ void run_reality(const RealityRequest& request);
 struct SimulatedExperiment {
   analysis::ExperimentSource source;
   std::vector<std::string> said;
+  Provenance provenance;
 };
 /// @throws std::invalid_argument as analysis::simulate_trials() and analysis::laboratory_setup()
-SimulatedExperiment simulated_experiment(const SimulateRequest& request);
-SimulatedExperiment simulated_experiment(const RealityRequest& request);
+SimulatedExperiment simulated_experiment(const SimulateRequest& request, const BeginPart& begin);
+SimulatedExperiment simulated_experiment(const RealityRequest& request, const BeginPart& begin);
 
 }  // namespace metastable::reports

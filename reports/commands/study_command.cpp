@@ -15,7 +15,6 @@
 #include "reports/description/stopping_pages.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/progress.h"
-#include "reports/output/standard_output.h"
 #include "reports/output/version.h"
 
 namespace metastable::reports {
@@ -42,6 +41,7 @@ void run_study(const StudyRequest& request) {
                                            ? analysis::simulated_experiments(asked.seed, asked.threads)
                                            : analysis::paper_experiments(analysis::read_experiment(request.data));
   PageFolder pages(request.out);
+  Answer answer(request.json);
   const std::vector<analysis::Variant> variants = analysis::paper_variants();
   std::optional<Progress> progress(std::in_place, "study",
                                    variants.size() * analysis::paper_study_units() + analysis::design_change_count());
@@ -111,7 +111,7 @@ void run_study(const StudyRequest& request) {
                 all_variants(studies, [&](const auto& s) { return fig9_figures(s, experiments, provenance); }),
                 {fig9_table(studies, provenance)});
   pages.write_index();
-  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  pages.finish(answer);
 }
 
 }  // namespace metastable::reports

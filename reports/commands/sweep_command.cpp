@@ -67,7 +67,8 @@ void run_sweep(const SweepRequest& request) {
       request.out,
       head(request),
       {},
-      {request.command, analysis::sweep_description(request.setting, request.axes), request.study.seed, version()}};
+      {request.command, analysis::sweep_description(request.setting, request.axes), request.study.seed, version()},
+      request.json};
   for (const analysis::SweepAxis& axis : request.axes)
     sweep.axes.push_back({std::string(analysis::parameter_label(axis.parameter)),
                           axis.parameter == analysis::Parameter::slope ? "deg" : "", axis.values});

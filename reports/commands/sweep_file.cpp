@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -11,12 +12,12 @@
 #include <limits>
 #include <optional>
 
+#include "reports/output/answer.h"
 #include "reports/output/figure.h"
 #include "reports/output/file_lock.h"
 #include "reports/output/input_file.h"
 #include "reports/output/interrupt.h"
 #include "reports/output/output_file.h"
-#include "reports/output/standard_output.h"
 
 namespace metastable::reports {
 namespace {
@@ -110,6 +111,34 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::s
   return figure;
 }
 
+// The rows as a table; its columns are named by the last line of the head.
+Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
+  const auto split = [](std::string_view line) {
+    std::vector<std::string> fields(1);
+    bool quoted = false;
+    for (const char c : line)
+      if (c == '"')
+        quoted = !quoted;
+      else if (c == ',' && !quoted)
+        fields.emplace_back();
+      else if (c != '\n')
+        fields.back() += c;
+    return fields;
+  };
+  Table table{.id = "sweep", .title = "Points of the sweep", .columns = {}};
+  const std::string_view head(sweep.head.data(), sweep.head.size() - 1);
+  for (const std::string& name : split(head.substr(head.rfind('\n') + 1))) table.columns.push_back({name});
+  for (const std::string& row : rows) {
+    std::vector<Cell>& cells = table.rows.emplace_back();
+    for (const std::string& field : split(row)) {
+      double number = 0;
+      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), number);
+      cells.push_back(error == std::errc() && end == field.data() + field.size() ? Cell(number) : Cell(field));
+    }
+  }
+  return table;
+}
+
 }  // namespace
 
 void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
@@ -120,6 +149,7 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   picture.replace_extension(".svg");
   if (picture == out)
     throw OutputError(out, "the figure beside the numbers has that name; give the numbers another ending, .csv");
+  Answer answer(sweep.json);
   std::vector<std::string> rows = rows_of(out, sweep.head, "holds another sweep");
   std::size_t had = rows.size();
   if (had < size) {
@@ -155,8 +185,12 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   }
   const std::optional<Figure> drawn = figure_of(sweep, rows);
   if (drawn) write_file(picture, render_svg(*drawn));
-  say("{}: {} points ({} taken over); {}\n", out.string(), size, had,
-      drawn ? picture.string() : "no figure: no point has a finite number of steps");
+  answer.say("{}: {} points ({} taken over); {}", out.string(), size, had,
+             drawn ? picture.string() : "no figure: no point has a finite number of steps");
+  answer.table(table_of(sweep, rows));
+  answer.file(out.string());
+  if (drawn) answer.file(picture.string());
+  answer.finish(sweep.provenance);
 }
 
 }  // namespace metastable::reports

@@ -20,6 +20,7 @@ struct SweepFile {
   std::string head;                 ///< everything the numbers depend on; a file with another head is another sweep's
   std::vector<SweepFileAxis> axes;  ///< the first varies slowest
   Provenance provenance;            ///< of the figure
+  std::string json = {};            ///< file, "-" for standard output, "" for none
 };
 
 /// Computes the points from number `had` on and hands each row over, with its line end: one column an axis, then

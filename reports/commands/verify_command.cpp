@@ -9,9 +9,9 @@
 
 #include "analysis/study/verification.h"
 #include "markov/passage/chain_files.h"
+#include "reports/output/answer.h"
 #include "reports/output/output_file.h"
 #include "reports/output/progress.h"
-#include "reports/output/standard_output.h"
 #include "reports/output/table.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
@@ -159,6 +159,7 @@ void export_chain(const Checked& checked, const std::filesystem::path& folder) {
 void run_verify(const VerifyRequest& request) {
   for (const std::string& folder : {request.out, request.export_to})  // before any long computation
     if (!folder.empty()) make_folder(folder);
+  Answer answer(request.json);
   const std::vector<analysis::Benchmark> terrain = analysis::rough_terrain_benchmarks(),
                                          wheels = analysis::wheel_benchmarks();
   Progress progress("verify", (terrain.size() + wheels.size()) * (request.seeds > 0 ? 2 : 1) + 1);
@@ -187,10 +188,9 @@ void run_verify(const VerifyRequest& request) {
                               "wheel: law published, eta ~ N(0.4, 0.1^2), the paper's launch, equal legs of 0.1519 m\n"
                               "settled: the paper's legs, r_g = 0.0424094 m",
                               1, version()};
-  const std::size_t width = terminal_width();
-  say("{}\n", wrapped(peers, "", width));
+  answer.say("{}", wrapped(peers, "", terminal_width()));
   for (Table& table : tables) {
-    say("{}\n", to_text(table, 1000, width));
+    answer.show(table);
     if (request.out.empty()) continue;
     table.notes.emplace_back(peers);  // a file stands alone
     table.provenance = provenance;
@@ -199,7 +199,8 @@ void run_verify(const VerifyRequest& request) {
     write_file(file.string() + ".md", to_markdown(table));
     write_file(file.string() + ".tex", to_latex(table));
   }
-  for (const std::string& line : provenance_lines(provenance)) say("{}\n", line);
+  for (const std::string& line : provenance_lines(provenance)) answer.say("{}", line);
+  answer.finish(provenance);
 }
 
 }  // namespace metastable::reports

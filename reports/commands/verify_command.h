@@ -11,6 +11,7 @@ struct VerifyRequest {
   int threads = 0;
   std::string out;        ///< folder for the tables as CSV, Markdown, LaTeX; "" for none
   std::string export_to;  ///< folder for one chain as PRISM and MatrixMarket files; "" for none
+  std::string json;       ///< file, "-" for standard output, "" for none
   std::string command;
 };
 

@@ -98,7 +98,8 @@ void run_walker_sweep(const WalkerRequest& request) {
                               what, fmt::join(request.slopes, " "), fmt::join(request.slope_sds, " "),
                               request.study.spacing, request.study.seed, version()),
                   {{"slope", "deg", request.slopes}, {"sd of the slope", "deg", request.slope_sds}},
-                  {request.command, what, request.study.seed, version()}};
+                  {request.command, what, request.study.seed, version()},
+                  request.json};
   run_sweep_file(sweep, [&](std::size_t had, const auto& add) {
     Progress progress("sweep", study_units * request.settings.size());
     progress.skip(study_units * had);
@@ -129,7 +130,13 @@ void run_walker_simulate(const WalkerRequest& request) {
     if (std::filesystem::exists(folder / name))
       throw OutputError(folder, fmt::format("already holds {}; choose another folder", name));
   OutputFolder whole(folder);
-  const std::vector<analysis::Walk> walks = analysis::simulate_walks(setting, request.walks);
+  Answer answer(request.json);
+  const std::vector<analysis::Walk> walks = [&] {
+    ProgressParts progress;
+    analysis::WalkOptions options = request.walks;
+    options.progress = [tell = progress.begin()("simulate")](double share) { tell(share, "simulate"); };
+    return analysis::simulate_walks(setting, options);
+  }();
   const Provenance provenance = walker_provenance(request);
   std::string head, steps = "trial,step", trials = "trial,steps,outcome\n";
   for (const std::string& line : provenance_lines(provenance)) head += "# " + line + "\n";
@@ -147,11 +154,16 @@ void run_walker_simulate(const WalkerRequest& request) {
   write_file(whole.path() / "walks.csv", head + steps);
   write_file(whole.path() / "trials.csv", head + trials);
   whole.commit("trials.csv");
-  say("{}: {} trials, {} of them fell\n", request.out, walks.size(), fallen);
+  answer.say("{}: {} trials, {} of them fell", request.out, walks.size(), fallen);
+  answer.fact("folder", request.out);
+  answer.fact("trials", walks.size());
+  answer.fact("fell", fallen);
+  answer.finish(provenance);
 }
 
 void run_walker_report(const WalkerRequest& request) {
   PageFolder pages(request.out);
+  Answer answer(request.json);
   const Provenance provenance = walker_provenance(request);
   std::vector<StudiedWalker> walkers;
   {
@@ -186,7 +198,7 @@ void run_walker_report(const WalkerRequest& request) {
         {last_moments_table(walkers[i].falls.moments, id + "-last-steps", provenance)});
   }
   pages.write_index();
-  say("{}\n", (std::filesystem::path(request.out) / "index.html").string());
+  pages.finish(answer);
 }
 
 }  // namespace metastable::reports

@@ -31,4 +31,15 @@ void PageFolder::section(const std::string& id, const std::string& heading, cons
 
 void PageFolder::write_index() const { write_file(folder_ / "index.html", render_page(page_)); }
 
+void PageFolder::finish(Answer& answer) const {
+  const std::string index = (folder_ / "index.html").string();
+  answer.say("{}", index);
+  answer.file(index);
+  for (const PageSection& section : page_.sections) {
+    for (const PageFigure& figure : section.figures) answer.file((folder_ / "figures" / (figure.id + ".svg")).string());
+    for (const PageTable& table : section.tables) answer.table(table.table);
+  }
+  answer.finish(page_.provenance);
+}
+
 }  // namespace metastable::reports

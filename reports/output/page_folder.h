@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "reports/output/answer.h"
 #include "reports/output/figure.h"
 #include "reports/output/page.h"
 #include "reports/output/table.h"
@@ -23,6 +24,8 @@ class PageFolder {
   void section(const std::string& id, const std::string& heading, const std::string& reading,
                const std::vector<Figure>& figures, std::vector<Table> tables);
   void write_index() const;
+  /// Says where the page is; its tables and files go into the answer, which is finished.
+  void finish(Answer& answer) const;
 
  private:
   std::filesystem::path folder_;

@@ -206,8 +206,11 @@ HeldExperiment simulate(const py::dict& setting, const py::dict& options, const 
   const bool reality = given.flag("reality");
   const RealityRequest laboratory = reality ? reality_of(request, given) : RealityRequest{};
   Call call(progress);
-  call.run(
-      [&] { experiment = of_simulation(reality ? simulated_experiment(laboratory) : simulated_experiment(request)); });
+  call.run([&] {
+    const BeginPart begin = parts_of(call);
+    experiment =
+        of_simulation(reality ? simulated_experiment(laboratory, begin) : simulated_experiment(request, begin));
+  });
   return experiment;
 }
 

@@ -199,12 +199,13 @@ py::dict simulate_map(const py::dict& fields, const py::dict& options, const py:
 py::dict simulate_walks(const py::dict& fields, const py::dict& options, const py::object& progress) {
   const analysis::WalkerSetting setting = walker_setting_of(Arguments(fields));
   const Arguments given(options);
-  const analysis::WalkOptions walking{.trials = given.whole("trials", 1, 1000000),
-                                      .longest = given.whole("most_steps", 1, 1000000),
-                                      .seed = given.seed(),
-                                      .threads = given.threads()};
+  analysis::WalkOptions walking{.trials = given.whole("trials", 1, 1000000),
+                                .longest = given.whole("most_steps", 1, 1000000),
+                                .seed = given.seed(),
+                                .threads = given.threads()};
   std::vector<analysis::Walk> walks;
   Call call(progress);
+  walking.progress = [&](double share) { call.tell(share, "simulate"); };
   call.run([&] { walks = analysis::simulate_walks(setting, walking); });
   std::vector<std::int64_t> trial, step, steps;
   std::vector<double> slope;

@@ -27,6 +27,21 @@ TEST(Parallel, AnExceptionComesBackToTheCaller) {
                  std::runtime_error);
 }
 
+TEST(Parallel, ToldOfProgressMayEndTheWork) {
+  std::atomic<int> told = 0, done = 0;
+  parallel_for(
+      2500, 2, [](std::size_t) {},
+      [&](double share) {
+        EXPECT_TRUE(share > 0 && share <= 1);
+        ++told;
+      });
+  EXPECT_EQ(told, 1000);
+  EXPECT_THROW(parallel_for(
+                   2500, 1, [&](std::size_t) { ++done; }, [](double) { throw std::runtime_error("enough"); }),
+               std::runtime_error);
+  EXPECT_EQ(done, 3);  // the third of 2500 completes the first thousandth
+}
+
 TEST(Parallel, ThreadCountIsAtLeastOne) {
   EXPECT_EQ(thread_count(3), 3);
   EXPECT_GE(thread_count(0), 1);

@@ -127,10 +127,24 @@ class Waiting(unittest.TestCase):
             metastable.study(setting, tolerance=1e-6, progress=lambda share: signal.raise_signal(signal.SIGINT))
         metastable.study(setting, **quick)
 
+    def test_ctrl_c_stops_within_a_simulation(self):
+        wheel, walker = metastable.Setting(slope_deg=9.59), metastable.WalkerSetting("simplest", slope_sd_deg=0.1)
+        for setting, options in ((wheel, dict(trials=1000000)), (wheel, dict(trials=100000, reality=True)),
+                                 (walker, dict(trials=100000))):
+            shares = []
+
+            def stop(share):
+                shares.append(share)
+                signal.raise_signal(signal.SIGINT)
+
+            with self.subTest(**options), self.assertRaises(KeyboardInterrupt):
+                metastable.simulate(setting, progress=stop, **options)
+            self.assertTrue(len(shares) == 1 and shares[0] < 0.5)
+
     def test_other_threads_run_meanwhile_and_may_study_too(self):
         setting = metastable.Setting(slope_deg=9.59)
         turns, found = 0, []
-        threads = [threading.Thread(target=lambda: found.append(metastable.study(setting, seed=3)))
+        threads = [threading.Thread(target=lambda: found.append(metastable.study(setting, seed=3, cells=64)))
                    for _ in range(2)]
         for thread in threads:
             thread.start()
@@ -142,10 +156,11 @@ class Waiting(unittest.TestCase):
 
     def test_progress_is_told_and_its_errors_stop(self):
         shares = []
-        metastable.study(metastable.Setting(slope_deg=9.59), tolerance=0.002, progress=shares.append)
+        setting = metastable.Setting(slope_deg=9.59, legs=[0.15] * 8)
+        metastable.study(setting, tolerance=0.002, progress=shares.append)
         self.assertTrue(shares and all(0 <= share <= 1 for share in shares))
         with self.assertRaises(ZeroDivisionError):
-            metastable.study(metastable.Setting(slope_deg=9.59), tolerance=1e-5, progress=lambda share: 1 / 0)
+            metastable.study(setting, tolerance=1e-5, progress=lambda share: 1 / 0)
         with self.assertRaisesRegex(TypeError, "progress: None, True, False or a function expected, not str"):
             metastable.study(metastable.Setting(), progress="loud")
 
