@@ -257,7 +257,7 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   if (experiment.contact.law == dynamics::Law::plastic)
     throw std::invalid_argument(
         "contact.law: plastic has no restitution and no friction, hence no spread to compare trials with "
-        "(published or coulomb is needed)");
+        "(published, coulomb or settled is needed)");
   WheelRuns measured;
   measured.wheel = experiment.wheel;
   measured.law = experiment.contact.law;
