@@ -31,6 +31,7 @@ class Settings(unittest.TestCase):
             self.assertEqual(other, setting)
             self.assertEqual(hash(other), hash(setting))
         self.assertIn("7 legs of 0.15 m, law coulomb", setting.describe())
+        self.assertEqual(metastable.Setting(legs=0.15), metastable.Setting(legs=[0.15] * 8))
 
     def test_launches_as_the_paper_does_until_told(self):
         self.assertEqual(metastable.Setting().launch, (7.35, 0.19))
