@@ -23,7 +23,7 @@ set(ROOMS
   "analysis/study: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/settled dynamics/return_map dynamics/bounds analysis/statistics"
   "analysis/experiment: markov dynamics/wheel dynamics/laboratory dynamics/settled dynamics/return_map analysis/statistics analysis/study"
   "analysis/description: markov dynamics/wheel dynamics/settled dynamics/return_map analysis/statistics analysis/study analysis/experiment"
-  "analysis/likelihood: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment"
+  "analysis/likelihood: dynamics/wheel dynamics/settled analysis/statistics analysis/diagnosis analysis/experiment"
   "analysis/blind: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment analysis/likelihood"
   "analysis/motion_capture: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/experiment"
   "analysis/paper: markov dynamics/wheel dynamics/settled dynamics/return_map analysis/statistics analysis/study analysis/experiment analysis/description"

@@ -18,26 +18,20 @@ constexpr double pair_prior = 0.05;   // odds of two effects to one
 
 // Which hypotheses are fitted; the others are weighed by what their scores promise. These save time, and decide only
 // where scores promise far too little. Gains are 2 Delta log likelihood, evidence is a log Bayes factor.
-constexpr double least_promise = 2;         // gain by the scores, for a fit
 constexpr double promise_share = 0.2;       // of the largest promised gain, less
 constexpr double promise_margin = 40;       //   this much
 constexpr double overlooked_margin = 12;    // evidence by the scores below the best fitted one, for a fit after all
-constexpr std::size_t most_variants = 3;    // of one effect that are fitted:
-constexpr double variant_gain = 8;          //   those that promise this much
+constexpr double variant_gain = 8;          // promised by one more variant of an effect that is fitted,
 constexpr double variant_share = 0.8;       //   and this share of the best variant's gain
-constexpr std::size_t most_leaders = 3;     // single effects that are refined, and that pairs are built on
-constexpr double leader_evidence = 2;       // of such an effect
+constexpr double leader_evidence = 2;       // of an effect that is refined, and that pairs are built on
 constexpr double refined_share = 0.7;       // of the best evidence, less
 constexpr double refined_margin = 10;       //   this much, for an effect worth refining
 constexpr double refit_margin = 60;         // evidence below the best, for a fit that did not settle to be tried again
 constexpr double least_pair_evidence = -4;  // promised beyond the first effect's, for a pair worth fitting
-constexpr std::size_t most_partners = 3;    // of one leader that are fitted
 
 // How fits are run.
 constexpr double furthest_start = 0.25;  // share of a parameter's range
 constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
-constexpr int refinements = 3;           // of a variant, each with half the moves
-constexpr int refining_steps = 4;        // of the fit at each move
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
 constexpr int law_steps = 12;            // of another law's fit, from either start
 constexpr int more_law_steps = 60;       // where it may still come near
@@ -78,31 +72,31 @@ EffectTerm term_at(const ScannedEffect& scanned, std::size_t variant) {
 }
 
 // These variants are worth a full fit.
-std::vector<std::size_t> leading_variants(const ScannedEffect& scanned) {
+std::vector<std::size_t> leading_variants(const ScannedEffect& scanned, std::size_t most) {
   std::vector<std::size_t> order(scanned.gain.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return scanned.gain[a] > scanned.gain[b]; });
   std::vector<std::size_t> leading;
   for (const std::size_t v : order)
-    if (leading.empty() || (leading.size() < most_variants && scanned.gain[v] > variant_gain &&
+    if (leading.empty() || (leading.size() < most && scanned.gain[v] > variant_gain &&
                             scanned.gain[v] > variant_share * scanned.gain[order[0]]))
       leading.push_back(v);
   return leading;
 }
 
 // Moves the last term's variant between the list's values as long as the likelihood rises, halving the moves.
-void refine_variant(const TransitionModel& model, Fit& best) {
+void refine_variant(const TransitionModel& model, const Effort& effort, Fit& best) {
   const std::vector<double> spacing = best.terms.back().candidate->refine;
   double share = 0.5;
-  for (int round = 0; round < refinements; ++round, share /= 2)
+  for (int round = 0; round < effort.refinements; ++round, share /= 2)
     for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
       if (spacing[entry] == 0) continue;
       for (const double sign : {1.0, -1.0}) {
         std::vector<EffectTerm> terms = best.terms;
         terms.back().variant[entry] += sign * share * spacing[entry];
-        Fit tried =
-            fit(model, best.nuisance, terms, {.count = {}, .refit_nuisances = true, .most_iterations = refining_steps});
+        Fit tried = fit(model, best.nuisance, terms,
+                        {.count = {}, .refit_nuisances = true, .most_iterations = effort.refining_steps});
         if (!(tried.penalised > best.penalised + worth_moving)) continue;
         const bool was_converged = best.converged;
         best = std::move(tried);
@@ -113,17 +107,19 @@ void refine_variant(const TransitionModel& model, Fit& best) {
 }
 
 // Finds the best fit of `base` with one more effect.
-RankedCause fit_cause(const TransitionModel& model, const Fit& base, const ScannedEffect& scanned) {
+RankedCause fit_cause(const TransitionModel& model, const Effort& effort, const Fit& base,
+                      const ScannedEffect& scanned) {
+  const FitOptions options{.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations};
   RankedCause cause;
   bool first = true;
-  for (const std::size_t variant : leading_variants(scanned)) {
+  for (const std::size_t variant : leading_variants(scanned, effort.most_variants)) {
     std::vector<EffectTerm> terms = base.terms;
     terms.push_back(term_at(scanned, variant));
-    Fit tried = best_fit(model, base.nuisance, terms);
+    Fit tried = best_fit(model, base.nuisance, terms, options);
     const auto try_from = [&](auto value_of) {
       for (std::size_t p = 0; p < terms.back().values.size(); ++p)
         terms.back().values[p] = value_of(scanned.candidate->parameters[p]);
-      Fit again = fit(model, base.nuisance, terms);
+      Fit again = fit(model, base.nuisance, terms, options);
       if (again.penalised > tried.penalised) tried = std::move(again);
     };
     if (tried.penalised < base.penalised)  // a bad start: from nothing instead
@@ -175,6 +171,7 @@ class Ranker {
         candidates_(candidates),
         options_(options),
         threads_(options.threads),
+        effort_(effort_for(model, recalibrated)),
         scan_(scan_effects(model, recalibrated, candidates, options.threads)),
         chance_(scan_, options.draws, options.seed),
         singles_(candidates.size()) {}
@@ -219,6 +216,7 @@ class Ranker {
   const std::vector<const Candidate*>& candidates_;
   const RankingOptions& options_;
   int threads_;
+  Effort effort_;
   EffectScan scan_;
   ChanceGains chance_;
   std::vector<RankedCause> singles_, pairs_;
@@ -245,7 +243,7 @@ void Ranker::fit_law(RankedCause& cause) const {
   Fit other = from(recalibrated_.nuisance, law_steps);
   if (other.penalised > cause.fit.penalised) cause.fit = std::move(other);
   if (!cause.fit.converged && cause.fit.penalised - recalibrated_.penalised > law_hopeless)
-    cause.fit = from(cause.fit.nuisance, more_law_steps);
+    cause.fit = from(cause.fit.nuisance, std::min(more_law_steps, 4 * effort_.most_iterations));
   cause.gain = gain(cause.fit);
   // What is far below and hardly rises any more is decided against.
   if (!cause.fit.converged && cause.gain > law_refuted) cause.not_decided = cause.fit.reason;
@@ -254,7 +252,7 @@ void Ranker::fit_law(RankedCause& cause) const {
 }
 
 void Ranker::fit_effect(RankedCause& cause, const ScannedEffect& scanned) const {
-  cause = fit_cause(model_, recalibrated_, scanned);
+  cause = fit_cause(model_, effort_, recalibrated_, scanned);
   cause.gain = gain(cause.fit);
   if (!std::isfinite(cause.gain)) return give_up(cause);
   // At the optimum up to what the differences resolve: small gains that the scores confirm are decided.
@@ -281,7 +279,7 @@ void Ranker::fit_singles() {
     const double promised = scanned.gain[scanned.best];
     // Where the model knows better starts than the scores, the scores do not decide.
     if (!model_.starts(std::vector{term_at(scanned, scanned.best)}).empty() ||
-        (promised >= least_promise && promised >= promise_share * largest - promise_margin))
+        (promised >= effort_.least_promise && promised >= promise_share * largest - promise_margin))
       return fit_effect(cause, scanned);
     cause.gain = promised;
     cause.evidence = log_evidence(scanned, promised);
@@ -318,7 +316,7 @@ std::vector<std::size_t> Ranker::leaders(bool to_refine) const {
       all.push_back(i);
   std::sort(all.begin(), all.end(),
             [&](std::size_t a, std::size_t b) { return singles_[a].evidence > singles_[b].evidence; });
-  if (all.size() > most_leaders) all.resize(most_leaders);
+  if (all.size() > effort_.most_leaders) all.resize(effort_.most_leaders);
   return all;
 }
 
@@ -339,7 +337,7 @@ void Ranker::refine_leaders() {
     RankedCause& cause = singles_[strongest[k]];
     if (cause.evidence < refined_share * top_ - refined_margin) return;
     Fit refined = cause.fit;
-    refine_variant(model_, refined);
+    refine_variant(model_, effort_, refined);
     take(cause, std::move(refined));
   });
 }
@@ -355,7 +353,8 @@ void Ranker::refit_unsettled() {
     if (&cause == &*best || cause.fit.converged || !fitted(cause) || !fitted(*best) ||
         cause.evidence < top_ - refit_margin)
       return;
-    Fit again = fit(model_, best->fit.nuisance, cause.terms);
+    Fit again = fit(model_, best->fit.nuisance, cause.terms,
+                    {.count = {}, .refit_nuisances = true, .most_iterations = effort_.most_iterations});
     if (!(again.penalised > cause.fit.penalised)) return;
     take(cause, std::move(again));
     cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
@@ -391,7 +390,7 @@ void Ranker::scan_pairs() {
       if (promised + prior > least_pair_evidence) promising.emplace_back(promised, &effect);
     }
     std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-    for (std::size_t k = 0; k < std::min(most_partners, promising.size()); ++k)
+    for (std::size_t k = 0; k < std::min(effort_.most_partners, promising.size()); ++k)
       tries_.push_back({leader, *promising[k].second});
   }
 }
@@ -428,7 +427,7 @@ void Ranker::fit_pairs() {
     heartbeat();
     const RankedCause& first = singles_[tries_[i].leader];
     RankedCause& pair = tried[i];
-    pair = fit_cause(model_, first.fit, tries_[i].second);
+    pair = fit_cause(model_, effort_, first.fit, tries_[i].second);
     pair.gain = gain(pair.fit);
     if (!std::isfinite(pair.gain)) return give_up(pair);
     const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
@@ -465,6 +464,14 @@ const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector
       if (term.candidate->exact && cause.terms[0].candidate == term.candidate && !cause.fit.nuisance.empty())
         return cause.fit;
   return recalibrated;
+}
+
+Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
+  constexpr std::size_t many_events = 6000;
+  constexpr double far_off = 50;  // rise of the log likelihood that a recalibration has left
+  if (!recalibrated.converged && recalibrated.promised > far_off) return {20, 1, 1, 1, 1, 2, 6};
+  if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 2, 12};
+  return {};
 }
 
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,

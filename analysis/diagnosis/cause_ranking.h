@@ -31,6 +31,18 @@ struct CauseRanking {
   double p_value = 1;  ///< of the best single effect among those listed, with the look elsewhere
 };
 
+/// How much is fitted. Experiments that are large, or far off their model, would take many minutes at full effort.
+struct Effort {
+  double least_promise = 2;       ///< gain by the scores, for a fit
+  std::size_t most_variants = 3;  ///< of one effect that are fitted
+  std::size_t most_leaders = 3;   ///< single effects that are refined, and that pairs are built on
+  std::size_t most_partners = 3;  ///< of one leader that are fitted
+  int refinements = 3;            ///< of a variant, each with half the moves
+  int refining_steps = 4;         ///< of the fit at each move
+  int most_iterations = FitOptions{}.most_iterations;
+};
+Effort effort_for(const TransitionModel& model, const Fit& recalibrated);
+
 struct RankingOptions {
   int threads = 0;
   int draws = 2000;

@@ -11,6 +11,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/gap_map.h"
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
@@ -171,6 +172,7 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& re
   markov::parallel_for(static_cast<std::size_t>(folds), threads, [&](std::size_t f) {
     speak();
     FitOptions options;
+    options.most_iterations = effort_for(model, recalibrated).most_iterations;
     options.count.resize(trials);
     for (std::size_t t = 0; t < trials; ++t) options.count[t] = fold[t] != static_cast<int>(f);
     const Fit plain = fit(model, recalibrated.nuisance, {}, options);

@@ -132,7 +132,7 @@ class Keys {
   std::set<std::string, std::less<>> known_;
 };
 
-void read_wheel(Keys& root, dynamics::Wheel& wheel, const Defects& defects) {
+void read_wheel(Keys& root, dynamics::Wheel& wheel, dynamics::Law law, const Defects& defects) {
   const std::size_t before = defects.count();
   std::optional<Keys> keys = root.table("wheel", true);
   if (!keys) return;
@@ -157,7 +157,7 @@ void read_wheel(Keys& root, dynamics::Wheel& wheel, const Defects& defects) {
   };
   if (defects.count() == before) {
     object("inertia_kg_m2", dynamics::inertia_objection(wheel));
-    object("radius_of_gyration_m", dynamics::gyration_objection(wheel));
+    object("radius_of_gyration_m", dynamics::gyration_objection(wheel, law));
     object("tip_radius_m", dynamics::tip_objection(wheel));
   }
   keys->finish();
@@ -270,8 +270,8 @@ void parse_experiment_toml(const std::string& file, std::string_view text, Exper
       root.report(*root.find("system", true), "system: \"rimless_wheel\" or \"coast_down\" is expected");
   }
   if (experiment.system == System::rimless_wheel) {
-    read_wheel(root, experiment.wheel, defects);
     read_contact(root, experiment.contact);
+    read_wheel(root, experiment.wheel, experiment.contact.law, defects);
   } else {
     read_rotor(root, experiment);
   }

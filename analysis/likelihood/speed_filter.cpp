@@ -33,11 +33,14 @@ double square(double v) { return v * v; }
 
 double score_of_probability(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
 
-SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack)
+SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack,
+                         double law_error, double slide_error)
     : extension_(extension),
       tilt_(tilt),
       noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
       slack2_(slack * slack),
+      law2_(law_error * law_error),
+      slide_error_(slide_error),
       blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
 
 SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {
@@ -53,16 +56,21 @@ SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported
 void SpeedFilter::start(double reported) {
   mean_ = reported - extension_.bias_before;
   variance_ = noise2_;
+  before_.reset();
 }
 
 SpeedFilter::Out SpeedFilter::collision(const ExtendedWheel& wheel, const StepContext& context, double reported) {
   const double seen = std::max(1e-3, reported - extension_.bias_after);
+  const Before before{mean_, variance_};
   const Out out = transition(wheel, context, seen, 1, std::sqrt(noise2_ + square(seen / mean_) * variance_));
   update(out, seen);
+  if (wheel.settles()) before_ = before;
   return out;
 }
 
-SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepContext& context, double reported) {
+SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepContext& context, double reported,
+                                     std::optional<double> slide) {
+  if (wheel.settles()) return settled_step(wheel, context, reported, slide);
   const double seen = reported - extension_.bias_before;
   const auto next = wheel.next(context, mean_);
   if (!next) {
@@ -77,7 +85,9 @@ SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepConte
   return {log_normal(z) - std::log(total), z, total};
 }
 
-SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext& context, double reported) {
+SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext& context, double reported,
+                                   std::optional<double> slide) {
+  if (wheel.settles()) return settled_step(wheel, context, reported, slide);
   const double seen = std::max(1e-3, reported - extension_.bias_before);
   const auto plus = wheel.back(context, seen);
   if (!plus) {
@@ -98,7 +108,36 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
   return out;
 }
 
+// The landing up to the next touch. Where omega+ was seen its contact is known all but one number, and only what that
+// leaves is weighed here; else the landing is the collision.
+SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const StepContext& context, double reported,
+                                           std::optional<double> slide) {
+  constexpr double carried_on = 0.5;  // d next / d omega-, times the ratio of the two
+  const double seen = std::max(1e-3, reported - extension_.bias_before);
+  const Before before = before_.value_or(Before{mean_, variance_});
+  const double rate = carried_on * before.mean / seen;
+  const double blur = std::sqrt(noise2_ + law2_ + rate * rate * before.variance);
+  const dynamics::NextTouch next = wheel.at_next_touch(
+      context, before.mean, {before_ ? std::optional(mean_) : std::nullopt, slide, slide_error_}, blur, seen);
+  Out out;
+  if (before_) {
+    const double density = next.speed.density, z = score_of_probability(next.speed.below);
+    out = {density > 0 ? std::max(least_log_density, std::log(density)) : least_log_density, z,
+           density > 0 ? std::clamp(normal_density(z) / density, 1e-4, 2.0) : 0.3};
+  } else {
+    out = weighed(next.speed.density * std::exp(tilt_.log_density(next.speed.below)), tilt_.below(next.speed.below), 1);
+  }
+  mean_ = seen;
+  variance_ = noise2_;
+  before_.reset();
+  out.log_density = std::max(least_log_density, out.log_density + std::log(std::max(1e-300, next.slide_density)));
+  return out;
+}
+
 double SpeedFilter::chance_below(const ExtendedWheel& wheel, const StepContext& context, double bound) const {
+  if (wheel.settles())
+    return before_ ? std::clamp(wheel.rest_share(context, before_->mean, mean_), 1e-300, 1.0)
+                   : conditional(tilt_.below(wheel.rest_share(context, mean_, std::nullopt)));
   return conditional(tilt_.below(wheel.after_collision(context, mean_, bound).below));
 }
 
@@ -132,6 +171,11 @@ SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepC
   } else {
     for (const Node& node : three_nodes) add(plus + node.score * blur, node.weight);
   }
+  return weighed(density, below, rate);
+}
+
+// What a transition's density and distribution function say, given the collision before.
+SpeedFilter::Out SpeedFilter::weighed(double density, double below, double rate) {
   Out out;
   out.log_density = density > 0 ? std::max(least_log_density, std::log(density * rate)) : least_log_density;
   const double z = score_of_probability(below);

@@ -28,7 +28,11 @@ class SpeedFilter {
   /// Both references must outlive the filter.
   /// @param noise  stated sd of reported speeds [rad/s]
   /// @param slack  sd of the least speed that a next collision can have, where the legs are not known [rad/s]
-  SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0);
+  /// @param law_error  sd of what the law does not know of a next omega-, which the reported one of a stance or step
+  ///        was given, too [rad/s]; `settled` only
+  /// @param slide_error  sd of what the law does not know of a slide [m]; `settled` only
+  SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0,
+              double law_error = 0, double slide_error = 1e-3);
 
   /// The first speed is seen: it is held against the stated launch.
   Out launch(const Condition& condition, double reported);
@@ -37,9 +41,12 @@ class SpeedFilter {
   /// omega+ is seen: the collision.
   Out collision(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
   /// Then the next omega- is seen: the stance.
-  Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
+  /// @param slide  of the foot, where it was seen [m]; `settled` only
+  Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
+             std::optional<double> slide = {});
   /// Only the next omega- is seen: collision and stance together.
-  Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
+  Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
+           std::optional<double> slide = {});
   /// After the last measured speed omega+ was below `bound` (or there was none, the foot jammed), or it was not.
   Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound, bool rested);
   /// How likely omega+ is to be below `bound` after the last measured speed.
@@ -49,15 +56,23 @@ class SpeedFilter {
   double conditional(double below) const;
   Out transition(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus, double rate,
                  double blur);
+  Out weighed(double density, double below, double rate);
+  Out settled_step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
+                   std::optional<double> slide);
   void update(const Out& out, double seen);
 
   const dynamics::Extension& extension_;
   const ScoreTilt& tilt_;
   double noise2_;  // variance of a reported speed
-  double slack2_;
+  double slack2_, law2_, slide_error_;
   bool blurred_;
   double mean_ = 0, variance_ = 0;
   std::optional<double> previous_;  // collision's score
+  // Under `settled`, of the speed before the collision whose omega+ the mean now is; nothing: it is that speed's.
+  struct Before {
+    double mean, variance;
+  };
+  std::optional<Before> before_;
 };
 
 }  // namespace metastable::analysis

@@ -32,7 +32,7 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       friction_sd_(hypothesis.extension.trial_friction_sd),
       nodes_(friction_sd_ > 0 ? five_nodes.size() : 1),
       filters_(nodes_, SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
-                                   measured.slack)) {
+                                   measured.slack, measured.law_error, measured.slide_error)) {
   static_assert(five_nodes.size() == most_nodes);
   if (nodes_ > 1)
     for (std::size_t q = 0; q < nodes_; ++q) log_weight_[q] = std::log(five_nodes[q].weight);
@@ -78,9 +78,14 @@ SpeedFilter::Out TrialFollower::seen_by(SpeedFilter& filter, const Event& event,
     case EventKind::collision:
       return filter.collision(wheel_, here, *m.after);
     case EventKind::stance:
-      return filter.stance(wheel_, here, run_.collisions[k + 1].before);
-    case EventKind::step:
-      return filter.step(wheel_, here, run_.collisions[k + 1].before);
+    case EventKind::step: {
+      const RunCollision& next = run_.collisions[k + 1];
+      const double reported = next.before + next.law_error;
+      const SpeedFilter::Out out = event.kind == EventKind::stance ? filter.stance(wheel_, here, reported, m.slide)
+                                                                   : filter.step(wheel_, here, reported, m.slide);
+      if (wheel_.settles()) filter.start(next.before);  // the law's error ends here
+      return out;
+    }
     case EventKind::rest:
     case EventKind::survival:
       return filter.rest(wheel_, here, m.after ? jam_bound(measured_) : wheel_.barrier(here),
@@ -93,6 +98,7 @@ SpeedFilter::Out TrialFollower::see(const Event& event) {
   come_to(event);
   next_.reset();
   if (event.kind == EventKind::launch) next_ = 0;
+  if (event.kind == EventKind::collision) next_ = collision_of(event);  // whether it rested may follow
   if (event.kind == EventKind::stance || event.kind == EventKind::step) next_ = collision_of(event) + 1;
   if (nodes_ == 1) return seen_by(filters_[0], event, 0);
   // The density is averaged over the nodes, which are weighed anew by it.

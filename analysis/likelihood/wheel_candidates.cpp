@@ -280,6 +280,7 @@ WheelCandidate bounce(const WheelDesign& design) {
     e.rebound_lost = v[0];
     e.hops_from = variant[0];
   };
+  if (design.law == dynamics::Law::settled) c.candidate.undecidable = "`settled` follows the hops itself";
   return c;
 }
 

@@ -8,7 +8,8 @@ namespace metastable::analysis {
 std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise) {
   const Spread &eta = nominal.restitution, &mu = nominal.friction;
   using Slot = WheelSlot;
-  std::vector<Nuisance> all(noise ? Slot::log_noise_sd + 1 : Slot::tails + 1);
+  const bool settled = nominal.law == dynamics::Law::settled;
+  std::vector<Nuisance> all(settled ? Slot::log_next_ratio + 1 : noise ? Slot::log_noise_sd + 1 : Slot::tails + 1);
   all[Slot::restitution_mean] = {"restitution_mean", eta.mean, 0.08, 1e-4, 0.02, 0.98};
   all[Slot::log_restitution_sd] = {"log restitution_sd", std::log(std::max(0.01, eta.sd)), 0.4, 1e-3, std::log(0.005),
                                    std::log(0.4)};
@@ -18,6 +19,12 @@ std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::option
   all[Slot::skew] = {"skew", 0, 0.06, 1e-3, -0.5, 0.5};
   all[Slot::tails] = {"tails", 0, 0.06, 1e-3, -0.4, 0.4};
   if (noise) all[Slot::log_noise_sd] = {"log noise_sd", std::log(*noise), 0.5, 1e-3, std::log(5e-6), 0};
+  if (settled) {
+    all[Slot::log_hub_inertia_ratio] = {"log hub_inertia_ratio", 0, 0.1, 1e-3, -0.7, 0.7};
+    all[Slot::log_sticking_ratio] = {"log sticking_ratio", 0, 0.003, 1e-4, -0.03, 0.03};
+    all[Slot::log_plus_ratio] = {"log plus_ratio", 0, 0.003, 1e-4, -0.03, 0.03};
+    all[Slot::log_next_ratio] = {"log next_ratio", 0, 5e-4, 1e-5, -0.005, 0.005};
+  }
   return all;
 }
 
@@ -27,7 +34,13 @@ WheelHypothesis hypothesis_at(std::span<const double> nuisance) {
                                          nuisance[Slot::friction_mean], std::exp(nuisance[Slot::log_friction_sd])},
                              .tilt = ScoreTilt(nuisance[Slot::skew], nuisance[Slot::tails]),
                              .extension = {}};
-  if (nuisance.size() > Slot::log_noise_sd) hypothesis.noise = std::exp(nuisance[Slot::log_noise_sd]);
+  if (nuisance.size() == Slot::log_noise_sd + 1) hypothesis.noise = std::exp(nuisance[Slot::log_noise_sd]);
+  if (nuisance.size() > Slot::log_next_ratio) {
+    hypothesis.extension.hub_inertia_ratio = std::exp(nuisance[Slot::log_hub_inertia_ratio]);
+    hypothesis.extension.sticking_ratio = std::exp(nuisance[Slot::log_sticking_ratio]);
+    hypothesis.extension.plus_ratio = std::exp(nuisance[Slot::log_plus_ratio]);
+    hypothesis.extension.next_ratio = std::exp(nuisance[Slot::log_next_ratio]);
+  }
   return hypothesis;
 }
 

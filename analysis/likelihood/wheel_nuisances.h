@@ -13,8 +13,8 @@
 
 namespace metastable::analysis {
 
-/// Where each nuisance stands in the list. Spreads and the noise are refitted by their logarithms; log_noise_sd is
-/// there only where the noise is refitted.
+/// Where each nuisance stands in the list. Spreads and ratios are refitted by their logarithms; log_noise_sd is there
+/// only where the noise is refitted, the last four only under `settled`, where it never is.
 struct WheelSlot {
   enum : std::size_t {
     restitution_mean,
@@ -23,7 +23,11 @@ struct WheelSlot {
     log_friction_sd,
     skew,
     tails,
-    log_noise_sd
+    log_noise_sd,
+    log_hub_inertia_ratio = log_noise_sd,
+    log_sticking_ratio,
+    log_plus_ratio,
+    log_next_ratio
   };
 };
 

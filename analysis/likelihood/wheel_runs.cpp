@@ -9,6 +9,8 @@
 #include <stdexcept>
 
 #include "analysis/statistics/median.h"
+#include "analysis/statistics/random.h"
+#include "dynamics/settled/share_grid.h"
 
 namespace metastable::analysis {
 namespace {
@@ -23,6 +25,19 @@ constexpr double finest_noise = 1e-5;      // finer, and the model's own numbers
 constexpr double chance_of_deviation = 4;  // in shares of a median deviation times root n: three and a half of its sds
 
 std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
+
+// The next omega- that follows from the speeds before and after a collision; under `settled` as if the foot stuck.
+std::optional<double> expected_next(const ExtendedWheel& wheel, const dynamics::StepContext& context,
+                                    const RunCollision& m) {
+  if (!wheel.settles()) return wheel.next(context, *m.after);
+  constexpr double high = 0.5, much_friction = 10;
+  const auto dead = wheel.omega_plus(context, m.before, {0, much_friction}, false);
+  const auto springy = wheel.omega_plus(context, m.before, {high, much_friction}, false);
+  if (!dead || !springy) return std::nullopt;
+  const double eta = high * (*m.after - *dead) / (*springy - *dead);
+  if (!(eta > -0.1 && eta < 0.8)) return std::nullopt;
+  return wheel.land(context, m.before, {std::max(0.0, eta), much_friction}, false).next;
+}
 
 // Where legs were not noted the stances tell them if omega_plus is there, because the legs' lengths differ.
 void find_legs(WheelRuns& measured, bool column) {
@@ -40,7 +55,7 @@ void find_legs(WheelRuns& measured, bool column) {
       for (std::size_t k = 0; k + 1 < run.collisions.size(); ++k) {
         if (!run.collisions[k].after) continue;
         const auto next =
-            stated[run.condition].next({.leg = (first + static_cast<int>(k)) % legs}, *run.collisions[k].after);
+            expected_next(stated[run.condition], {.leg = (first + static_cast<int>(k)) % legs}, run.collisions[k]);
         const double miss = next ? run.collisions[k + 1].before - *next : 1;
         misfit[static_cast<std::size_t>(first)] += std::min(1.0, miss * miss);
       }
@@ -106,7 +121,7 @@ std::vector<double> stance_residuals(const WheelRuns& measured) {
     const ExtendedWheel& stated = wheels[run.condition];
     for (std::size_t k = 0; k + 1 < run.collisions.size(); ++k)
       if (run.collisions[k].after)
-        if (const auto next = stated.next(run.collisions[k].context, *run.collisions[k].after))
+        if (const auto next = expected_next(stated, run.collisions[k].context, run.collisions[k]))
           residual.push_back(run.collisions[k + 1].before - *next);
   }
   return residual;
@@ -153,6 +168,40 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
   }
 }
 
+// Slides from the feet's places; next speeds are blurred to what the law is good for.
+void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
+  const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
+  std::size_t all = 0, left_out = 0;
+  measured.slides_seen = experiment.columns.position == Presence::all && measured.legs_known;
+  for (WheelRun& run : measured.runs)
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+      RunCollision& m = run.collisions[k];
+      ++all;
+      left_out += !m.counted;
+      if (measured.slides_seen && k + 1 < run.collisions.size())
+        m.slide =
+            run.collisions[k + 1].context.position - m.context.position - wheels[run.condition].advance(m.context.leg);
+    }
+  if (left_out > 0)
+    measured.notes.push_back(fmt::format(
+        "{} of {} collisions are left out: at their speed the foot does not stand before the next one touches, and "
+        "`settled` holds for landings on feet that stand",
+        left_out, all));
+  // Where stances scatter more than that, the law may know less of this machine.
+  const double root = std::sqrt(std::max(1.0, static_cast<double>(all - left_out))), known = settled_precision * root;
+  measured.law_error = std::clamp(3 * measured.noise_seen, known, std::max(known, 0.03));
+  measured.slide_error = settled_slide_precision * root;
+  measured.notes.push_back(
+      fmt::format("`settled` is held to tell a next speed to {:.2g} rad/s: {:.2g} rad/s, as n "
+                  "touches of it have an error of form in common, times the root of n",
+                  measured.law_error, settled_precision));
+  std::uint64_t trial = 0;
+  for (WheelRun& run : measured.runs) {
+    const std::vector<double> error = normal_multipliers(1, trial++, DrawStream::blur, run.collisions.size());
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) run.collisions[k].law_error = measured.law_error * error[k];
+  }
+}
+
 }  // namespace
 
 std::vector<ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dynamics::ContactSpread& contact,
@@ -160,9 +209,46 @@ std::vector<ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dyna
   constexpr double degree = std::numbers::pi / 180;
   std::vector<ExtendedWheel> all;
   all.reserve(measured.conditions.size());
-  for (const Condition& c : measured.conditions)
-    all.emplace_back(measured.wheel, c.slope_deg * degree, measured.law, contact, extension);
+  for (std::size_t c = 0; c < measured.conditions.size(); ++c)
+    all.emplace_back(measured.wheel, measured.conditions[c].slope_deg * degree, measured.law, contact, extension,
+                     measured.landings.empty() ? nullptr : measured.landings[c]);
   return all;
+}
+
+void tabulate_landings(WheelRuns& measured) {
+  measured.landings.clear();
+  if (measured.law != dynamics::Law::settled) return;
+  constexpr double degree = std::numbers::pi / 180, margin = 0.03, slowest = 1, fastest = 15;
+  double low = fastest, high = slowest;
+  for (const WheelRun& run : measured.runs)
+    for (const RunCollision& m : run.collisions) {
+      low = std::min(low, m.before);
+      high = std::max(high, m.before);
+    }
+  low = std::clamp((1 - margin) * low, slowest, fastest - 1);
+  high = std::clamp((1 + margin) * high, low + 1, fastest);
+  for (std::size_t c = 0; c < measured.conditions.size(); ++c) {
+    const double slope = measured.conditions[c].slope_deg;
+    const auto same = std::find_if(measured.conditions.begin(), measured.conditions.begin() + static_cast<long>(c),
+                                   [&](const Condition& other) { return other.slope_deg == slope; });
+    const auto before = static_cast<std::size_t>(same - measured.conditions.begin());
+    measured.landings.push_back(before < c
+                                    ? measured.landings[before]
+                                    : dynamics::share_grid(dynamics::settled_wheel(measured.wheel, slope * degree), low,
+                                                           high, measured.contact));
+  }
+}
+
+void mark_counted(const WheelRuns& measured, WheelRun& run) {
+  if (measured.landings.empty()) return;
+  const dynamics::LandingShares& landings = *measured.landings[run.condition];
+  constexpr int forgotten = 3;  // steps after which a foot that did not stand is forgotten
+  int stood = forgotten;
+  for (RunCollision& m : run.collisions) {
+    const bool stands = m.before < landings.legs[static_cast<std::size_t>(m.context.leg)].settles_below;
+    m.counted = stands && stood >= forgotten;
+    stood = stands ? stood + 1 : 0;
+  }
 }
 
 WheelRuns wheel_runs(const Experiment& experiment) {
@@ -171,14 +257,12 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   if (experiment.contact.law == dynamics::Law::plastic)
     throw std::invalid_argument(
         "contact.law: plastic has no restitution and no friction, hence no spread to compare trials with "
-        "(published or coulomb is needed)");
-  if (experiment.contact.law == dynamics::Law::settled)
-    throw std::invalid_argument(
-        "contact.law: settled has no likelihood here; published or coulomb can be diagnosed, and "
-        "`metastable describe --against settled` puts its predictions beside the trials");
+        "(published, coulomb or settled is needed)");
   WheelRuns measured;
   measured.wheel = experiment.wheel;
   measured.law = experiment.contact.law;
+  const Spread &eta = experiment.contact.restitution, &mu = experiment.contact.friction;
+  measured.contact = {eta.mean, eta.sd, mu.mean, mu.sd};
   measured.conditions = experiment.conditions;
   bool leg_column = true;
   const double count = static_cast<double>(experiment.trials.size());
@@ -204,9 +288,13 @@ WheelRuns wheel_runs(const Experiment& experiment) {
     measured.runs.push_back(std::move(run));
   }
   measured.noise = experiment.sensor.noise_sd.value_or(0);
+  tabulate_landings(measured);
   find_legs(measured, leg_column);
+  if (!leg_column && !measured.legs_known) tabulate_landings(measured);  // of legs of the mean length
   complete_contexts(measured);
+  for (WheelRun& run : measured.runs) mark_counted(measured, run);
   estimate_noise(measured, experiment.sensor);
+  if (measured.law == dynamics::Law::settled) prepare_settled(measured, experiment);
   for (WheelRun& run : measured.runs) mark_jam(measured, run);
   if (experiment.columns.time == Presence::none)
     measured.notes.push_back(
@@ -249,6 +337,7 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
         events.push_back(event);
       };
       if (k == 0 && measured.conditions[run.condition].initial_speed) add(EventKind::launch);
+      if (!m.counted) continue;
       const bool last = k + 1 == run.collisions.size();
       const bool after = m.after && *m.after > 0;
       if (!last)
@@ -260,7 +349,8 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
         if (after) event.speed = *m.after;
         if (after) event.rested.reset();
         if (!after || !measured.exact_stances) add(after ? EventKind::stance : EventKind::step);
-      } else if (!after && run.outcome) {
+      } else if ((!after || !measured.landings.empty()) && run.outcome) {
+        if (after) event.rested.reset();  // its collision said so
         add(*run.outcome == dynamics::Outcome::rest ? EventKind::rest : EventKind::survival);
       }
     }

@@ -2,6 +2,7 @@
 // A wheel's measured trials as runs of collisions whose legs, positions, times and sensor noise are all known or
 // completed, and the list of their transitions.
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "analysis/diagnosis/transition_model.h"
 #include "analysis/experiment/experiment.h"
 #include "dynamics/wheel/extended_wheel.h"
+#include "dynamics/wheel/landing_shares.h"
 
 namespace metastable::analysis {
 
@@ -17,6 +19,9 @@ struct RunCollision {
   dynamics::StepContext context;
   double before = 0;            ///< reported omega- [rad/s]
   std::optional<double> after;  ///< reported omega+ [rad/s]
+  std::optional<double> slide;  ///< of the foot, from its place and the next one's [m]; `settled` only
+  double law_error = 0;         ///< added to `before` where the law foretells it [rad/s]; `settled` only
+  bool counted = true;          ///< false: the law does not hold for it, and it is left out
 };
 
 /// One trial is a run of collisions.
@@ -30,14 +35,19 @@ struct WheelRun {
 struct WheelRuns {
   dynamics::Wheel wheel;  ///< as stated; legs of mean length where it is not known which leg landed
   dynamics::Law law = dynamics::Law::published;
+  dynamics::ContactSpread contact;  ///< nominal
   std::vector<Condition> conditions;
+  std::vector<std::shared_ptr<const dynamics::LandingShares>> landings;  ///< by condition; `settled` only
   std::vector<WheelRun> runs;
   double noise = 0;                ///< sd of reported speeds [rad/s], stated, taken from the stances or assumed
   double noise_seen = 0;           ///< by how much stances scatter [rad/s]; 0: too few to say
   double slack = 0;                ///< sd of a stance's outcome because its leg is not known [rad/s]
+  double law_error = 0;            ///< sd of what the law does not know of a next omega- [rad/s]; `settled` only
+  double slide_error = 1e-3;       ///< sd of what the law does not know of a slide [m]; `settled` only
   bool noise_stated = true;        ///< noise is the experiment's own
   bool legs_known = true;          ///< by the column, or found
   bool speeds_after = false;       ///< omega+ is there
+  bool slides_seen = false;        ///< the feet's places are there; `settled` only
   bool exact_stances = false;      ///< they repeat the model to rounding, and say nothing
   std::vector<std::string> notes;  ///< what was assumed, a sentence each
 };
@@ -46,6 +56,20 @@ struct WheelRuns {
 /// @throws std::invalid_argument as dynamics::ExtendedWheel
 std::vector<dynamics::ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dynamics::ContactSpread& contact,
                                                      const dynamics::Extension& extension);
+
+/// How good `settled` is as a model of rigid-body engines: by so much a next omega- is off in a way that goes with leg,
+/// slope and speed [rad/s]. It does not average out, so n touches are given an error of sqrt(n) times it, after which
+/// they tell no mean more exactly. (The engine of the paper's wheel with steps of 0.1 ms: medians of legs by 0.0004.)
+inline constexpr double settled_precision = 0.0005;
+/// The same of a slide [m]: torques and slopes that the law does not hold move a foot's hops by up to twice that.
+inline constexpr double settled_slide_precision = 0.0002;
+
+/// Tabulates the landings of every condition anew, under `settled`; under other laws there are none.
+void tabulate_landings(WheelRuns& measured);
+
+/// Marks the collisions for which the law `settled` holds: slow enough that the landed foot stands before the next one
+/// touches, as the one before was. Under other laws all count.
+void mark_counted(const WheelRuns& measured, WheelRun& run);
 
 /// Reads an experiment. A missing leg is found from the stances where omega_plus is there, else legs of mean length are
 /// taken; missing positions and times follow from the geometry.

@@ -56,13 +56,14 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
     if (k > 0) {
       const RunCollision& previous = run.collisions.back();
       m.context.leg = (previous.context.leg + 1) % wheel.legs();
-      m.context.position = previous.context.position + wheel.advance(previous.context.leg);
+      m.context.position = previous.context.position + wheel.advance(previous.context.leg) + previous.slide.value_or(0);
     } else {
       m.context.since_previous.reset();
     }
     m.context.friction_shift = shift;
     const double rho = e.memory, left = std::sqrt(1 - rho * rho);
     std::optional<double> plus;
+    ExtendedWheel::Drawn landed;
     for (std::uint64_t attempt = 0; attempt < 60; ++attempt) {  // the tilt by rejection
       const auto u = uniforms(seed, index, 1 + k * 64 + attempt);
       double a = score(u[0]), b = score(u[1]);
@@ -70,9 +71,14 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
         a = rho * *eta_score + left * a;
         b = rho * *mu_score + left * b;
       }
-      plus =
-          wheel.omega_plus(m.context, omega, {restitution.at_score(a), friction.at_score(b)}, u[2] < e.outlier_share);
-      const double below = plus ? wheel.after_collision(m.context, omega, *plus).below : 0.0;
+      const dynamics::Contact drawn{restitution.at_score(a), friction.at_score(b)};
+      plus = wheel.omega_plus(m.context, omega, drawn, u[2] < e.outlier_share);
+      double below = plus ? wheel.after_collision(m.context, omega, *plus).below : 0.0;
+      if (wheel.settles()) {
+        landed = wheel.land(m.context, omega, drawn, u[2] < e.outlier_share);
+        if (!like.after)
+          below = landed.next ? wheel.at_next_touch(m.context, omega, {}, noise, *landed.next).speed.below : 0.0;
+      }
       if (attempt == 59 || u[3] * hypothesis.tilt.largest_density() <= std::exp(hypothesis.tilt.log_density(below))) {
         eta_score = a;
         mu_score = b;
@@ -80,14 +86,18 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
       }
     }
     const double barrier = wheel.barrier(m.context);
-    visit(hypothesis.tilt.below(wheel.after_collision(m.context, omega, barrier).below));
+    visit(hypothesis.tilt.below(wheel.settles() ? wheel.rest_share(m.context, omega, std::nullopt)
+                                                : wheel.after_collision(m.context, omega, barrier).below));
     const auto error = uniforms(seed ^ 0x6e6f697365ULL, index, k);
     m.before = std::max(1e-3, omega + e.bias_before + noise * score(error[0]));
-    const bool rests = !plus || *plus < barrier;
+    m.law_error = all.law_error * score(error[2]);
+    const bool rests = wheel.settles() ? !landed.next : !plus || *plus < barrier;
     if (like.after && plus) m.after = std::max(1e-3, *plus + e.bias_after + noise * score(error[1]));
     if (like.after && !plus) m.after = 0;
+    m.slide.reset();
+    if (all.slides_seen && !rests) m.slide = landed.displacement;
     run.collisions.push_back(m);
-    const auto next = rests ? std::nullopt : wheel.next(m.context, *plus);
+    const auto next = rests ? std::nullopt : wheel.settles() ? landed.next : wheel.next(m.context, *plus);
     if (!next) {
       run.outcome = dynamics::Outcome::rest;
       break;
@@ -101,6 +111,8 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
   }
   for (RunCollision& m : run.collisions) m.context.friction_shift = 0;
   if (!design.outcome) run.outcome.reset();
+  if (run.collisions.back().slide && run.outcome != dynamics::Outcome::rest) run.collisions.back().slide.reset();
+  mark_counted(all, run);
   mark_jam(all, run);
   return run;
 }

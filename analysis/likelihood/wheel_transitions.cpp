@@ -89,7 +89,9 @@ WheelTransitions::WheelTransitions(const Experiment& experiment)
 
 void WheelTransitions::set_up_parameters() {
   // Where nobody stated the noise, the stances say it only together with the effects that act in them.
-  const bool refits_noise = !measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances;
+  // Under `settled` they say what the law does not know.
+  const bool settled = measured_.law == dynamics::Law::settled;
+  const bool refits_noise = !settled && !measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances;
   nuisances_ =
       wheel_nuisances(experiment_.contact, refits_noise ? std::optional<double>(measured_.noise) : std::nullopt);
   WheelDesign design;
@@ -169,6 +171,7 @@ std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTrans
                     [&](const Condition& c) { return c.slope_deg + by > 1 && c.slope_deg + by < steepest; }))
       add(fmt::format("slopes {} by 2 deg", by < 0 ? "flatter" : "steeper"), [by](WheelTransitions& w) {
         for (Condition& c : w.measured_.conditions) c.slope_deg += by;
+        tabulate_landings(w.measured_);
       });
   for (const double by : {-1.0, 1.0})
     add(fmt::format("launches {} by 1 rad/s", by < 0 ? "slower" : "faster"), [by](WheelTransitions& w) {
@@ -218,11 +221,18 @@ double WheelTransitions::expected_steps(std::span<const double> nuisance, std::s
 }
 
 std::vector<NamedValue> WheelTransitions::report_nuisances(std::span<const double> nuisance) const {
-  const dynamics::ContactSpread contact = hypothesis_at(nuisance).contact;
-  return {{"restitution_mean", contact.restitution_mean},
-          {"restitution_sd", contact.restitution_sd},
-          {"friction_mean", contact.friction_mean},
-          {"friction_sd", contact.friction_sd}};
+  const WheelHypothesis at = hypothesis_at(nuisance);
+  const dynamics::ContactSpread& contact = at.contact;
+  std::vector<NamedValue> named{{"restitution_mean", contact.restitution_mean},
+                                {"restitution_sd", contact.restitution_sd},
+                                {"friction_mean", contact.friction_mean},
+                                {"friction_sd", contact.friction_sd}};
+  if (measured_.law == dynamics::Law::settled) {
+    const dynamics::ContactModel model = dynamics::contact_model(measured_.wheel, measured_.law);
+    named.emplace_back("hub_inertia_kg_m2", model.mass * model.radius_of_gyration * model.radius_of_gyration *
+                                                at.extension.hub_inertia_ratio);
+  }
+  return named;
 }
 
 }  // namespace

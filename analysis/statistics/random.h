@@ -18,7 +18,8 @@ enum class DrawStream : std::uint64_t {
   chance_of_effects = 1,  ///< multipliers of the effects' scores
   chance_on_map = 2,      ///< multipliers of the map's scores
   held_out_weights = 3,   ///< weights of held-out trials
-  folds = 4               ///< the order in which trials go to folds
+  folds = 4,              ///< the order in which trials go to folds
+  blur = 5                ///< errors added to speeds that are more exact than the law
 };
 
 /// Standard normals by which a bootstrap multiplies scores: those of draw number `draw`.

@@ -66,7 +66,7 @@ void Setting::validate() const {
   require_range("ramp_stiffness:", wheel.ramp_stiffness, "N/m", range::ramp_stiffness);
   require_range("gravity:", wheel.gravity, "m/s^2", range::gravity);
   for (const auto& [name, objection] : {std::pair("inertia", dynamics::inertia_objection(wheel)),
-                                        std::pair("radius_of_gyration", dynamics::gyration_objection(wheel))})
+                                        std::pair("radius_of_gyration", dynamics::gyration_objection(wheel, law))})
     if (!objection.empty()) throw std::invalid_argument(fmt::format("{}: {}", name, objection));
   require_range("slope:", slope_deg, "deg", dynamics::slope_range(wheel.legs()));
   if (pairs.empty()) {

@@ -419,6 +419,8 @@ void SettledReturnMap::Table::add(const Contact& draw) {
   }
   lowest_.push_back(low);
   contact_.push_back(draw);
+  const double high_state = map_->highest_state_;
+  kept_.push_back(slice ? slice->at(std::sqrt(high_state)).land(draw.friction).carried_squared / high_state : -1);
   const double lowest_next = map_->state_interval(phase_ + 1).first;
   for (std::size_t j = 0; j < curve_nodes; ++j) {
     const double t = static_cast<double>(j) / (curve_nodes - 1);
@@ -443,7 +445,9 @@ void SettledReturnMap::Table::land(double origin, double width, std::span<const 
       continue;
     }
     if (state > map_->highest_state_) {
-      next[k] = map_->next_state(phase_, std::sqrt(state), contact_[first + k]);
+      const double kept = kept_[first + k];
+      next[k] = kept < 0 ? map_->next_state(phase_, std::sqrt(state), contact_[first + k])
+                         : map_->arrival(phase_, {kept * state, 0, false});
       continue;
     }
     const double t = std::sqrt((state - low) / (map_->highest_state_ - low)) * (curve_nodes - 1);
@@ -457,16 +461,18 @@ void SettledReturnMap::Table::land(double origin, double width, std::span<const 
 }
 
 void SettledReturnMap::Table::reorder(std::span<const std::uint32_t> order) {
-  std::vector<double> lowest;
+  std::vector<double> lowest, kept;
   std::vector<Contact> contact;
   std::vector<float> curve;
   for (const std::uint32_t k : order) {
     lowest.push_back(lowest_[k]);
+    kept.push_back(kept_[k]);
     contact.push_back(contact_[k]);
     curve.insert(curve.end(), curve_.begin() + static_cast<std::ptrdiff_t>(k * curve_nodes),
                  curve_.begin() + static_cast<std::ptrdiff_t>((k + 1) * curve_nodes));
   }
   lowest_ = std::move(lowest);
+  kept_ = std::move(kept);
   contact_ = std::move(contact);
   curve_ = std::move(curve);
 }

@@ -77,6 +77,7 @@ class SettledReturnMap {
     const SettledReturnMap* map_;
     int phase_;
     std::vector<double> lowest_;
+    std::vector<double> kept_;  // share of omega-^2 above the highest state; below 0 where landings are followed
     std::vector<Contact> contact_;
     std::vector<float> curve_;  // landings of a draw, from lowest_ to the highest state
   };

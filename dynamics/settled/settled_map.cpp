@@ -158,6 +158,7 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
   // Around the guess, or step by step from above: at high omega and eta there are gaps in rest further down.
   double low = high, at_low = at_high;
   constexpr double farthest = 4e-3;
+  guess = std::min(guess, high);  // a table that says "rests at every mu" is tried where a foot sticks
   for (double reach = off; guess > 0 && reach <= farthest; reach *= 4) {
     const double below = std::max(0.0, guess - reach), above = std::min(guess + reach, high);
     const double at_below = value(below), at_above = value(above);

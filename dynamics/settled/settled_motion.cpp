@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -182,18 +181,18 @@ void SettledRoll::note_moving_touch() {
   const StandingFoot& foot = motion_->foot(leg_);
   const SettledWheel& wheel = motion_->wheel();
   const double about_new =
-      wheel.gyration_sq() * velocity_.spin + height_ * velocity_.along - lever(leg_ + 1).behind * velocity_.out;
-  const double stood = foot.next_angle(), lands = motion_->foot(leg_ + 1).landing_angle();
+      wheel.gyration_sq() * velocity_.spin + height_ * velocity_.along - lever(foot_).behind * velocity_.out;
+  const double stood = foot.next_angle(), lands = motion_->foot(foot_).landing_angle();
   const double height = wheel.length(leg_) * std::cos(stood) + wheel.tip_radius;
   const double spin = about_new / (wheel.gyration_sq() + height * height +
-                                   wheel.length(leg_) * std::sin(stood) * wheel.length(leg_ + 1) * std::sin(lands));
+                                   wheel.length(leg_) * std::sin(stood) * wheel.length(foot_) * std::sin(lands));
   landing_.carried_squared = foot.landing_squared(spin > 0 ? spin * spin : 0);
   landing_.omega_eq_squared = foot.landing_squared(velocity_.spin * std::abs(velocity_.spin));
   landing_.slips_late = landing_.end == LandingEnd::settled;
   if (landing_.slips_late) return;
   landing_.end = LandingEnd::unsettled;
   landing_.duration = time_ - touch_time_;
-  landing_.displacement = tip_along(leg_ + 1) - touch_along_ - foot.pace();
+  landing_.displacement = tip_along(foot_) - touch_along_ - foot.pace();
 }
 
 Landing SettledRoll::land() {
@@ -226,13 +225,13 @@ Step SettledRoll::step() {
   if (event == Event::next_touch) {
     step.touched = true;
     step.omega_minus = velocity_.spin;
-    step.between_feet = tip_along(leg_ + 1) - touch_along_;
+    step.between_feet = tip_along(foot_) - touch_along_;
   }
   step.landing = landing_;
   if (step.touched) {
-    // The next leg is the one that lands now.
-    angle_ -= motion_->wheel().leg_angle();
-    ++leg_;
+    // The next leg is the one that lands now; a wheel that is thrown up may pass some over.
+    angle_ -= (foot_ - leg_) * motion_->wheel().leg_angle();
+    leg_ = foot_;
   }
   return step;
 }
@@ -428,8 +427,8 @@ SettledRoll::Event SettledRoll::carry(bool until_settled) {
         return strikes(foot_);
       case next_leg:
         if (foot_ != leg_) return strikes(foot_ + 1);
-        if (on.way != 0) note_moving_touch();
         strikes(leg_ + 1);
+        if (on.way != 0) note_moving_touch();
         return Event::next_touch;
       case leg_before:
         return strikes(foot_ - 1);
@@ -442,15 +441,20 @@ SettledRoll::Event SettledRoll::carry(bool until_settled) {
 SettledRoll::Event SettledRoll::fly() {
   const SettledWheel& wheel = motion_->wheel();
   const double turn = wheel.leg_angle();
-  constexpr double never = std::numeric_limits<double>::infinity();
   const int reach = wheel.legs() < 5 ? 1 : 2;
+  const double longest = *std::max_element(wheel.leg_length.begin(), wheel.leg_length.end());
   bool leaves = true;  // the feet that lift are at 0 exactly
+  if (++events_ >= wheel.max_events) return Event::given_up;
   for (;;) {
-    if (++events_ >= wheel.max_events) return Event::given_up;
     const double spin = velocity_.spin;
-    double slowing = 0, first = never;
+    const double out = velocity_.out;
+    // While the wheel turns by one leg no others may touch than those looked at, and none before a hub that is higher
+    // than legs are long is down again.
+    double slowing = 0, first = turn / std::max(1e-3, std::abs(spin));
+    if (height_ > longest * (1 + 1e-9))
+      first = (out + std::sqrt(out * out + 2 * cosine_ * (height_ - longest))) / cosine_;
     if (wheel.drags()) {
-      first = 1e-3;
+      first = std::min(first, 1e-3);
       slowing = -wheel.drag(spin - wheel.drag(spin) / wheel.gyration_sq() * first / 2) / wheel.gyration_sq();
     }
     int touches = 0;

@@ -82,6 +82,10 @@ StandingFoot::StandingFoot(const SettledWheel& wheel, int leg)
   next_ = both_down(length_, wheel.length(leg + 1), between);
   apex_ = -wheel.slope_rad - std::asin(radius_ * sine_ / length_);
   pace_ = triangle(length_, wheel.length(leg + 1), between).chord + radius_ * (next_ - landing_);
+  landing_inertia_ = inertia(landing_);
+  next_inertia_ = inertia(next_);
+  fall_ = potential(landing_) - potential(next_);
+  barrier_ = apex_ > landing_ ? 2 * (potential(apex_) - potential(landing_)) / landing_inertia_ : 0;
 }
 
 double StandingFoot::inertia(double angle) const {
@@ -94,15 +98,11 @@ double StandingFoot::potential(double angle) const {
 }
 
 double StandingFoot::next_squared(double omega_eq_squared) const {
-  return (inertia(landing_) * omega_eq_squared + 2 * (potential(landing_) - potential(next_))) / inertia(next_);
+  return (landing_inertia_ * omega_eq_squared + 2 * fall_) / next_inertia_;
 }
 
 double StandingFoot::landing_squared(double next_squared) const {
-  return (inertia(next_) * next_squared + 2 * (potential(next_) - potential(landing_))) / inertia(landing_);
-}
-
-double StandingFoot::barrier_squared() const {
-  return apex_ > landing_ ? 2 * (potential(apex_) - potential(landing_)) / inertia(landing_) : 0;
+  return (next_inertia_ * next_squared - 2 * fall_) / landing_inertia_;
 }
 
 double sticking_friction(const SettledWheel& wheel, int leg) {

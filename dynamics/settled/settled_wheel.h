@@ -61,13 +61,14 @@ class StandingFoot {
   double next_squared(double omega_eq_squared) const;
   double landing_squared(double next_squared) const;
   /// Least omega_eq^2 that passes the barrier [rad^2/s^2].
-  double barrier_squared() const;
+  double barrier_squared() const { return barrier_; }
   /// From touch to touch of two standing feet [m]: chord of the next landing plus what the tip rolls.
   double pace() const { return pace_; }
 
  private:
   double length_, radius_, gravity_, gyration_sq_, sine_, cosine_;
   double landing_, next_, apex_, pace_;
+  double landing_inertia_, next_inertia_, fall_, barrier_;
 };
 
 /// Restitutions above it make feet hop for longer than a step.

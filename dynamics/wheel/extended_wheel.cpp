@@ -21,12 +21,18 @@ Wheel changed(Wheel wheel, const Extension& extension) {
 }  // namespace
 
 ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const ContactSpread& contact,
-                             const Extension& extension)
+                             const Extension& extension, std::shared_ptr<const LandingShares> landings)
     : extension_(extension),
       slope_(slope + extension.slope_offset),
       model_(contact_model(stated, extension.law.value_or(law))),
-      density_(model_, contact) {
-  const Wheel wheel = changed(stated, extension);
+      contact_(contact),
+      density_(model_, contact),
+      landings_(std::move(landings)) {
+  Wheel wheel = changed(stated, extension);
+  if (model_.law == Law::settled) {  // feet are discs about points that much nearer to the hub
+    tip_radius_ = stated.tip_radius;
+    for (double& length : wheel.leg_length) length -= tip_radius_;
+  }
   const auto legs = wheel.leg_length.size();
   for (std::size_t k = 0; k < legs; ++k) {
     const double first = wheel.leg_length[(k + legs - 1) % legs], second = wheel.leg_length[k];
@@ -34,8 +40,17 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
     leg.triangle = triangle(first, second, wheel.leg_angle());
     leg.length = second;
     // The stated wheel's: legs that differ from the stated lengths do not change what is known of the inertia.
-    leg.before = stance_inertia(stated, model_.law, first) * extension.inertia_ratio;
-    leg.inertia = stance_inertia(stated, model_.law, second) * extension.inertia_ratio;
+    leg.before = stance_inertia(stated, model_.law, first);
+    leg.inertia = stance_inertia(stated, model_.law, second);
+    if (model_.law == Law::settled) {
+      const double hub = model_.mass * model_.radius_of_gyration * model_.radius_of_gyration;
+      const double height = leg.triangle.hub_height + tip_radius_;
+      const double ahead = leg.triangle.contact_x, behind = leg.triangle.chord - ahead;
+      leg.before = hub * extension.hub_inertia_ratio + model_.mass * (behind * behind + height * height);
+      leg.inertia = hub * extension.hub_inertia_ratio + model_.mass * (ahead * ahead + height * height);
+    }
+    leg.before *= extension.inertia_ratio;
+    leg.inertia *= extension.inertia_ratio;
     leg.eccentric_phase = -static_cast<double>(k) * wheel.leg_angle();
     const double offset2 = extension.hub_forward * extension.hub_forward + extension.hub_aside * extension.hub_aside;
     if (offset2 > 0) {
@@ -50,6 +65,18 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
   }
   drag_ = extension.viscous != 0 || extension.rolling != 0 || extension.air != 0;
   profile_ = extension.sag != 0;
+  if (!settles()) return;
+  const ExtendedWheel as_stated(stated, slope, law, contact, Extension{});
+  for (std::size_t k = 0; k < legs; ++k) {
+    const StepContext here{.leg = static_cast<int>(k)};
+    geometry_[k].stated_gain = as_stated.path(here).gain;
+    geometry_[k].stated_barrier = as_stated.barrier(here);
+    const LandingShares::Drag& drag = landings_->legs[k].drag;
+    const double standing = work(as_stated.path(here), drag.carried_squared);
+    const double landing =
+        extension.rolling * drag.lost[0] + extension.viscous * drag.lost[1] + extension.air * drag.lost[2];
+    if (std::abs(standing) > 0) geometry_[k].drag_ratio = landing / standing;
+  }
 }
 
 double ExtendedWheel::local_slope(double position) const {
@@ -156,7 +183,7 @@ Collision ExtendedWheel::collision(const StepContext& context, double omega) con
   c.stance_length = geometry_[index(context.leg + legs() - 1)].length;
   c.landing_length = leg.length;
   c.contact_x = leg.triangle.contact_x;
-  c.contact_y = leg.triangle.hub_height;
+  c.contact_y = leg.triangle.hub_height + tip_radius_;
   if (extension_.hub_forward != 0 || extension_.hub_aside != 0) {  // the impulse acts about the centre of mass
     const double at = leg.triangle.beta_second_rad - leg.eccentric_phase;
     c.contact_x -= extension_.hub_forward * std::cos(at) + extension_.hub_aside * std::sin(at);
@@ -173,7 +200,7 @@ CollisionChange ExtendedWheel::change(const StepContext& context, double omega) 
   CollisionChange change;
   change.friction_shift = context.friction_shift;
   if (omega >= e.hops_from) change.rebound_lost = e.rebound_lost;
-  change.friction_ratio = 1 + e.drift * context.run_share;
+  change.friction_ratio = (1 + e.drift * context.run_share) / e.sticking_ratio;
   if (e.stribeck != 0) change.friction_ratio *= 1 + e.stribeck * std::exp(-omega / e.stribeck_speed);
   if (e.patch_friction != 1 && context.position >= e.patch_from && context.position <= e.patch_to)
     change.friction_ratio *= e.patch_friction;
@@ -194,6 +221,12 @@ CollisionChange ExtendedWheel::change(const StepContext& context, double omega) 
 SpeedDensity ExtendedWheel::after_collision(const StepContext& context, double omega, double omega_plus) const {
   const Leg& leg = geometry_[index(context.leg)];
   CollisionChange usual = change(context, omega);
+  if (settles()) {
+    SpeedDensity first =
+        after_first_impact(landing(context, omega), this->contact(usual), omega_plus / extension_.plus_ratio);
+    first.density /= extension_.plus_ratio;
+    return first;
+  }
   const Collision at = collision(context, omega);
   SpeedDensity result = density_.at(at, leg.before, leg.inertia, usual, omega_plus);
   if (extension_.outlier_share > 0) {
@@ -205,14 +238,23 @@ SpeedDensity ExtendedWheel::after_collision(const StepContext& context, double o
   return result;
 }
 
-std::optional<double> ExtendedWheel::omega_plus(const StepContext& context, double omega, const Contact& drawn,
-                                                bool outlier) const {
-  const Leg& leg = geometry_[index(context.leg)];
-  const CollisionChange c = change(context, omega);
+Contact ExtendedWheel::changed_contact(const CollisionChange& c, const Contact& drawn, bool outlier) const {
   Contact contact;
   contact.restitution = std::clamp(drawn.restitution * c.restitution_ratio, 0.0, 1.0);
   contact.friction = std::max(0.0, drawn.friction + c.friction_shift) * c.friction_ratio;
   if (outlier) contact.friction *= extension_.outlier_friction;
+  return contact;
+}
+
+std::optional<double> ExtendedWheel::omega_plus(const StepContext& context, double omega, const Contact& drawn,
+                                                bool outlier) const {
+  const Leg& leg = geometry_[index(context.leg)];
+  const CollisionChange c = change(context, omega);
+  const Contact contact = changed_contact(c, drawn, outlier);
+  if (settles()) {
+    const double plus = extension_.plus_ratio * omega * landing(context, omega).first_impact(contact);
+    return plus > 0 ? std::optional(plus) : std::nullopt;
+  }
   const Loss loss = collide(model_, collision(context, omega), contact);
   if (loss.jammed) return std::nullopt;
   double lost = loss.total();
@@ -225,6 +267,62 @@ std::optional<double> ExtendedWheel::omega_plus(const StepContext& context, doub
   const double squared = (leg.before * omega * omega - 2 * c.loss_ratio * lost) / leg.inertia;
   if (!(squared > 0)) return std::nullopt;
   return std::sqrt(squared);
+}
+
+SettledLanding ExtendedWheel::landing(const StepContext& context, double omega) const {
+  const Leg& leg = geometry_[index(context.leg)];
+  const LandingShares::Leg& stated = landings_->legs[index(context.leg)];
+  const Collision c = collision(context, omega);
+  const double climb = barrier(context);
+  SettledLanding at{.place = landings_->place(static_cast<int>(index(context.leg)), omega)};
+  at.omega = omega;
+  at.ahead = c.contact_x;
+  at.height = c.contact_y;
+  at.chord = c.chord;
+  at.gyration_sq = leg.inertia / model_.mass - at.ahead * at.ahead - at.height * at.height;
+  at.barrier_squared = stated.barrier_squared + climb * climb - leg.stated_barrier * leg.stated_barrier;
+  at.loss_ratio = change(context, omega).loss_ratio;
+  const Path way = path(context);
+  at.next_rate = stated.next_rate;
+  at.next_gain = stated.next_gain + way.gain - leg.stated_gain;
+  at.next_ratio = extension_.next_ratio;
+  if (drag_) {  // the parabola through three places between the barrier and a foot that sticks
+    const double low = at.barrier_squared, half = std::max(1.0, stated.plastic * omega * omega - low) / 2;
+    const double first = leg.drag_ratio * work(way, low), middle = leg.drag_ratio * work(way, low + half),
+                 last = leg.drag_ratio * work(way, low + 2 * half);
+    const double bend = (last - 2 * middle + first) / (2 * half * half), rise = (middle - first) / half - bend * half;
+    at.dragged = {first - low * (rise - low * bend), rise - 2 * low * bend, bend};
+  }
+  return at;
+}
+
+SettledContact ExtendedWheel::contact(const CollisionChange& c) const {
+  return {contact_.restitution_mean * c.restitution_ratio,
+          contact_.restitution_sd * c.restitution_ratio,
+          (contact_.friction_mean + c.friction_shift) * c.friction_ratio,
+          contact_.friction_sd * c.friction_ratio,
+          extension_.outlier_share,
+          extension_.outlier_friction};
+}
+
+NextTouch ExtendedWheel::at_next_touch(const StepContext& context, double omega, const SeenOfLanding& seen, double blur,
+                                       double next) const {
+  SeenOfLanding first = seen;
+  if (first.omega_plus) *first.omega_plus /= extension_.plus_ratio;
+  return dynamics::at_next_touch(landing(context, omega), contact(change(context, omega)), first, blur, next);
+}
+
+double ExtendedWheel::rest_share(const StepContext& context, double omega, std::optional<double> omega_plus) const {
+  if (omega_plus) *omega_plus /= extension_.plus_ratio;
+  return dynamics::rest_share(landing(context, omega), contact(change(context, omega)), omega_plus);
+}
+
+ExtendedWheel::Drawn ExtendedWheel::land(const StepContext& context, double omega, const Contact& drawn,
+                                         bool outlier) const {
+  const SettledLanding at = landing(context, omega);
+  const LandingShares::Kept kept = at.carried(changed_contact(change(context, omega), drawn, outlier));
+  if (!(kept.share >= at.barrier_squared && kept.share > 0)) return {std::nullopt, kept.displacement};
+  return {at.next(kept.share), kept.displacement};
 }
 
 }  // namespace metastable::dynamics

@@ -1,10 +1,12 @@
 #pragma once
 // The wheel's step with physical extensions: what each effect of the catalogue does inside the return map.
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "dynamics/wheel/collision_density.h"
+#include "dynamics/wheel/settled_density.h"
 #include "dynamics/wheel/wheel.h"
 
 namespace metastable::dynamics {
@@ -44,6 +46,10 @@ struct Extension {
   double launch_shift = 0;                       ///< added to the mean launch speed [rad/s]
   double launch_widening = 0;                    ///< added to its sd [rad/s]
   std::optional<Law> law;                        ///< another contact law
+  double hub_inertia_ratio = 1;                  ///< of J about the hub; `settled`
+  double sticking_ratio = 1;  ///< of every mu_c, a little off in engines that move by time steps; `settled`
+  double plus_ratio = 1;      ///< of every omega+, which is seen a little after the impact; `settled`
+  double next_ratio = 1;      ///< of every next omega-: how good the law is; `settled`
 };
 
 /// Holds what one collision's place in the experiment tells.
@@ -60,8 +66,28 @@ struct StepContext {
 class ExtendedWheel {
  public:
   /// @param slope  stated slope [rad]
+  /// @param landings  of the stated wheel on that slope; needed under `settled` for all that comes after a first impact
   /// @throws std::invalid_argument for `plastic`, and for sds, lengths or slopes out of range
-  ExtendedWheel(const Wheel& wheel, double slope, Law law, const ContactSpread& contact, const Extension& extension);
+  ExtendedWheel(const Wheel& wheel, double slope, Law law, const ContactSpread& contact, const Extension& extension,
+                std::shared_ptr<const LandingShares> landings = {});
+
+  /// Whether a landing is a motion of its own (`settled`): omega+ is then that after its first impact, and the next
+  /// three say the rest.
+  bool settles() const { return landings_ != nullptr; }
+  /// The next omega-, and the slide where that was seen.
+  /// @param blur  sd of its error [rad/s]
+  NextTouch at_next_touch(const StepContext& context, double omega, const SeenOfLanding& seen, double blur,
+                          double next) const;
+  /// P(rest) after a landing at speed omega [rad/s]. @param omega_plus  after the first impact, where it is known
+  double rest_share(const StepContext& context, double omega, std::optional<double> omega_plus) const;
+  /// A landing with a drawn contact: the next omega- [rad/s], nothing at rest, and the slide [m].
+  struct Drawn {
+    std::optional<double> next;
+    double displacement = 0;
+  };
+  Drawn land(const StepContext& context, double omega, const Contact& drawn, bool outlier) const;
+  /// Speed up to which the foot of a landing stands before the next one touches [rad/s].
+  double settles_below(int leg) const { return landings_->legs[index(leg)].settles_below; }
 
   /// Gives density of omega+ and probability of less, for a collision at speed omega [rad/s].
   SpeedDensity after_collision(const StepContext& context, double omega, double omega_plus) const;
@@ -79,7 +105,9 @@ class ExtendedWheel {
   /// Returns the time of the stance [s], from its speeds.
   double duration(const StepContext& context, double omega_plus) const;
   /// Returns the distance between the landing foot and the next [m].
-  double advance(int leg) const { return geometry_[index(leg + 1)].triangle.chord; }
+  double advance(int leg) const {
+    return settles() ? landings_->legs[index(leg)].pace : geometry_[index(leg + 1)].triangle.chord;
+  }
   int legs() const { return static_cast<int>(geometry_.size()); }
 
  private:
@@ -87,6 +115,8 @@ class ExtendedWheel {
     Triangle triangle;  // of the collision in which it lands
     double length = 0, before = 0, inertia = 0;
     double eccentric_phase = 0;
+    double stated_gain = 0, stated_barrier = 0;  // of the stated wheel's stance, of omega^2
+    double drag_ratio = 1;  // what resisting torques take off beside what they take off a foot that stands
   };
   struct Path {  // of one stance
     double start = 0, end = 0, pendulum = 0, gain = 0, inertia = 0;
@@ -97,11 +127,17 @@ class ExtendedWheel {
   double work(const Path& path, double omega_plus_squared) const;
   Collision collision(const StepContext& context, double omega) const;
   CollisionChange change(const StepContext& context, double omega) const;
+  Contact changed_contact(const CollisionChange& change, const Contact& drawn, bool outlier) const;
+  SettledLanding landing(const StepContext& context, double omega) const;
+  SettledContact contact(const CollisionChange& change) const;
 
   Extension extension_;
   double slope_;
   ContactModel model_;
+  ContactSpread contact_;
   CollisionDensity density_;
+  std::shared_ptr<const LandingShares> landings_;
+  double tip_radius_ = 0;
   std::vector<Leg> geometry_;
   bool drag_ = false, profile_ = false;
 };

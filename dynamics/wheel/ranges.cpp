@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/wheel/contact_law.h"
+
 namespace metastable::dynamics {
 namespace {
 
@@ -39,10 +41,13 @@ std::string inertia_objection(const Wheel& wheel) {
   return "";
 }
 
-std::string gyration_objection(const Wheel& wheel) {
+std::string gyration_objection(const Wheel& wheel, Law law) {
   const double most = most_gyration * wheel.mean_leg_length();
-  if (!wheel.radius_of_gyration || *wheel.radius_of_gyration <= most) return "";
-  return fmt::format("{} m is outside [0, {:.4g}] m ({} mean legs)", *wheel.radius_of_gyration, most, most_gyration);
+  const bool turns = law == Law::settled;
+  if (!wheel.radius_of_gyration) return "";
+  if (*wheel.radius_of_gyration <= most && (*wheel.radius_of_gyration > 0 || !turns)) return "";
+  return fmt::format("{} m is outside {}0, {:.4g}] m ({} mean legs{})", *wheel.radius_of_gyration, turns ? '(' : '[',
+                     most, most_gyration, turns ? "; law settled" : "");
 }
 
 std::string tip_objection(const Wheel& wheel) {

@@ -8,6 +8,8 @@
 
 namespace metastable::dynamics {
 
+enum class Law;
+
 /// The values that a quantity may have.
 struct Range {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
@@ -49,8 +51,8 @@ Range slope_range(int legs);
 /// Why the wheel's inertia about the stance foot is none, "" if nothing is wrong with it or it is not given: it is at
 /// least M (mean L)^2, that of the hub's mass alone, and its r_g at most three mean legs.
 std::string inertia_objection(const Wheel& wheel);
-/// Likewise the radius of gyration: at most three mean legs.
-std::string gyration_objection(const Wheel& wheel);
+/// Likewise the radius of gyration: at most three mean legs, and under `settled` above 0.
+std::string gyration_objection(const Wheel& wheel, Law law);
 /// Likewise the tips' radius: in [0, shortest leg / 20].
 std::string tip_objection(const Wheel& wheel);
 

@@ -186,9 +186,13 @@ LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
     left_done = left_rule.done(left_change) || left_done;
     right_done = right_rule.done(right_change) || right_done;
     const bool settled = left_done && right_done && (rate_change <= kRateAccuracy || left_change <= kAccuracy);
-    if (settled || (pair.iterations >= kNobodyLeft && std::abs(1 - rate) <= kNobody) ||
-        (pair.iterations >= kFewLeft && std::abs(1 - rate) <= kHardlyAnybody))
+    if (settled) return pair;
+    if ((pair.iterations >= kNobodyLeft && std::abs(1 - rate) <= kNobody) ||
+        (pair.iterations >= kFewLeft && std::abs(1 - rate) <= kHardlyAnybody)) {
+      // Of vectors that are still changing the rate is that of the survivors they tell of.
+      pair.rate = 1 - std::clamp(total(apply_left(chain, pair.left)), 0.0, 1.0);
       return pair;
+    }
   }
   if (chain.interpolated())
     throw ConvergenceError("inverse iteration", pair.residual,

@@ -297,7 +297,7 @@ Command diagnose() {
   return {
       "diagnose", "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
       [](Options& o) {
-        o.add_place("DIR", "Experiment folder");
+        o.add_place("DIR", "Experiment folder; the law of its [contact] is published, coulomb or settled");
         o.add(
             "catalogue", "FILE|ID,ID,...", "",
             "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects'); a pair, "

@@ -31,8 +31,10 @@ dynamics::Wheel wheel(const Options& options) {
     wheel.gravity = options.number("gravity");
   }
   wheel.validate();
+  const dynamics::Law law =
+      options.has("law") ? dynamics::law_from_name(options.text("law")) : dynamics::Law::published;
   for (const auto& [name, objection] : {std::pair("inertia", dynamics::inertia_objection(wheel)),
-                                        std::pair("radius-of-gyration", dynamics::gyration_objection(wheel))})
+                                        std::pair("radius-of-gyration", dynamics::gyration_objection(wheel, law))})
     if (!objection.empty()) throw std::invalid_argument(fmt::format("--{}: {}", name, objection));
   return wheel;
 }

@@ -13,6 +13,7 @@ computations a ComputationError (a RuntimeError).
 
 import dataclasses
 import json
+import numbers
 import os
 from typing import Optional, Sequence, Tuple, Union
 
@@ -62,7 +63,7 @@ class Setting:
     correlation         of the normal scores of eta and mu, (-1, 1)
     contact_list        instead of these three: pairs (eta, mu) to draw from, an array of n rows
     rebound_lost        share of the rebound's energy lost in hops, 0 to 1 (coulomb)
-    legs                lengths [m] in the order they land, 3 or more; None: the paper's eight
+    legs                lengths [m] in the order they land, 3 or more, or one length for eight; None: the paper's eight
     mass                of the hub [kg]; None: 1.39
     inertia             about the stance foot [kg m^2]; None: mass times mean leg squared, and what the law adds
     radius_of_gyration  about the hub [m] (coulomb, plastic, settled); None: 0.05, under plastic 0
@@ -84,7 +85,7 @@ class Setting:
     correlation: Optional[float] = None
     contact_list: Optional[Sequence[Tuple[float, float]]] = None
     rebound_lost: Optional[float] = None
-    legs: Optional[Sequence[float]] = None
+    legs: Union[None, float, Sequence[float]] = None
     mass: Optional[float] = None
     inertia: Optional[float] = None
     radius_of_gyration: Optional[float] = None
@@ -96,6 +97,8 @@ class Setting:
     first_leg: int = 0
 
     def __post_init__(self):
+        if isinstance(self.legs, numbers.Real):
+            object.__setattr__(self, "legs", (float(self.legs),) * 8)
         _metastable.describe_setting(_fields(self))
         # Plain numbers and tuples: equal settings compare, hash, print and pickle alike.
         for name, value in _fields(self).items():
@@ -580,6 +583,8 @@ def chain(matrix, kill, *, threads=0):
     kill = numpy.ascontiguousarray(kill, float)
     if kill.ndim != 1:
         raise InputError(f"kill: a vector expected, not an array of shape {kill.shape}")
+    if not hasattr(matrix, "tocsr"):
+        matrix = numpy.ascontiguousarray(matrix, float)
     if matrix.ndim != 2 or matrix.shape != (len(kill), len(kill)):
         raise InputError(f"matrix: shape {matrix.shape}, {(len(kill), len(kill))} expected for {len(kill)} kill rates")
     if hasattr(matrix, "tocsr"):
@@ -587,8 +592,7 @@ def chain(matrix, kill, *, threads=0):
         rows.sum_duplicates()  # columns ascend then
         starts, columns, values = rows.indptr, rows.indices, rows.data
     else:
-        dense = numpy.ascontiguousarray(matrix, float)
-        i, columns = dense.nonzero()
-        starts, values = numpy.searchsorted(i, numpy.arange(len(kill) + 1)), dense[i, columns]
+        i, columns = matrix.nonzero()
+        starts, values = numpy.searchsorted(i, numpy.arange(len(kill) + 1)), matrix[i, columns]
     return Chain(_metastable.Chain(starts, columns, values, kill, threads))
 

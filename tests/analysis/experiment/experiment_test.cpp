@@ -171,6 +171,12 @@ TEST(Experiment, RefusesWhatNoWheelCanHave) {
   EXPECT_EQ(of("hub_mass_kg = 1.39\n", "radius_of_gyration_m = 2\nhub_mass_kg = 1.39\n"),
             "experiment.toml:2:24: wheel.radius_of_gyration_m: 2 m is outside [0, 0.4507] m (3 mean legs)");
   EXPECT_EQ(
+      defects(source(replaced(replaced(description, "coulomb", "settled"), "hub_mass_kg = 1.39\n",
+                              "radius_of_gyration_m = 0\nhub_mass_kg = 1.39\n"),
+                     header + "a,1,1,0,5.0\n"))
+          .front(),
+      "experiment.toml:2:24: wheel.radius_of_gyration_m: 0 m is outside (0, 0.4507] m (3 mean legs; law settled)");
+  EXPECT_EQ(
       of("hub_mass_kg = 1.39\n", "tip_radius_m = 0.01\nhub_mass_kg = 1.39\n"),
       "experiment.toml:2:16: wheel.tip_radius_m: 0.01 m is outside [0, 0.0075] m (a twentieth of the shortest leg)");
   EXPECT_EQ(of("1.39", "1.39", "a,1,1,0,1e308\n"),

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 
 #include "analysis/diagnosis/model_fit.h"
+#include "analysis/experiment/experiment_folder.h"
+#include "analysis/likelihood/experiment_model.h"
 #include "tests/analysis/diagnosed.h"
 
 namespace metastable::analysis {
@@ -39,6 +42,71 @@ TEST(WheelTransitions, FitsFindTheSizesOfEffects) {
     }
     EXPECT_GT(found.penalised, fit(*data, nominal_values(*data), {}).penalised + 8) << one.id;
   }
+}
+
+// Trials rolled event by event under `settled`, with feet that hop and slide; next speeds after odd legs are reported
+// so much too fast, those after even ones too slow [rad/s].
+std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off, double form_error = 0) {
+  Setting stated;
+  stated.law = dynamics::Law::settled;
+  stated.slope_deg = 7.02;
+  stated.wheel.leg_length.assign(8, 0.152);
+  stated.wheel.radius_of_gyration = 0.0424;
+  stated.wheel.tip_radius = 0.0005;
+  stated.restitution = {0.4, 0.05};
+  stated.friction = {0.4, 0.03};
+  stated.initial_speed = {4.9, 0.2};
+  Setting real = stated;
+  real.slope_deg += slope_off;
+  auto rolled = simulate_trials(real, {.trials = trials, .collisions = 24, .seed = 3});
+  for (dynamics::Trial& trial : rolled)
+    for (dynamics::TrialCollision& c : trial.collisions) c.omega_minus += c.leg % 2 == 0 ? form_error : -form_error;
+  return transition_model(
+      parse_experiment(source_of(experiment_files({{"ramp", stated, rolled}}, "rolled", {}), "rolled")));
+}
+
+TEST(WheelTransitions, OfSettledHoldForTrialsThatAreFollowed) {
+  const auto data = rolled_transitions(60, 0);
+  const Evaluation nominal = data->evaluate(nominal_values(*data), {});
+  for (const EventKind kind : {EventKind::collision, EventKind::stance}) {
+    double count = 0, sum = 0, squares = 0;
+    for (std::size_t i = 0; i < nominal.score.size(); ++i)
+      if (data->events()[i].kind == kind) ++count, sum += nominal.score[i], squares += std::pow(nominal.score[i], 2);
+    EXPECT_GT(count, 600);
+    EXPECT_NEAR(sum / count, 0, 4 / std::sqrt(count));
+    EXPECT_NEAR(squares / count, 1, 0.15);
+  }
+  const Fit refitted = fit(*data, nominal_values(*data), {});
+  EXPECT_TRUE(refitted.converged) << refitted.reason;
+  const auto named = data->report_nuisances(refitted.nuisance);
+  EXPECT_NEAR(named[0].second, 0.4, 0.01);
+  EXPECT_NEAR(named[2].second, 0.4, 0.01);
+  EXPECT_EQ(named[4].first, "hub_inertia_kg_m2");
+  EXPECT_NEAR(named[4].second, 0.0025, 0.0003);
+}
+
+TEST(WheelTransitions, OfSettledFindASlopeThatIsMisread) {
+  const auto data = rolled_transitions(40, 0.25);
+  const Fit found = fit(*data, nominal_values(*data), {term(*data, "slope_offset", {}, {0.1})});
+  EXPECT_TRUE(found.converged) << found.reason;
+  const auto at = static_cast<Eigen::Index>(nominal_values(*data).size());
+  const Eigen::MatrixXd covariance = found.information.inverse();
+  EXPECT_NEAR(found.terms[0].values[0], 0.25, 4 * std::sqrt(covariance(at, at)) + 0.01);
+}
+
+// An error of form, as engines have it, is no gap.
+TEST(WheelTransitions, OfSettledTakeAnErrorOfItsFormForNoGap) {
+  constexpr double chance_999 = 26.1;  // chi-squared, eight degrees of freedom
+  const auto data = rolled_transitions(40, 0, 0.001);
+  const Evaluation nominal = data->evaluate(nominal_values(*data), {});
+  std::array<double, 8> sum{}, count{};
+  for (std::size_t i = 0; i < nominal.score.size(); ++i)
+    if (const Event& event = data->events()[i]; event.kind == EventKind::stance)
+      sum.at(static_cast<std::size_t>(*event.leg)) += nominal.score[i],
+          ++count.at(static_cast<std::size_t>(*event.leg));
+  double left = 0;
+  for (std::size_t leg = 0; leg < 8; ++leg) left += sum[leg] * sum[leg] / count[leg];
+  EXPECT_LT(left, chance_999);
 }
 
 TEST(WheelTransitions, NeedATransition) {

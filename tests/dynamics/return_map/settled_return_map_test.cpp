@@ -71,7 +71,7 @@ TEST(SettledReturnMap, TabulatedDrawsLandAsTheMapDoes) {
   for (int k = 0; k < 40; ++k) scores.insert(scores.end(), {-2 + 0.1 * k, 2.5 * std::sin(1.7 * k)});
   SettledReturnMap::Table table = map.tabulate(0, scores);
   std::vector<double> offset(40, 0.0), next(40);
-  for (double state = 10; state < 42; state += 1.7) {
+  for (double state = 10; state < 60; state += 1.7) {  // the table's last is 42.25
     table.land(state, 0, offset, 0, next);
     for (std::size_t k = 0; k < 40; ++k) {
       const auto landed = map.landing(state, 0, std::span(scores).subspan(2 * k, 2));

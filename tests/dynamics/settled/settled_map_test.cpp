@@ -60,6 +60,15 @@ TEST(SettledMap, AtomKinkAndThresholdAreKept) {
   }
 }
 
+TEST(SettledMap, TheThresholdIsFoundFromAnyGuess) {
+  SettledMapOptions options = narrow();
+  options.direct = true;
+  const auto map = SettledMap::of(paper_wheel(7.02), options);
+  const double resting = map->followed_resting_friction(0, 5, 0.4);
+  for (const double guess : {resting + 1e-3, 0.1, 0.9, std::numeric_limits<double>::infinity()})
+    EXPECT_NEAR(map->followed_resting_friction(0, 5, 0.4, guess), resting, 1e-8) << guess;
+}
+
 TEST(SettledMap, WithoutATableLandingsAreFollowed) {
   SettledMapOptions options;
   options.direct = true;

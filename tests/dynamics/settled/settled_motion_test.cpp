@@ -228,6 +228,23 @@ TEST(SettledMotion, DragSlowsInFlightAndOnTheFoot) {
   EXPECT_NEAR(second / first, 2, 1e-3);
 }
 
+// A drag that is nothing has flights followed a millisecond at a time; without one the hub is looked up where it comes
+// down again.
+TEST(SettledMotion, AWheelThrownUpComesDownAsMillisecondByMillisecond) {
+  SettledWheel dragged = paper(7.02, 1e-5);
+  dragged.linear_drag = 1e-300;
+  const SettledMotion at_once(paper(7.02, 1e-5)), followed(dragged);
+  for (const double omega : {40.0, 60.0, 90.0}) {
+    const Contact contact{0.6, 0.5};
+    SettledRoll one(at_once, 0, omega, contact, contact), other(followed, 0, omega, contact, contact);
+    const Step step = one.step(), slow = other.step();
+    EXPECT_EQ(step.touched, slow.touched);
+    EXPECT_GT(step.duration, 0.2) << omega;
+    EXPECT_NEAR(step.duration, slow.duration, 1e-9) << omega;
+    EXPECT_NEAR(one.energy(), other.energy(), 1e-7) << omega;
+  }
+}
+
 TEST(SettledMotion, IllegalInputIsNamed) {
   const auto broken = [](auto change) {
     SettledWheel wheel = paper(7.02);

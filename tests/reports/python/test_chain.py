@@ -31,6 +31,8 @@ class Chains(unittest.TestCase):
         np.testing.assert_allclose(passage.sd, np.sqrt(2 * inverse @ mean - mean - mean**2), rtol=1e-9)
         self.assertTrue(np.all(passage.lower <= passage.mean) and np.all(passage.mean <= passage.upper))
         self.assertLess((passage.upper / passage.lower).max() - 1, 1e-11)
+        lists = metastable.chain(matrix.tolist(), kill.tolist())
+        np.testing.assert_array_equal(lists.first_passage().mean, passage.mean)
         values, vectors = np.linalg.eig(matrix.T)
         quasi = chain.quasi_stationary()
         self.assertAlmostEqual(quasi.failure_rate, 1 - values.real.max(), 12)

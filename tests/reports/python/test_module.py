@@ -31,6 +31,7 @@ class Settings(unittest.TestCase):
             self.assertEqual(other, setting)
             self.assertEqual(hash(other), hash(setting))
         self.assertIn("7 legs of 0.15 m, law coulomb", setting.describe())
+        self.assertEqual(metastable.Setting(legs=0.15), metastable.Setting(legs=[0.15] * 8))
 
     def test_launches_as_the_paper_does_until_told(self):
         self.assertEqual(metastable.Setting().launch, (7.35, 0.19))
@@ -142,9 +143,9 @@ class Waiting(unittest.TestCase):
             self.assertTrue(len(shares) == 1 and shares[0] < 0.5)
 
     def test_other_threads_run_meanwhile_and_may_study_too(self):
-        setting = metastable.Setting(slope_deg=9.59)
+        setting = metastable.Setting(slope_deg=9.59, legs=[0.15] * 8)
         turns, found = 0, []
-        threads = [threading.Thread(target=lambda: found.append(metastable.study(setting, seed=3, cells=64)))
+        threads = [threading.Thread(target=lambda: found.append(metastable.study(setting, seed=3)))
                    for _ in range(2)]
         for thread in threads:
             thread.start()

@@ -19,7 +19,7 @@ def drift(state, noise):
 
 class CartPole(unittest.TestCase):
     def test_direct_simulation_confirms_the_interval(self):
-        study = cart_pole.pole.study(spacing=0.8, simulated_steps=0, how_it_fails=True, seed=3)
+        study = cart_pole.pole.study(spacing=1.0, simulated_steps=0, how_it_fails=True, seed=3)
         rng = np.random.default_rng(11)
         steps, alive, state = np.zeros(4000), np.arange(4000), np.zeros((4000, 2))
         while alive.size:

@@ -1,0 +1,23 @@
+#pragma once
+// Fills the coarse grid of landings that likelihoods read.
+
+#include <functional>
+#include <memory>
+
+#include "dynamics/settled/settled_wheel.h"
+#include "dynamics/wheel/collision_density.h"
+#include "dynamics/wheel/landing_shares.h"
+
+namespace metastable::dynamics {
+
+/// Landings of this wheel on its slope, each followed. Some 70,000 of them, 2 to 3 s.
+/// @param slowest, fastest  speeds omega- to be read [rad/s], 0 < slowest < fastest
+/// @param contact  nominal: LandingShares::Leg::settles_below is that at its mean restitution plus an sd; speeds above
+///        it are not tabulated, nor restitutions beyond four sds
+/// @param executor  calls the work for every index in [0, count), in any order, from any threads; none: in order
+/// @throws std::invalid_argument as SettledWheel::validate()
+std::shared_ptr<const LandingShares> share_grid(
+    const SettledWheel& wheel, double slowest, double fastest, const ContactSpread& contact,
+    const std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>& executor = {});
+
+}  // namespace metastable::dynamics

@@ -1,0 +1,74 @@
+#include "dynamics/wheel/landing_shares.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace metastable::dynamics {
+namespace {
+
+// Index of the node below a value and the weight of the one above.
+std::pair<int, double> between_nodes(const LandingShares::Axis& axis, double value) {
+  const double at = std::clamp((value - axis.low) / (axis.high - axis.low), 0.0, 1.0) * (axis.count - 1);
+  const int below = std::min(static_cast<int>(at), axis.count - 2);
+  return {below, at - below};
+}
+
+}  // namespace
+
+struct LandingShares::Place::Corners {
+  std::array<std::size_t, 4> cell;
+  std::array<double, 4> weight;
+  double of(const std::vector<float>& values, std::size_t stride, std::size_t place) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < cell.size(); ++k)
+      sum += weight[k] * static_cast<double>(values[cell[k] * stride + place]);
+    return sum;
+  }
+};
+
+void LandingShares::resize() {
+  resting.resize(legs.size() * static_cast<std::size_t>(speed.count * restitution.count));
+  kept.resize(resting.size() * static_cast<std::size_t>(parts));
+  displacement.resize(kept.size());
+}
+
+std::size_t LandingShares::cell(int leg, int at_speed, int at_restitution) const {
+  return static_cast<std::size_t>((leg * speed.count + at_speed) * restitution.count + at_restitution);
+}
+
+LandingShares::Place::Place(const LandingShares& grid, int leg, double omega)
+    : grid_(&grid), leg_(&grid.legs[static_cast<std::size_t>(leg)]) {
+  const auto [below, weight] = between_nodes(grid.speed, omega);
+  slow_ = grid.cell(leg, below, 0);
+  fast_ = grid.cell(leg, below + 1, 0);
+  faster_ = weight;
+}
+
+LandingShares::Place::Corners LandingShares::Place::around(double eta) const {
+  const auto [below, weight] = between_nodes(grid_->restitution, eta);
+  const auto row = static_cast<std::size_t>(below);
+  return {{slow_ + row, slow_ + row + 1, fast_ + row, fast_ + row + 1},
+          {(1 - faster_) * (1 - weight), (1 - faster_) * weight, faster_ * (1 - weight), faster_ * weight}};
+}
+
+double LandingShares::Place::resting_friction(double eta) const { return around(eta).of(grid_->resting, 1, 0); }
+
+LandingShares::Kept LandingShares::Place::at(double eta, double friction) const {
+  const Corners corners = around(eta);
+  const double resting = corners.of(grid_->resting, 1, 0);
+  const double part = std::min(1.0, (friction - resting) / std::max(1e-6, leg_->sticking - resting));
+  const auto stride = static_cast<std::size_t>(grid_->parts);
+  const double along = part > 0 ? std::sqrt(part) * (grid_->parts - 1) : 0;
+  const auto below = std::min(static_cast<std::size_t>(along), stride - 2);
+  const double first = grid_->part(static_cast<int>(below)), second = grid_->part(static_cast<int>(below) + 1);
+  const double weight = (part - first) / (second - first);
+  const auto read = [&](const std::vector<float>& values) {
+    const double low = corners.of(values, stride, below);
+    return low + weight * (corners.of(values, stride, below + 1) - low);
+  };
+  return {read(grid_->kept), part > 0 ? read(grid_->displacement) : corners.of(grid_->displacement, stride, 0)};
+}
+
+}  // namespace metastable::dynamics

@@ -1,0 +1,70 @@
+#pragma once
+// Landings of a rigid wheel (`settled`) on a coarse grid of speed, restitution and friction: fast enough for
+// likelihoods of whole experiments. dynamics/settled/share_grid fills it.
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace metastable::dynamics {
+
+/// What landings on one slope keep, leg by leg. Along the axes of speed and restitution values are read by straight
+/// lines, along friction on places that stand as the squares of even numbers between mu_r, where it is steep, and mu_c.
+struct LandingShares {
+  struct Axis {
+    double low = 0, high = 1;
+    int count = 2;
+    double at(int i) const { return low + (high - low) * i / (count - 1); }
+  };
+  /// What resisting torques take off the next omega-^2 of a foot that carries on `carried_squared`, per unit of torque:
+  /// constant, by omega, by omega^2. More than of a foot that stands, as the wheel turns slower while it hops.
+  struct Drag {
+    double carried_squared = 0;
+    std::array<double, 3> lost{};
+  };
+  struct Leg {
+    Drag drag;
+    double sticking = 0;         ///< mu_c
+    double plastic = 0;          ///< share of omega^2 that a foot keeps which sticks and does not spring
+    double barrier_squared = 0;  ///< least omega_eq^2 that passes [rad^2/s^2]
+    double next_rate = 1;        ///< omega-^2 of the next touch is next_rate omega_eq^2 + next_gain
+    double next_gain = 0;        ///< [rad^2/s^2]
+    double pace = 0;             ///< from touch to touch of two standing feet [m]
+    double settles_below = 0;    ///< omega- up to which the landed foot stands before the next leg touches [rad/s]
+  };
+  Axis speed, restitution;
+  int parts = 20;  ///< places between mu_r and mu_c, both included
+  std::vector<Leg> legs;
+  std::vector<float> resting;             ///< by leg, speed, restitution: mu_r; mu_c where even a sticking foot rests
+  std::vector<float> kept, displacement;  ///< ... and place: carried omega^2 / omega-^2, slide of the foot [m]
+
+  /// Sizes the lists for `legs`.
+  void resize();
+  std::size_t cell(int leg, int speed, int restitution) const;
+  double part(int place) const { return static_cast<double>(place) * place / ((parts - 1.0) * (parts - 1.0)); }
+
+  /// A landing's omega_eq^2 / omega-^2 and the slide of its foot [m].
+  struct Kept {
+    double share = 0, displacement = 0;
+  };
+  /// One leg at one speed; beyond the axes the last values are kept. Refers to the grid.
+  class Place {
+   public:
+    Place(const LandingShares& grid, int leg, double omega);
+    const Leg& leg() const { return *leg_; }
+    double resting_friction(double eta) const;
+    /// Friction above mu_c is read as mu_c; below mu_r the share falls on as it does just above.
+    Kept at(double eta, double friction) const;
+
+   private:
+    struct Corners;
+    Corners around(double eta) const;
+    const LandingShares* grid_;
+    const Leg* leg_;
+    std::size_t slow_, fast_;  // first cells of the speeds around
+    double faster_;            // weight of the second
+  };
+  Place place(int leg, double omega) const { return {*this, leg, omega}; }
+};
+
+}  // namespace metastable::dynamics

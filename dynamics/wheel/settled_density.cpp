@@ -1,0 +1,299 @@
+#include "dynamics/wheel/settled_density.h"
+
+#include <algorithm>
+#include <boost/math/quadrature/gauss.hpp>
+#include <cmath>
+
+#include "dynamics/wheel/truncated_normal.h"
+
+namespace metastable::dynamics {
+namespace {
+
+constexpr std::size_t nodes_of_restitution = 12;
+constexpr double far_score = 4.2;
+constexpr double unknown_share = 0.005, unknown_error = 0.2;  // of landings; [rad/s]
+constexpr double thin = 0.05;                                 // a cell that counts as a point, in blurs
+
+// Weighs restitutions and frictions of one landing.
+class Weights {
+ public:
+  Weights(const SettledContact& c, double ratio)
+      : c_(c),
+        friction_mean_(c.friction_mean * ratio),
+        friction_sd_(c.friction_sd * ratio),
+        friction_mass_(std::max(1e-300, normal_cdf(friction_mean_ / friction_sd_))),
+        low_(normal_cdf(-c.restitution_mean / c.restitution_sd)),
+        mass_(std::max(1e-300, normal_cdf((1 - c.restitution_mean) / c.restitution_sd) - low_)) {}
+  double friction_density(double mu) const {
+    return mu > 0 ? normal_density((mu - friction_mean_) / friction_sd_) / (friction_sd_ * friction_mass_) : 0;
+  }
+  double friction_above(double mu) const {
+    return mu > 0 ? normal_cdf((friction_mean_ - mu) / friction_sd_) / friction_mass_ : 1;
+  }
+  double restitution_density(double eta) const {
+    return eta >= 0 && eta <= 1
+               ? normal_density((eta - c_.restitution_mean) / c_.restitution_sd) / (c_.restitution_sd * mass_)
+               : 0;
+  }
+  double restitution_above(double eta) const {
+    if (eta >= 1) return 0;
+    return eta > 0 ? 1 - (normal_cdf((eta - c_.restitution_mean) / c_.restitution_sd) - low_) / mass_ : 1;
+  }
+  double least_restitution() const { return std::max(0.0, c_.restitution_mean - far_score * c_.restitution_sd); }
+  double most_restitution() const { return std::min(1.0, c_.restitution_mean + far_score * c_.restitution_sd); }
+
+ private:
+  const SettledContact& c_;
+  double friction_mean_, friction_sd_, friction_mass_, low_, mass_;
+};
+
+// Student's with three degrees of freedom: a foot that slides far does so less surely than the grid says.
+double slide_density(double z) {
+  const double tail = 1 + z * z / 3;
+  return 0.3675525969478614 / (tail * tail);
+}
+
+using Rule = boost::math::quadrature::gauss<double, nodes_of_restitution>;
+
+// Calls use(eta, weight) at twelve restitutions, rising.
+template <class Use>
+void restitutions(double from, double to, Use use) {
+  if (!(to > from)) return;
+  const auto& at = Rule::abscissa();  // the positive half
+  const double middle = (from + to) / 2, half = (to - from) / 2;
+  for (std::size_t k = at.size(); k-- > 0;) use(middle - half * at[k], half * Rule::weights()[k]);
+  for (std::size_t k = 0; k < at.size(); ++k) use(middle + half * at[k], half * Rule::weights()[k]);
+}
+
+// The contacts that give one omega+ of the first impact: mu as a function of eta up to the restitution at which the
+// foot sticks, where every friction above mu_c does.
+class FirstImpact {
+ public:
+  FirstImpact(const SettledLanding& landing, double omega_plus)
+      : landing_(landing), lever_sq_(landing.gyration_sq + landing.ahead * landing.ahead) {
+    // The energy lost by the law itself, of which loss_ratio times as much was lost.
+    const double share = omega_plus / landing.omega;
+    const double own = 1 - (1 - share * share) / landing.loss_ratio;
+    lost_ = 1 - std::sqrt(std::max(1e-6, own));
+    rate_ = share / (landing.loss_ratio * landing.omega * (1 - lost_));
+    stuck_ = landing.chord * landing.ahead / (lever_sq_ + landing.height * landing.height);
+  }
+  double sticking_restitution() const { return lost_ / stuck_ - 1; }
+  double sticking_rate() const { return rate_ / stuck_; }  // of that restitution with omega+
+  // mu, and its change with omega+.
+  std::pair<double, double> friction(double eta) const {
+    const double lost = lost_ / (1 + eta), arm = landing_.chord - lost * landing_.ahead;
+    if (!(arm > 0)) return {0, 0};
+    return {(landing_.chord * landing_.ahead - lost * lever_sq_) / (landing_.height * arm),
+            rate_ * landing_.chord * landing_.gyration_sq / (landing_.height * arm * arm * (1 + eta))};
+  }
+
+ private:
+  const SettledLanding& landing_;
+  double lever_sq_, lost_, rate_, stuck_;
+};
+
+// Adds up what cells of landings say of the next touch.
+class TouchSum {
+ public:
+  TouchSum(const SettledLanding& landing, const SeenOfLanding& seen, double blur, double next)
+      : landing_(landing),
+        displacement_(seen.displacement),
+        slide_error_(seen.displacement_error),
+        blur_(blur),
+        at_(next) {}
+
+  // Landings that carry omega^2 spread evenly over [first, second], whose feet slide so far.
+  void add(double mass, double first, double second, double slide) {
+    if (first > second) std::swap(first, second);
+    const double barrier = landing_.barrier_squared;
+    double rests = first < barrier ? 1 : 0;
+    if (first < barrier && second > barrier) rests = (barrier - first) / (second - first);
+    all_ += mass;
+    rest_ += mass * rests;
+    mass *= 1 - rests;
+    if (!(mass > 0)) return;
+    if (displacement_) {
+      const double z = (*displacement_ - slide) / slide_error_;
+      mass *= slide_density(z) / slide_error_;
+    }
+    touch_ += mass;
+    const double low = landing_.next(std::max(first, barrier)), high = landing_.next(second);
+    middle_ += mass * (low + high) / 2;
+    const double above = (at_ - low) / blur_, below = (at_ - high) / blur_;
+    if (above < -8) return;
+    if (below > 8) {
+      below_ += mass;
+    } else if (above - below < thin) {
+      const double z = (above + below) / 2;
+      density_ += mass * normal_density(z) / blur_;
+      below_ += mass * normal_cdf(z);
+    } else {
+      const double up = normal_cdf(above), down = normal_cdf(below);
+      density_ += mass * (up - down) / (high - low);
+      below_ += mass * (above * up + normal_density(above) - below * down - normal_density(below)) / (above - below);
+    }
+  }
+
+  void add_rest(double mass) {
+    all_ += mass;
+    rest_ += mass;
+  }
+  bool empty() const { return !(all_ > 0); }
+  double rest() const { return empty() ? 0 : rest_ / all_; }
+  NextTouch result() const {
+    if (!(touch_ > 0)) return {{0, 1}, 1};
+    // Given a slide the next foot did touch.
+    const double whole = displacement_ ? touch_ : all_, resting = displacement_ ? 0 : rest_;
+    const double width = std::hypot(blur_, unknown_error), z = (at_ - middle_ / touch_) / width;
+    const double density = (1 - unknown_share) * density_ + unknown_share * touch_ * normal_density(z) / width;
+    const double below = (1 - unknown_share) * below_ + unknown_share * touch_ * normal_cdf(z) + resting;
+    return {{density / whole, std::clamp(below / whole, 0.0, 1.0)}, displacement_ ? touch_ / all_ : 1};
+  }
+
+ private:
+  const SettledLanding& landing_;
+  std::optional<double> displacement_;
+  double slide_error_, blur_, at_;
+  double all_ = 0, rest_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0;
+};
+
+// Landings whose first impact left omega+: cells around twelve restitutions, and the sticking foot.
+void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share, double omega_plus) {
+  const FirstImpact first(landing, omega_plus);
+  const double eta_stuck = first.sticking_restitution(), critical = landing.sticking();
+  struct Node {
+    double mass, carried, slide;
+  };
+  std::array<Node, nodes_of_restitution> nodes{};
+  std::size_t count = 0;
+  const double to = std::min(eta_stuck, weights.most_restitution());
+  restitutions(std::min(weights.least_restitution(), to - 1e-3), to, [&](double eta, double weight) {
+    const auto [mu, rate] = first.friction(eta);
+    const double mass = share * weight * weights.restitution_density(eta) * weights.friction_density(mu) * rate;
+    if (!(mass > 0)) return;
+    const LandingShares::Kept kept = landing.carried({eta, mu});
+    nodes[count++] = {mass, kept.share, kept.displacement};
+  });
+  for (std::size_t k = 0; k < count; ++k) {
+    const double here = nodes[k].carried;
+    const double before = k > 0 ? (nodes[k - 1].carried + here) / 2 : here;
+    const double after = k + 1 < count ? (nodes[k + 1].carried + here) / 2 : here;
+    sum.add(nodes[k].mass, before, after, nodes[k].slide);
+  }
+  const double stuck = share * weights.friction_above(critical) * first.sticking_rate();
+  if (const double mass = stuck * weights.restitution_density(std::max(0.0, eta_stuck)); mass > 0) {
+    const LandingShares::Kept kept = landing.carried({std::max(0.0, eta_stuck), critical});
+    sum.add(mass, kept.share, kept.share, kept.displacement);
+  }
+}
+
+// All landings: for twelve restitutions cells of friction, and the sticking foot between its neighbours.
+void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
+  constexpr int cells = 12;
+  const double critical = landing.sticking(), off = critical - landing.place.leg().sticking;
+  struct Stuck {
+    double mass, carried, slide;
+  };
+  std::array<Stuck, nodes_of_restitution> stuck{};
+  std::size_t count = 0;
+  restitutions(weights.least_restitution(), weights.most_restitution(), [&](double eta, double weight) {
+    const double mass = share * weight * weights.restitution_density(eta);
+    const double resting = landing.place.resting_friction(eta) + off, width = critical - resting;
+    // From somewhat below the grid's mu_r, that the wheel's own may be lower.
+    const double start = resting - 0.1 * width;
+    double above = weights.friction_above(start);
+    LandingShares::Kept last = landing.carried({eta, start});
+    sum.add_rest(mass * (1 - above));
+    for (int k = 0; k <= cells; ++k) {
+      const double part = static_cast<double>(k) / cells, mu = resting + part * part * width;
+      const double next_above = weights.friction_above(mu);
+      const LandingShares::Kept here = landing.carried({eta, mu});
+      sum.add(mass * (above - next_above), last.share, here.share, (last.displacement + here.displacement) / 2);
+      above = next_above;
+      last = here;
+    }
+    stuck[count++] = {mass * above, last.share, last.displacement};
+  });
+  for (std::size_t k = 0; k < count; ++k) {
+    const double here = stuck[k].carried;
+    sum.add(stuck[k].mass, k > 0 ? (stuck[k - 1].carried + here) / 2 : here,
+            k + 1 < count ? (stuck[k + 1].carried + here) / 2 : here, stuck[k].slide);
+  }
+}
+
+// Adds usual and rare frictions.
+template <class Add>
+void of_each_friction(const SettledContact& contact, Add add) {
+  if (contact.rare_share < 1) add(Weights(contact, 1), 1 - contact.rare_share);
+  if (contact.rare_share > 0) add(Weights(contact, contact.rare_ratio), contact.rare_share);
+}
+
+void add_landings(TouchSum& sum, const SettledLanding& landing, const SettledContact& contact,
+                  std::optional<double> omega_plus) {
+  if (omega_plus)
+    of_each_friction(
+        contact, [&](const Weights& weights, double share) { add_along(sum, landing, weights, share, *omega_plus); });
+  if (!sum.empty()) return;  // else no contact gives that omega+: it says nothing
+  of_each_friction(contact, [&](const Weights& weights, double share) { add_all(sum, landing, weights, share); });
+}
+
+}  // namespace
+
+double SettledLanding::next(double squared) const {
+  const double taken = dragged[0] + squared * (dragged[1] + squared * dragged[2]);
+  return next_ratio * std::sqrt(std::max(1e-6, next_rate * squared + next_gain - taken));
+}
+
+double SettledLanding::first_impact(const Contact& contact) const {
+  const double mu = std::min(contact.friction, sticking());
+  const double lost =
+      (1 + contact.restitution) * chord * (ahead - mu * height) / (gyration_sq + ahead * ahead - mu * ahead * height);
+  const double kept = 1 - lost;
+  if (!(kept > 0)) return 0;
+  return std::sqrt(std::max(0.0, 1 - loss_ratio * (1 - kept * kept)));
+}
+
+LandingShares::Kept SettledLanding::carried(const Contact& contact) const {
+  const double critical = sticking(), own = place.leg().sticking;
+  LandingShares::Kept kept = place.at(contact.restitution, contact.friction - critical + own);
+  const double plastic = 1 - chord * ahead / (gyration_sq + ahead * ahead + height * height);
+  kept.share += plastic * plastic - place.leg().plastic;
+  kept.share = (1 - loss_ratio * (1 - kept.share)) * omega * omega;
+  return kept;
+}
+
+SpeedDensity after_first_impact(const SettledLanding& landing, const SettledContact& contact, double omega_plus) {
+  const FirstImpact first(landing, omega_plus);
+  const double eta_stuck = first.sticking_restitution(), critical = landing.sticking();
+  SpeedDensity result;
+  of_each_friction(contact, [&](const Weights& weights, double share) {
+    result.below += share * weights.restitution_above(eta_stuck);
+    result.density +=
+        share * weights.friction_above(critical) * weights.restitution_density(eta_stuck) * first.sticking_rate();
+    restitutions(weights.least_restitution(), std::min(eta_stuck, weights.most_restitution()),
+                 [&](double eta, double weight) {
+                   const auto [mu, rate] = first.friction(eta);
+                   const double here = share * weight * weights.restitution_density(eta);
+                   result.density += here * weights.friction_density(mu) * rate;
+                   result.below += here * (1 - weights.friction_above(mu));
+                 });
+  });
+  result.below = std::clamp(result.below, 0.0, 1.0);
+  return result;
+}
+
+NextTouch at_next_touch(const SettledLanding& landing, const SettledContact& contact, const SeenOfLanding& seen,
+                        double blur, double next) {
+  TouchSum sum(landing, seen, blur, next);
+  add_landings(sum, landing, contact, seen.omega_plus);
+  return sum.result();
+}
+
+double rest_share(const SettledLanding& landing, const SettledContact& contact, std::optional<double> omega_plus) {
+  TouchSum sum(landing, {}, 1, 0);
+  add_landings(sum, landing, contact, omega_plus);
+  return sum.rest();
+}
+
+}  // namespace metastable::dynamics

@@ -1,0 +1,204 @@
+#include "dynamics/wheel/settled_density.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <ostream>
+#include <random>
+#include <vector>
+
+#include "dynamics/settled/settled_motion.h"
+#include "dynamics/settled/share_grid.h"
+#include "dynamics/wheel/extended_wheel.h"
+
+namespace metastable::dynamics {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr double slope = 7.02 * degree;
+constexpr ContactSpread usual{0.4, 0.05, 0.38, 0.03};
+
+// Equal legs, whose grid is one leg's.
+Wheel equal_wheel() {
+  Wheel wheel;
+  wheel.leg_length.assign(8, 0.152);
+  wheel.radius_of_gyration = 0.0424;
+  wheel.tip_radius = 0.0005;
+  return wheel;
+}
+
+SettledWheel rigid(const Wheel& wheel, double at = slope) { return settled_wheel(wheel, at); }
+
+std::shared_ptr<const LandingShares> grid() {
+  static const std::shared_ptr<const LandingShares> built = share_grid(rigid(equal_wheel()), 4, 6, usual);
+  return built;
+}
+
+ExtendedWheel extended(const Extension& extension = {}) {
+  return {equal_wheel(), slope, Law::settled, usual, extension, grid()};
+}
+
+class Draws {
+ public:
+  Contact contact() {
+    return {std::clamp(usual.restitution_mean + usual.restitution_sd * normal_(bits_), 0.0, 1.0),
+            std::max(0.0, usual.friction_mean + usual.friction_sd * normal_(bits_))};
+  }
+  double normal() { return normal_(bits_); }
+
+ private:
+  std::mt19937_64 bits_{5};
+  std::normal_distribution<double> normal_;
+};
+
+// Largest distance of the draws' distribution function from `below`, times the root of their number.
+double kolmogorov(std::vector<double> drawn, const std::function<double(double)>& below) {
+  std::sort(drawn.begin(), drawn.end());
+  const auto count = static_cast<double>(drawn.size());
+  double most = 0;
+  for (std::size_t i = 0; i < drawn.size(); i += 7) {
+    if (drawn[i] <= 0) continue;  // rests
+    const double share = below(drawn[i]);
+    most = std::max(
+        {most, std::abs(share - static_cast<double>(i) / count), std::abs(share - static_cast<double>(i + 1) / count)});
+  }
+  return most * std::sqrt(count);
+}
+
+constexpr double kolmogorov_999 = 1.95;
+
+TEST(ShareGrid, KeepsWhatLandingsThatAreFollowedKeep) {
+  const SettledMotion motion(rigid(equal_wheel()));
+  Draws draws;
+  std::vector<double> off;
+  int misjudged = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double omega = 4.2 + 1.5 * i / 400;
+    const Contact contact = draws.contact();
+    const Landing landing = motion.land(3, omega, contact);
+    const LandingShares::Place place = grid()->place(3, omega);
+    const LandingShares::Kept kept = place.at(contact.restitution, contact.friction);
+    const bool rests = kept.share * omega * omega < place.leg().barrier_squared;
+    misjudged += rests != (landing.end == LandingEnd::rest);
+    if (!rests && landing.end != LandingEnd::rest)
+      off.push_back(std::abs(kept.share - landing.carried_squared / (omega * omega)));
+  }
+  std::sort(off.begin(), off.end());
+  EXPECT_LT(off[off.size() / 2], 2e-4);
+  EXPECT_LT(off[off.size() * 95 / 100], 2e-3);
+  EXPECT_LE(misjudged, 1);
+}
+
+TEST(SettledDensity, OfTheFirstImpactIsThatOfDrawnContacts) {
+  const ExtendedWheel wheel = extended();
+  const StepContext context{.leg = 2};
+  Draws draws;
+  std::vector<double> drawn;
+  for (int i = 0; i < 20000; ++i) drawn.push_back(wheel.omega_plus(context, 4.9, draws.contact(), false).value_or(0));
+  const auto below = [&](double plus) { return wheel.after_collision(context, 4.9, plus).below; };
+  EXPECT_LT(kolmogorov(drawn, below), kolmogorov_999);
+  for (const double plus : {2.0, 2.7, 3.0, 3.2})
+    EXPECT_NEAR(wheel.after_collision(context, 4.9, plus).density, (below(plus + 1e-4) - below(plus - 1e-4)) / 2e-4,
+                2e-3);
+}
+
+TEST(SettledDensity, OfTheNextTouchIsThatOfDrawnContacts) {
+  const ExtendedWheel wheel = extended();
+  const StepContext context{.leg = 2};
+  constexpr double omega = 4.9, blur = 0.01;
+  Draws draws;
+  std::vector<double> drawn;
+  for (int i = 0; i < 5000; ++i) {
+    const auto next = wheel.land(context, omega, draws.contact(), false).next;
+    drawn.push_back(next ? *next + blur * draws.normal() : 0);
+  }
+  const auto below = [&](double next) { return wheel.at_next_touch(context, omega, {}, blur, next).speed.below; };
+  EXPECT_LT(kolmogorov(drawn, below), kolmogorov_999);
+}
+
+// What a landing says given omega+, averaged over omega+, is what it says without.
+TEST(SettledDensity, GivenTheFirstImpactAveragesToThatWithout) {
+  const ExtendedWheel wheel = extended();
+  const StepContext context{.leg = 2};
+  constexpr double omega = 4.6, blur = 0.02, step = 0.01;
+  double rests = 0, below = 0, mass = 0;
+  for (double plus = 0.02; plus < 4; plus += step) {
+    const double weight = step * wheel.after_collision(context, omega, plus).density;
+    mass += weight;
+    if (!(weight > 0)) continue;
+    rests += weight * wheel.rest_share(context, omega, plus);
+    below += weight * wheel.at_next_touch(context, omega, {plus, {}}, blur, 4.7).speed.below;
+  }
+  EXPECT_NEAR(mass, 1, 2e-3);
+  EXPECT_NEAR(rests, wheel.rest_share(context, omega, {}), 2e-3);
+  EXPECT_NEAR(below, wheel.at_next_touch(context, omega, {}, blur, 4.7).speed.below, 5e-3);
+}
+
+// An effect moves the next speed as it does in a wheel that is built so and followed.
+struct BuiltEffect {
+  const char* name;
+  Extension extension;
+  std::function<SettledMotion()> built;
+  double tolerance;  // of the change
+};
+
+void PrintTo(const BuiltEffect& effect, std::ostream* out) { *out << effect.name; }
+
+class EffectOnLanding : public testing::TestWithParam<BuiltEffect> {};
+
+TEST_P(EffectOnLanding, IsThatOfTheWheelBuiltSo) {
+  const SettledMotion stated(rigid(equal_wheel())), built = GetParam().built();
+  const ExtendedWheel plain = extended(), changed = extended(GetParam().extension);
+  for (const Contact contact : {Contact{0.4, 0.45}, Contact{0.3, 0.36}}) {
+    const double omega = 4.9;
+    const double followed = built.step(1, omega, contact).omega_minus - stated.step(1, omega, contact).omega_minus;
+    const double read =
+        *changed.land({.leg = 1}, omega, contact, false).next - *plain.land({.leg = 1}, omega, contact, false).next;
+    EXPECT_NEAR(read, followed, GetParam().tolerance * std::abs(followed) + 1e-3) << contact.friction;
+  }
+}
+
+std::vector<BuiltEffect> built_effects() {
+  const auto with = [](const std::function<void(Extension&)>& change) {
+    Extension extension;
+    change(extension);
+    return extension;
+  };
+  const auto heavier = [](SettledWheel wheel, double ratio) {
+    wheel.radius_of_gyration *= std::sqrt(ratio);
+    return SettledMotion(wheel);
+  };
+  const auto dragged = [](const std::function<void(SettledWheel&)>& change) {
+    SettledWheel wheel = rigid(equal_wheel());
+    change(wheel);
+    return SettledMotion(wheel);
+  };
+  return {
+      {"slope_offset", with([](Extension& e) { e.slope_offset = 0.25 * degree; }),
+       [] { return SettledMotion(rigid(equal_wheel(), slope + 0.25 * degree)); }, 0.05},
+      {"hub_inertia", with([](Extension& e) { e.hub_inertia_ratio = 1.2; }),
+       [heavier] { return heavier(rigid(equal_wheel()), 1.2); }, 0.35},
+      {"axle_drag_viscous", with([](Extension& e) { e.viscous = 0.002; }),
+       [dragged] { return dragged([](SettledWheel& w) { w.linear_drag = 0.002; }); }, 0.1},
+      {"rolling_resistance", with([](Extension& e) { e.rolling = 0.01; }),
+       [dragged] { return dragged([](SettledWheel& w) { w.constant_drag = 0.01; }); }, 0.1},
+      {"air_drag", with([](Extension& e) { e.air = 0.0004; }),
+       [dragged] { return dragged([](SettledWheel& w) { w.quadratic_drag = 0.0004; }); }, 0.1},
+      {"leg_lengths", with([](Extension& e) { e.leg_change = {0, 0.001, 0, 0, 0, 0, 0, 0}; }),
+       [] {
+         Wheel wheel = equal_wheel();
+         wheel.leg_length[1] += 0.001;
+         return SettledMotion(rigid(wheel));
+       },
+       0.1},
+  };
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EffectOnLanding, testing::ValuesIn(built_effects()),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace metastable::dynamics
