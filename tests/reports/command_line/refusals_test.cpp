@@ -46,7 +46,7 @@ TEST_F(Refusals, OfWheelsThatSettledDoesNotHold) {
   };
   expect_refused({
       {steps({"--radius-of-gyration", "0"}),
-       "--radius-of-gyration: 0 m is outside (0, 0.4556] m (3 mean legs; law settled)"},
+       "--radius-of-gyration: 0 m is outside (0, 0.4557] m (3 mean legs; law settled)"},
       {steps({"--radius-of-gyration", "-1"}), "--radius-of-gyration: -1 is outside [0, 1000]"},
       {steps({"--tip-radius", "0.01"}),
        "tip_radius: 0.01 m is outside [0, 0.00754] m (a twentieth of the shortest leg)"},
