@@ -24,7 +24,7 @@ SavitzkyGolay::SavitzkyGolay(int window, int degree, int derivative) : window_(w
   Eigen::MatrixXd powers(window, degree + 1);
   for (int i = 0; i < window; ++i)
     for (int p = 0; p <= degree; ++p) powers(i, p) = std::pow(position(i), p);
-  // Normal equations: at these degrees and on [-1, 1] they lose no more than a few digits.
+  // On [-1, 1] and at these degrees normal equations lose no more than a few digits.
   const Eigen::MatrixXd fit =
       markov::solve_columns(powers.transpose() * powers, powers.transpose());  // samples to coefficients
   weights_.resize(static_cast<std::size_t>(window) * static_cast<std::size_t>(window));
