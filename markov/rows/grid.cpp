@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t chunk = 256;
 
-// 1 + min(max((state - front) * scale, 0), most), cut to whole numbers; 0 for -infinity. Is every state a number?
+// Finds 1 + min(max((state - front) * scale, 0), most), cut to whole numbers; 0 for -infinity. Is every state a number?
 METASTABLE_WIDE bool find_buckets(std::span<const double> state, double front, double scale, double most,
                                   std::int32_t* bucket) {
   std::int64_t numbers = 0;
@@ -84,7 +84,7 @@ void Grid::tally(std::span<const double> state, std::span<const double> weight, 
     }
     return;
   }
-  // Without branches: a landing that cannot be foreseen costs no more than one that can.
+  // It does without branches: a landing that cannot be foreseen costs no more than one that can.
   std::array<std::int32_t, chunk> slot;
   const auto most = static_cast<double>(table_.size() - 1);
   const std::int32_t* const start = start_.data();
