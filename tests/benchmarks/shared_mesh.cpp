@@ -1,5 +1,5 @@
-// One mesh of three dimensions across the ranks of mpirun, of a map that costs next to nothing: what rows, products and
-// solvers take by themselves. Expected steps are known from quadrature in one dimension.
+// Times one mesh of three dimensions across the ranks of mpirun, of a map that costs next to nothing: what rows,
+// products and solvers take by themselves. Expected steps are known from quadrature in one dimension.
 //   mpirun -n 2 shared_mesh SPACING [SCORE_SPACING]
 
 #include <fmt/format.h>

@@ -44,7 +44,7 @@ TEST(Comparison, NoRatioWhereOneSideIsInfinite) {
   EXPECT_TRUE(contrast.trials_needed);  // trials that rest tell it from one that does not
 }
 
-// Two geometric lifetimes, failure 0.5 and 0.25 a step, seen for 2 collisions: min(T, 3) has means 1.75 and 2.3125.
+// Of two geometric lifetimes, failure 0.5 and 0.25 a step, seen for 2 collisions, min(T, 3) has means 1.75 and 2.3125.
 TEST(Comparison, TrialsToTellApartByHand) {
   const std::vector<double> a{1, 0.5, 0.25}, b{1, 0.75, 0.5625};
   const double var_a = (1 + 3 * 0.5 + 5 * 0.25) - 1.75 * 1.75, var_b = (1 + 3 * 0.75 + 5 * 0.5625) - 2.3125 * 2.3125;
