@@ -16,7 +16,7 @@ Fit at_nominal(const TransitionModel& model) {
   return fit;
 }
 
-// The measured speeds' means and standard errors, by hand from the trials.
+// The measured speeds' means and standard errors are taken by hand from the trials.
 TEST(CollisionProfile, MeasuredMeansAreThoseOfTheTrials) {
   Experiment e = test::wheel_design(7, 3);  // four trials on the first ramp, three on the second
   for (std::size_t t = 0; t < 7; ++t)
