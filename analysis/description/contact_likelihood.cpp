@@ -253,7 +253,8 @@ ContactLikelihood::Value ContactLikelihood::rest(const Observed& observed, const
 
 double ContactLikelihood::operator()(const ContactParameters& p, ContactParameters* gradient) const {
   const dynamics::TruncatedNormal restitution(p[0], p[1], 0, 1), friction(p[2], p[3], 0);
-  // What the truncation leaves of both normals, from the tails that do not cancel, and its logarithm's derivatives.
+  // It is what the truncation leaves of both normals, from the tails that do not cancel, and its logarithm's
+  // derivatives.
   const double low = -p[0] / p[1], high = (1 - p[0]) / p[1];
   const double of_restitution = p[0] < 0.5 ? dynamics::normal_cdf(-low) - dynamics::normal_cdf(-high)
                                            : dynamics::normal_cdf(high) - dynamics::normal_cdf(low);

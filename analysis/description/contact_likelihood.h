@@ -31,7 +31,7 @@ class ContactLikelihood {
   /// them vanishes. Fills `gradient`, if given, with the derivatives by the parameters (NaN where it is infinite).
   double operator()(const ContactParameters& parameters, ContactParameters* gradient = nullptr) const;
 
-  /// Transitions that some eta and mu can lead to, and how many others there are.
+  /// Count the transitions that some eta and mu can lead to, and how many others there are.
   std::size_t possible() const { return possible_.size(); }
   std::size_t possible_rests() const { return rests_; }
   std::size_t impossible() const { return impossible_; }

@@ -103,7 +103,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   for (Eigen::Index k = 0; k < events; ++k)
     scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
   scan.trials_suffice = model.trials() >= enough_trials && model.events().size() >= enough_transitions * model.trials();
-  // At the fit the nuisances' scores and their prior's balance: the plain sum of the slopes is efficient already.
+  // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
   const Eigen::VectorXd total = all.slope.colwise().sum();
 
   for (ScannedEffect& effect : scan.effects) {

@@ -283,8 +283,8 @@ void standardise(std::vector<GapCell>& cells, const std::vector<Column>& columns
     const auto c = static_cast<Eigen::Index>(k);
     // The variance is summed by event: without a gap events are independent, and there are many more than trials.
     const double sum = efficient.sums[c], whole = efficient.whole_norm[c];
-    // The model's own variance, less the share that the fitted parameters take off: where nothing rare happened (no
-    // rest, no far score) the events themselves show almost none.
+    // It is the model's own variance, less the share that the fitted parameters take off: where nothing rare happened
+    // (no rest, no far score) the events themselves show almost none.
     // Where nearly all of the column is explained there is nothing left to say: a tenth is kept as the least share.
     const double squares = efficient.dense.col(c).squaredNorm();
     const double kept = whole > 0 ? squares / whole : 1;

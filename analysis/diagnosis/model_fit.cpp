@@ -9,7 +9,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is the optimum
-// Where no step rises: a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
+// Where no step rises, a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
 // what differences do not resolve.
 constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve

@@ -15,7 +15,7 @@ struct Derivatives {
   Eigen::MatrixXd change;  ///< [events x parameters] of the normal score
 };
 
-/// What a fit has found of a hypothesis.
+/// Holds what a fit has found of a hypothesis.
 struct Fit {
   std::vector<double> nuisance;
   std::vector<EffectTerm> terms;

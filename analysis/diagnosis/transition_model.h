@@ -1,6 +1,6 @@
 #pragma once
 // States what the diagnosis knows of a system: one-step transition densities of its measured trials, with effects that
-// can be added. No wheel in here: any stochastic return map can be diagnosed that has these members.
+// can be added. No wheel stands in here: any stochastic return map can be diagnosed that has these members.
 
 #include <cstdint>
 #include <functional>
@@ -130,7 +130,7 @@ class TransitionModel {
   /// Gives the densities with these nuisances and effects. Values outside a model's reach give a very small density,
   /// never a NaN.
   virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const = 0;
-  /// Whether a recalibration refits the noise of every step, so that it takes up part of a large gap.
+  /// Says whether a recalibration refits the noise of every step, so that it takes up part of a large gap.
   virtual bool refits_noise() const { return false; }
   /// Offers starts that the data themselves suggest for a fit of these terms, tried beside the usual one. The default
   /// offers none.

@@ -1,5 +1,5 @@
 #pragma once
-// Measured (or simulated) trials read from an experiment folder: experiment.toml, collisions.csv, trials.csv.
+// Holds measured (or simulated) trials, read from an experiment folder: experiment.toml, collisions.csv, trials.csv.
 
 #include <cstddef>
 #include <filesystem>

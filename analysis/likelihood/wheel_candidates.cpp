@@ -298,7 +298,7 @@ WheelCandidate slip_reversal(const WheelDesign& design) {
 std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
   constexpr const char* after_another = "collisions with one before them in their trial";
   constexpr const char* away = "collisions away from the start";
-  // A mean and a spread, or a trend, and as many again to judge them by.
+  // It needs a mean and a spread, or a trend, and as many again to judge them by.
   return {
       needing(5, design.launches, "launches where a launch speed is stated", initial_speed(design)),
       leg_lengths(design),

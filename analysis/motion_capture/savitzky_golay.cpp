@@ -18,7 +18,7 @@ SavitzkyGolay::SavitzkyGolay(int window, int degree, int derivative) : window_(w
         fmt::format("window: {} is not an odd number of samples in {}..10001", window, degree + 1));
   if (derivative < 0 || derivative > degree)
     throw std::invalid_argument(fmt::format("derivative: {} is outside 0..{}", derivative, degree));
-  // Positions scaled to [-1, 1], so that the powers stay of one size.
+  // Positions are scaled to [-1, 1], so that the powers stay of one size.
   const double half = std::max(1, window / 2);
   const auto position = [&](int i) { return (i - window / 2) / half; };
   Eigen::MatrixXd powers(window, degree + 1);

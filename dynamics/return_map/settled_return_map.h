@@ -60,8 +60,8 @@ class SettledReturnMap {
   /// chance.
   std::optional<double> memory_defect(double state, int phase, std::span<const double> score,
                                       const std::function<double(double after_next)>& f) const;
-  /// "foot lifts" as under the other laws, just before the collision; "foot unsettled": the next leg touches while the
-  /// landed foot still hops or slides.
+  /// Names "foot lifts" as under the other laws, just before the collision; "foot unsettled": the next leg touches
+  /// while the landed foot still hops or slides.
   std::vector<std::string> assumptions() const;
   bool violates(int which, double state, int phase, std::span<const double> score) const;
 

@@ -12,10 +12,10 @@ namespace metastable::markov {
 
 /// Describes how survivors of an absorbing chain behave (Byl & Tedrake 2009, their lambda_2 is lambda_1 here).
 struct QuasiStationary {
-  /// Left eigenvector of lambda_1 (size n), which says what survivors look like. For period d it is the distribution
-  /// per class: each class's entries sum to one (one distribution per landing leg).
+  /// Is the left eigenvector of lambda_1 (size n), which says what survivors look like. For period d it is the
+  /// distribution per class: each class's entries sum to one (one distribution per landing leg).
   std::vector<double> distribution;
-  /// Right eigenvector, max 1, which is the relative long-run survival from each state.
+  /// Is the right eigenvector, max 1, which is the relative long-run survival from each state.
   std::vector<double> survival_weight;
   /// It is 1 - lambda_1 per step, with relative accuracy near rounding: for period d, 1 - (lambda of the
   /// revolution)^(1/d), evaluated as -expm1(log1p(-rate of the revolution) / d).

@@ -34,7 +34,7 @@ Grid::Grid(std::vector<double> edges) : edges_(std::move(edges)) {
       throw std::invalid_argument("grid: edges must be finite and strictly ascending");
   upper_.assign(edges_.begin() + 1, edges_.end());
   upper_.back() = std::numeric_limits<double>::quiet_NaN();  // nothing lies beyond the last cell, not even infinity
-  // Buckets narrower than the narrowest cell, unless cells differ so much that these would be too many.
+  // Buckets are narrower than the narrowest cell, unless cells differ so much that these would be too many.
   double narrowest = width(0);
   for (std::size_t i = 1; i < cells(); ++i) narrowest = std::min(narrowest, width(i));
   const double fine = std::ceil(1.001 * (edges_.back() - edges_.front()) / narrowest);
@@ -44,7 +44,7 @@ Grid::Grid(std::vector<double> edges) : edges_(std::move(edges)) {
   table_.resize(buckets + 1);
   std::uint32_t c = 0;
   for (std::size_t b = 0; b <= buckets; ++b) {
-    // A little below the bucket's start, so that rounding in cell() never begins beyond the right cell.
+    // It lies a little below the bucket's start, so that rounding in cell() never begins beyond the right cell.
     const double start = edges_.front() + (static_cast<double>(b) - 1e-6) / table_scale_;
     while (c + 1 < cells() && start >= edges_[c + 1]) ++c;
     table_[b] = c;

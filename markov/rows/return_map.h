@@ -73,8 +73,8 @@ class NoiseTable {
   /// rest_landing where the system comes to rest. offset has the size of next.
   virtual void land(double origin, double width, std::span<const double> offset, std::size_t first,
                     std::span<double> next) const = 0;
-  /// No state below this one survives draw k: where landings rise with the state, the state that just does. -infinity
-  /// if unknown.
+  /// No state below this one survives draw k: where landings rise with the state, it is the state that just does.
+  /// -infinity if unknown.
   virtual double lowest_survivor(std::size_t) const { return rest_landing; }
   /// Puts draw order[k] in place k; order is a permutation. Nothing happens where lowest_survivor() is unknown.
   virtual void reorder(std::span<const std::uint32_t>) {}

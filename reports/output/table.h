@@ -26,7 +26,7 @@ std::vector<std::string> provenance_lines(const Provenance& provenance);
 
 /// Ends may be infinite.
 using analysis::Estimate;
-// How numbers are shown.
+// These say how numbers are shown.
 using analysis::Decimal;
 using analysis::DecimalEstimate;
 using analysis::format_estimate;

@@ -13,7 +13,7 @@
 namespace metastable::markov {
 namespace {
 
-/// x' = x / 2 + 1 + 0.5 z, failed where x' <= 0, and two numbers that follow x.
+/// Maps x' = x / 2 + 1 + 0.5 z, failed where x' <= 0, and two numbers that follow x.
 BatchMap cheap_map() {
   BatchMap map;
   map.dimension = 3;

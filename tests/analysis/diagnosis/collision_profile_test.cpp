@@ -47,7 +47,7 @@ TEST(CollisionProfile, FewerThanThreeTrialsHaveNoMean) {
     EXPECT_EQ(p.condition, 0U);
 }
 
-// Launches that are faster by 0.5 rad/s, on the same random numbers: the first means differ by just that.
+// Launches are faster by 0.5 rad/s, on the same random numbers: the first means differ by just that.
 TEST(CollisionProfile, SimulatedMeansAreTheModels) {
   const auto model = wheel_transitions(test::wheel_design(200, 3));
   Fit chosen = at_nominal(*model);

@@ -157,7 +157,7 @@ TEST(Diagnosis, TriesThePairsAskedFor) {
   EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
 }
 
-// Noise of the contact that grows with speed: two effects on its mean that cancel one another take its shape.
+// Noise of the contact grows with speed here: two effects on its mean that cancel one another take its shape.
 TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   auto conditions = stand_in_conditions(stand_in_setting());
   const dynamics::LaboratorySetup setup =

@@ -26,7 +26,7 @@ TEST(Comparison, ASettingAgainstItselfDiffersByNothing) {
   const Comparison comparison =
       compare({paper_setting(7.02, true), paper_setting(7.02, true)}, {.cells = 64, .samples = 1024});
   EXPECT_DOUBLE_EQ(comparison.contrasts[0].ratio->value, 1.0);
-  // Common random numbers: nothing is left but the discretization errors.
+  // With common random numbers nothing is left but the discretization errors.
   EXPECT_NEAR(comparison.contrasts[0].ratio->upper, std::exp(2 * comparison.studies[0].steps.discretization_error),
               1e-9);
   EXPECT_FALSE(comparison.contrasts[0].trials_needed);

@@ -172,9 +172,9 @@ TEST(IntegratedStudy, TakesAnyNoise) {
   }
 }
 
-// metastable steps --restitution 0.4,0.2 --friction 0.45,0 --legs 0.1519 --tolerance 0.001: 3.33529 (3.33441
+// metastable steps --restitution 0.4,0.2 --friction 0.45,0 --legs 0.1519 --tolerance 0.001 says 3.33529 (3.33441
 // to 3.33617).
-// The paper's Fig. 6.
+// It is the paper's Fig. 6.
 TEST(IntegratedStudy, OfConstantFrictionAgreesWithSampling) {
   Setting setting = equal_legs(7.02, {0.45, 0});
   setting.restitution = {0.4, 0.2};

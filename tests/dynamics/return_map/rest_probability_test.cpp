@@ -46,7 +46,7 @@ double two_dimensional(const WheelMap& map, double state) {
   double total = 0;
   constexpr int panels = 40;
   for (int i = 0; i < panels; ++i) {
-    // panels shrink towards eta = 0, where T_r has its logarithm
+    // Panels shrink towards eta = 0, where T_r has its logarithm.
     const double a = std::pow(i / double(panels), 3), b = std::pow((i + 1) / double(panels), 3);
     total += Gauss::integrate([&](double e) { return eta.density(e) * inner(e); }, a, b);
   }
@@ -97,7 +97,7 @@ TEST(RestProbability, AgreesWithTheOtherOrderOfIntegrationForCoulomb) {
   EXPECT_GE(reachable, 4);
 }
 
-// Far tails: on ln p the two ways must agree to the accuracy of the quadrature, at 1e-20 and far below.
+// In far tails, on ln p, the two ways must agree to the accuracy of the quadrature, at 1e-20 and far below.
 TEST(RestProbability, KeepsRelativeAccuracyInTheFarTail) {
   double smallest = 1;
   for (double mean : {0.3, 0.25})

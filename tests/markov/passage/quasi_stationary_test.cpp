@@ -180,7 +180,7 @@ TEST(StationaryWithRestart, IsInvariantUnderTheRestartedChain) {
             "stationary distribution with restart: the restart has no mass");
 }
 
-// Two states that swap with probability 1/4 and rest never: the difference halves every step.
+// Two states swap with probability 1/4 and never rest: the difference halves every step.
 TEST(Mixing, GeometricDecayInClosedForm) {
   const ChainSolver solver(Chain({0, 1, 2}, {1, 0}, {0.25, 0.25}, {1e-15, 1e-15}));
   const QuasiStationary quasi = quasi_stationary(solver);

@@ -83,7 +83,7 @@ class Import : public test::InFolder {
     return metastable(words);
   }
 
-  // The experiment that was imported is the known one; numbers to a relative `close`.
+  // The experiment that was imported is the known one, numbers to a relative `close`.
   void expect_same(const Ran& ran, double close = 0) const {
     ASSERT_EQ(ran.code, 0) << ran.err;
     const Experiment read = analysis::read_experiment(folder_ / "out");
