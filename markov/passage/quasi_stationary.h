@@ -29,10 +29,10 @@ struct QuasiStationary {
 /// Iterates inversely with the subtraction-free factors, each time followed by one step of the chain (iterates stay
 /// positive; an iteration shrinks the rest by (1 - lambda_1) |lambda_2| / (lambda_1 |1 - lambda_2|)). A chain that
 /// cannot visit a state twice has lambda_1 = 0: failure_rate = 1, and the distribution is that of the last survivors
-/// (zero on classes they do not reach). O(n^2) an iteration for full rows. Where 500 iterations were not enough, because
-/// |lambda_2| is nearly lambda_1, shifts follow (Noda, Numer. Math. 17, 1971), each with an elimination.
-/// Where nobody survives (lambda_1 < 1e-13) the vectors are those of 100 iterations, settled or not; where hardly
-/// anybody does (lambda_1 < 1e-6), those of 500.
+/// (zero on classes they do not reach). O(n^2) an iteration for full rows. Where 500 iterations were not enough,
+/// because |lambda_2| is nearly lambda_1, shifts follow (Noda, Numer. Math. 17, 1971), each with an elimination. Where
+/// nobody survives (lambda_1 < 1e-13) the vectors are those of 100 iterations, settled or not; where hardly anybody
+/// does (lambda_1 < 1e-6), those of 500.
 /// @throws ConvergenceError("inverse iteration", residual, ...) after 10000 iterations of interpolated rows, or 100
 /// shifts of others.
 QuasiStationary quasi_stationary(const ChainSolver& solver);
