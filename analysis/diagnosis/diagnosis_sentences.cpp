@@ -27,7 +27,7 @@ std::string with_parameters(const Cause& cause) {
   return text;
 }
 
-// Where something without a name acts, were it at work alone or beside a cause that is.
+// Says where something without a name acts, were it at work alone or beside a cause that is.
 void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
   const auto most = std::max_element(d.causes.unnamed.begin(), d.causes.unnamed.end(),
                                      [](const Unnamed& a, const Unnamed& b) { return a.evidence < b.evidence; });

@@ -18,7 +18,7 @@ constexpr double beyond_doubt = 5;      // [standard deviations]
 constexpr double least_left = 0.1;      // share of a column that is kept where the fitted parameters explain nearly all
 constexpr double usual_critical = 3.5;  // of the largest statistic, where no chance is drawn
 
-// What is drawn anew, and how much trials scatter beyond it.
+// Holds what is drawn anew, and how much trials scatter beyond it.
 struct Units {
   Eigen::MatrixXd rows;        // [trials or events x columns]
   Eigen::RowVectorXd scatter;  // of the columns' sums, by the trials' own; 0 where trials are drawn
@@ -46,8 +46,8 @@ Units units_of_chance(const EfficientColumns& efficient, const TransitionModel& 
   return units;
 }
 
-// How much of a shift of the cell the fitted parameters leave, by the slopes of its scores: where the gap is large the
-// events' own products say too much.
+// Says how much of a shift of the cell the fitted parameters leave, by the slopes of its scores: where the gap is large
+// the events' own products say too much.
 double left_of_shift(const MapColumn& column, const Fit& fit) {
   Eigen::VectorXd follows = Eigen::VectorXd::Zero(fit.derivatives.change.cols());
   for (std::size_t k = 0; k < column.terms.size(); ++k) {
@@ -65,8 +65,8 @@ void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& colu
     const auto c = static_cast<Eigen::Index>(k);
     // The variance is summed by event: without a gap events are independent, and there are many more than trials.
     const double sum = efficient.sums[c], whole = efficient.whole_norm[c];
-    // The model's own variance, less the share that the fitted parameters take off: where nothing rare happened (no
-    // rest, no far score) the events themselves show almost none.
+    // It is the model's own variance, less the share that the fitted parameters take off: where nothing rare happened
+    // (no rest, no far score) the events themselves show almost none.
     // Where nearly all of the column is explained there is nothing left to say: a tenth is kept as the least share.
     const double squares = efficient.dense.col(c).squaredNorm();
     const double kept = whole > 0 ? squares / whole : 1;
@@ -80,7 +80,7 @@ void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& colu
       const double plain = std::clamp(sum / std::sqrt(own), -beyond_doubt, beyond_doubt);
       if (std::abs(plain) > std::abs(cell.statistic)) cell.statistic = plain;
     }
-    // EfficientColumns size: the score by its information, so that size and statistic have one sign.
+    // The efficient size is the score by its information, so that size and statistic have one sign.
     const bool shift = column.measure == Measure::shift;
     const double left = shift && fit.derivatives.change.cols() > 0 ? left_of_shift(column, fit) : kept;
     const double information = std::max(1e-12, std::max(least_left, left) * column.variance);
@@ -92,7 +92,7 @@ void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& colu
   }
 }
 
-// The columns around their means, of norm 1: sums of rows times normals are statistics by chance.
+// Takes the columns around their means, of norm 1: sums of rows times normals are statistics by chance.
 Eigen::MatrixXd centred(const Eigen::MatrixXd& rows) {
   const Eigen::RowVectorXd mean = rows.colwise().mean();
   Eigen::MatrixXd all = rows.rowwise() - mean;
@@ -106,7 +106,7 @@ Eigen::MatrixXd centred(const Eigen::MatrixXd& rows) {
   return all;
 }
 
-// Step-down max-T (Westfall and Young): the largest statistic against the largest by chance, the next against the
+// Steps down by max-T (Westfall and Young): the largest statistic against the largest by chance, the next against the
 // largest of those left, and so on; and the bands that hold all cells at once.
 void step_down(std::vector<GapCell>& cells, const std::vector<std::size_t>& order, const Eigen::MatrixXd& rows,
                int draws, std::uint64_t seed) {
@@ -131,7 +131,7 @@ void step_down(std::vector<GapCell>& cells, const std::vector<std::size_t>& orde
   for (std::size_t k = 0; k < order.size(); ++k) {
     GapCell& cell = cells[order[k]];
     double p = (exceeded[k] + 1.0) / (draws + 1.0);
-    // Where no draw reached it: Sidak's bound from the cell's own p-value, if that is smaller.
+    // Where no draw reached it this takes Sidak's bound from the cell's own p-value, if that is smaller.
     if (exceeded[k] == 0) p = std::min(p, static_cast<double>(order.size() - k) * cell.p_value);
     adjusted = std::max(adjusted, std::min(1.0, p));
     cell.p_adjusted = adjusted;
@@ -140,7 +140,7 @@ void step_down(std::vector<GapCell>& cells, const std::vector<std::size_t>& orde
   }
 }
 
-// Benjamini and Hochberg's. @param order  of falling statistics
+// Applies Benjamini and Hochberg's procedure. @param order  of falling statistics
 void discover(std::vector<GapCell>& cells, const std::vector<std::size_t>& order) {
   double discovery = 1;
   for (std::size_t k = order.size(); k-- > 0;) {

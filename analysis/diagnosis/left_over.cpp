@@ -20,7 +20,7 @@ constexpr int most_cycles = 4;            // of a slow swing over the trials
 constexpr std::size_t least_events = 40;  // of a column that the map lacks
 constexpr double least_own = 0.1;         // share of a facet's direction that the fitted parameters leave, to be judged
 
-// Columns by facet, aspect and phase.
+// Holds columns by facet, aspect and phase.
 using Key = std::tuple<std::string, std::string, bool>;
 using Facets = std::map<Key, std::vector<MapColumn>>;
 
@@ -71,7 +71,7 @@ class Gatherer {
   bool stance_;
 };
 
-// Facets that the map lacks.
+// Adds facets that the map lacks.
 void add_unmapped(Facets& facets, const TransitionModel& model, const std::vector<EventResidual>& left, bool stance) {
   const Gatherer gather(model, left, stance);
   const double trials = static_cast<double>(model.trials());
@@ -97,7 +97,7 @@ void add_unmapped(Facets& facets, const TransitionModel& model, const std::vecto
   gather.change_of_speed(facets);
 }
 
-// The columns' sums by what they scatter without a gap, in the directions that the fitted parameters leave.
+// Weighs the columns' sums by what they scatter without a gap, in the directions that the fitted parameters leave.
 LeftInFacet judge(const Key& key, const Eigen::MatrixXd& dense, const Eigen::VectorXd& sums,
                   const Eigen::VectorXd& whole, double forgiven) {
   LeftInFacet left{.facet = std::get<0>(key), .aspect = std::get<1>(key), .stance = std::get<2>(key)};

@@ -35,9 +35,9 @@ EventResidual residual(EventKind kind, double score, double log_density) {
 
 EventKind phase_of(EventKind kind) { return is_contact(kind) ? EventKind::collision : kind; }
 
-// [rad/s] by phase, contacts as collisions: what a unit of score is in the middle of its distribution. Where a cell's
-// events are far out it is more there, and would exaggerate the shift that brought them out. Where none is in the
-// middle: the usual one.
+// Returns [rad/s] by phase, contacts as collisions, what a unit of score is in the middle of its distribution. Where a
+// cell's events are far out it is more there, and would exaggerate the shift that brought them out. Where none is in
+// the middle it is the usual one.
 std::map<EventKind, double> units_of_score(const std::vector<Event>& events, const Evaluation& evaluation) {
   std::map<EventKind, std::pair<double, double>> sums;  // and their number
   std::map<EventKind, std::vector<double>> all;
@@ -55,7 +55,7 @@ std::map<EventKind, double> units_of_score(const std::vector<Event>& events, con
   return units;
 }
 
-// Mean, spread and, of whole phases, tail share of every cell; contrasts have a mean only.
+// Adds mean, spread and, of whole phases, tail share of every cell; contrasts have a mean only.
 void add_cells(MapColumns& all, const TransitionModel& model, const std::vector<EventResidual>& residuals,
                const std::map<EventKind, double>& units) {
   const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
@@ -87,8 +87,8 @@ void add_cells(MapColumns& all, const TransitionModel& model, const std::vector<
   }
 }
 
-// Memory: successive scores of a trial; and trials that differ as a whole. By correlation, so that a model far off does
-// not pass for either.
+// Adds memory: successive scores of a trial; and trials that differ as a whole. It goes by correlation, so that a model
+// far off does not pass for either.
 void add_memory(MapColumns& all, const std::vector<Event>& events, const std::vector<EventResidual>& residuals,
                 bool stance) {
   std::vector<std::size_t> members;
@@ -131,7 +131,7 @@ void add_memory(MapColumns& all, const std::vector<Event>& events, const std::ve
   all.add(trials, "spread", "correlation", between / pairs, std::move(whole));
 }
 
-// Rests against what the model expects at the same speeds.
+// Puts rests against what the model expects at the same speeds.
 void add_rests(MapColumns& all, const TransitionModel& model, const Fit& fit) {
   const auto& events = model.events();
   const std::vector<double> chance_of_rest = model.rest_chances(fit.nuisance, fit.terms);

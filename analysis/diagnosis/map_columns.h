@@ -13,19 +13,19 @@
 
 namespace metastable::analysis {
 
-/// What an event adds to the sums of a cell: functions of its normal score, or their means given that the wheel rested
-/// (a score below that of the chance of rest) or did not. All have mean zero if the model is right.
+/// Holds what an event adds to the sums of a cell: functions of its normal score, or their means given that the wheel
+/// rested (a score below that of the chance of rest) or did not. All have mean zero if the model is right.
 struct EventResidual {
   double mean = 0, spread = 0, tail = 0;
 };
 
-/// By event.
+/// Returns what each event adds.
 std::vector<EventResidual> residuals(const TransitionModel& model, const Evaluation& evaluation);
 
-/// What a column of the map looks for: how its size follows from its sum.
+/// Says what a column of the map looks for: how its size follows from its sum.
 enum class Measure { shift, spread, tail, correlation, rests };
 
-/// Contributions of events to the statistic of one cell and aspect: their sum has mean zero without a gap.
+/// Holds the contributions of events to the statistic of one cell and aspect: their sum has mean zero without a gap.
 struct MapColumn {
   Measure measure;
   std::vector<std::pair<std::size_t, double>> terms;  // by event
@@ -53,10 +53,10 @@ struct MapColumns {
   }
 };
 
-/// The columns of all cells of the map, under this fit.
+/// Returns the columns of all cells of the map, under this fit.
 MapColumns map_columns(const TransitionModel& model, const Fit& fit);
 
-/// Columns by event, of which the part that the fitted parameters' scores explain is taken off.
+/// Holds columns by event, of which the part that the fitted parameters' scores explain is taken off.
 struct EfficientColumns {
   Eigen::MatrixXd dense;          // [events x columns]
   Eigen::RowVectorXd sums;        // of the columns

@@ -40,7 +40,7 @@ WheelRuns runs_with_legs(const Experiment& experiment) {
 
 constexpr double least_shift = 1e-4;  // of mu from day to day: no two days are more alike
 
-// Where the foot of each collision lands, by number; nothing where trials differ by more than a quarter of a step.
+// Says where the foot of each collision lands, by number; nothing where trials differ by more than a quarter of a step.
 std::vector<double> fixed_footholds(const std::vector<WheelRun>& runs) {
   std::vector<std::pair<double, double>> ends;  // least and largest
   for (const WheelRun& run : runs)
