@@ -420,10 +420,11 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const std
   for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
   // The tests decide whether there is a gap, because their levels are calibrated and the evidence's are not: where both
   // disagree, the odds of a gap go no further than even.
-  const double even = weight_null / (1 + none_prior + none);
+  none = std::max(none, none_prior);
+  const double even = weight_null / (1 + none);
   double share = 1;
   if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
-  const double weight_none = (none + none_prior) * (given_gap > 0 ? share * given_gap : even);
+  const double weight_none = none * (given_gap > 0 ? share * given_gap : even);
   const double sum = weight_null + share * given_gap + weight_none;
   d.causes.p_none = weight_none / sum;
   (d.gap.p_recalibration < recalibration_level ? d.causes.p_recalibrate : d.causes.p_no_gap) = weight_null / sum;

@@ -109,8 +109,7 @@ Table gap_table(const Diagnosis& d) {
                    {"as given", "other contact parameters", together(d.gap.p_recalibration)},
                    {"recalibrated", "anything else", together(d.gap.p_value)},
                    {"recalibrated", "the effects of the catalogue", together(d.gap.p_effects)},
-                   {"recalibrated", "the cells of the map", together(d.gap.p_where)},
-                   {"recalibrated", "whole facets", together(d.gap.p_facets)}}};
+                   {"recalibrated", "the cells of the map", together(d.gap.p_where)}}};
 }
 
 Table contact_table(const Diagnosis& d) {
