@@ -40,11 +40,11 @@ struct Verified {
 /// @param most_nodes per phase, where doubling stops whatever the change
 Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes = 512);
 
-/// The table that `settled` is read from, held against landings that are followed (SettledMapError).
+/// The table that `settled` is read from, held against landings that are followed (SettledMapErrors).
 struct VerifiedTable {
   std::string wheel;
   double slope_deg = 0;
-  dynamics::SettledMapError error;
+  dynamics::SettledMapErrors error;
 };
 /// Of the paper's wheel with J = 0.0025 kg m^2 at 7.02 deg, and of one with equal legs, an eighth of the work, at 9.59.
 std::vector<VerifiedTable> verify_tables(int threads);

@@ -2,6 +2,7 @@
 // The law `settled`: landings, steps and trials of a planar rigid wheel, followed event by event.
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "dynamics/settled/foot_strike.h"
@@ -70,9 +71,9 @@ class SettledMotion {
   Landing land(int leg, double omega_minus, const Contact& contact) const {
     return land(leg, omega_minus, contact, contact);
   }
-  /// Speed at which the landed foot slips down the plane after its first `strikes` impacts [m/s]; 0 once it has stuck,
-  /// and if fewer follow. The landing is not smooth in mu where this becomes 0.
-  double slip_after(int leg, double omega_minus, const Contact& contact, int strikes) const;
+  /// What the landed foot has left of its slip in the impact with the number `strike`; nothing if fewer follow. The
+  /// landing is not smooth in mu where either part of it becomes 0.
+  std::optional<SlipLeft> slip_left(int leg, double omega_minus, const Contact& contact, int strike) const;
   /// The same and on to the next touch, the stance integrated in time.
   Step step(int leg, double omega_minus, const Contact& landed, const Contact& old) const;
   Step step(int leg, double omega_minus, const Contact& contact) const {
@@ -95,8 +96,8 @@ class SettledRoll {
   Step step();
   /// The landing alone, until its foot has settled. Ends the roll unless it is `settled`.
   Landing land();
-  /// As SettledMotion::slip_after. Ends the roll.
-  double slip_after(int strikes);
+  /// As SettledMotion::slip_left. Ends the roll.
+  std::optional<SlipLeft> slip_left(int strike);
 
   int leg() const { return leg_; }                ///< that touches, counted on without end
   double position() const;                        ///< of its tip, down the plane from the first touch [m]

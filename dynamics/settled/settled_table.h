@@ -21,14 +21,15 @@ struct MappedLanding {
 };
 
 /// One leg's table. By restitution the speed at which even a sticking foot rests; from there on, spread in speed, mu_r
-/// and the frictions mu_2, mu_3, ... from which slip stops in the second, third, ... impact: there the landing has a
-/// kink, between them it is smooth. Landings are kept on every piece [mu_c, mu_2], ... at a few even places, on the
-/// last one, down to mu_r, spread evenly in log(1 + part / bend), part = (mu - mu_r) / (its width), bend falling
-/// exponentially with omega: steep above mu_r, nearly straight in that scale.
+/// and the frictions at which the landing has a kink: mu_2', from which slip stops before the second compression ends,
+/// and mu_2, mu_3, ..., from which it stops in the second, third, ... impact; between them it is smooth. Landings are
+/// kept on every piece [mu_c, mu_2'], [mu_2', mu_2], ... at a few even places, on the last one, down to mu_r, spread so
+/// as to follow the landing, which is steep within some `bend` of mu_r. Where the wheel barely passes, mu_r lies above
+/// kinks: there the pieces go on below it, with the omega_eq^2 of feet that stood and were turned back.
 /// Between the nodes polynomials of degree 5 are read, straight lines in eta above smooth_eta. What is read is
 /// continuous, so that chains made of it converge; where feet are still unsettled the landings themselves jump.
 struct SettledTable {
-  static constexpr int stops = 8;                // mu_2 to mu_9
+  static constexpr int stops = 9;                // mu_2', mu_2, mu_3', mu_3 to mu_8
   static constexpr int piece = 4;                // places on a piece but the last
   static constexpr double clear_of_rest = 0.02;  // the first speed, over the one at which a sticking foot rests [rad/s]
 
@@ -38,11 +39,15 @@ struct SettledTable {
   double omega_high = 9;                                  // [rad/s]
   double sticking = 0;                                    // mu_c
   bool usable = false;
-  std::array<double, 6> bend{};            // of log(bend): 1, omega times 1, eta, eta^2
+  std::array<double, 6> bend{};            // of log(bend), a friction: 1, omega times 1, eta, eta^2
   std::vector<double> standstill;          // by row [rad/s]
-  std::vector<double> edges;               // by row, speed: mu_2, mu_3, ..., mu_r
+  std::vector<double> edges;               // by row, speed: mu_2', mu_2, mu_3, ..., mu_r
   std::vector<double> kept, displacement;  // by row, speed, place: carried_squared / omega-^2, [m]
   std::vector<std::uint16_t> unsettled;    // by row, speed: a bit for each piece with an unsettled landing
+  struct Span {
+    int first = 0, count = 0;
+  };
+  std::vector<Span> known;  // by row, piece: the speeds at which all its landings are known
 
   void resize();
   double eta(int row) const;
@@ -51,6 +56,10 @@ struct SettledTable {
   double speed(double still, double share) const;
   double share(double still, double omega) const;
   double bend_at(double omega, double eta) const;
+  /// Where a friction above mu_r stands on the last piece, in [0, 1]; and back. Even in log(1 + above / bend), with
+  /// some of a straight line. @param width of the piece
+  static double place(double above, double width, double bend);
+  static double above_resting(double place, double width, double bend);
   bool holds(double eta) const { return usable && eta >= eta_low && eta <= eta_high; }
   SettledSlice slice(double eta) const;  ///< @param eta that holds()
 };
@@ -73,7 +82,7 @@ class SettledSlice {
   class Place {
    public:
     double resting_friction() const { return edge_[SettledTable::stops]; }
-    /// mu_2, mu_3, ..., mu_r: where the landing has a kink.
+    /// mu_2', mu_2, mu_3, ..., mu_r: where the landing has a kink.
     std::span<const double> edges() const { return edge_; }
     MappedLanding land(double friction) const;  ///< friction above mu_c is read as mu_c
     /// Are feet unsettled at some of the nodes around?
@@ -83,10 +92,9 @@ class SettledSlice {
     friend class SettledSlice;
     std::size_t piece_of(double friction) const;
     const SettledSlice* slice_ = nullptr;
-    double omega_ = 0;
+    double omega_ = 0, place_ = 0, bend_ = 0;
     Stencil speed_;
     std::array<double, SettledTable::stops + 1> edge_{};
-    double bend_ = 0, scale_ = 0;
     std::uint16_t rough_ = 0;  // of any node around: a bit for each piece
   };
   /// @param omega at least lowest_speed(); above the table's speeds the last one's share of omega^2 is kept
