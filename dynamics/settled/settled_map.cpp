@@ -246,13 +246,14 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
     low = below, at_low = at_below, high = above, at_high = at_above;
     break;
   }
-  for (double step = 2e-3; at_low >= 0 && low > 0;) {
+  const bool smooth = eta <= smooth_restitution;  // elsewhere landings are rough, and may take a millisecond
+  for (const double step = smooth ? 2e-3 : 1e-2; at_low >= 0 && low > 0;) {
     high = low, at_high = at_low;
     low = std::max(0.0, low - step);
     at_low = value(low);
   }
   if (at_low >= 0) return 0;
-  return rising_root(value, low, at_low, high, at_high, 1e-10);
+  return rising_root(value, low, at_low, high, at_high, smooth ? 1e-10 : 1e-6);
 }
 
 // The bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
@@ -333,7 +334,7 @@ void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
   const bool smooth = row < table.smooth_rows;
   find_edges(table, leg, row);
-  std::array<int, stops + 1> run{};  // of speeds with known landings, up to this one
+  int* known = &table.known[static_cast<std::size_t>(row) * (stops + 1)];
   for (int i = 0; i < table.speeds; ++i) {
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     const auto at = static_cast<std::size_t>(row * table.speeds + i);
@@ -380,15 +381,8 @@ void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
     }
     *kept = end_kept, *displacement = end_displacement;
     table.unsettled[at] |= static_cast<std::uint16_t>((table.unsettled[at] >> (stops - 1) & 1) << stops);
-    for (std::size_t n = 0; n <= stops; ++n) {
-      SettledTable::Span& known = table.known[static_cast<std::size_t>(row) * (stops + 1) + n];
-      run[n] = (unknown >> n & 1) != 0 ? 0 : run[n] + 1;
-      if (run[n] > known.count) known = {i + 1 - run[n], run[n]};
-    }
-  }
-  for (std::size_t n = 0; n <= stops; ++n) {
-    SettledTable::Span& known = table.known[static_cast<std::size_t>(row) * (stops + 1) + n];
-    if (known.count == 0) known = {0, table.speeds};
+    for (int n = 0; n <= stops; ++n)
+      if (smooth && 2 * i < table.speeds && (unknown >> n & 1) != 0) known[n] = i + 1;
   }
 }
 

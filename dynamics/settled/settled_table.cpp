@@ -161,13 +161,13 @@ MappedLanding SettledSlice::Place::land(double friction) const {
   const std::size_t stride = index(table.places()), first = n * piece + mu.first;
   double kept = 0, displacement = 0;
   for (std::size_t j = 0; j < row.size; ++j) {
-    const SettledTable::Span known = table.known[(row.first + j) * (stops + 1) + n];
-    Stencil some;
-    if (known.count < table.speeds) {
-      some = stencil(place_ - known.first, known.count, smooth);
-      some.first += index(known.first);
+    // Where the wheel barely passes a row's piece may begin at a higher speed.
+    const int known = table.known[(row.first + j) * (stops + 1) + n];
+    Stencil speed = speed_;
+    if (index(known) > speed.first) {
+      speed = stencil(place_ - known, table.speeds - known, place_ < known ? beyond : smooth);
+      speed.first += index(known);
     }
-    const Stencil& speed = known.count < table.speeds ? some : speed_;
     for (std::size_t i = 0; i < speed.size; ++i) {
       const std::size_t at = ((row.first + j) * index(table.speeds) + speed.first + i) * stride + first;
       double kept_here = 0, displacement_here = 0;

@@ -44,10 +44,7 @@ struct SettledTable {
   std::vector<double> edges;               // by row, speed: mu_2', mu_2, mu_3, ..., mu_r
   std::vector<double> kept, displacement;  // by row, speed, place: carried_squared / omega-^2, [m]
   std::vector<std::uint16_t> unsettled;    // by row, speed: a bit for each piece with an unsettled landing
-  struct Span {
-    int first = 0, count = 0;
-  };
-  std::vector<Span> known;  // by row, piece: the speeds at which all its landings are known
+  std::vector<int> known;                  // by row, piece: the first speed at which its landings are known
 
   void resize();
   double eta(int row) const;
@@ -67,7 +64,7 @@ struct SettledTable {
 /// The table at one restitution. Refers to the table.
 class SettledSlice {
   // Neighbouring nodes around a place on an axis and their weights: Lagrange's polynomial through them.
-  static constexpr std::size_t smooth = 6, straight = 2;  // nodes
+  static constexpr std::size_t smooth = 6, straight = 2, beyond = 3;  // nodes: between them, and outside
   struct Stencil {
     std::size_t first = 0, size = 0;
     std::array<double, smooth> weight{};
