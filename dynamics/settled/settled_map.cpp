@@ -20,7 +20,7 @@ constexpr double smooth_restitution = 0.6;  // above it feet hop on to the next 
 constexpr double rough_step = 0.05;         // between rows there
 constexpr std::size_t most_kept = 32;       // maps, of some 8 MB
 
-// How far a landing gets beyond the barrier: omega_eq^2 of the settled foot less the barrier's; its sign says rest.
+// Says how far a landing gets beyond the barrier: the settled foot's omega_eq^2 less the barrier's; its sign says rest.
 double beyond_barrier(const Landing& landing, double barrier) {
   constexpr double tiny = 1e-12;
   if (landing.end == LandingEnd::rest)
@@ -28,14 +28,14 @@ double beyond_barrier(const Landing& landing, double barrier) {
   return std::max((landing.settled_squared > 0 ? landing.settled_squared : landing.carried_squared) - barrier, tiny);
 }
 
-// Root of a rising function that changes sign in [low, high]: false position with the Illinois rule, bisection where
-// that is slow.
+// Finds the root of a rising function that changes sign in [low, high]: false position with the Illinois rule,
+// bisection where that is slow.
 template <class F>
 double rising_root(const F& value, double low, double at_low, double high, double at_high, double width) {
   int side = 0;
   for (int i = 0; i < 200 && high - low > width; ++i) {
     double at = i % 4 == 3 ? (low + high) / 2 : high - at_high * (high - low) / (at_high - at_low);
-    // Not closer to the ends than asked for: the bracket closes from both sides.
+    // It comes no closer to the ends than asked for: the bracket closes from both sides.
     at = std::clamp(at, low + width / 2, high - width / 2);
     const double v = value(at);
     if (v < 0) {
@@ -51,7 +51,7 @@ double rising_root(const F& value, double low, double at_low, double high, doubl
   return high;
 }
 
-// What a value will be at the next of evenly spread places, from those before.
+// Says what a value will be at the next of evenly spread places, from those before.
 class Trend {
  public:
   void add(double value) {
@@ -62,7 +62,7 @@ class Trend {
   double off() const { return count_ < 3 ? 1e-3 : std::abs(next() - through(count_ - 1)) / 4 + 1e-8; }
 
  private:
-  // The polynomial through so many values.
+  // Continues the polynomial through so many values.
   double through(int count) const {
     const auto [a, b, c, d] = last_;
     return count == 1   ? a
@@ -75,8 +75,8 @@ class Trend {
   int count_ = 0;
 };
 
-// The friction up to `high` from which slip stops in an impact, or before its compression ends; `high` if it does not
-// stop there either.
+// Finds the friction up to `high` from which slip stops in an impact, or before its compression ends; `high` if it does
+// not stop there either.
 double stopping_friction(const SettledMotion& motion, int leg, double omega, double eta, int strike,
                          double SlipLeft::*when, double high, const Trend& trend) {
   const auto value = [&](double mu) {
@@ -105,13 +105,13 @@ double stopping_friction(const SettledMotion& motion, int leg, double omega, dou
   return rising_root(value, low, at_low, top, at_top, 1e-9);
 }
 
-// The impact in which slip stops at the n-th edge of a table, and when.
+// Names the impact in which slip stops at the n-th edge of a table, and when.
 std::pair<int, double SlipLeft::*> stop_of(int n) {
   if (n < 4) return {2 + n / 2, n % 2 == 0 ? &SlipLeft::compressed : &SlipLeft::struck};
   return {n, &SlipLeft::struck};
 }
 
-// Evenly spread points in the unit cube (Roberts' sequence).
+// Returns evenly spread points in the unit cube (Roberts' sequence).
 double spread(std::size_t index, int dimension) {
   constexpr double g = 1.22074408460575947536;  // g^4 = g + 1
   const double step = std::pow(g, -dimension - 1);
@@ -119,7 +119,7 @@ double spread(std::size_t index, int dimension) {
   return std::modf(0.5 + static_cast<double>(index + 1) * step, &whole);
 }
 
-// What was found at the points of one region.
+// Collects what was found at the points of one region.
 struct Found {
   std::size_t landings = 0, misjudged_rests = 0;
   double displacement = 0;
@@ -213,7 +213,7 @@ std::shared_ptr<const SettledMap> SettledMap::of(const SettledWheel& wheel, cons
 }
 
 double SettledMap::standstill(int leg, double eta) const {
-  // Speeds so low that a sticking foot is carried back; none for a slope without barrier.
+  // These are speeds so low that a sticking foot is carried back; there are none for a slope without barrier.
   const double barrier = motion_.foot(leg).barrier_squared();
   if (!(barrier > 0)) return 0;
   const double mu = sticking_[static_cast<std::size_t>(leg)] + clear_of_sticking;
@@ -233,7 +233,7 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
   const auto value = [&](double mu) { return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier); };
   double high = sticking_[static_cast<std::size_t>(leg)] + clear_of_sticking, at_high = value(high);
   if (at_high < 0) return never;
-  // Around the guess, or step by step from above: at high omega and eta there are gaps in rest further down.
+  // Around the guess it searches, or step by step from above: at high omega and eta there are gaps in rest below.
   double low = high, at_low = at_high;
   constexpr double farthest = 4e-3;
   guess = std::min(guess, high);  // a table that says "rests at every mu" is tried where a foot sticks
@@ -256,7 +256,7 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
   return rising_root(value, low, at_low, high, at_high, smooth ? 1e-10 : 1e-6);
 }
 
-// The bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
+// Finds the bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
 // mu_c], log(1 + part / bend) shall have, too.
 void SettledMap::find_bend(SettledTable& table, int leg) const {
   const SettledRange& range = options_.range;
@@ -290,7 +290,7 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
     rate[j] = (found[1] - found[0]) / (omega[1] - omega[0]);
     at_0[j] = found[0] - rate[j] * omega[0];
   }
-  // The parabolas in eta through three values.
+  // These are the parabolas in eta through three values.
   const auto parabola = [&](const std::array<double, 3>& value, double* term) {
     if (!(eta[1] > eta[0])) {
       term[0] = value[0];
@@ -306,7 +306,7 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
   parabola(rate, &table.bend[3]);
 }
 
-// The frictions where the landing has kinks, and mu_r, at all speeds of one restitution.
+// Finds the frictions where the landing has kinks, and mu_r, at all speeds of one restitution.
 void SettledMap::find_edges(SettledTable& table, int leg, int row) const {
   constexpr int stops = SettledTable::stops;
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
@@ -328,7 +328,7 @@ void SettledMap::find_edges(SettledTable& table, int leg, int row) const {
   }
 }
 
-// One row of a leg's table: all speeds and frictions at one restitution.
+// Tabulates one row of a leg's table: all speeds and frictions at one restitution.
 void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
   constexpr int stops = SettledTable::stops, piece = SettledTable::piece;
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
