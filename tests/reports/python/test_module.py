@@ -49,6 +49,21 @@ class Settings(unittest.TestCase):
             with self.assertRaises(ValueError) as raised:
                 metastable.Setting(**{"initial_speed": (7.35, 0.19), **fields})
             self.assertEqual(str(raised.exception), refusal("steps", *words).replace("--", ""))
+        for name, value, text, more in (
+            ("mass", 1e250, "1e250", {}), ("legs", [0.15, 0.15], "0.15,0.15", {}), ("legs", [1000], "1000", {}),
+            ("gravity", 1e5, "1e5", {}), ("ramp_length", 1e9, "1e9", {}), ("ramp_stiffness", 0, "0", {}),
+            ("contact_mass", -1, "-1", {}), ("friction", (0.4, -1), "0.4,-1", {}), ("friction", 20, "20", {}),
+            ("restitution", (1.2, 0.1), "1.2,0.1", {}), ("initial_speed", (1e200, 1), "1e200,1", {}),
+            ("inertia", 0.0035, "0.0035", {}), ("inertia", 1e6, "1e6", {}), ("tip_radius", -1, "-1", dict(law="settled")),
+            ("radius_of_gyration", 2, "2", dict(law="coulomb")), ("rebound_lost", 2, "2", dict(law="coulomb")),
+        ):
+            option = name.replace("_", "-")
+            words = [f"--{option}", text] + [f"--law={law}" for law in more.values()]
+            with self.subTest(name), self.assertRaises(metastable.InputError) as raised:
+                metastable.Setting(**{name: value, **more})
+            said = str(raised.exception)
+            self.assertIn(said.replace(name, option, 1), (refusal("steps", *words).replace("--", ""),
+                                                         refusal("steps", *words).replace("--", "").replace(name, option)))
         for fields, sentence in ((dict(mass="heavy"), "mass: a number expected, not str"),
                                  (dict(friction=(1, 2, 3)), r"friction: \(mean, sd\) expected, 3 numbers given"),
                                  (dict(contact_list=[1, 2]), "contact_list: an array of n rows and two columns"),
