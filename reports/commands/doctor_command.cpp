@@ -61,6 +61,14 @@ void run_doctor(const std::string& json) {
   else
     answer.say("Python module: {}", module);
   answer.fact("python_module", module);
+  const std::string ranks = first_line("command -v metastable-mpi 2>/dev/null");
+  if (ranks.empty())
+    answer.say(
+        "metastable-mpi: not on the PATH; it shares meshes and sweeps between machines: ./run test-mpi builds it "
+        "(needs libpetsc-real-dev, libslepc-real-dev and openmpi-bin)");
+  else
+    answer.say("metastable-mpi: {}", ranks);
+  answer.fact("metastable_mpi", ranks);
   answer.finish({"metastable doctor", {}, 0, version()});
 }
 

@@ -220,6 +220,8 @@ class Experiments(unittest.TestCase):
             self.assertEqual(other.collisions.to_dict(), columns.to_dict())
             self.assertEqual(other.trials.to_dict(), simulated.trials.to_dict())
         self.assertFalse(columns.omega_minus_rad_s.flags.owndata)
+        self.assertEqual(read.to_dict()["collisions"], columns.to_dict())
+        self.assertEqual(read._repr_html_().count("<tr>"), 21)  # a head and the trials
 
     def test_defects_have_their_places(self):
         wrong = dict(trial=[1, 1, 1], collision=[1, 2, 4], omega_minus_rad_s=[5.0, -1, 5])
@@ -238,6 +240,7 @@ class Experiments(unittest.TestCase):
         conditions = description.tables["conditions"]
         self.assertEqual([row["trials"] for row in conditions], [12])
         self.assertEqual(description.to_dict()["tables"]["conditions"]["title"], conditions.title)
+        self.assertIn("<td>12</td>", conditions._repr_html_())
         self.assertIn("<table", description._repr_html_())
 
     def test_effects_are_the_catalogue(self):
