@@ -20,7 +20,7 @@ std::string replaced(std::string text, std::string_view from, std::string_view t
   return text;
 }
 
-// The words an option or a place takes, with a space between them, if its value lists words (capitals stand for
+// Returns the words an option or a place takes, with a space between them, if its value lists words (capitals stand for
 // something else); the place COMMAND takes the commands.
 std::string choices(const ManualOption& o, const std::vector<ManualCommand>& commands) {
   if (o.place && o.name == "COMMAND")
@@ -137,7 +137,7 @@ std::string fish(const std::vector<ManualCommand>& commands) {
   return text;
 }
 
-// What troff would take for a command or an escape.
+// Escapes what troff would take for a command or an escape.
 std::string troff(std::string text) {
   text = replaced(replaced(std::move(text), "\\", "\\e"), "-", "\\-");
   if (text.starts_with(".") || text.starts_with("'")) text = "\\&" + text;

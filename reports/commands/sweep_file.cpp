@@ -26,8 +26,8 @@ constexpr std::size_t most_lines = 8;         // of a figure
 constexpr std::size_t most_map_columns = 16;  // of a heat map with a number in every cell
 constexpr std::size_t most_map_rows = 16;
 
-// Complete rows behind the head of a file, none if there is no such file; a last line without its end was cut short and
-// is dropped, and so is a head. @throws OutputError if it is another sweep's
+// Returns the complete rows behind the head of a file, none if there is no such file; a last line without its end was
+// cut short and is dropped, and so is a head. @throws OutputError if it is another sweep's
 std::vector<std::string> rows_of(const std::filesystem::path& file, const std::string& head, const char* otherwise) {
   if (!std::filesystem::exists(file)) return {};
   if (std::filesystem::is_directory(file)) throw OutputError(file, "is a folder");
@@ -46,7 +46,7 @@ std::vector<std::string> rows_of(const std::filesystem::path& file, const std::s
   return rows;
 }
 
-// A number of the table, which is text where it is none: "infinite", or empty for a point whose solver failed.
+// Returns a number of the table, which is text where it is none: "infinite", or empty for a point whose solver failed.
 double value_of(const Cell& cell) {
   if (const double* number = std::get_if<double>(&cell.value())) return *number;
   return std::get<std::string>(cell.value()).empty() ? std::numeric_limits<double>::quiet_NaN()
@@ -66,8 +66,8 @@ std::vector<std::string> fields_of(std::string_view line) {
   return fields;
 }
 
-// The rows as a table, those taken over from the file as those just computed: all are what the file holds. The last
-// line of the head names the columns.
+// Returns the rows as a table, those taken over from the file as those just computed: all are what the file holds. The
+// last line of the head names the columns.
 Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
   Table table{.id = "sweep", .title = "Points of the sweep", .columns = {}};
   const std::string_view head(sweep.head.data(), sweep.head.size() - 1);
@@ -83,14 +83,14 @@ Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
   return table;
 }
 
-// Nothing if no point has a finite number of steps.
+// Returns nothing if no point has a finite number of steps.
 std::optional<Figure> figure_of(const SweepFile& sweep, const Table& table) {
   const std::vector<SweepFileAxis>& axes = sweep.axes;
   Figure figure;
   figure.id = "sweep";
   figure.title = "Expected steps before failure";
   figure.provenance = sweep.provenance;
-  // The two axes shown; further ones stay at their first value.
+  // These two axes are shown; further ones stay at their first value.
   const SweepFileAxis& across = axes.front();
   const std::size_t second = axes.size() > 1 ? 1 : 0;
   std::size_t stride = 1, stride_second = 1;
@@ -163,7 +163,7 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   if (had < size) {
     const FileLock lock(partial, FileLock::Missing::create);
     if (!lock.held()) throw OutputError(partial, "another sweep is writing it");
-    // Read again: the other one may have ended in between.
+    // They are read again: the other one may have ended in between.
     rows = rows_of(out, sweep.head, "holds another sweep");
     if (rows.empty()) rows = rows_of(partial, sweep.head, "belongs to another sweep");
     had = rows.size();

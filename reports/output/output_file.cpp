@@ -30,7 +30,7 @@ fs::path temporary_name(const fs::path& target) {
          ("." + target.filename().string() + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".tmp");
 }
 
-// Temporaries of the same target whose writer was killed.
+// Removes temporaries of the same target whose writer was killed.
 void remove_left_behind(const fs::path& target) {
   const std::string begin = "." + target.filename().string() + ".";
   std::error_code error;
@@ -58,7 +58,8 @@ void wait_for_reader(const fs::path& pipe) {
   }
 }
 
-// Links followed as far as they exist, without a slash at the end; empty if even that cannot be looked up.
+// Returns a path with links followed as far as they exist, without a slash at the end; empty if even that cannot be
+// looked up.
 fs::path resolved(const fs::path& path) {
   std::error_code error;
   const fs::path whole = fs::weakly_canonical(fs::absolute(path, error), error);

@@ -1,5 +1,5 @@
 #pragma once
-// Output files that are either whole or not there.
+// Writes output files that are either whole or not there.
 
 #include <filesystem>
 #include <fstream>
@@ -10,7 +10,7 @@
 
 namespace metastable::reports {
 
-/// An output that cannot be written; the message names the path and the reason. A user error: exit code 2.
+/// Says that an output cannot be written; the message names the path and the reason. It is a user error: exit code 2.
 class OutputError : public std::invalid_argument {
  public:
   OutputError(const std::filesystem::path& path, const std::string& reason);
@@ -59,8 +59,8 @@ class OutputFolder {
   std::filesystem::path target_, temporary_;
 };
 
-/// A folder made before the work, with its parents, so that a place that cannot be written to is refused at once; what
-/// was made of them is gone again where the work puts nothing into it.
+/// Is a folder made before the work, with its parents, so that a place that cannot be written to is refused at once;
+/// what was made of them is gone again where the work puts nothing into it.
 class FolderIfFilled {
  public:
   /// @throws OutputError
@@ -79,9 +79,9 @@ class FolderIfFilled {
 /// Writes the whole of `content` into `path` ("-": standard output), or nothing. @throws OutputError
 void write_file(const std::filesystem::path& path, std::string_view content);
 
-/// Do both name one file, which need not be there yet?
+/// Returns whether both name one file, which need not be there yet.
 bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
-/// Is a file, there or not, below a folder?
+/// Returns whether a file, there or not, lies below a folder.
 bool lies_in(const std::filesystem::path& file, const std::filesystem::path& folder);
 
 /// Creates a folder and its parents where they are missing. @throws OutputError

@@ -26,7 +26,7 @@ const std::vector<ManualCommand> manual{
     {"blind", "The check", {{"ACTION", "make|open", "", "What to do", true}, {"DIR", "", "", "Folder", true}}},
     {"man", "The manual", {{"COMMAND", "", "", "One of them", true}}}};
 
-// What bash itself makes of the script, for the words of a command line of which the last is to be completed.
+// Returns what bash itself makes of the script, for the words of a command line of which the last is to be completed.
 std::string completed(const std::string& words, int last) {
   const std::filesystem::path script = std::filesystem::path(testing::TempDir()) / "metastable_completion.bash";
   std::ofstream(script) << completion_script(manual, "bash") << "COMP_WORDS=(" << words << ")\nCOMP_CWORD=" << last
