@@ -106,7 +106,7 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"compare", "--slopes", "7.02,9.59", "--initial-speed", "7,0.1"}, "--initial-speed: 1 values for 2 slopes"},
       {{"sweep"}, "no range given"},
       {{"sweep", "--slope", "5:12:0"}, "--slope: range 5:12:0"},
-      {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")}, "slope: 25 deg"},
+      {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")}, "--slope: 30 is outside [0.001, 22.5)"},
       {{"sweep", "--method", "integrated", "--friction-sd", "0.0005,0.1", "--out", path("s.csv")},
        "friction: sd 0.0005 is too narrow for method integrated"},
       {{"sweep", "--slope", "7:8:1", "--initial-speed", "7,0.1", "--out", path("")}, "is a folder"},
