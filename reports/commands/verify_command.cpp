@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "analysis/study/verification.h"
@@ -89,25 +91,29 @@ Table settled_table(const std::vector<analysis::VerifiedTable>& rows) {
       .title = "The table of landings under settled, against landings followed event by event",
       .notes =
           {"At points spread over restitutions to 0.95, speeds to 9 rad/s, and frictions from a little below rest to "
-           "beyond sticking. Landings: error of the ω² that a standing foot would have, over ω² before the landing; "
-           "where feet settle, and rough ones, where some do not before the next leg lands. Threshold: error of the "
-           "friction below which the wheel rests."},
+           "beyond sticking. Errors of the ω² that a standing foot would have, over ω² before the landing. Feet slide, "
+           "or stick, or the wheel barely passes: less than 0.5 rad/s above the speed at which even a sticking foot "
+           "rests; rough: above a restitution of 0.6, or some feet do not settle before the next leg lands. Threshold: "
+           "error of the friction below which the wheel rests."},
       .columns = {{"wheel"},
                   {"slope", "deg"},
                   {"landings"},
+                  {"number"},
                   {"rms error", "", NumberFormat::significant, 2},
+                  {"median", "", NumberFormat::significant, 2},
                   {"largest", "", NumberFormat::significant, 2},
+                  {"slide, largest", "m", NumberFormat::significant, 2},
                   {"rests misjudged"},
                   {"threshold, median", "", NumberFormat::significant, 2},
-                  {"largest threshold", "", NumberFormat::significant, 2},
-                  {"slide, largest", "m", NumberFormat::significant, 2},
-                  {"rough landings"},
-                  {"rms error, rough", "", NumberFormat::significant, 2},
-                  {"rests misjudged, rough"}}};
-  for (const auto& [wheel, slope, e] : rows)
-    table.rows.push_back({wheel, slope, e.landings, e.settled_rms, e.settled_max, e.misjudged_rests,
-                          e.resting_friction_median, e.resting_friction_max, e.displacement_max, e.rough, e.rough_rms,
-                          e.rough_misjudged_rests});
+                  {"largest threshold", "", NumberFormat::significant, 2}}};
+  const auto if_any = [](double error) { return error > 0 ? Cell(error) : Cell(""); };  // of rough ones none is sought
+  for (const auto& [wheel, slope, errors] : rows)
+    for (const auto& [landings, e] : {std::pair{"feet slide", errors.sliding},
+                                      {"feet stick", errors.sticking},
+                                      {"barely passes", errors.slow},
+                                      {"rough", errors.rough}})
+      table.rows.push_back({wheel, slope, landings, e.landings, e.rms, e.median, e.largest, e.displacement,
+                            e.misjudged_rests, if_any(e.resting_friction_median), if_any(e.resting_friction)});
   return table;
 }
 
@@ -157,8 +163,9 @@ void export_chain(const Checked& checked, const std::filesystem::path& folder) {
 }  // namespace
 
 void run_verify(const VerifyRequest& request) {
-  for (const std::string& folder : {request.out, request.export_to})  // before any long computation
-    if (!folder.empty()) make_folder(folder);
+  std::optional<FolderIfFilled> out, export_to;  // before any long computation
+  if (!request.out.empty()) out.emplace(request.out);
+  if (!request.export_to.empty()) export_to.emplace(request.export_to);
   Answer answer(request.json);
   const std::vector<analysis::Benchmark> terrain = analysis::rough_terrain_benchmarks(),
                                          wheels = analysis::wheel_benchmarks();
