@@ -20,7 +20,8 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t first_panels = 1;
-constexpr double safety = 2;  // of the error over the changes it is told from
+constexpr double most_unseen = 1e-9;  // launches that land between the nodes
+constexpr double safety = 2;          // of the error over the changes it is told from
 
 struct Level {
   markov::NodeSpace space;
@@ -36,10 +37,13 @@ double inner(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-// Nothing if the nodes are too few to lead to rest, or so few that interpolation makes nonsense of it.
+// Nothing if the nodes are too few to see where the launch lands or to lead to rest, or so few that interpolation
+// makes nonsense of it.
 std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::size_t panels) {
   const markov::NodeSpace space = rows.space(panels);
   markov::SampledChain chain = rows.chain(problem, space).chain;
+  const markov::Launch& launch = chain.launch;
+  if (std::accumulate(launch.after.begin(), launch.after.end(), launch.rest) < 1 - most_unseen) return std::nullopt;
   const markov::Reachability reach = markov::classify(chain.chain);
   if (std::find(reach.must_rest.begin(), reach.must_rest.end(), 0) != reach.must_rest.end()) return std::nullopt;
   std::optional<SolvedChain> solved;
@@ -133,7 +137,8 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   if (!fine || !coarse)
     throw markov::ConvergenceError(
         "integrated rows", 1,
-        fmt::format("{} nodes are too few to lead to rest; method sampled may tell", panels * rows.coarsest()));
+        fmt::format("{} nodes are too few to follow the launch and lead to rest; method sampled may tell",
+                    panels * rows.coarsest()));
 
   Metastability result;
   result.method = Method::integrated;
