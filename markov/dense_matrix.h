@@ -10,7 +10,7 @@ namespace metastable::markov {
 /// @param matrix  [n x n], n >= 1, of which the lower triangle is read
 /// @param right  [n]
 Eigen::VectorXd solve_symmetric(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
-/// Likewise for every column of `right` [n x k].
+/// Does it for every column of `right` [n x k].
 Eigen::MatrixXd solve_columns(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
 /// Holds the eigenvalues [n] of a symmetric matrix by rising size, and its orthonormal eigenvectors [n x n] by column.

@@ -14,14 +14,13 @@ int thread_count(int requested);
 /// started are then skipped.
 void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& work);
 
-/// Told the share of the work that is done, (0, 1], from any thread, one at a time; what it
-/// throws ends the work.
+/// Is told the share of the work that is done, (0, 1], from any thread, one at a time; what it throws ends the work.
 using Share = std::function<void(double share)>;
 
-/// The same, and `progress`, if there is one, is told a thousand times at most.
+/// Does the same, and `progress`, if there is one, is told a thousand times at most.
 void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& work, const Share& progress);
 
-/// The same as a function to hand on, for those who know no threads.
+/// Returns the same as a function to hand on, for those who know no threads.
 inline auto on_threads(int threads) {
   return [threads](std::size_t count, const std::function<void(std::size_t)>& work) {
     parallel_for(count, threads, work);

@@ -1,5 +1,5 @@
 #pragma once
-// Whole numbers from the environment, by which long runs of a test are asked for.
+// Reads whole numbers from the environment, by which long runs of a test are asked for.
 
 #include <cstdint>
 #include <cstdlib>

@@ -22,11 +22,11 @@ constexpr std::array<std::pair<std::string_view, BlindKind>, 5> kinds{{{"none", 
                                                                        {"outside", BlindKind::outside},
                                                                        {"left_out", BlindKind::left_out}}};
 
-// The nuisances of every model, which recalibration removes: no candidate that could be left out or paired.
+// It is the nuisances of every model, which recalibration removes: no candidate to be left out or paired.
 constexpr std::string_view recalibration = dynamics::contact_distribution_id;
 
-// The size whose power is `target`. Powers grow like a power of a small size, mostly its square: secant steps in
-// logarithms, inside the bracket known so far.
+// Finds the size whose power is `target`. Powers grow like a power of a small size, mostly its square: it takes secant
+// steps in logarithms, inside the bracket known so far.
 double find_size(const SizedEffect& effect, double target,
                  const std::function<double(const dynamics::Effect&)>& power) {
   double size = std::min(effect.start * std::sqrt(target / 16), effect.largest);
@@ -51,7 +51,7 @@ double find_size(const SizedEffect& effect, double target,
 
 Setting base_setting() {
   Setting setting = stand_in_setting();
-  // Both stated, so that the folder alone says what `coulomb` would be.
+  // Both are stated, so that the folder alone says what `coulomb` would be.
   setting.wheel.inertia = 0.0320723;  // M (mean L)^2
   setting.wheel.radius_of_gyration = 0.05;
   return setting;

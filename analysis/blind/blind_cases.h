@@ -1,5 +1,5 @@
 #pragma once
-// Blind cases: experiments from the laboratory whose truth is sealed until the diagnosis has answered.
+// Makes blind cases, experiments from the laboratory whose truth is sealed until the diagnosis has answered.
 
 #include <cstdint>
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace metastable::analysis {
 
-/// What a case is about.
+/// Says what a case is about.
 enum class BlindKind {
   none,      ///< no gap but what recalibration removes; nuisances varied
   effect,    ///< one effect of the catalogue
@@ -24,7 +24,7 @@ std::string_view blind_kind_name(BlindKind kind);
 /// @throws std::invalid_argument for an unknown name
 BlindKind blind_kind(std::string_view name);
 
-/// How many cases of each kind a run has, none below 0.
+/// Says how many cases of each kind a run has, none below 0.
 struct BlindSize {
   int per_effect_and_strength = 6;  ///< each effect at 1x, 2x and 4x
   int none = 300;
@@ -33,7 +33,7 @@ struct BlindSize {
   int left_out_per_effect = 3;
 };
 
-/// What is true of a case, sealed until it is answered.
+/// Holds what is true of a case, sealed until it is answered.
 struct BlindTruth {
   int number = 0;  ///< from 1
   BlindKind kind = BlindKind::none;
@@ -53,17 +53,17 @@ struct BlindTruth {
   std::vector<std::string> left_out;  ///< of the catalogue
 };
 
-/// A case as it is written: public files, and the truth.
+/// Holds a case as it is written: public files, and the truth.
 struct BlindCase {
   BlindTruth truth;
   RealityFiles files;
   std::vector<std::string> catalogue;  ///< ids the diagnosis may use; empty: all
 };
 
-/// Expected 2 Delta log likelihood of effects in a design (expected_power(), or a stand-in in tests).
+/// Gives the expected 2 Delta log likelihood of effects in a design (expected_power(), or a stand-in in tests).
 using Power = std::function<double(const PowerDesign&, const std::vector<dynamics::Effect>&)>;
 
-/// What each case of a run is, without its data: kinds, effects and strengths in an order drawn from the seed.
+/// Says what each case of a run is, without its data: kinds, effects and strengths in an order drawn from the seed.
 struct BlindPlan {
   BlindKind kind;
   std::vector<std::string> effects;  ///< ids; of `outside` the family

@@ -20,9 +20,9 @@ class BlindDice {
     const r123::Philox4x64::ctr_type counter{{number_, asked_++, 300, 0}};
     return r123::Philox4x64()(counter, r123::Philox4x64::key_type{{seed_, 0}})[0];
   }
-  /// A number that lies in the open interval (from, to).
+  /// Returns a number that lies in the open interval (from, to).
   double uniform(double from = 0, double to = 1) { return from + (to - from) * unit_interval(word()); }
-  /// from .. to, both included.
+  /// Draws from .. to, both included.
   int whole(int from, int to) { return std::min(to, from + static_cast<int>(uniform(0, to - from + 1))); }
   bool chance(double probability) { return uniform() < probability; }
   double sign() { return chance(0.5) ? 1 : -1; }

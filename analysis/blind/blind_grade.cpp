@@ -23,7 +23,7 @@ bool contains(const std::vector<std::string>& list, const std::string& one) {
 
 std::string joined(const std::string& a, const std::string& b) { return a + "+" + b; }
 
-// The effects a name stands for: "a" or "a+b".
+// Lists the effects a name stands for: "a" or "a+b".
 std::vector<std::string> members(const std::string& name) {
   const auto plus = name.find('+');
   if (plus == std::string::npos) return {name};
@@ -59,7 +59,7 @@ std::string asked(const BlindTruth& truth) {
   throw std::logic_error("unknown kind");
 }
 
-// The true value of a parameter, where it is one number.
+// Returns the true value of a parameter, where it is one number.
 std::optional<double> true_value(const BlindTruth& truth, const std::string& effect, const std::string& name) {
   for (const dynamics::Effect& e : truth.effects) {
     if (e.id != effect) continue;
@@ -70,7 +70,7 @@ std::optional<double> true_value(const BlindTruth& truth, const std::string& eff
   return std::nullopt;
 }
 
-// What is counted over the cases; maps are by strength.
+// Holds what is counted over the cases; maps are by strength.
 struct Tally {
   Proportion alarms, alarms_true, alarms_unlike, place_alarms;
   std::map<int, Proportion> found, found_left, cause, holds, facet;
@@ -90,7 +90,7 @@ void count_none(Tally& tally, const BlindTruth& truth, const Answer& answer) {
                                                   [](const auto& w) { return w.p_adjusted <= claim; }));
 }
 
-// The 90 % intervals of an answer whose first cause is the right one.
+// Counts the 90 % intervals of an answer whose first cause is the right one.
 void count_intervals(Tally& tally, const BlindTruth& truth, const BlindAnswer& answer) {
   for (const AnsweredParameter& p : answer.parameters) {
     const std::optional<double> value = true_value(truth, p.effect, p.name);
@@ -166,7 +166,7 @@ void count_left_out(Tally& tally, const BlindTruth& truth, const Answer& answer,
   tally.left_right.count(is(answer, Verdict::unexplained) || own || absorbed);
 }
 
-// Ambiguity groups, from the cause sets of the effects that were in the catalogue.
+// Finds ambiguity groups, from the cause sets of the effects that were in the catalogue.
 Groups ambiguity_groups(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
   std::map<std::string, std::map<std::string, int>> together;
   std::map<std::string, int> sets;
@@ -184,7 +184,7 @@ Groups ambiguity_groups(const std::vector<BlindTruth>& truths, const std::vector
   return alike;
 }
 
-// The measures beside what is asked for.
+// Lists the measures beside what is asked for.
 std::vector<Grade> measures(Tally tally) {
   std::vector<Grade> grades;
   const auto add = [&](std::string measure, const Proportion& p, double low, double high) {

@@ -1,5 +1,5 @@
 #pragma once
-// Grading of blind answers against their truths.
+// Grades blind answers against their truths.
 
 #include <map>
 #include <optional>
@@ -12,14 +12,14 @@
 
 namespace metastable::analysis {
 
-/// A fitted parameter of an answer's leading cause.
+/// Holds a fitted parameter of an answer's leading cause.
 struct AnsweredParameter {
   std::string effect, name;
   double value = 0;
   std::optional<double> lower, upper;  ///< 90 %
 };
 
-/// What a diagnosis said, as far as it is graded.
+/// Holds what a diagnosis said, as far as it is graded.
 struct BlindAnswer {
   Verdict verdict = Verdict::no_gap;
   std::vector<std::pair<std::string, double>> causes;  ///< by falling probability
@@ -40,7 +40,7 @@ struct Proportion {
 /// Gives Wilson's 95 % interval of a proportion; that of nothing is {0, 1}.
 std::pair<double, double> wilson(const Proportion& proportion);
 
-/// One line of the table of measures.
+/// Is one line of the table of measures.
 struct Grade {
   std::string measure;
   Proportion proportion;
@@ -59,7 +59,7 @@ struct BlindGrades {
   std::vector<Grade> grades;
   double mean_set_size_1x = 0, mean_set_size_2x = 0;  ///< of explained effect cases; 0: none
   std::vector<CalibrationBin> calibration;            ///< probability of the first cause against how often it is right
-  /// Truth (an effect, or none, outside, ...) to what was answered (first cause, or the verdict), counts.
+  /// Counts what was answered (first cause, or the verdict) by the truth (an effect, or none, outside, ...).
   std::map<std::string, std::map<std::string, int>> confusion;
   std::map<std::string, std::vector<std::string>> alike;  ///< ambiguity groups: what shares the cause sets of an effect
 };

@@ -1,5 +1,5 @@
 #pragma once
-// How visible an effect is in an experiment: the strength of blind cases is defined by it.
+// Measures how visible an effect is in an experiment, which defines the strength of blind cases.
 
 #include <string>
 #include <vector>
@@ -10,14 +10,14 @@
 
 namespace metastable::analysis {
 
-/// An experiment in the laboratory, with what its folder tells.
+/// Describes an experiment in the laboratory, with what its folder tells.
 struct PowerDesign {
   std::vector<RealityCondition> conditions;  ///< stated; contact as it truly is
   RealityOptions reality;                    ///< without effects
   std::vector<std::string> dropped;
 };
 
-/// A catalogue effect as a wheel's model takes it.
+/// Returns a catalogue effect as a wheel's model takes it.
 /// @throws std::invalid_argument for an effect that is no candidate of the model, as contact_distribution (its
 /// nuisances)
 EffectTerm fitted_term(const TransitionModel& model, const dynamics::Effect& effect);
@@ -25,13 +25,13 @@ EffectTerm fitted_term(const TransitionModel& model, const dynamics::Effect& eff
 /// Sets the nuisances of a wheel's model to a true contact distribution; the others stay at their nominal values.
 std::vector<double> true_nuisances(const TransitionModel& model, const dynamics::NominalValues& contact);
 
-/// Mean over `replicates` laboratory experiments with the effects of 2 log(likelihood with them / without), true
-/// contact known to both: about the effects' own noncentrality. Seeds follow design.reality.seed, apart from the case's
-/// own. @throws std::invalid_argument for replicates < 1
+/// Returns the mean over `replicates` laboratory experiments with the effects of 2 log(likelihood with them / without),
+/// true contact known to both: about the effects' own noncentrality. Seeds follow design.reality.seed, apart from the
+/// case's own. @throws std::invalid_argument for replicates < 1
 double expected_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects, int replicates);
 
-/// 2 log(likelihood of the truth / of the best recalibrated model without the effects) on one experiment: what is left
-/// to be found once the contact is refitted.
+/// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effects) on one experiment: what
+/// is left to be found once the contact is refitted.
 /// @param kept  effects that the recalibrated model has, their sizes refitted too: what the others leave beside them
 double power_left(const Experiment& experiment, const dynamics::NominalValues& truth,
                   const std::vector<dynamics::Effect>& effects, const std::vector<dynamics::Effect>& kept = {});

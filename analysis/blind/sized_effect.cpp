@@ -11,7 +11,7 @@ namespace {
 
 using Values = std::map<std::string, std::vector<double>>;
 
-// What the draws of one effect start from.
+// Holds what the draws of one effect start from.
 struct Draw {
   std::string id;
   dynamics::NominalValues truth;
@@ -25,7 +25,7 @@ SizedEffect sized(const Draw& d, double start, double largest, ValuesOf values, 
           start, largest, std::move(needs)};
 }
 
-// One parameter that is the size itself, or the size with the sign drawn, or its exponential for a ratio.
+// Makes one parameter the size itself, or the size with the sign drawn, or its exponential for a ratio.
 SizedEffect plain(const Draw& d, const char* name, double start, double largest, std::set<std::string> needs = {}) {
   return sized(
       d, start, largest,
@@ -71,7 +71,7 @@ SizedEffect initial_speed(const Draw& d) {
                {"initial_speed_rad_s"});
 }
 
-// A pattern of legs whose mean length stays: a common change would be another wheel.
+// Draws a pattern of legs whose mean length stays: a common change would be another wheel.
 SizedEffect leg_lengths(const Draw& d) {
   std::vector<double> pattern(d.truth.leg_lengths.size());
   double mean = 0;
@@ -133,7 +133,7 @@ SizedEffect ramp_vibration(const Draw& d) {
                {"time_s"});
 }
 
-// How an effect is drawn, and where it may rightly be found.
+// Says how an effect is drawn, and where it may rightly be found.
 struct Entry {
   SizedEffect (*draw)(const Draw&);
   std::vector<std::string> places;

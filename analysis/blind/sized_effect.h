@@ -1,5 +1,5 @@
 #pragma once
-// The effects of blind cases as functions of one size each, and where they may be found. Each has one entry.
+// Gives the effects of blind cases as functions of one size each, and where they may be found. Each has one entry.
 
 #include <functional>
 #include <set>
@@ -11,7 +11,7 @@
 
 namespace metastable::analysis {
 
-/// An effect as a function of its size: the rest of it (which leg, where, which sign) is drawn once.
+/// Is an effect as a function of its size: the rest of it (which leg, where, which sign) is drawn once.
 struct SizedEffect {
   std::function<dynamics::Effect(double)> at;  ///< of a size in [0, largest]; at 0 the effect is neutral
   double start = 0;                            ///< where a search for a power of 16 begins, in (0, largest]
@@ -24,7 +24,7 @@ struct SizedEffect {
 /// @throws std::logic_error naming an id for which nothing says how it is drawn
 SizedEffect sized_effect(const std::string& id, const dynamics::NominalValues& truth, BlindDice& dice);
 
-/// Facets, and aspects written with a leading ':', in which an effect may rightly be found; empty for an unknown id.
+/// Lists facets, and aspects (with a leading ':'), in which an effect may rightly be found; none for an unknown id.
 const std::vector<std::string>& rightful_places(const std::string& id);
 
 }  // namespace metastable::analysis

@@ -65,7 +65,7 @@ ContactParameters to_parameters(const Point& x) { return {x[0], to_sd(x[1]), x[2
 // Variables stay in these ranges. Means of mu end where the likelihood's grid is too coarse for a small spread.
 constexpr ContactParameters lowest = {-0.5, 0, -0.5, 0}, highest = {1.5, 1, 0.85, 1};
 
-// Minus the log-likelihood and its gradient; infinite beyond the ranges (an sd's variable may change its sign).
+// Returns minus the log-likelihood and its gradient; infinite beyond the ranges (an sd's variable may change its sign).
 double cost(const ContactLikelihood& likelihood, const Point& x, Point& gradient) {
   for (std::size_t i = 0; i < 4; ++i) {
     const double value = i % 2 == 0 ? x[i] : std::abs(x[i]);
@@ -97,7 +97,7 @@ Eigen::MatrixXd curvature(const SmoothFunction& function, const Minimum& minimum
   return (hessian + hessian.transpose()) / 2;
 }
 
-// Down from a point, in variables that the curvature there makes alike.
+// Descends from a point, in variables that the curvature there makes alike.
 Minimum descend(const SmoothFunction& function, const Minimum& from) {
   const Eigen::MatrixXd hessian = curvature(function, from);
   const auto n = static_cast<Eigen::Index>(from.at.size());
@@ -121,7 +121,7 @@ Minimum descend(const SmoothFunction& function, const Minimum& from) {
   return minimum;
 }
 
-// A long narrow ridge (see ambiguities) stops descents early: started anew until that gains nothing.
+// A long narrow ridge (see ambiguities) stops descents early: they start anew until that gains nothing.
 Minimum settle(const SmoothFunction& function, Minimum minimum) {
   for (int restart = 0; restart < 8; ++restart) {
     Minimum again = descend(function, minimum);
@@ -199,7 +199,7 @@ void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, con
   }
 }
 
-// Minima of the cost from the best starts.
+// Finds the minima of the cost from the best starts.
 std::vector<Mode> modes_from_starts(const SmoothFunction& function, std::vector<Point> starts) {
   std::vector<Mode> modes;
   for (Point& start : starts) {
@@ -274,7 +274,7 @@ std::string describe_errors(ContactFit& fit, const Mode& mode) {
   return fmt::format("{}", fmt::join(bound, " and "));
 }
 
-// Profile intervals; unbounded where they are not known.
+// Fills in the profile intervals, unbounded where they are not known.
 void describe_intervals(ContactFit& fit, const Maximum& best, bool intervals) {
   const bool known = intervals && best.settled && best.mode.hessian.allFinite();
   for (std::size_t i = 0; i < 4; ++i) {

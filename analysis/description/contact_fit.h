@@ -25,7 +25,7 @@ struct ContactFitOptions {
   Transition transition = Transition::step;
   int threads = 0;        ///< the same result on any number
   bool intervals = true;  ///< lower_95 and upper_95 too: most of the time
-  /// Called now and then; may throw to stop.
+  /// It is called now and then and may throw to stop.
   std::function<void()> progress = {};
 };
 
@@ -60,8 +60,8 @@ struct ContactFit {
 /// Tells what the fit cannot tell apart, in plain sentences, from its correlations and directions.
 std::vector<std::string> ambiguities(const ContactFit& fit);
 
-/// Whether the law has contact parameters that a fit can find: not `plastic`, which has none, and not `settled`, whose
-/// landing has no density in closed form.
+/// Says whether the law has contact parameters that a fit can find: not `plastic`, which has none, and not `settled`,
+/// whose landing has no density in closed form.
 bool has_contact_fit(dynamics::Law law);
 
 /// Fits all trials of the named conditions together, under the wheel of the experiment.

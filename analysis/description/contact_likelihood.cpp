@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t columns = 161;           // eta = 0 .. 1
 constexpr double gauss = 0.28867513459481288;  // 1 / (2 sqrt(3)): two-point rule on [0, 1]
 
-// Nodes of mu, with those where the loss has a kink.
+// Returns the nodes of mu, with those where the loss has a kink.
 std::vector<double> friction_nodes(const dynamics::WheelMap& map, int phase) {
   std::vector<double> nodes = dynamics::friction_breaks(map.contact_model(), map.collision(phase, 1));
   for (int i = 0; i <= 144; ++i) nodes.push_back(i / 160.0);
@@ -28,14 +28,14 @@ std::vector<double> friction_nodes(const dynamics::WheelMap& map, int phase) {
 
 double restitution_at(std::size_t column) { return static_cast<double>(column) / (columns - 1); }
 
-// A node of the grid with omega+^2 there.
+// Is a node of the grid with omega+^2 there.
 struct Corner {
   double restitution, friction, value;
 };
 
 }  // namespace
 
-// omega+^2 = scale x - drag sqrt(x) of one phase on the grid, column by column.
+// Holds omega+^2 = scale x - drag sqrt(x) of one phase on the grid, column by column.
 struct ContactLikelihood::Surface {
   std::vector<double> friction;
   std::vector<dynamics::StepCoefficients> node;
@@ -52,7 +52,7 @@ struct ContactLikelihood::Surface {
   }
 };
 
-// Intervals of mu that rest, for each eta.
+// Returns intervals of mu that rest, for each eta.
 std::vector<ContactLikelihood::Piece> ContactLikelihood::region_of_rest(const Surface& surface,
                                                                         const std::vector<double>& after,
                                                                         double barrier) {
@@ -78,7 +78,7 @@ std::vector<ContactLikelihood::Piece> ContactLikelihood::region_of_rest(const Su
   return pieces;
 }
 
-// The curve of the (eta, mu) that lead from one state to its landing: where omega+^2 has the level it needs for that.
+// Is the curve of the (eta, mu) that lead from one state to its landing: omega+^2 has the level it needs there.
 class ContactLikelihood::LevelCurve {
  public:
   LevelCurve(const dynamics::WheelMap& map, const MeasuredLanding& transition)
@@ -106,7 +106,7 @@ class ContactLikelihood::LevelCurve {
   }
 
  private:
-  // Where the level lies between two corners.
+  // Finds where the level lies between two corners.
   std::pair<double, double> cross(const Corner& a, const Corner& b) const {
     const double share = (level_ - a.value) / (b.value - a.value);
     return {a.restitution + share * (b.restitution - a.restitution), a.friction + share * (b.friction - a.friction)};
@@ -116,12 +116,12 @@ class ContactLikelihood::LevelCurve {
     return map_.after_collision(state_, phase_, {restitution, friction});
   }
 
-  // How far the curve lies from the triangle's chord, and |grad omega+^2| there.
+  // Says how far the curve lies from the triangle's chord, and |grad omega+^2| there.
   struct Bend {
     double gradient, shift_x = 0, shift_y = 0;
   };
 
-  // The gradient of the plane through the corners; the surface's own takes its place unless it changes within the
+  // Takes the gradient of the plane through the corners; the surface's own takes its place unless it changes within the
   // triangle, as it does about its extremes.
   Bend bend(const Corner& a, const Corner& b, const Corner& c, double middle_x, double middle_y) const {
     const double dx1 = b.restitution - a.restitution, dy1 = b.friction - a.friction, dv1 = b.value - a.value;
@@ -138,7 +138,7 @@ class ContactLikelihood::LevelCurve {
     return bend;
   }
 
-  // The curve's piece in one triangle, by two points of Gauss's rule.
+  // Sums the curve's piece in one triangle, by two points of Gauss's rule.
   void pass_through(const Corner& a, const Corner& b, const Corner& c) {
     const bool above_a = a.value > level_, above_b = b.value > level_, above_c = c.value > level_;
     if (above_a == above_b && above_b == above_c) return;
@@ -253,7 +253,8 @@ ContactLikelihood::Value ContactLikelihood::rest(const Observed& observed, const
 
 double ContactLikelihood::operator()(const ContactParameters& p, ContactParameters* gradient) const {
   const dynamics::TruncatedNormal restitution(p[0], p[1], 0, 1), friction(p[2], p[3], 0);
-  // What the truncation leaves of both normals, from the tails that do not cancel, and its logarithm's derivatives.
+  // It is what the truncation leaves of both normals, from the tails that do not cancel, and its logarithm's
+  // derivatives.
   const double low = -p[0] / p[1], high = (1 - p[0]) / p[1];
   const double of_restitution = p[0] < 0.5 ? dynamics::normal_cdf(-low) - dynamics::normal_cdf(-high)
                                            : dynamics::normal_cdf(high) - dynamics::normal_cdf(low);

@@ -14,12 +14,12 @@ namespace metastable::analysis {
 /// Holds mean and sd of eta, then of mu: eta ~ N(mean, sd^2) on [0, 1] and mu ~ N(mean, sd^2) on [0, inf), independent.
 using ContactParameters = std::array<double, 4>;
 
-/// Which (eta, mu) lead from a state to its landing is a curve that does not depend on how eta and mu are distributed.
-/// The density of the landing is the integral of f(eta) f(mu) / |grad x'| along it; the probability of rest, that of
-/// the region below the barrier. Curves are found once, on triangles of a grid over [0, 1] x [0, 3] (spacing 1/160 up
-/// to mu = 0.9, a line of it on the law's kink); a likelihood is then a sum over their pieces. Good to about 1e-3 of a
-/// density for sds of 0.01 and more (dynamics/return_map/landing_density.h is the exact form); too low where eta is
-/// left in less than a column by a mean beyond [0, 1], which a wider sd describes as well.
+/// The (eta, mu) that lead from a state to its landing form a curve, which does not depend on how eta and mu are
+/// distributed. The density of the landing is the integral of f(eta) f(mu) / |grad x'| along it; the probability of
+/// rest, that of the region below the barrier. Curves are found once, on triangles of a grid over [0, 1] x [0, 3]
+/// (spacing 1/160 up to mu = 0.9, a line of it on the law's kink); a likelihood is then a sum over their pieces. Good
+/// to about 1e-3 of a density for sds of 0.01 and more (dynamics/return_map/landing_density.h is the exact form); too
+/// low where eta is left in less than a column by a mean beyond [0, 1], which a wider sd describes as well.
 class ContactLikelihood {
  public:
   /// @param maps  one a condition of the transitions; their noise does not matter
@@ -31,23 +31,23 @@ class ContactLikelihood {
   /// them vanishes. Fills `gradient`, if given, with the derivatives by the parameters (NaN where it is infinite).
   double operator()(const ContactParameters& parameters, ContactParameters* gradient = nullptr) const;
 
-  /// Transitions that some eta and mu can lead to, and how many others there are.
+  /// Count the transitions that some eta and mu can lead to, and how many others there are.
   std::size_t possible() const { return possible_.size(); }
   std::size_t possible_rests() const { return rests_; }
   std::size_t impossible() const { return impossible_; }
 
  private:
-  /// Of a curve: a point, and its share of length / |grad x'|. Of a region: a column of eta, mu from and to.
+  /// Holds a curve's point and its share of length / |grad x'|, or a region's column of eta and mu from and to.
   struct Piece {
     double restitution, friction, weight, friction_to;
     std::size_t column;
   };
-  /// One transition: the curve that leads to its landing, or the region that rests.
+  /// Is one transition: the curve that leads to its landing, or the region that rests.
   struct Observed {
     bool landing, rested;
     std::vector<Piece> pieces;
   };
-  /// A probability or density, and its logarithm's derivatives.
+  /// Holds a probability or density, and its logarithm's derivatives.
   struct Value {
     double value = 0;
     ContactParameters slope{};
@@ -58,7 +58,7 @@ class ContactLikelihood {
   void keep_possible(std::vector<Observed> all);
   /// The density takes normals that are not truncated.
   static Value density(const Observed& observed, const ContactParameters& parameters);
-  /// The weight of one eta of the grid, and its derivatives by eta's mean and sd.
+  /// Holds the weight of one eta of the grid, and its derivatives by eta's mean and sd.
   using ColumnWeight = std::array<double, 3>;
   static std::vector<ColumnWeight> column_weights(const dynamics::TruncatedNormal& restitution);
   static Value rest(const Observed& observed, const std::vector<ColumnWeight>& weights,

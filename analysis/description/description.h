@@ -1,5 +1,5 @@
 #pragma once
-// What an experiment's trials show, before any model but the contact fit.
+// Describes what an experiment's trials show, before any model but the contact fit.
 
 #include <cstdint>
 #include <functional>
@@ -16,7 +16,7 @@
 
 namespace metastable::analysis {
 
-/// Survival of one condition's trials; those that did not rest are censored.
+/// Holds the survival of one condition's trials; those that did not rest are censored.
 struct Survival {
   std::size_t trials = 0, rests = 0;
   std::vector<SurvivalPoint> curve;
@@ -36,7 +36,7 @@ struct ConditionDescription {
   std::optional<Survival> survival;               ///< nothing: outcomes unknown
 };
 
-/// All tests on two samples.
+/// Holds all tests on two samples.
 struct SampleComparison {
   std::size_t count_a = 0, count_b = 0;
   TTest welch, pooled;
@@ -51,7 +51,7 @@ struct ConditionComparison {
   std::optional<SampleComparison> trial_means;        ///< steady state, one value a trial: the p-values hold
   std::optional<SampleComparison> all_collisions;     ///< steady state, collisions pooled as the paper seems to do
   std::vector<std::optional<double>> p_by_collision;  ///< Welch at collision 1, 2, ...
-  /// First collision from which on no test up to the last common one has p < 0.05; nothing if the last one has.
+  /// Is the first collision from which on no test up to the last common one has p < 0.05; nothing if the last one has.
   std::optional<int> meet;
 };
 ConditionComparison compare_conditions(const TrialSpeeds& a, const TrialSpeeds& b);

@@ -1,5 +1,5 @@
 #pragma once
-// Measured collisions and where they landed: what the contact's likelihood is made of.
+// Holds measured collisions and where they landed: that is what the contact's likelihood is made of.
 
 #include <cstddef>
 #include <optional>
@@ -15,7 +15,7 @@ struct MeasuredLanding {
   std::size_t condition = 0;  ///< index in the experiment
   int phase = 0;              ///< of the map
   double state = 0;           ///< omega_minus^2 [rad^2/s^2]
-  /// x' [rad^2/s^2] of the landing; nothing: only whether it came to rest is known.
+  /// Is x' [rad^2/s^2] of the landing; nothing where only whether it came to rest is known.
   std::optional<double> landing;
   bool rested = false;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// Speeds before collisions, trial by trial, and what is usually said of them.
+// Gives the speeds before collisions, trial by trial, and what is usually said of them.
 
 #include <cstddef>
 #include <optional>
@@ -11,14 +11,14 @@
 
 namespace metastable::analysis {
 
-/// Speeds just before collisions 1, 2, ... [rad/s], one list a trial.
+/// Holds the speeds just before collisions 1, 2, ... [rad/s], one list a trial.
 using TrialSpeeds = std::vector<std::vector<double>>;
 
 /// Takes the trials of one condition. @throws std::invalid_argument for an index out of range
 TrialSpeeds speeds(const Experiment& experiment, std::size_t condition);
 TrialSpeeds speeds(const std::vector<dynamics::Trial>& trials);
 
-/// First collision of the steady state: the paper compares beyond the 12th.
+/// Is the first collision of the steady state: the paper compares beyond the 12th.
 constexpr int steady_collision = 13;
 
 struct SpeedSummary {
@@ -31,7 +31,7 @@ SpeedSummary speed_summary(std::span<const double> values);
 
 /// Returns the speeds at collision `number` (from 1) of the trials that got there.
 std::vector<double> at_collision(const TrialSpeeds& trials, int number);
-/// Entry k is collision k + 1, up to the longest trial.
+/// Returns a list whose entry k is collision k + 1, up to the longest trial.
 std::vector<SpeedSummary> speed_profile(const TrialSpeeds& trials);
 
 /// Return the speeds from collision `from` on: all of them, and the mean of each trial that got there (one a trial:
@@ -39,8 +39,8 @@ std::vector<SpeedSummary> speed_profile(const TrialSpeeds& trials);
 std::vector<double> steady_speeds(const TrialSpeeds& trials, int from = steady_collision);
 std::vector<double> steady_trial_means(const TrialSpeeds& trials, int from = steady_collision);
 
-/// Speed at each leg from collision `from` on: the mean over trials of the trial's mean where that leg lands. Entry i
-/// is leg i; nothing if the legs of some collision are not known.
+/// Returns the speed at each leg from collision `from` on: the mean over trials of the trial's mean where that leg
+/// lands. Entry i is leg i; nothing if the legs of some collision are not known.
 std::optional<std::vector<SpeedSummary>> speed_per_leg(const Experiment& experiment, std::size_t condition, int from);
 
 /// Fits a straight line to the pairs (omega_k, omega_k+1) from collision `from` on.
@@ -51,7 +51,7 @@ struct ReturnMapLine {
   std::optional<double> fixed_point;  ///< where it meets the diagonal [rad/s]; nothing for slope 1
   double residual_sd = 0;             ///< of omega_k+1 about the line [rad/s]
 };
-/// Nothing for fewer than three pairs or equal speeds.
+/// Returns nothing for fewer than three pairs or equal speeds.
 std::optional<ReturnMapLine> return_map_line(const TrialSpeeds& trials, int from);
 
 }  // namespace metastable::analysis

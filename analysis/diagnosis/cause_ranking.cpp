@@ -12,12 +12,12 @@
 namespace metastable::analysis {
 namespace {
 
-// The prior.
+// These numbers are the prior.
 constexpr double expected_gain = 36;  // of an effect before its size is known
 constexpr double pair_prior = 0.05;   // odds of two effects to one
 
-// Which hypotheses are fitted; the others are weighed by what their scores promise. These save time, and decide only
-// where scores promise far too little. Gains are 2 Delta log likelihood, evidence is a log Bayes factor.
+// They say which hypotheses are fitted; the others are weighed by what their scores promise. These save time, and
+// decide only where scores promise far too little. Gains are 2 Delta log likelihood, evidence is a log Bayes factor.
 constexpr double promise_share = 0.2;       // of the largest promised gain, less
 constexpr double promise_margin = 40;       //   this much
 constexpr double overlooked_margin = 12;    // evidence by the scores below the best fitted one, for a fit after all
@@ -29,7 +29,7 @@ constexpr double refined_margin = 10;       //   this much, for an effect worth 
 constexpr double refit_margin = 60;         // evidence below the best, for a fit that did not settle to be tried again
 constexpr double least_pair_evidence = -4;  // promised beyond the first effect's, for a pair worth fitting
 
-// How fits are run.
+// These numbers say how fits are run.
 constexpr double furthest_start = 0.25;  // share of a parameter's range
 constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
@@ -37,7 +37,7 @@ constexpr int law_steps = 12;            // of another law's fit, from either st
 constexpr int more_law_steps = 60;       // where it may still come near
 constexpr double law_hopeless = -100;    // log likelihood below the recalibrated model's that no more steps make good
 
-// When a fit that did not settle is decided all the same.
+// These numbers say when a fit that did not settle is decided all the same.
 constexpr double law_refuted = -30;     // gain of another law: so far below that what it could still rise is nothing
 constexpr double small_gain = 10;       // by fit and by scores: at the optimum up to what differences resolve
 constexpr double rise_weight = 3;       // of the rise that the slope still promises, as evidence, and
@@ -45,7 +45,7 @@ constexpr double far_behind = 12;       //   evidence below the best that it lea
 constexpr double next_to_nothing = 2;   // promised rise of the log likelihood, plus
 constexpr double share_of_gain = 1e-3;  //   this share of the gain
 
-// Log of the mean likelihood ratio over variants and sizes. `gain` is the fitted one of the best variant.
+// Returns the log of the mean likelihood ratio over variants and sizes. `gain` is the fitted one of the best variant.
 double log_evidence(const ScannedEffect& scanned, double gain) {
   const auto parameters = static_cast<double>(scanned.candidate->parameters.size());
   const double g = expected_gain / std::max(1.0, parameters), shrink = g / (1 + g);
@@ -134,19 +134,19 @@ RankedCause fit_cause(const TransitionModel& model, const Effort& effort, const 
   return cause;
 }
 
-// A second effect counts for what it gained beyond the model error of the first. `exact`: the part of the first that
+// Counts a second effect for what it gained beyond the model error of the first. `exact`: the part of the first that
 // has none.
 double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact) {
   const PhaseGain before = phase_gain(model, first, exact), now = phase_gain(model, pair, first);
   const double tolerated = model_error * model_error;
-  // Only what the second effect gained by itself: one phase may have paid for the other.
+  // What the second effect gained by itself counts alone: one phase may have paid for the other.
   const double all = now.collisions + now.stances;
   const double beyond = std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +
                         std::max(0.0, now.stances - tolerated * std::max(0.0, before.stances));
   return std::max(0.0, std::min(all, beyond));
 }
 
-// A hypothesis whose likelihood is not finite anywhere the fit began.
+// Gives up a hypothesis whose likelihood is not finite anywhere the fit began.
 void give_up(RankedCause& cause) {
   cause.not_decided = cause.fit.reason.empty() ? "its likelihood is not finite" : cause.fit.reason;
   cause.gain = 0;
@@ -161,7 +161,7 @@ const ScannedEffect* find(const EffectScan& scan, const Candidate* candidate) {
   return nullptr;
 }
 
-// The ranking in its steps, in the order in which they are taken.
+// Ranks in steps, in the order in which they are taken.
 class Ranker {
  public:
   Ranker(const TransitionModel& model, const Fit& recalibrated, const std::vector<const Candidate*>& candidates,
@@ -198,7 +198,7 @@ class Ranker {
     ScannedEffect second;
   };
 
-  // Before every fit, so that who waits can stop.
+  // Beats before every fit, so that who waits can stop.
   void heartbeat() const {
     const std::lock_guard lock(speaking_);
     if (options_.progress) options_.progress(share_);
@@ -227,7 +227,7 @@ class Ranker {
   double top_ = 0;  // evidence of the best of them
 };
 
-// How likely one effect alone gains as much by chance.
+// Says how likely one effect alone gains as much by chance.
 double Ranker::p_value(const Candidate* candidate, double gain) const {
   if (candidate->parameters.empty()) return 2 * dynamics::normal_cdf(-std::sqrt(std::max(0.0, gain)));
   return chance_.p_value(candidate, gain);
@@ -255,7 +255,7 @@ void Ranker::fit_effect(RankedCause& cause, const ScannedEffect& scanned) const 
   cause = fit_cause(model_, effort_, recalibrated_, scanned);
   cause.gain = gain(cause.fit);
   if (!std::isfinite(cause.gain)) return give_up(cause);
-  // At the optimum up to what the differences resolve: small gains that the scores confirm are decided.
+  // These are at the optimum up to what the differences resolve: small gains that the scores confirm are decided.
   if (cause.gain < small_gain && scanned.gain[scanned.best] < small_gain) cause.not_decided.clear();
   cause.p_value = p_value(scanned.candidate, cause.gain);
   cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
@@ -320,7 +320,7 @@ std::vector<std::size_t> Ranker::leaders(bool to_refine) const {
   return all;
 }
 
-// A better fit of the same effect: the likelihoods of its other variants, and so its prior, stay what they were.
+// Takes a better fit of the same effect: the likelihoods of its other variants, and so its prior, stay what they were.
 void Ranker::take(RankedCause& cause, Fit better) const {
   const double now = gain(better);
   cause.evidence += 0.5 * (now - cause.gain);
@@ -342,7 +342,7 @@ void Ranker::refine_leaders() {
   });
 }
 
-// Where a fit did not settle near the top: once more, from the nuisances that suit the leader.
+// Fits once more where a fit did not settle near the top, from the nuisances that suit the leader.
 void Ranker::refit_unsettled() {
   const auto best = std::max_element(singles_.begin(), singles_.end(), [](const RankedCause& a, const RankedCause& b) {
     return a.evidence < b.evidence;
@@ -375,7 +375,7 @@ double pair_log_prior(std::size_t candidates) {
   return std::log(pair_prior / std::max(1.0, 0.5 * static_cast<double>(candidates - 1)));
 }
 
-// What the leaders leave, scanned again.
+// Scans again what the leaders leave.
 void Ranker::scan_pairs() {
   const double prior = pair_log_prior(candidates_.size());
   for (const std::size_t leader : leaders(false)) {
@@ -395,7 +395,7 @@ void Ranker::scan_pairs() {
   }
 }
 
-// The pairs asked for, whatever the scores promise.
+// Scans the pairs asked for, whatever the scores promise.
 void Ranker::scan_asked_pairs() {
   for (auto [one, other] : options_.pairs) {
     if (other->parameters.empty()) std::swap(one, other);  // another law has nothing to scan

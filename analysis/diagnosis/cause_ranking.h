@@ -1,5 +1,5 @@
 #pragma once
-// Which effect it is: every candidate is fitted, weighed and compared with chance; pairs where they earn it.
+// Finds which effect it is: every candidate is fitted, weighed and compared with chance, pairs where they earn it.
 
 #include <functional>
 #include <string>
@@ -15,8 +15,8 @@ struct RankedCause {
   std::vector<EffectTerm> terms;
   Fit fit;
   double gain = 0;  ///< 2 Delta penalised log likelihood over the recalibrated model
-  /// Of the gain by chance: of a single effect by the variants listed, before one between them was sought; of a pair
-  /// that of what the second effect earned beyond the first.
+  /// Is of the gain by chance: of a single effect by the variants listed, before one between them was sought; of a
+  /// pair that of what the second effect earned beyond the first.
   double p_value = 1;
   double evidence = 0;      ///< log Bayes factor against the recalibrated model, prior odds of pairs included
   double together = 1;      ///< of a pair: its gain over the sum of what its two effects gain alone
@@ -31,7 +31,7 @@ struct CauseRanking {
   double p_value = 1;  ///< of the best single effect among those listed, with the look elsewhere
 };
 
-/// How much is fitted. Experiments that are large, or far off their model, would take many minutes at full effort.
+/// Says how much is fitted. Experiments that are large, or far off their model, would take many minutes at full effort.
 struct Effort {
   double least_promise = 2;       ///< gain by the scores, for a fit
   std::size_t most_variants = 3;  ///< of one effect that are fitted
@@ -51,8 +51,8 @@ struct RankingOptions {
   std::function<void(double)> progress;  ///< share done; called from any thread, one at a time; may throw to stop
 };
 
-/// Evidence: the likelihood ratio averaged over an effect's variants and over a normal prior on its p parameters whose
-/// expected gain is 36 (so that effects of one and of eight parameters start level), by Laplace's approximation:
+/// Evidence is the likelihood ratio averaged over an effect's variants and over a normal prior on its p parameters
+/// whose expected gain is 36 (so that effects of one and of eight parameters start level), by Laplace's approximation:
 /// log mean_v exp(gain_v g/(1+g)/2) - p/2 log(1+g), g = 36/p.
 /// A second effect must earn beyond `model_error`^2 of what the first one gained in the same phase (collisions,
 /// stances): no catalogue entry has exactly the form of what nature did, and a misfit of 6 % of a large effect is none
@@ -64,14 +64,14 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
 
 inline constexpr double model_error = 0.06;
 
-/// 2 Delta log likelihood of one fit over another, in stances and in everything else.
+/// Is 2 Delta log likelihood of one fit over another, in stances and in everything else.
 struct PhaseGain {
   double collisions = 0, stances = 0;
 };
 PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse);
 
-/// What `terms` gained beyond this fit may be off by an error of form: the fit of those of them that are exact, or
-/// `recalibrated`. @param singles  fitted causes
+/// Returns the fit beyond which what `terms` gained may be off by an error of form: that of those of them that are
+/// exact, or `recalibrated`. @param singles  fitted causes
 const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<EffectTerm>& terms,
                       const Fit& recalibrated);
 

@@ -1,5 +1,5 @@
 #pragma once
-// How the speed runs on from collision to collision, measured and simulated.
+// Says how the speed runs on from collision to collision, measured and simulated.
 
 #include <cstdint>
 #include <vector>
@@ -10,8 +10,8 @@
 
 namespace metastable::analysis {
 
-/// Mean speed before each collision by condition, up to the 40th, where three trials or more have one. The means of the
-/// nominal and of the chosen model are taken over four simulated experiments each.
+/// Returns the mean speed before each collision by condition, up to the 40th, where three trials or more have one. The
+/// means of the nominal and of the chosen model are taken over four simulated experiments each.
 std::vector<ProfilePoint> collision_profile(const TransitionModel& model, const std::vector<double>& nominal,
                                             const Fit& chosen, std::uint64_t seed);
 

@@ -31,7 +31,7 @@ constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide 
 constexpr double recalibration_level = 0.02;
 constexpr double least_p_value = 1e-12;  // smaller ones are beyond what chance levels can say
 
-// What the best hypothesis may leave before none of all is believed.
+// These levels say what the best hypothesis may leave before none of all is believed.
 constexpr double left_over_level = 0.003;  // of the map's p-value
 constexpr double left_over_square = 15;    // of a cell's statistic, beyond the model error
 constexpr double least_left_over = 0.05;   // held-out gap that counts as one [nats a collision]
@@ -39,7 +39,7 @@ constexpr double left_over_errors = 6;     // squared model errors of the gap as
 constexpr double largest_log_odds = 300;   // of none: their exponential stays finite
 constexpr double certain = 1e6;            // odds of none where a test decides against all that were fitted
 
-// Odds and sets.
+// These numbers are of odds and sets.
 constexpr double none_prior = 0.01;      // odds of none to a gap where nothing is left over
 constexpr double set_share = 0.95;       // of what the effects share that the set holds
 constexpr double least_of_first = 0.05;  // one less likely than this share of the first is not named for completeness
@@ -51,13 +51,13 @@ constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likel
 
 constexpr double score_90 = 1.6448536269514722;  // half-width of a two-sided interval
 
-// How likely a quadratic form of the nuisances' scores is as large by chance: the prior shrinks each direction of the
-// information.
+// Says how likely a quadratic form of the nuisances' scores is as large by chance: the prior shrinks each direction of
+// the information.
 double recalibration_p_value(const TransitionModel& model, const Fit& as_given, double gain) {
   const Eigen::Index size = as_given.information.rows();
   Eigen::MatrixXd root_prior = Eigen::MatrixXd::Zero(size, size);
   for (Eigen::Index p = 0; p < size; ++p) root_prior(p, p) = model.nuisances()[static_cast<std::size_t>(p)].prior_sd;
-  // In units of the prior: eigenvalues l of the information; a direction's share of chance gain is l/(1+l) chi^2_1.
+  // In units of the prior the information has eigenvalues l; a direction's share of chance gain is l/(1+l) chi^2_1.
   const Eigen::VectorXd eigenvalues = markov::symmetric_eigen(root_prior * as_given.information * root_prior).values;
   double mean = 0, variance = 0;
   for (const double one : eigenvalues) {
@@ -67,12 +67,12 @@ double recalibration_p_value(const TransitionModel& model, const Fit& as_given, 
     variance += 2 * weight * weight;
   }
   if (!(mean > 0)) return 1;
-  // Satterthwaite: a chi-squared of the same mean and variance.
+  // By Satterthwaite it is a chi-squared of the same mean and variance.
   const double scale = variance / (2 * mean), degrees = mean / scale;
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), std::max(0.0, gain) / scale));
 }
 
-// Two effects may hide one another from the scores of each alone: the best pair's gain, for all pairs there are.
+// Two effects may hide one another from the scores of each alone: judges the best pair's gain, for all pairs there are.
 double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit& recalibrated) {
   double least = 1;
   if (!ranking.scan.trials_suffice) return least;
@@ -195,7 +195,7 @@ StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std:
   StepsBeforeFailure steps;
   const auto [at_risk, rests] = model.rests();
   if (at_risk > 0) {
-    // Rests are counts: exact limits of a Poisson mean.
+    // Rests are counts: these are exact limits of a Poisson mean.
     const auto limit = [](double degrees, double p) {
       return degrees > 0 ? boost::math::quantile(boost::math::chi_squared(degrees), p) / 2 : 0.0;
     };
@@ -211,7 +211,7 @@ StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std:
   return steps;
 }
 
-// The one or two effects that an entry of the catalogue names. Throws for unknown ones.
+// Returns the one or two effects that an entry of the catalogue names. It throws for unknown ones.
 std::vector<std::string> effects_of(const std::string& entry) {
   const auto plus = entry.find('+');
   std::vector<std::string> ids{entry.substr(0, plus)};
@@ -261,7 +261,7 @@ std::vector<std::pair<const Candidate*, const Candidate*>> wanted_pairs(const st
   return pairs;
 }
 
-// The model without anything fitted: nothing to project out.
+// Evaluates the model without anything fitted: nothing to project out.
 Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
   Fit given;
   given.nuisance = nominal;
@@ -298,7 +298,7 @@ void note_what_is_rough(Diagnosis& d, const CauseRanking& ranking, const Fit& re
         enough_trials, enough_transitions));
 }
 
-// All hypotheses by falling evidence; those that are not decided go to the diagnosis.
+// Lists all hypotheses by falling evidence; those that are not decided go to the diagnosis.
 std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking) {
   std::vector<const RankedCause*> ordered;
   for (const RankedCause& cause : ranking.singles) {
@@ -348,7 +348,7 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
   return chosen;
 }
 
-// Those that compete on the trials held out.
+// Lists those that compete on the trials held out.
 std::vector<const Fit*> rivals(const std::vector<const RankedCause*>& ordered) {
   std::vector<const Fit*> all;
   for (const RankedCause* cause : ordered) {
@@ -358,8 +358,8 @@ std::vector<const Fit*> rivals(const std::vector<const RankedCause*>& ordered) {
   return all;
 }
 
-// Probabilities over everything; the prior gives a gap even odds, shared by the effects. Returns the share of the
-// effects together.
+// Shares probabilities over everything; the prior gives a gap even odds, shared by the effects. Returns the share of
+// the effects together.
 double share_probabilities(Diagnosis& d, const TransitionModel& model, const std::vector<const RankedCause*>& ordered,
                            std::size_t candidates, bool gap, double none) {
   const double top = ordered.empty() ? 0 : std::max(0.0, ordered.front()->evidence);

@@ -1,5 +1,6 @@
 #pragma once
-// The sim-to-real gap of one experiment: is there one, where, which unmodelled effect causes it, how far it shrinks.
+// Diagnoses one experiment's sim-to-real gap: is there one, where, which unmodelled effect causes it, how far it
+// shrinks.
 
 #include <cstdint>
 #include <functional>
@@ -17,13 +18,13 @@ namespace metastable::analysis {
 struct DiagnosisOptions {
   std::uint64_t seed = 1;
   int threads = 0;  ///< the same bits on any number
-  /// Ids to consider, those the model lacks left out; none: all. A pair, "trial_drift+bounce", is tried in any case,
-  /// not only where the scores promise something.
+  /// Lists ids to consider, those the model lacks left out; none: all. A pair, "trial_drift+bounce", is tried in any
+  /// case, not only where the scores promise something.
   std::vector<std::string> catalogue = {};
   int draws = 2000;     ///< bootstrap draws of each chance level, >= 200; the map as given takes half
   double level = 0.03;  ///< of the test for a gap after recalibration, in (0, 0.5)
   int folds = 5;        ///< of the cross-validation by trial, >= 2
-  /// Called now and then with the share done, 0..1, and what is being done; may throw to stop.
+  /// It is called now and then with the share done, 0..1, and what is being done, and may throw to stop.
   std::function<void(double, const std::string&)> progress = {};
 };
 
@@ -51,7 +52,7 @@ struct Cause {
   std::string name() const;  ///< "a" or "a+b"
 };
 
-/// What the data could have seen of one effect.
+/// Says what the data could have seen of one effect.
 struct Visibility {
   std::string effect;
   std::string parameter;
@@ -62,7 +63,7 @@ struct Visibility {
   double times_more = 0;  ///< data needed to see the effect at the end of its range, as a multiple of these
 };
 
-/// A statement that these data do not allow.
+/// Is a statement that these data do not allow.
 struct NotPossible {
   std::string statement, because;
   std::optional<std::size_t>
@@ -70,7 +71,7 @@ struct NotPossible {
   bool of_the_gap = false;  ///< one of the questions asked of the gap, not of one effect or of the rests
 };
 
-/// An effect that a missing column hides.
+/// Is an effect that a missing column hides.
 struct HiddenEffect {
   std::string effect, parameter;
   std::optional<double> smallest;          ///< visible size without the column; nothing: it cannot be told at all
@@ -82,11 +83,11 @@ struct MissingColumn {
   std::vector<HiddenEffect> effects;  ///< empty: next to nothing is lost
 };
 
-/// A measure of the gap under the models compared, held out, and on data of the last model itself.
+/// Is a measure of the gap under the models compared, held out, and on data of the last model itself.
 struct Shrinkage {
   std::string measure, unit;
   double baseline = 0, recalibrated = 0, with_effect = 0, floor = 0;
-  /// (baseline - with_effect) / (baseline - floor); nothing where the denominator's interval covers zero.
+  /// Is (baseline - with_effect) / (baseline - floor); nothing where the denominator's interval covers zero.
   std::optional<double> closed, closed_lower, closed_upper;  ///< 90 % interval over trials
   double baseline_lower = 0, baseline_upper = 0;             ///< 90 %
 };
@@ -97,7 +98,7 @@ struct StepsBeforeFailure {
   double baseline = 0, recalibrated = 0, with_effect = 0;
 };
 
-/// Mean speed before each collision, measured and simulated.
+/// Holds mean speed before each collision, measured and simulated.
 struct ProfilePoint {
   std::size_t condition = 0;
   int collision = 1;
@@ -107,7 +108,7 @@ struct ProfilePoint {
   double band = 0;                          ///< half-width of the 95 % band of the mean of as many trials [rad/s]
 };
 
-/// An experiment that would tell the remaining causes apart.
+/// Is an experiment that would tell the remaining causes apart.
 struct NextExperiment {
   std::string change;
   double separation = 0;  ///< 2 Delta log likelihood expected between the two leading causes, at the fitted size
@@ -118,13 +119,13 @@ struct NextExperiment {
 /// depends on speed passed for two mean effects that cancel). Beyond this ratio a pair describes and does not explain.
 inline constexpr double most_together = 1.2;
 
-/// The answer for one experiment.
+/// Holds the answer for one experiment.
 struct Diagnosis {
   std::shared_ptr<const TransitionModel> model;  ///< diagnosed; nothing where it was passed by reference
   Verdict verdict = Verdict::no_gap;
   std::vector<std::string> sentences;  ///< the verdict in plain words
 
-  /// Is there a gap, and where. p-values by chance, none below 1e-12.
+  /// Says whether there is a gap, and where. Its p-values are by chance, none below 1e-12.
   struct Gap {
     double p_as_given = 1;       ///< of the model as given: twice the smaller of the next two
     double p_recalibration = 1;  ///< of as large a gain by recalibration
@@ -136,26 +137,26 @@ struct Diagnosis {
     std::vector<EstimatedParameter> contact;  ///< recalibrated
   } gap;
 
-  /// Which unmodelled effect causes it.
+  /// Says which unmodelled effect causes it.
   struct Causes {
     std::vector<Cause> ranked;  ///< by falling probability; singles, then pairs that were tried among them
     std::vector<Cause> not_decided;
     std::vector<std::string> set;  ///< names; empty if unexplained or no gap
     std::string size;              ///< of the likeliest beside the nominal model, a sentence; or empty
-    /// Probabilities. A gap has at least even odds where the tests find one, and at most even odds where they do not.
+    /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
     double together =
         1;  ///< of the best hypothesis, if a pair: its gain over the sum of its effects', see most_together
   } causes;
 
-  /// How far the gap shrinks.
+  /// Says how far the gap shrinks.
   struct Shrinkages {
     std::vector<Shrinkage> measures;  ///< log score first, then CRPS; empty: too few trials
     StepsBeforeFailure steps;
     std::vector<ProfilePoint> profile;
   } shrinkage;
 
-  /// What these data could not tell, and an experiment that would.
+  /// Says what these data could not tell, and an experiment that would.
   struct Limits {
     std::vector<Visibility> visible;
     std::vector<MissingColumn> missing;
@@ -163,7 +164,7 @@ struct Diagnosis {
     std::vector<NextExperiment> next;
   } limits;
 
-  /// What was diagnosed.
+  /// Says what was diagnosed.
   struct Data {
     std::size_t trials = 0, collisions = 0, events = 0;
     std::vector<std::string> condition_names;
@@ -178,7 +179,7 @@ struct Diagnosis {
 /// @throws std::invalid_argument for options out of range and unknown ids; what options.progress throws
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options = {});
 
-/// The same, with Diagnosis::model in the answer.
+/// Does the same, with Diagnosis::model in the answer.
 /// @throws std::invalid_argument also where there is no model
 Diagnosis diagnose(std::shared_ptr<const TransitionModel> model, const DiagnosisOptions& options = {});
 

@@ -8,17 +8,17 @@
 
 namespace metastable::analysis {
 
-/// The verdict, where the gap shows most, how much of it closes, and what the data could not say. @param d  complete
-/// but for its sentences
+/// Says the verdict, where the gap shows most, how much of it closes, and what the data could not say.
+/// @param d  complete but for its sentences
 std::vector<std::string> sentences(const Diagnosis& d);
 
-/// What the verdict asks for, one or two sentences.
+/// Says what the verdict asks for, one or two sentences.
 std::string next_step(const Diagnosis& d);
 
-/// Whether the share of the gap that closes says anything: its 90 % interval is no wider than the gap itself.
+/// Says whether the share of the gap that closes says anything: its 90 % interval is no wider than the gap itself.
 bool closed_is_known(const Shrinkage& shrinkage);
 
-/// "not known: 90 % interval −141 to 142 %, wider than the gap": of a share that is not.
+/// Says "not known: 90 % interval −141 to 142 %, wider than the gap" of a share that is not.
 std::string closed_unknown(const Shrinkage& shrinkage);
 
 }  // namespace metastable::analysis

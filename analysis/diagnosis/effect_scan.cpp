@@ -17,7 +17,7 @@ namespace {
 constexpr double largest_step = 0.1;  // of a difference, in standard errors
 constexpr double far_out = 0.03;      // share of the draws beyond which a tail follows its law instead of their count
 
-// What the score `u` gains with information `info`; one parameter at its lower bound gains only upwards.
+// Returns what the score `u` gains with information `info`; one parameter at its lower bound gains only upwards.
 double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,
                      Eigen::VectorXd* start) {
   if (u.size() == 1) {
@@ -88,7 +88,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
     }
   });
 
-  // Efficient scores and information: what the fitted parameters could take up is projected out.
+  // What the fitted parameters could take up is projected out of scores and information, which makes them efficient.
   const Eigen::Map<const Eigen::VectorXd> z(fit.evaluation.score.data(), events);
   const Eigen::MatrixXd stretch = all.slope + z.asDiagonal() * all.change;
   const Derivatives& held = fit.derivatives;
@@ -103,7 +103,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   for (Eigen::Index k = 0; k < events; ++k)
     scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
   scan.trials_suffice = model.trials() >= enough_trials && model.events().size() >= enough_transitions * model.trials();
-  // At the fit the nuisances' scores and their prior's balance: the plain sum of the slopes is efficient already.
+  // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
   const Eigen::VectorXd total = all.slope.colwise().sum();
 
   for (ScannedEffect& effect : scan.effects) {
@@ -122,9 +122,9 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
 
 namespace {
 
-// Scores whose rows, multiplied by independent standard normals and summed, are a draw of chance.
+// Returns scores whose rows, multiplied by independent standard normals and summed, are a draw of chance.
 Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
-  // Around their mean, so that a gap does not count as chance.
+  // They are taken around their mean, so that a gap does not count as chance.
   const Eigen::RowVectorXd mean = scan.by_trial.colwise().mean();
   Eigen::MatrixXd rows = scan.by_trial.rowwise() - mean;
   if (scan.trials_suffice) return rows;

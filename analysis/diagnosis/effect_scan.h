@@ -1,5 +1,5 @@
 #pragma once
-// Which effects would a fit gain from: score tests of every effect and variant at one fit.
+// Says which effects a fit would gain from: score tests of every effect and variant at one fit.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// What the scores at a fit say of one candidate.
+/// Holds what the scores at a fit say of one candidate.
 struct ScannedEffect {
   const Candidate* candidate = nullptr;
   std::vector<double> gain;            ///< by variant: 2 Delta log likelihood that the scores promise
@@ -31,21 +31,21 @@ struct EffectScan {
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
                         int threads);
 
-/// Trials, and transitions of each on average, from which their scores tell how large chance is: below, false alarms
-/// soar.
+/// Are the trials, and transitions of each on average, from which their scores tell how large chance is: below, false
+/// alarms soar.
 inline constexpr std::size_t enough_trials = 40, enough_transitions = 4;
 
-/// How large the scan's gains get by chance alone, by signs and sizes of whole trials' scores drawn anew (multiplier
-/// bootstrap), and what that says of gains found. Few trials, or trials of few transitions, have too few scores for
-/// that: chance has the covariance of the information then.
+/// Knows how large the scan's gains get by chance alone, by signs and sizes of whole trials' scores drawn anew
+/// (multiplier bootstrap), and what that says of gains found. Few trials, or trials of few transitions, have too few
+/// scores for that: chance has the covariance of the information then.
 class ChanceGains {
  public:
   /// @param draws  >= 1 @throws std::invalid_argument for fewer
   ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed);
-  /// P(the effect's largest gain over its variants >= gain) by chance.
+  /// Returns P(the effect's largest gain over its variants >= gain) by chance.
   /// @param effect  one of those scanned @throws std::invalid_argument for another
   double p_value(const Candidate* effect, double gain) const;
-  /// P(some effect's p-value is <= p) by chance.
+  /// Returns P(some effect's p-value is <= p) by chance.
   double look_elsewhere(double p) const;
 
  private:

@@ -20,8 +20,8 @@ struct GapCell {
   double false_discovery = 1;  ///< Benjamini and Hochberg's adjusted p-value, for the map
   double size = 0;             ///< [unit]
   double band = 0;             ///< half-width of the simultaneous 95 % band [unit]
-  /// In words: "rad/s" of a mean, "of the model's" of a spread, "share" of a tail, "correlation" of a memory and of
-  /// trials as a whole, "share of collisions" of rests.
+  /// Says it in words: "rad/s" of a mean, "of the model's" of a spread, "share" of a tail, "correlation" of a memory
+  /// and of trials as a whole, "share of collisions" of rests.
   std::string unit;
   std::size_t events = 0;
 };
@@ -29,7 +29,8 @@ struct GapCell {
 struct GapMap {
   std::vector<GapCell> cells;  ///< in the order of the facets
   double p_value = 1;          ///< smallest adjusted p-value
-  /// Largest squared statistic beyond what a misfit of the given size in collisions and in stances would explain.
+  /// Returns the largest squared statistic beyond what a misfit of this size in collisions and in stances would
+  /// explain.
   double largest_beyond(double collisions, double stances) const;
 };
 

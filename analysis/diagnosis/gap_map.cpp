@@ -25,8 +25,8 @@ constexpr double beyond_doubt = 5;             // [standard deviations]
 constexpr double least_left = 0.1;      // share of a column that is kept where the fitted parameters explain nearly all
 constexpr double usual_critical = 3.5;  // of the largest statistic, where no chance is drawn
 
-// What an event adds to the sums of a cell: functions of its normal score, or their means given that the wheel rested
-// (a score below that of the chance of rest) or did not. All have mean zero if the model is right.
+// Holds what an event adds to the sums of a cell: functions of its normal score, or their means given that the wheel
+// rested (a score below that of the chance of rest) or did not. All have mean zero if the model is right.
 struct Residual {
   double mean = 0, spread = 0, tail = 0;
 };
@@ -46,10 +46,10 @@ Residual residual(EventKind kind, double score, double log_density) {
   return {-density * weight, -edge * density * weight / std::numbers::sqrt2, (beyond - share_beyond * chance) * weight};
 }
 
-// What a column of the map looks for: how its size follows from its sum.
+// Says what a column of the map looks for: how its size follows from its sum.
 enum class Measure { shift, spread, tail, correlation, rests };
 
-// Contributions of events to the statistic of one cell and aspect: their sum has mean zero without a gap.
+// Holds the contributions of events to the statistic of one cell and aspect: their sum has mean zero without a gap.
 struct Column {
   Measure measure;
   std::vector<std::pair<std::size_t, double>> terms;  // by event
@@ -79,9 +79,9 @@ struct Columns {
 
 EventKind phase_of(EventKind kind) { return is_contact(kind) ? EventKind::collision : kind; }
 
-// [rad/s] by phase, contacts as collisions: what a unit of score is in the middle of its distribution. Where a cell's
-// events are far out it is more there, and would exaggerate the shift that brought them out. Where none is in the
-// middle: the usual one.
+// Returns [rad/s] by phase, contacts as collisions, what a unit of score is in the middle of its distribution. Where a
+// cell's events are far out it is more there, and would exaggerate the shift that brought them out. Where none is in
+// the middle it is the usual one.
 std::map<EventKind, double> units_of_score(const std::vector<Event>& events, const Evaluation& evaluation) {
   std::map<EventKind, std::pair<double, double>> sums;  // and their number
   std::map<EventKind, std::vector<double>> all;
@@ -99,7 +99,7 @@ std::map<EventKind, double> units_of_score(const std::vector<Event>& events, con
   return units;
 }
 
-// Mean, spread and, of whole phases, tail share of every cell; contrasts have a mean only.
+// Adds mean, spread and, of whole phases, tail share of every cell; contrasts have a mean only.
 void add_cells(Columns& all, const TransitionModel& model, const std::vector<Residual>& residuals,
                const std::map<EventKind, double>& units) {
   const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
@@ -131,8 +131,8 @@ void add_cells(Columns& all, const TransitionModel& model, const std::vector<Res
   }
 }
 
-// Memory: successive scores of a trial; and trials that differ as a whole. By correlation, so that a model far off does
-// not pass for either.
+// Adds memory: successive scores of a trial; and trials that differ as a whole. It goes by correlation, so that a model
+// far off does not pass for either.
 void add_memory(Columns& all, const std::vector<Event>& events, const std::vector<Residual>& residuals, bool stance) {
   std::vector<std::size_t> members;
   for (std::size_t i = 0; i < events.size(); ++i)
@@ -174,7 +174,7 @@ void add_memory(Columns& all, const std::vector<Event>& events, const std::vecto
   all.add(trials, "spread", "correlation", between / pairs, std::move(whole));
 }
 
-// Rests against what the model expects at the same speeds.
+// Puts rests against what the model expects at the same speeds.
 void add_rests(Columns& all, const TransitionModel& model, const Fit& fit) {
   const auto& events = model.events();
   const std::vector<double> chance_of_rest = model.rest_chances(fit.nuisance, fit.terms);
@@ -201,7 +201,7 @@ void add_rests(Columns& all, const TransitionModel& model, const Fit& fit) {
   }
 }
 
-// Columns by event, of which the part that the fitted parameters' scores explain is taken off.
+// Holds columns by event, of which the part that the fitted parameters' scores explain is taken off.
 struct Efficient {
   Eigen::MatrixXd dense;          // [events x columns]
   Eigen::RowVectorXd sums;        // of the columns
@@ -236,7 +236,7 @@ Efficient project(const std::vector<Column>& columns, const TransitionModel& mod
   return all;
 }
 
-// What is drawn anew, and how much trials scatter beyond it.
+// Holds what is drawn anew, and how much trials scatter beyond it.
 struct Units {
   Eigen::MatrixXd rows;        // [trials or events x columns]
   Eigen::RowVectorXd scatter;  // of the columns' sums, by the trials' own; 0 where trials are drawn
@@ -264,8 +264,8 @@ Units units_of_chance(const Efficient& efficient, const TransitionModel& model) 
   return units;
 }
 
-// How much of a shift of the cell the fitted parameters leave, by the slopes of its scores: where the gap is large the
-// events' own products say too much.
+// Says how much of a shift of the cell the fitted parameters leave, by the slopes of its scores: where the gap is large
+// the events' own products say too much.
 double left_of_shift(const Column& column, const Fit& fit) {
   Eigen::VectorXd follows = Eigen::VectorXd::Zero(fit.derivatives.change.cols());
   for (std::size_t k = 0; k < column.terms.size(); ++k) {
@@ -283,8 +283,8 @@ void standardise(std::vector<GapCell>& cells, const std::vector<Column>& columns
     const auto c = static_cast<Eigen::Index>(k);
     // The variance is summed by event: without a gap events are independent, and there are many more than trials.
     const double sum = efficient.sums[c], whole = efficient.whole_norm[c];
-    // The model's own variance, less the share that the fitted parameters take off: where nothing rare happened (no
-    // rest, no far score) the events themselves show almost none.
+    // It is the model's own variance, less the share that the fitted parameters take off: where nothing rare happened
+    // (no rest, no far score) the events themselves show almost none.
     // Where nearly all of the column is explained there is nothing left to say: a tenth is kept as the least share.
     const double squares = efficient.dense.col(c).squaredNorm();
     const double kept = whole > 0 ? squares / whole : 1;
@@ -298,7 +298,7 @@ void standardise(std::vector<GapCell>& cells, const std::vector<Column>& columns
       const double plain = std::clamp(sum / std::sqrt(own), -beyond_doubt, beyond_doubt);
       if (std::abs(plain) > std::abs(cell.statistic)) cell.statistic = plain;
     }
-    // Efficient size: the score by its information, so that size and statistic have one sign.
+    // The efficient size is the score by its information, so that size and statistic have one sign.
     const bool shift = column.measure == Measure::shift;
     const double left = shift && fit.derivatives.change.cols() > 0 ? left_of_shift(column, fit) : kept;
     const double information = std::max(1e-12, std::max(least_left, left) * column.variance);
@@ -310,7 +310,7 @@ void standardise(std::vector<GapCell>& cells, const std::vector<Column>& columns
   }
 }
 
-// The columns around their means, of norm 1: sums of rows times normals are statistics by chance.
+// Takes the columns around their means, of norm 1: sums of rows times normals are statistics by chance.
 Eigen::MatrixXd centred(const Eigen::MatrixXd& rows) {
   const Eigen::RowVectorXd mean = rows.colwise().mean();
   Eigen::MatrixXd all = rows.rowwise() - mean;
@@ -324,7 +324,7 @@ Eigen::MatrixXd centred(const Eigen::MatrixXd& rows) {
   return all;
 }
 
-// Step-down max-T (Westfall and Young): the largest statistic against the largest by chance, the next against the
+// Steps down by max-T (Westfall and Young): the largest statistic against the largest by chance, the next against the
 // largest of those left, and so on; and the bands that hold all cells at once.
 void step_down(std::vector<GapCell>& cells, const std::vector<std::size_t>& order, const Eigen::MatrixXd& rows,
                int draws, std::uint64_t seed) {
@@ -349,7 +349,7 @@ void step_down(std::vector<GapCell>& cells, const std::vector<std::size_t>& orde
   for (std::size_t k = 0; k < order.size(); ++k) {
     GapCell& cell = cells[order[k]];
     double p = (exceeded[k] + 1.0) / (draws + 1.0);
-    // Where no draw reached it: Sidak's bound from the cell's own p-value, if that is smaller.
+    // Where no draw reached it this takes Sidak's bound from the cell's own p-value, if that is smaller.
     if (exceeded[k] == 0) p = std::min(p, static_cast<double>(order.size() - k) * cell.p_value);
     adjusted = std::max(adjusted, std::min(1.0, p));
     cell.p_adjusted = adjusted;
@@ -358,7 +358,7 @@ void step_down(std::vector<GapCell>& cells, const std::vector<std::size_t>& orde
   }
 }
 
-// Benjamini and Hochberg's. @param order  of falling statistics
+// Applies Benjamini and Hochberg's procedure. @param order  of falling statistics
 void discover(std::vector<GapCell>& cells, const std::vector<std::size_t>& order) {
   double discovery = 1;
   for (std::size_t k = order.size(); k-- > 0;) {

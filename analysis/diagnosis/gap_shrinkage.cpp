@@ -28,7 +28,7 @@ constexpr int interval_draws = 400;      // of the bootstrap over trials
 constexpr double bounded_score = 6;      // scores further out count as this one to the flexible model
 constexpr double farthest_score = 12;    // and as this one to the CRPS
 
-// What one trial, held out, says.
+// Holds what one trial, held out, says.
 struct HeldOut {
   double collisions = 0;
   double log_score[3] = {0, 0, 0};  // as given, recalibrated, with effect
@@ -42,7 +42,7 @@ double crps(double z) {
   return z * (2 * dynamics::normal_cdf(z) - 1) + 2 * dynamics::normal_density(z) - std::numbers::inv_sqrtpi;
 }
 
-// [rad/s of a score] by kind of event.
+// Returns [rad/s of a score] by kind of event.
 std::vector<double> typical_units(const TransitionModel& model, const Evaluation& e) {
   std::vector<double> typical(6, 0.0);
   for (std::size_t kind = 0; kind < typical.size(); ++kind) {
@@ -98,7 +98,7 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
   return s;
 }
 
-// [trials] Trials go to folds in turn, in an order of their own.
+// Returns [trials] their folds: trials go to folds in turn, in an order of their own.
 std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t seed) {
   std::vector<std::size_t> order(trials);
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -109,7 +109,7 @@ std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t se
   return fold;
 }
 
-// The rival that does best on the trials counted; without any, `plain`.
+// Returns the rival that does best on the trials counted; without any, `plain`.
 Fit best_rival(const TransitionModel& model, const std::vector<const Fit*>& rivals, const Fit& plain,
                const FitOptions& options, const std::function<void()>& heartbeat) {
   Fit chosen = plain;
@@ -227,7 +227,7 @@ Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure&
   const bool inside = given > low && given < high;
   s.baseline_lower = inside ? 0 : std::min(std::abs(given - low), std::abs(given - high));
   s.baseline_upper = std::max(std::abs(given - low), std::abs(given - high));
-  // Mean absolute deviation of a Poisson count.
+  // This is the mean absolute deviation of a Poisson count.
   const double mean = with * at_risk, whole = std::floor(mean);
   s.floor = mean > 0 ? 2 * std::exp((whole + 1) * std::log(mean) - mean - std::lgamma(whole + 1)) / at_risk : 0;
   if (s.baseline_lower <= s.floor) return s;

@@ -1,5 +1,5 @@
 #pragma once
-// How far the gap shrinks: models compared on trials they were not fitted to.
+// Says how far the gap shrinks: models compared on trials they were not fitted to.
 
 #include <cstdint>
 #include <functional>
@@ -11,7 +11,7 @@ namespace metastable::analysis {
 
 struct Fit;
 
-/// Cross-validated by trial: in every fold nuisances and each of `rivals` are refitted to the other trials, the rival
+/// Cross-validates by trial: in every fold nuisances and each of `rivals` are refitted to the other trials, the rival
 /// with the best penalised likelihood there is used on the held-out ones (an empty list of terms: none). Measures:
 /// log score per collision below that of a flexible model (the chosen one plus a ridge-fitted shift in every cell of
 /// the gap map, cross-fitted), and CRPS of the next speed. The floor is the same measure on data of the chosen model
@@ -23,9 +23,10 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& re
                                      const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
                                      const std::function<void()>& heartbeat = {});
 
-/// The share of collisions that led to rest, model against observed, by what the models expect in steps before failure.
-/// Rests are counts, so intervals are those of a Poisson mean (exact, 90 %), and the floor is the mean deviation of
-/// such a count from the last model's own expectation. All trials count: rests are too few to hold any out.
+/// Compares the share of collisions that led to rest, model against observed, by what the models expect in steps before
+/// failure. Rests are counts, so intervals are those of a Poisson mean (exact, 90 %), and the floor is the mean
+/// deviation of such a count from the last model's own expectation. All trials count: rests are too few to hold any
+/// out.
 /// @param at_risk, rests  observed; at_risk > 0
 Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure& steps);
 

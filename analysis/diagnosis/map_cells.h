@@ -1,5 +1,5 @@
 #pragma once
-// The cells of a gap map before anything is measured in them: which events each holds.
+// Makes the cells of a gap map before anything is measured in them: it says which events each holds.
 
 #include <cstddef>
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// Transitions that a cell of the map holds at least.
+/// Counts the transitions that a cell of the map holds at least.
 inline constexpr int least_cell_events = 20;
 
 /// Says which events one cell holds. With weights it is a contrast of means: a trend, a swing.
@@ -21,7 +21,7 @@ struct MapCell {
   bool swing = false;                    ///< cosine or sine of the time since the previous collision
 };
 
-/// The model's events cut by speed, leg, position, collision, trial, time and condition, each phase by itself; trends
+/// Cuts the model's events by speed, leg, position, collision, trial, time and condition, each phase by itself; trends
 /// over the trials; and swings where time_tells(). Phases, and cells of a facet, with too few events have none.
 std::vector<MapCell> map_cells(const TransitionModel& model);
 

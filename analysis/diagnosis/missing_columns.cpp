@@ -12,7 +12,7 @@ constexpr double much_harder = 1.5;                // smallest size over smalles
 constexpr double not_told = 0.9, well_told = 0.8;  // share of an effect's information that another imitates
 constexpr std::size_t most_stand_ins = 6;          // of an effect, to stand for all of its own
 
-// Every effect's visibility in data drawn from the model, by its id.
+// Returns every effect's visibility in data drawn from the model, by its id.
 std::map<std::string, Visibility> look(const TransitionModel& model, const std::vector<double>& nuisance,
                                        const std::vector<const Candidate*>& wanted, int threads) {
   std::vector<Candidate> few;

@@ -9,7 +9,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is the optimum
-// Where no step rises: a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
+// Where no step rises, a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
 // what differences do not resolve.
 constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
@@ -55,7 +55,7 @@ class Point {
   std::vector<Slot> slots_;
 };
 
-// `steps`: what was gone in each parameter.
+// `steps` holds what was gone in each parameter.
 Derivatives differences(Point& point, const Evaluation& here, std::vector<double>& steps) {
   const auto events = static_cast<Eigen::Index>(here.score.size());
   auto& slots = point.slots();
@@ -124,8 +124,8 @@ bool search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::Ve
   return false;
 }
 
-// Gradient of the penalised likelihood at the point where result.derivatives were taken over `steps`. The prior goes
-// into the information, too, and the slots get the steps of their next differences.
+// Returns the gradient of the penalised likelihood at the point where result.derivatives were taken over `steps`. The
+// prior goes into the information, too, and the slots get the steps of their next differences.
 Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen::VectorXd& weights,
                                    const std::vector<double>& steps, Fit& result) {
   Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
@@ -144,7 +144,7 @@ Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen:
   return gradient;
 }
 
-// Indices of the parameters that may move: one held at a bound by the gradient stays there.
+// Holds the indices of the parameters that may move: one held at a bound by the gradient stays there.
 struct FreeParts {
   std::vector<Eigen::Index> all, of_nuisances, of_terms;
 };

@@ -9,13 +9,13 @@
 
 namespace metastable::analysis {
 
-/// Change of every event's log density and score with each parameter, by differences.
+/// Holds the change of every event's log density and score with each parameter, by differences.
 struct Derivatives {
   Eigen::MatrixXd slope;   ///< [events x parameters] of the log density
   Eigen::MatrixXd change;  ///< [events x parameters] of the normal score
 };
 
-/// What a fit has found of a hypothesis.
+/// Holds what a fit has found of a hypothesis.
 struct Fit {
   std::vector<double> nuisance;
   std::vector<EffectTerm> terms;
@@ -35,14 +35,14 @@ struct FitOptions {
   int most_iterations = 25;
 };
 
-/// Maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
+/// Finds the maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
 /// dz/d(speed), log density = log phi(z) + log J, and the information is the sum of z' z'^T + (log J)' (log J)'^T,
 /// which no outlying observation inflates. Starts from the given values; parameters stay inside their bounds. A
-/// likelihood that is not finite there: not converged, with that reason.
+/// likelihood that is not finite there has not converged, with that reason.
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options = {});
 
-/// The better of the fits from the given values and from the starts that the model offers (TransitionModel::starts).
+/// Returns the better of the fits from the given values and from the model's own starts (TransitionModel::starts).
 Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
              const FitOptions& options = {});
 
@@ -50,11 +50,11 @@ Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, 
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
                         const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances);
 
-/// The information of columns: sum over counted events of change change^T + (slope + z change)(...)^T.
+/// Returns the information of columns: sum over counted events of change change^T + (slope + z change)(...)^T.
 /// @param weights  by event, 1 or 0
 Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, const Eigen::VectorXd& weights);
 
-/// 1 or 0 an event. @param count  by trial; empty: all ones
+/// Returns 1 or 0 an event. @param count  by trial; empty: all ones
 Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count);
 
 }  // namespace metastable::analysis

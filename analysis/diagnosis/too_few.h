@@ -1,5 +1,5 @@
 #pragma once
-// Statements for which an experiment has too few trials, collisions or rests, and how many would do.
+// Lists statements for which an experiment has too few trials, collisions or rests, and how many would do.
 
 #include <vector>
 
@@ -7,7 +7,7 @@
 
 namespace metastable::analysis {
 
-/// Trials that the held-out measures need: two a fold.
+/// Counts the trials that the held-out measures need: two a fold.
 inline std::size_t trials_for_folds(int folds) { return 2 * static_cast<std::size_t>(folds); }
 
 /// @param d  complete but for `not_possible`

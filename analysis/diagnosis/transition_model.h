@@ -1,6 +1,6 @@
 #pragma once
-// What the diagnosis knows of a system: one-step transition densities of its measured trials, with effects that can be
-// added. No wheel in here: any stochastic return map can be diagnosed that has these members.
+// States what the diagnosis knows of a system: one-step transition densities of its measured trials, with effects that
+// can be added. No wheel stands in here: any stochastic return map can be diagnosed that has these members.
 
 #include <cstdint>
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace metastable::analysis {
 
-/// What a transition's density is of.
+/// Says what a transition's density is of.
 enum class EventKind {
   launch,     ///< the first speed
   collision,  ///< omega+ given omega-
@@ -24,10 +24,10 @@ enum class EventKind {
 };
 
 inline bool is_stance(EventKind kind) { return kind == EventKind::stance; }
-/// A collision, with its stance or alone, or what came of one: rest, survival.
+/// Says whether it is a collision, with its stance or alone, or what came of one: rest, survival.
 inline bool is_contact(EventKind kind) { return kind != EventKind::stance && kind != EventKind::launch; }
 
-/// One observed transition and where in the experiment it stands. The list of a data set does not depend on parameters.
+/// Is one observed transition and its place in the experiment. The list of a data set does not depend on parameters.
 struct Event {
   EventKind kind = EventKind::step;
   std::size_t trial = 0;      ///< index, in the order the trials were run
@@ -40,8 +40,8 @@ struct Event {
   std::optional<bool> rested = {};            ///< after this collision; none: not known, or no collision
 };
 
-/// Logarithm of each event's density [events] and the normal score of its probability integral transform: independent
-/// and standard normal if the model is right. The score of a `survival` is 0.
+/// Holds the logarithm of each event's density [events] and the normal score of its probability integral transform,
+/// independent and standard normal if the model is right. The score of a `survival` is 0.
 struct Evaluation {
   std::vector<double> log_density;
   std::vector<double> score;
@@ -49,7 +49,7 @@ struct Evaluation {
   double total() const;
 };
 
-/// A parameter that is refitted with every hypothesis, held near its nominal value by a normal prior.
+/// Is a parameter that is refitted with every hypothesis, held near its nominal value by a normal prior.
 struct Nuisance {
   std::string name;
   double nominal = 0;
@@ -58,7 +58,7 @@ struct Nuisance {
   double lower = 0, upper = 0;
 };
 
-/// A parameter of an effect that is fitted.
+/// Is a parameter of an effect that is fitted.
 struct FreeParameter {
   double neutral = 0;
   double lower = 0, upper = 0;
@@ -67,29 +67,29 @@ struct FreeParameter {
   double likely = 0;   ///< a size that the data show by themselves, from which fits start as well; 0: there is none
 };
 
-/// A number as it is reported: by its name.
+/// Is a number as it is reported: by its name.
 using NamedValue = std::pair<std::string, double>;
 
-/// What stands for an effect of one size in a fit.
+/// Is what stands for an effect of one size in a fit.
 struct FittedForm {
   std::vector<double> variant, values;
 };
 
-/// An effect as it is fitted: some parameters are free, the others run over a list of variants (a leg, an interval).
+/// Is an effect as it is fitted: some parameters are free, the others run over a list of variants (a leg, an interval).
 struct Candidate {
   std::string id;
   std::vector<FreeParameter> parameters;
   std::vector<std::vector<double>> variants{{}};  ///< at least one
-  /// By entry of a variant: how far apart the list's values lie, where those between are possible too; 0: they are not.
+  /// Says by entry of a variant how far apart the list's values lie, where those between are possible; else 0.
   std::vector<double> refine = {};
-  /// The fitted values under the names of the catalogue.
+  /// Returns the fitted values under the names of the catalogue.
   std::function<std::vector<NamedValue>(const std::vector<double>& variant, const std::vector<double>& values)> report;
   /// The inverse gives the form of the effect with these values of the catalogue, in the order of its parameters. Where
   /// it is empty the catalogue's values are the fitted ones.
   std::function<FittedForm(const std::vector<double>& catalogue_values)> form_of = {};
-  /// Why these data cannot tell it; empty if they can.
+  /// Says why these data cannot tell it; empty if they can.
   std::string undecidable;
-  /// Reality has no other form of it than this one: none of its gain is forgiven as an error of form.
+  /// If true, reality has no other form of it than this one: none of its gain is forgiven as an error of form.
   bool exact = false;
 };
 
@@ -103,7 +103,7 @@ struct EffectTerm {
 /// Makes the candidate the effect with these values of the catalogue.
 EffectTerm term_of(const Candidate& candidate, const std::vector<double>& catalogue_values);
 
-/// Where a fit may start.
+/// Says where a fit may start.
 struct FitStart {
   std::vector<double> nuisance;
   std::vector<std::vector<double>> values;  ///< by term
@@ -115,54 +115,54 @@ class TransitionModel {
   virtual const std::vector<Event>& events() const = 0;
   virtual std::size_t trials() const = 0;
   virtual std::size_t conditions() const = 0;
-  /// Legs, where events know theirs; 0: not known which leg landed, or a system without legs.
+  /// Counts the legs, where events know theirs; 0 where it is not known which leg landed, or without legs.
   virtual int legs() const = 0;
-  /// Whether the events' times since the previous one tell more than their speeds do: false where a time was computed
-  /// from the event's own speed alone.
+  /// Says whether the events' times since the previous one tell more than their speeds do: false where a time was
+  /// computed from the event's own speed alone.
   virtual bool time_tells() const = 0;
   virtual std::string condition_name(std::size_t condition) const = 0;
-  /// In which Event::position is measured.
+  /// Names the unit in which Event::position is measured.
   virtual std::string position_unit() const { return "m"; }
-  /// What a recalibration refits, in words that "remove" can follow.
+  /// Says what a recalibration refits, in words that "remove" can follow.
   virtual std::string recalibrated() const { return "contact parameters"; }
   virtual const std::vector<Nuisance>& nuisances() const = 0;
   virtual const std::vector<Candidate>& candidates() const = 0;
   /// Gives the densities with these nuisances and effects. Values outside a model's reach give a very small density,
   /// never a NaN.
   virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const = 0;
-  /// Whether a recalibration refits the noise of every step, so that it takes up part of a large gap.
+  /// Says whether a recalibration refits the noise of every step, so that it takes up part of a large gap.
   virtual bool refits_noise() const { return false; }
-  /// Starts that the data themselves suggest for a fit of these terms, tried beside the usual one. The default offers
-  /// none.
+  /// Offers starts that the data themselves suggest for a fit of these terms, tried beside the usual one. The default
+  /// offers none.
   virtual std::vector<FitStart> starts(std::span<const EffectTerm> terms) const;
-  /// How large effects are beside what the nominal model states, a sentence. The default says nothing.
+  /// Says how large effects are beside what the nominal model states, a sentence. The default says nothing.
   virtual std::string size_in_words(std::span<const EffectTerm> terms) const;
-  /// [events] Probability of coming to rest after each event's collision, given what was measured before it; 0 for
-  /// events of no collision. The default is 0 throughout.
+  /// Returns [events] the probability of coming to rest after each event's collision, given what was measured before
+  /// it; 0 for events of no collision. The default is 0 throughout.
   virtual std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
-  /// The same design (trials, columns, conditions) with outcomes drawn from the model. The same seed gives the same
-  /// data.
+  /// Returns the same design (trials, columns, conditions) with outcomes drawn from the model. The same seed gives the
+  /// same data.
   virtual std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                                     std::uint64_t seed) const = 0;
-  /// Changed experiments in words, each with data drawn from the model without effects: another slope or launch speed,
-  /// more columns, more trials.
+  /// Describes changed experiments in words, each with data drawn from the model without effects: another slope or
+  /// launch speed, more columns, more trials.
   virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
       std::span<const double> nuisance, std::uint64_t seed) const = 0;
-  /// The same design with each column that was not measured, by the column's name, with data drawn from the model.
+  /// Returns the same design with each column not measured, by the column's name, with data drawn from the model.
   /// The default has none.
   virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(
       std::span<const double> nuisance, std::uint64_t seed) const;
-  /// Observed collisions at risk, and how many of them led to rest. Zero where outcomes are unknown.
+  /// Counts observed collisions at risk, and how many of them led to rest. Zero where outcomes are unknown.
   virtual std::pair<double, double> rests() const = 0;
-  /// Expected steps before failure under the model, from its hazard along simulated trials as long as the measured
-  /// ones; infinity where it never rests.
+  /// Finds the expected steps before failure under the model, from its hazard along simulated trials as long as the
+  /// measured ones: infinity where it never rests.
   virtual double expected_steps(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                 std::uint64_t seed) const = 0;
-  /// What is not known or was assumed, a sentence each.
+  /// Says what is not known or was assumed, a sentence each.
   virtual const std::vector<std::string>& notes() const = 0;
   /// Says what was wrong with the data or the nominal model and taken all the same; "" if nothing was.
   virtual std::string accepted_defects() const { return ""; }
-  /// What a recalibration is reported by: contact or loss parameters.
+  /// Says what a recalibration is reported by: contact or loss parameters.
   virtual std::vector<NamedValue> report_nuisances(std::span<const double> nuisance) const = 0;
 };
 

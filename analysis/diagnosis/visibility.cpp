@@ -34,7 +34,7 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
       all.push_back(std::move(v));
       continue;
     }
-    // The first parameter's size, the others free to follow.
+    // This is the first parameter's size, the others free to follow.
     double information = own(0, 0);
     if (count > 1) {
       const Eigen::VectorXd cross = own.block(1, 0, count - 1, 1);
@@ -58,7 +58,7 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
     v.times_more = std::pow(size / (p.upper - p.neutral), 2);
     if (p.neutral + size > p.upper) v.undecidable = "it would have to pass its range to be seen";
 
-    // Along the direction in which it was found (or its first parameter): what others explain of it.
+    // This asks along the direction in which it was found (or its first parameter) what others explain of it.
     Eigen::VectorXd direction = found->start[found->best];
     if (count == 1 || !(direction.norm() > 0)) direction = Eigen::VectorXd::Unit(count, 0);
     const double strength = direction.dot(own * direction);
@@ -92,7 +92,7 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
     const TransitionModel& changed = *alternatives[i].second;
     all[i].change = alternatives[i].first;
     const Fit plain = fit(changed, cause.nuisance, {});
-    // The same effects in the changed experiment: with the one variant that was fitted.
+    // The same effects stand in the changed experiment, with the one variant that was fitted.
     Candidate first = *cause.terms[0].candidate, second = *rival[0].candidate;
     first.variants = {cause.terms[0].variant};
     second.variants = {rival[0].variant};

@@ -22,7 +22,7 @@ using dynamics::StanceState;
 constexpr double lead = 0.3;         // [s] recorded before collision 1
 constexpr std::uint64_t stream = 1;  // of random numbers, apart from the trials' own
 
-// The motion between two collisions, or before the first, or after the last.
+// Is the motion between two collisions, or before the first, or after the last.
 struct Piece {
   double begin = 0, end = 0;  // [s]
   double angle = 0;           // of the wheel at `from`
@@ -34,7 +34,7 @@ struct Piece {
   }
 };
 
-// The stance before collision 1, from its end backwards.
+// Returns the stance before collision 1, from its end backwards.
 Piece before_first(const Stance& stance, double omega) {
   Piece piece{.begin = -lead,
               .end = 0,
@@ -90,7 +90,7 @@ AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial
     if (i + 1 < trial.collisions.size()) {
       piece.end = trial.collisions[i + 1].time;
     } else if (trial.outcome == dynamics::Outcome::rest) {
-      // Up to where it turns and back again, as long as up.
+      // It goes up to where it turns and back again, which takes as long.
       double up = 0;
       for (StanceState now = piece.state; now.speed > 0; up += 1e-4)
         now = dynamics::stance_motion(piece.pendulum, now, 1e-4);
@@ -115,7 +115,7 @@ AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial
         options.noise_sd_rad > 0
             ? options.noise_sd_rad * dynamics::normal_quantile(uniform_at(options.seed, index, k + 1, stream))
             : 0;
-    // Held before the release; on both feet after the fall back.
+    // The wheel is held before the release; it stands on both feet after the fall back.
     const double moment = rested && time >= pieces[p].end ? pieces[p].begin : std::max(time, pieces.front().begin);
     recording.time.push_back(time);
     recording.angle_rad.push_back(pieces[p].at(moment) + noise);

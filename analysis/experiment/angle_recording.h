@@ -1,5 +1,5 @@
 #pragma once
-// What a camera sees of a simulated trial: the wheel's angle over time (angle.csv).
+// Records what a camera sees of a simulated trial: the wheel's angle over time (angle.csv).
 
 #include <cstdint>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace metastable::analysis {
 
-/// The unwrapped angle of the wheel, rising as it rolls down, at rising times [s].
+/// Holds the unwrapped angle of the wheel, rising as it rolls down, at rising times [s].
 struct AngleRecording {
   std::vector<double> time, angle_rad;
 };
@@ -29,16 +29,16 @@ struct CameraOptions {
   void validate() const;
 };
 
-/// Trial `index` as recorded: the angle is 0 and the time 0 at collision 1. It begins in the stance before collision 1
-/// (at most 0.3 s before; a wheel too slow to have come over its foot was held until its release) and ends before the
-/// collision after the last one; a wheel that came to rest falls back onto both feet and lies still for 0.3 s. The
-/// first frame falls at random between two ticks of the trial's clock.
+/// Returns trial `index` as recorded: the angle is 0 and the time 0 at collision 1. It begins in the stance before
+/// collision 1 (at most 0.3 s before; a wheel too slow to have come over its foot was held until its release) and ends
+/// before the collision after the last one; a wheel that came to rest falls back onto both feet and lies still for 0.3
+/// s. The first frame falls at random between two ticks of the trial's clock.
 AngleRecording record_angle(const dynamics::WheelMap& map, const dynamics::Trial& trial, const CameraOptions& options,
                             std::uint64_t index);
 
-/// angle.csv of all trials, as text; trials are numbered through all conditions.
+/// Returns angle.csv of all trials, as text; trials are numbered through all conditions.
 std::string angle_csv(const std::vector<SimulatedCondition>& conditions, const CameraOptions& options);
-/// The same for one condition, whose id is its slope.
+/// Does the same for one condition, whose id is its slope.
 std::string angle_csv(const Setting& setting, const std::vector<dynamics::Trial>& trials, const CameraOptions& options);
 
 }  // namespace metastable::analysis

@@ -39,7 +39,7 @@ std::vector<double> running_median(const std::vector<double>& values, std::size_
   return medians;
 }
 
-// By how much a period is off the line between its neighbours, relative; 0 beside split and joint periods.
+// Returns by how much a period is off the line between its neighbours, relative; 0 beside split and joint periods.
 std::vector<double> bends(const std::vector<double>& periods, const std::vector<double>& medians) {
   const auto whole = [&](std::size_t k) {
     return periods[k] < missed_from * medians[k] && periods[k] >= double_below * medians[k];

@@ -48,10 +48,10 @@ struct CoastDownRun {
   std::size_t displaced = 0;                    ///< ticks early or late
 };
 
-/// From the last revolution within half a per cent of the top speed to the first below `stop`. A period of 1.5 times
-/// the median of the eleven around it and more is a missed tick, one below 0.6 a double one; periods off the line
-/// between their neighbours by more than eight robust standard deviations of the fifty around (and 0.02 %) show a
-/// displaced one. Blocks end there and begin anew, so that no transition goes over a defect.
+/// Takes the revolutions from the last one within half a per cent of the top speed to the first below `stop`. A
+/// period of 1.5 times the median of the eleven around it and more is a missed tick, one below 0.6 a double one;
+/// periods off the line between their neighbours by more than eight robust standard deviations of the fifty around (and
+/// 0.02 %) show a displaced one. Blocks end there and begin anew, so that no transition goes over a defect.
 /// @param log  at least 10 ticks
 /// @throws std::invalid_argument for fewer ticks, for skips that are not one a tick, if the top speed is not above
 ///         `stop`, or if no block remains
@@ -65,7 +65,7 @@ struct LossFit {
   std::size_t outliers = 0;  ///< beyond five noise_sd
 };
 /// Regresses robustly (Huber's, tuned to 95 % efficiency) the loss of omega^2 on 1, omega (if `linear`) and omega^2;
-/// noise_sd from the median absolute residual.
+/// noise_sd comes from the median absolute residual.
 /// @throws std::invalid_argument for fewer than 20 transitions
 LossFit fit_loss(const std::vector<CoastDownRun>& runs, bool linear);
 
@@ -78,7 +78,7 @@ std::string objection(const CoastDownRun& run, const RevolutionLoss& nominal);
 /// @param runs  two or more @param linear  as for fit_loss @throws std::invalid_argument as fit_loss
 double run_to_run_of(const std::vector<CoastDownRun>& runs, bool linear);
 
-/// The folder: one condition a run, blocks as trials in their order.
+/// Returns the folder: one condition a run, blocks as trials in their order.
 ExperimentFiles coast_down_files(const std::vector<CoastDownRun>& runs, const RevolutionLoss& nominal,
                                  std::optional<double> rotor_inertia, const std::string& title,
                                  const std::vector<std::string>& comment);

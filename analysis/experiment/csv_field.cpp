@@ -13,7 +13,7 @@ bool is_number(std::string_view text) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// A formula behind any number of single quotes.
+// Says whether the text is a formula behind any number of single quotes.
 bool guarded(std::string_view text) {
   const std::string_view formula = text.substr(std::min(text.find_first_not_of('\''), text.size()));
   return !formula.empty() && std::string_view("=+-@\t").find(formula.front()) != std::string_view::npos &&

@@ -14,7 +14,7 @@
 
 namespace metastable::analysis {
 
-/// A column that a file may or must have.
+/// Describes a column that a file may or must have.
 struct CsvColumn {
   std::string_view name;
   bool required = false;  ///< must be in the header, and filled in every row
@@ -41,7 +41,7 @@ class CsvReader {
   /// Goes to the next record that has as many fields as the header; defective ones are reported and skipped. False at
   /// the end of the text, and at once if a required column is missing.
   bool next();
-  /// Whether every record so far had as many fields as the header, and no required column is missing.
+  /// Says whether every record so far had as many fields as the header, and no required column is missing.
   bool complete() const { return complete_; }
   std::size_t line() const { return line_; }  ///< where the record begins
 

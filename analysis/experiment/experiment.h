@@ -1,5 +1,5 @@
 #pragma once
-// Measured (or simulated) trials read from an experiment folder: experiment.toml, collisions.csv, trials.csv.
+// Holds measured (or simulated) trials, read from an experiment folder: experiment.toml, collisions.csv, trials.csv.
 
 #include <cstddef>
 #include <filesystem>
@@ -29,7 +29,7 @@ struct RevolutionLoss {
   double linear = 0;     ///< [rad/s]
   double quadratic = 0;  ///< [1]
   double noise_sd = 0;   ///< [rad^2/s^2], >= 0
-  /// By how much each of the terms differs from run to run: an sd, as a share of the loss, in [0, 0.5].
+  /// Says by how much each of the terms differs from run to run: an sd, as a share of the loss, in [0, 0.5].
   std::optional<double> run_to_run = {};
   std::string accepted_defects =
       {};  ///< of the runs it was fitted to, or of the trials, a sentence; "": there are none
@@ -37,7 +37,7 @@ struct RevolutionLoss {
   /// Returns the mean loss at a speed [rad^2/s^2]. @param omega [rad/s]
   double at(double omega) const { return constant + linear * omega + quadratic * omega * omega; }
 };
-/// RevolutionLoss::run_to_run of a drum of which one run is known.
+/// Is RevolutionLoss::run_to_run of a drum of which one run is known.
 inline constexpr double usual_run_to_run = 0.03;
 
 struct Condition {
@@ -51,8 +51,8 @@ struct Condition {
 struct Sensor {
   std::optional<double> rate;      ///< [Hz]
   std::optional<double> noise_sd;  ///< believed noise of the reported speeds [rad/s]
-  /// The step of the last digit in the speeds as they were printed [rad/s]; 0: none that tells; nothing: no speeds were
-  /// measured (a design).
+  /// Is the step of the last digit in the speeds as they were printed [rad/s]; 0: none that tells; nothing: no speeds
+  /// were measured (a design).
   std::optional<double> last_digit;
 };
 

@@ -16,7 +16,7 @@ std::string toml_spread(const Spread& spread) {
   return fmt::format("{{ mean = {}, sd = {} }}", spread.mean, spread.sd);
 }
 
-// The nominal distributions; of a list of pairs, its means and sds.
+// Holds the nominal distributions; of a list of pairs, its means and sds.
 struct Nominal {
   Spread restitution, friction;
 };

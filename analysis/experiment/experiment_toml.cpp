@@ -91,7 +91,7 @@ class Keys {
     return std::nullopt;
   }
 
-  // { mean = , sd = }
+  // Reads { mean = , sd = }.
   std::optional<Spread> spread(std::string_view key, bool required, const Range& either) {
     const toml::node* node = find(key, required);
     if (node == nullptr) return std::nullopt;

@@ -1,5 +1,5 @@
 #pragma once
-// experiment.toml to data; toml++ stays inside experiment_toml.cpp.
+// Turns experiment.toml into data; toml++ stays inside experiment_toml.cpp.
 
 #include <string>
 #include <string_view>

@@ -1,5 +1,5 @@
 #pragma once
-// What is wrong with files that were read: every defect with its place, several at once.
+// Says what is wrong with files that were read: it lists every defect with its place, several at once.
 
 #include <cstddef>
 #include <stdexcept>

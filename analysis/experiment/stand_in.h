@@ -9,9 +9,10 @@
 
 namespace metastable::analysis {
 
-/// Contact of the stand-in: eta ~ N(0.54, 0.045^2), mu ~ N(0.352, 0.043^2) under `published`. Not the paper's nominal
-/// values, with which that law stops nearly every trial within a few steps: chosen so that the steady speeds are near
-/// those of rigid-body wheels and about one trial in ten rests at 7.02 deg, the "intermittent failures" of Sec. III.
+/// Has the stand-in's contact: eta ~ N(0.54, 0.045^2), mu ~ N(0.352, 0.043^2) under `published`. Not the paper's
+/// nominal values, with which that law stops nearly every trial within a few steps: chosen so that the steady speeds
+/// are near those of rigid-body wheels and about one trial in ten rests at 7.02 deg, the "intermittent failures" of
+/// Sec. III.
 Setting stand_in_setting();
 
 /// Returns the conditions of stand_in() with their numbers of trials, for the virtual laboratory.

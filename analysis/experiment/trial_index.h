@@ -25,8 +25,8 @@ class TrialIndex {
   /// @param described   false: experiment.toml has defects, so conditions are not held against the rows
   TrialIndex(Experiment& experiment, Rows rows, bool described);
 
-  /// Place among entries() of the row that `csv` stands at; a trial not seen before is appended. Nothing: the
-  /// row does not say which trial it belongs to, or says it wrongly; reported.
+  /// Returns the place among entries() of the row that `csv` stands at; a trial not seen before is appended. Nothing
+  /// where the row does not say which trial it belongs to, or says it wrongly, which is reported.
   std::optional<std::size_t> row(CsvReader& csv, std::size_t condition_column, std::size_t trial_column);
   const std::vector<Entry>& entries() const { return entries_; }
   const Entry* find(int number) const;

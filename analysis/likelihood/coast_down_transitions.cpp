@@ -26,8 +26,8 @@ constexpr double half_log_two_pi = 0.91893853320467274178;
 constexpr double outlier_size = 6;  // losses of contact_outliers, in noises
 constexpr double glitch_size = 10;  // spread of a revolution that the counter garbled, in noises
 
-// What differs between runs of one rig is no cause: bearings warm up, air gets thinner. Shares of the mean nominal
-// loss.
+// What differs between runs of one rig is no cause: bearings warm up, air gets thinner. These are shares of the mean
+// nominal loss.
 constexpr double least_run_to_run = 0.001;            // no two runs are more alike
 constexpr double farthest_run = 5;                    // sds from run to run: how far its terms go
 constexpr double usual_ring = 0.3, largest_ring = 3;  // more loss where the rig rings
@@ -37,7 +37,7 @@ constexpr std::size_t stretch = 10;                   // revolutions whose mean 
 constexpr double small_loss = 0.1;                    // of the nominal loss: less is called small
 constexpr double slowest_share = 0.2;                 // of the speed seen: the filter's is never below
 
-// Where each nuisance stands in the list.
+// Says where each nuisance stands in the list.
 struct DrumSlot {
   enum : std::size_t {
     log_noise_sd,
@@ -77,14 +77,14 @@ struct Losses {
   }
 };
 
-// An effect as it is fitted, and what its value does to the losses.
+// Is an effect as it is fitted, and what its value does to the losses.
 struct DrumEffect {
   Candidate candidate;
   std::function<void(Losses&, double)> apply;
   std::optional<int> power = {};  // of the speed with which a torque grows
 };
 
-// How late a tick makes a revolution's omega^2 too small.
+// Says by how much a late tick makes a revolution's omega^2 too small.
 double slope_of_lateness(double omega) { return omega * omega * omega / pi; }
 
 class CoastDownTransitions : public TransitionModel {
@@ -264,7 +264,7 @@ void CoastDownTransitions::set_up_effects() {
     effects_.back().candidate.undecidable =
         "the trials are blocks of one run: a drift cannot be told from a loss that varies with the speed";
   in_range("contact_outliers", &Losses::outliers, 1e-4, 0.01);
-  // Fitted as a variance: there the likelihood has a slope at nothing.
+  // It is fitted as a variance: there the likelihood has a slope at nothing.
   add("sensor_noise", {0, 0, std::pow(parameter("sensor_noise").upper, 2), 1e-9, 1e-7},
       [](Losses& l, double v) { l.sensor = std::hypot(l.sensor, std::sqrt(std::max(0.0, v))); });
   effects_.back().candidate.report = [name = parameter("sensor_noise").name](const Values&, const Values& v) {
@@ -300,7 +300,7 @@ Losses CoastDownTransitions::losses(std::span<const double> nuisance, std::span<
   return l;
 }
 
-// What one transition says.
+// Holds what one transition says.
 struct Seen {
   double log_density, score, unit;
 };
@@ -310,7 +310,7 @@ struct Seen {
 // short.
 class LossFilter {
  public:
-  // `constant`: the trial's own.
+  // `constant` is the trial's own.
   LossFilter(const Losses& losses, double constant, double first_speed) : l_(losses), constant_(constant) {
     spread_(1, 1) = l_.wander_sd * l_.wander_sd;
     begin(first_speed * first_speed);
@@ -414,8 +414,8 @@ Evaluation CoastDownTransitions::evaluate(std::span<const double> nuisance, std:
   return result;
 }
 
-// The mean loss of short stretches beyond the nominal one, by least squares on the terms: close to what they are in the
-// end, where the slopes of the likelihood without them point anywhere.
+// Starts from the mean loss of short stretches beyond the nominal one, by least squares on the terms: close to what
+// they are in the end, where the slopes of the likelihood without them point anywhere.
 std::vector<FitStart> CoastDownTransitions::starts(std::span<const EffectTerm> terms) const {
   const double per_torque = 4 * pi / inertia_;
   std::vector<std::size_t> fitted;
@@ -466,7 +466,7 @@ std::vector<FitStart> CoastDownTransitions::starts(std::span<const EffectTerm> t
     set(DrumSlot::log_wander_revolutions, revolutions);
     all.push_back(start);
   }
-  // Or the stretch that lost most is where the rig rings.
+  // Or it may be that the stretch that lost most is where the rig rings.
   Eigen::Index most = 0;
   const double ring = left.maxCoeff(&most);
   start.nuisance[DrumSlot::resonance] = std::clamp(ring, 0.0, nuisances_[DrumSlot::resonance].upper);

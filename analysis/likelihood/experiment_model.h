@@ -1,5 +1,5 @@
 #pragma once
-// The transition model that belongs to an experiment.
+// Makes the transition model that belongs to an experiment.
 
 #include <memory>
 
@@ -8,7 +8,7 @@
 
 namespace metastable::analysis {
 
-/// wheel_transitions() or coast_down_transitions(). @throws std::invalid_argument as these
+/// Returns wheel_transitions() or coast_down_transitions(). @throws std::invalid_argument as these
 std::unique_ptr<TransitionModel> transition_model(const Experiment& experiment);
 
 }  // namespace metastable::analysis

@@ -35,7 +35,7 @@ double ScoreTilt::log_density(double u) const {
 
 double ScoreTilt::below(double u) const {
   if (skew_ == 0 && weight_ == 0) return u;
-  // Within a cell from the nearer end, so that both tails keep their relative accuracy.
+  // Within a cell it goes from the nearer end, so that both tails keep their relative accuracy.
   const double at = std::clamp(u, 0.0, 1.0) * cells;
   const auto i = static_cast<std::size_t>(std::min<double>(cells - 1, std::floor(at)));
   const double left = static_cast<double>(i) / cells, h = u - left;

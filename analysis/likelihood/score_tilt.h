@@ -1,17 +1,17 @@
 #pragma once
-// A smooth change of shape of a distribution, as nuisance: contact noise is not exactly normal.
+// Makes a smooth change of shape of a distribution a nuisance: contact noise is not exactly normal.
 
 #include <array>
 
 namespace metastable::analysis {
 
-/// Density exp(skew P3(u) + weight P4(u)) / C of the probability integral transform u in [0, 1], with orthonormal
-/// shifted Legendre polynomials: after contact means and spreads are refitted, what is left of a skewed or flatter
-/// distribution, but not of rare outliers.
+/// Has the density exp(skew P3(u) + weight P4(u)) / C of the probability integral transform u in [0, 1], with
+/// orthonormal shifted Legendre polynomials: after contact means and spreads are refitted, what is left of a skewed or
+/// flatter distribution, but not of rare outliers.
 class ScoreTilt {
  public:
   ScoreTilt(double skew, double weight);
-  /// log density at u, and the distribution function there.
+  /// Return the log density at u, and the distribution function there.
   double log_density(double u) const;
   double below(double u) const;
   double largest_density() const { return largest_; }

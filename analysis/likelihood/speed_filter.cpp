@@ -16,7 +16,7 @@ using dynamics::normal_density;
 using dynamics::StepContext;
 
 constexpr double log_sqrt_two_pi = 0.91893853320467274178;
-// Noise that a collision's density is blurred by [rad/s]; less than this is half a per cent of its variance.
+// Is the noise that a collision's density is blurred by [rad/s]; less than this is half a per cent of its variance.
 constexpr double least_blur = 0.012;
 
 struct Node {  // of Gauss-Hermite's rule for the standard normal
@@ -94,7 +94,7 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
     start(reported);
     return {least_log_density, -8, 0.1};
   }
-  // d omega+ / d next omega-: without torques seen / plus, which they change.
+  // d omega+ / d next omega- is seen / plus without torques, which change it.
   const double step = 1e-4 * seen;
   const auto faster = wheel.back(context, seen + step), slower = wheel.back(context, seen - step);
   const double rate = faster && slower ? (*faster - *slower) / (2 * step) : seen / *plus;
@@ -108,8 +108,8 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
   return out;
 }
 
-// The landing up to the next touch. Where omega+ was seen its contact is known all but one number, and only what that
-// leaves is weighed here; else the landing is the collision.
+// Takes the landing up to the next touch. Where omega+ was seen its contact is known all but one number, and only what
+// that leaves is weighed here; else the landing is the collision.
 SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const StepContext& context, double reported,
                                            std::optional<double> slide) {
   constexpr double carried_on = 0.5;  // d next / d omega-, times the ratio of the two
@@ -174,7 +174,7 @@ SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepC
   return weighed(density, below, rate);
 }
 
-// What a transition's density and distribution function say, given the collision before.
+// Returns what a transition's density and distribution function say, given the collision before.
 SpeedFilter::Out SpeedFilter::weighed(double density, double below, double rate) {
   Out out;
   out.log_density = density > 0 ? std::max(least_log_density, std::log(density * rate)) : least_log_density;
@@ -190,7 +190,7 @@ SpeedFilter::Out SpeedFilter::weighed(double density, double below, double rate)
   return out;
 }
 
-// The prior that the transition gives, taken as normal around what was seen.
+// Applies the prior that the transition gives, taken as normal around what was seen.
 void SpeedFilter::update(const Out& out, double seen) {
   const double prior = out.unit * out.unit, gain = noise2_ / (noise2_ + prior);
   mean_ = std::max(1e-2, seen - gain * std::clamp(out.score, -4.0, 4.0) * out.unit);

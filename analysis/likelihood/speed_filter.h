@@ -9,10 +9,10 @@
 
 namespace metastable::analysis {
 
-/// Log density below which no event falls: values outside a model's reach stay finite.
+/// Is the log density below which no event falls: values outside a model's reach stay finite.
 inline constexpr double least_log_density = -60;
 
-/// Normal score of a probability, held inside +-8.
+/// Returns the normal score of a probability, held inside +-8.
 double score_of_probability(double below);
 
 /// Holds the wheel's speed given all measurements so far as N(mean, variance): just before each collision, just after
@@ -20,7 +20,7 @@ double score_of_probability(double below);
 /// trial needs a filter of its own.
 class SpeedFilter {
  public:
-  /// What one measurement says: its log density, its normal score, and the speed that a unit of score is [rad/s].
+  /// Holds what one measurement says: its log density, its normal score, and the speed that a unit of score is [rad/s].
   struct Out {
     double log_density = 0, score = 0, unit = 1;
   };
@@ -38,18 +38,18 @@ class SpeedFilter {
   Out launch(const Condition& condition, double reported);
   /// The first speed is seen (or one after a gap), and nothing can be held against it.
   void start(double reported);
-  /// omega+ is seen: the collision.
+  /// omega+ is seen: this is the collision.
   Out collision(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
-  /// Then the next omega- is seen: the stance.
+  /// Then the next omega- is seen: this is the stance.
   /// @param slide  of the foot, where it was seen [m]; `settled` only
   Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
              std::optional<double> slide = {});
-  /// Only the next omega- is seen: collision and stance together.
+  /// Only the next omega- is seen: this is collision and stance together.
   Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
            std::optional<double> slide = {});
   /// After the last measured speed omega+ was below `bound` (or there was none, the foot jammed), or it was not.
   Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound, bool rested);
-  /// How likely omega+ is to be below `bound` after the last measured speed.
+  /// Says how likely omega+ is to be below `bound` after the last measured speed.
   double chance_below(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound) const;
 
  private:
@@ -68,7 +68,7 @@ class SpeedFilter {
   bool blurred_;
   double mean_ = 0, variance_ = 0;
   std::optional<double> previous_;  // collision's score
-  // Under `settled`, of the speed before the collision whose omega+ the mean now is; nothing: it is that speed's.
+  // Tells, under `settled`, the speed before the collision whose omega+ the mean now is; nothing: it is that speed's.
   struct Before {
     double mean, variance;
   };

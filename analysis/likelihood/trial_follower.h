@@ -1,5 +1,5 @@
 #pragma once
-// One trial followed through its events, as wheel_events() lists them.
+// Follows one trial through its events, as wheel_events() lists them.
 
 #include <array>
 #include <optional>
@@ -12,9 +12,10 @@
 
 namespace metastable::analysis {
 
-/// What each event of one trial says, given those before it. A friction of the trial's own is integrated over by five
-/// Gauss-Hermite nodes: every node follows the trial, weighted by what it has explained. Where no event leads up to a
-/// collision (no launch is stated, or the stances are left out), its reported speed is where the trial goes on from.
+/// Says what each event of one trial says, given those before it. A friction of the trial's own is integrated over by
+/// five Gauss-Hermite nodes: every node follows the trial, weighted by what it has explained. Where no event leads up
+/// to a collision (no launch is stated, or the stances are left out), its reported speed is where the trial goes on
+/// from.
 class TrialFollower {
  public:
   /// All references must outlive the follower.
@@ -22,9 +23,9 @@ class TrialFollower {
   TrialFollower(const WheelRuns& measured, const WheelRun& run, const dynamics::ExtendedWheel& wheel,
                 const WheelHypothesis& hypothesis);
 
-  /// The chance that the collision of this event, which comes next, ends in rest; 0 for events of no collision.
+  /// Returns the chance that the collision of this event, which comes next, ends in rest; 0 for events of no collision.
   double chance_of_rest(const Event& event);
-  /// Log density, normal score and unit of the event that comes next.
+  /// Returns log density, normal score and unit of the event that comes next.
   SpeedFilter::Out see(const Event& event);
 
  private:

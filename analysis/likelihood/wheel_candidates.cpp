@@ -133,7 +133,7 @@ WheelCandidate slope_profile(const WheelDesign& design) {
   if (design.ramp_length > 1.4 * design.furthest) ends.push_back(design.ramp_length);
   for (const double to : ends)
     for (const double shape : {0.0, 1.0}) c.candidate.variants.push_back({shape, 0, to});
-  // A bend anywhere is a step in the slope: stretches whose middle lies there.
+  // A bend anywhere is a step in the slope: these are stretches whose middle lies there.
   for (const double share : {0.25, 0.375, 0.5, 0.625, 0.75})
     c.candidate.variants.push_back({2, 0, 2 * share * design.furthest});
   c.candidate.refine = {0, 0, 0.25 * design.furthest};
@@ -298,7 +298,7 @@ WheelCandidate slip_reversal(const WheelDesign& design) {
 std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
   constexpr const char* after_another = "collisions with one before them in their trial";
   constexpr const char* away = "collisions away from the start";
-  // A mean and a spread, or a trend, and as many again to judge them by.
+  // It needs a mean and a spread, or a trend, and as many again to judge them by.
   return {
       needing(5, design.launches, "launches where a launch speed is stated", initial_speed(design)),
       leg_lengths(design),

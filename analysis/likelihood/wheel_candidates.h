@@ -1,6 +1,7 @@
 #pragma once
-// The catalogue's effects on the wheel, as they are fitted. Each has one entry: what is free in it, what its values do
-// to the wheel, what they are called in the catalogue and which of them the catalogue's values are, and what it needs.
+// Lists the catalogue's effects on the wheel, as they are fitted. Each has one entry: what is free in it, what its
+// values do to the wheel, what they are called in the catalogue and which of them the catalogue's values are, and what
+// it needs.
 
 #include <cstddef>
 #include <functional>
@@ -11,7 +12,7 @@
 
 namespace metastable::analysis {
 
-/// What the data allow, for the choice of variants and for saying what cannot be told.
+/// Says what the data allow, for the choice of variants and for saying what cannot be told.
 struct WheelDesign {
   int legs = 8;
   bool legs_known = true, speeds_after = true;
@@ -29,14 +30,14 @@ struct WheelDesign {
   dynamics::Law law = dynamics::Law::published;
 };
 
-/// A candidate, and what its variant and values do to the wheel.
+/// Holds a candidate, and what its variant and values do to the wheel.
 struct WheelCandidate {
   Candidate candidate;
   std::function<void(dynamics::Extension&, const std::vector<double>& variant, const std::vector<double>& values)>
       apply;
 };
 
-/// All but contact_distribution, which is the recalibration; in the order of the catalogue.
+/// Lists all but contact_distribution, which is the recalibration; in the order of the catalogue.
 std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design);
 
 }  // namespace metastable::analysis

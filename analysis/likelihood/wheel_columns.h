@@ -1,5 +1,5 @@
 #pragma once
-// Columns of a wheel's experiment that were not measured, filled in.
+// Fills in columns of a wheel's experiment that were not measured.
 
 #include <string>
 #include <utility>
@@ -9,13 +9,13 @@
 
 namespace metastable::analysis {
 
-/// Noise of speeds after collisions where these are imagined and none is stated [rad/s].
+/// Is the noise of speeds after collisions where these are imagined and none is stated [rad/s].
 inline constexpr double imagined_noise = 0.005;
 
-/// The experiment with the legs that land in their turn from each condition's first one; it must be of a rimless wheel.
+/// Returns the experiment with the legs that land in turn from each condition's first; it must be of a rimless wheel.
 Experiment with_legs_from_the_first(Experiment experiment);
 
-/// The experiment with each column that is missing filled in, by the column's name: legs in their turn from the
+/// Returns the experiment with each column that is missing filled in, by the column's name: legs in their turn from the
 /// condition's first, speeds after collisions as values to be drawn anew. It must be of a rimless wheel.
 std::vector<std::pair<std::string, Experiment>> completed_experiments(const Experiment& experiment);
 

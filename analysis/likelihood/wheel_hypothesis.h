@@ -1,5 +1,5 @@
 #pragma once
-// What is supposed of a wheel whose trials were measured: its contact and the effects added to it.
+// Holds what is supposed of a wheel whose trials were measured: its contact and the effects added to it.
 
 #include <optional>
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a recalibration refits of a wheel, each in a slot of its own of the model's list of nuisances.
+// Says what a recalibration refits of a wheel, each in a slot of its own of the model's list of nuisances.
 
 #include <cstddef>
 #include <optional>
@@ -13,8 +13,8 @@
 
 namespace metastable::analysis {
 
-/// Where each nuisance stands in the list. Spreads and ratios are refitted by their logarithms; log_noise_sd is there
-/// only where the noise is refitted, the last four only under `settled`, where it never is.
+/// Says where each nuisance stands in the list. Spreads and ratios are refitted by their logarithms; log_noise_sd is
+/// there only where the noise is refitted, the last four only under `settled`, where it never is.
 struct WheelSlot {
   enum : std::size_t {
     restitution_mean,
@@ -34,7 +34,7 @@ struct WheelSlot {
 /// @param noise  sd of reported speeds to start from, where it is refitted [rad/s]
 std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise);
 
-/// What these values of the nuisances suppose of the wheel, without effects.
+/// Says what these values of the nuisances suppose of the wheel, without effects.
 WheelHypothesis hypothesis_at(std::span<const double> nuisance);
 
 /// Sets the slots of the contact; the others keep their values.

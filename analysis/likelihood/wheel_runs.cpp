@@ -26,7 +26,7 @@ constexpr double chance_of_deviation = 4;  // in shares of a median deviation ti
 
 std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
 
-// The next omega- that follows from the speeds before and after a collision; under `settled` as if the foot stuck.
+// Returns the next omega- that follows from the speeds around a collision; under `settled` as if the foot stuck.
 std::optional<double> expected_next(const ExtendedWheel& wheel, const dynamics::StepContext& context,
                                     const RunCollision& m) {
   if (!wheel.settles()) return wheel.next(context, *m.after);
@@ -113,7 +113,7 @@ void complete_contexts(WheelRuns& measured) {
   }
 }
 
-// By how much each stance misses the model's next speed [rad/s].
+// Says by how much each stance misses the model's next speed [rad/s].
 std::vector<double> stance_residuals(const WheelRuns& measured) {
   std::vector<double> residual;
   const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
@@ -168,7 +168,7 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
   }
 }
 
-// Slides from the feet's places; next speeds are blurred to what the law is good for.
+// Takes slides from the feet's places; next speeds are blurred to what the law is good for.
 void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
   const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
   std::size_t all = 0, left_out = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// A wheel's measured trials as runs of collisions whose legs, positions, times and sensor noise are all known or
+// Makes a wheel's measured trials runs of collisions whose legs, positions, times and sensor noise are all known or
 // completed, and the list of their transitions.
 
 #include <memory>
@@ -14,7 +14,7 @@
 
 namespace metastable::analysis {
 
-/// One collision and what a step from it depends on.
+/// Holds one collision and what a step from it depends on.
 struct RunCollision {
   dynamics::StepContext context;
   double before = 0;            ///< reported omega- [rad/s]
@@ -31,7 +31,7 @@ struct WheelRun {
   std::optional<dynamics::Outcome> outcome;
 };
 
-/// All trials, in the order they were run, and what is known of wheel and sensors.
+/// Holds all trials, in the order they were run, and what is known of wheel and sensors.
 struct WheelRuns {
   dynamics::Wheel wheel;  ///< as stated; legs of mean length where it is not known which leg landed
   dynamics::Law law = dynamics::Law::published;
@@ -52,16 +52,17 @@ struct WheelRuns {
   std::vector<std::string> notes;  ///< what was assumed, a sentence each
 };
 
-/// The wheel with this contact and these effects, on the ramp of each condition.
+/// Returns the wheel with this contact and these effects, on the ramp of each condition.
 /// @throws std::invalid_argument as dynamics::ExtendedWheel
 std::vector<dynamics::ExtendedWheel> wheels_on_ramps(const WheelRuns& measured, const dynamics::ContactSpread& contact,
                                                      const dynamics::Extension& extension);
 
-/// How good `settled` is as a model of rigid-body engines: by so much a next omega- is off in a way that goes with leg,
-/// slope and speed [rad/s]. It does not average out, so n touches are given an error of sqrt(n) times it, after which
-/// they tell no mean more exactly. (The engine of the paper's wheel with steps of 0.1 ms: medians of legs by 0.0004.)
+/// Says how good `settled` is as a model of rigid-body engines: by so much a next omega- is off in a way that goes with
+/// leg, slope and speed [rad/s]. It does not average out, so n touches are given an error of sqrt(n) times it, after
+/// which they tell no mean more exactly. (The engine of the paper's wheel with steps of 0.1 ms: medians of legs by
+/// 0.0004.)
 inline constexpr double settled_precision = 0.0005;
-/// The same of a slide [m]: torques and slopes that the law does not hold move a foot's hops by up to twice that.
+/// Says the same of a slide [m]: torques and slopes that the law does not hold move a foot's hops by up to twice that.
 inline constexpr double settled_slide_precision = 0.0002;
 
 /// Tabulates the landings of every condition anew, under `settled`; under other laws there are none.
@@ -76,14 +77,14 @@ void mark_counted(const WheelRuns& measured, WheelRun& run);
 /// @throws std::invalid_argument for a coast-down and for `plastic`
 WheelRuns wheel_runs(const Experiment& experiment);
 
-/// An omega+ below this is that of a foot that jammed, seen through the noise [rad/s].
+/// Returns the bound [rad/s] for which an omega+ below it is that of a foot that jammed, seen through the noise.
 double jam_bound(const WheelRuns& measured);
 
 /// The last collision's omega+ becomes 0 where it is below jam_bound and the wheel is not known to have gone on.
 void mark_jam(const WheelRuns& measured, WheelRun& run);
 
-/// Their transitions, the one list that likelihoods go by: per trial launch (where one is stated), then collision and
-/// stance, or step, and rest or survival where the outcome is known. Stances that are exact are left out.
+/// Lists their transitions, the one list that likelihoods go by: per trial launch (where one is stated), then collision
+/// and stance, or step, and rest or survival where the outcome is known. Stances that are exact are left out.
 std::vector<Event> wheel_events(const WheelRuns& measured);
 
 }  // namespace metastable::analysis

@@ -15,7 +15,7 @@ namespace {
 
 using dynamics::ExtendedWheel;
 
-// A draw of collision `event` of trial `index`: uniforms of one Philox block.
+// Draws for collision `event` of trial `index`: uniforms of one Philox block.
 std::array<double, 4> uniforms(std::uint64_t seed, std::uint64_t index, std::uint64_t event) {
   const r123::Philox4x64::ctr_type counter{{index, event, 0x64696167, 0}};
   const r123::Philox4x64::key_type key{{seed, 0}};
@@ -25,7 +25,7 @@ std::array<double, 4> uniforms(std::uint64_t seed, std::uint64_t index, std::uin
   return u;
 }
 
-// One trial; `visit` sees the probability of rest in each of its collisions.
+// Simulates one trial; `visit` sees the probability of rest in each of its collisions.
 template <class Visit>
 WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t index,
                    const std::vector<ExtendedWheel>& wheels, const WheelHypothesis& hypothesis, std::uint64_t seed,

@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// The recording of one trial.
+/// Holds the recording of one trial.
 struct MeasuredAngle {
   int number = 0;             ///< of the trial
   std::size_t condition = 0;  ///< index

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double same_collision = 0.1;  // [s]
 
-// Mean and spread as differences come in (Welford).
+// Follows mean and spread as differences come in (Welford).
 class Spreading {
  public:
   void add(double difference) {

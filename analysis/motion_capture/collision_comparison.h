@@ -1,5 +1,5 @@
 #pragma once
-// Collisions found in recordings beside collisions that are known of the same trials.
+// Puts collisions found in recordings beside collisions that are known of the same trials.
 
 #include <cstddef>
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace metastable::analysis {
 
-/// Found less known [rad/s].
+/// Sums up found less known [rad/s].
 struct SpeedDifferences {
   std::size_t count = 0;
   double bias = 0;             ///< their mean

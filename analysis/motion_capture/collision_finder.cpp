@@ -20,7 +20,7 @@ struct Peak {
   std::size_t trough = 0;  // of the smallest one behind it, before the next peak
 };
 
-// Peaks that rise by `rise` above the troughs on both sides.
+// Finds the peaks that rise by `rise` above the troughs on both sides.
 std::vector<Peak> peaks(std::span<const double> speed, double rise) {
   std::vector<Peak> all;
   std::size_t low = 0, high = 0;
@@ -124,7 +124,7 @@ class Search {
     for (std::size_t i = peak.at; i < peak.trough; ++i)
       if (speed_[i] - speed_[i + 1] > speed_[fall] - speed_[fall + 1]) fall = i;
     const double at = (time[fall] + time[fall + 1]) / 2;
-    // Away from the neighbouring peaks: half way to the fall behind the last one, and up to the next one.
+    // It keeps away from the neighbouring peaks: half way to the fall behind the last one, and up to the next one.
     double from = at - options_.fit_span, to = at + options_.fit_span;
     if (k > 0) from = std::max(from, (time[all[k - 1].trough] + time[all[k - 1].at]) / 2);
     if (k + 1 < all.size()) to = std::min(to, time[all[k + 1].at]);

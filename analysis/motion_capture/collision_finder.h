@@ -25,21 +25,21 @@ struct FoundCollision {
   double peak_time = 0;       ///< of the largest smoothed speed [s]
   double peak = 0;            ///< that speed [rad/s]: the paper's omega_minus
   double peak_angle_rad = 0;  ///< of the wheel then
-  /// The stance motion fitted to the samples before and after the drop, extrapolated to the collision. Nothing: too few
-  /// samples, or the fit did not settle.
+  /// Is the stance motion fitted to the samples before and after the drop, extrapolated to the collision. Nothing where
+  /// samples are too few or the fit did not settle.
   std::optional<StanceFit> fit;
   double apex_time = 0;  ///< of the smallest smoothed speed before the next collision, mid-stance [s]
   double apex = 0;       ///< that speed [rad/s]
   int bounces = 0;       ///< peaks between this collision and the next (or the end)
 };
 
-/// What a collisions.csv says of it: the fit, or the peak where there is no fit or `peak` is wanted.
+/// Returns what a collisions.csv says of it: the fit, or the peak where there is no fit or `peak` is wanted.
 double reported_speed(const FoundCollision& collision, bool peak);  ///< omega_minus [rad/s]
 double reported_time(const FoundCollision& collision);              ///< [s]; of the peak where there is no fit
 
 struct FoundTrial {
   std::vector<FoundCollision> collisions;
-  /// Why there are fewer than asked for; empty if there are not.
+  /// Says why there are fewer than asked for; empty if there are not.
   std::string stopped;
 };
 
@@ -52,7 +52,7 @@ struct FoundTrial {
 FoundTrial find_collisions(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg,
                            const FinderOptions& options);
 
-/// The window that `options` mean at a sampling rate [Hz].
+/// Returns the window that `options` mean at a sampling rate [Hz].
 int smoothing_window(const FinderOptions& options, double rate);
 
 }  // namespace metastable::analysis

@@ -18,13 +18,13 @@ SavitzkyGolay::SavitzkyGolay(int window, int degree, int derivative) : window_(w
         fmt::format("window: {} is not an odd number of samples in {}..10001", window, degree + 1));
   if (derivative < 0 || derivative > degree)
     throw std::invalid_argument(fmt::format("derivative: {} is outside 0..{}", derivative, degree));
-  // Positions scaled to [-1, 1], so that the powers stay of one size.
+  // Positions are scaled to [-1, 1], so that the powers stay of one size.
   const double half = std::max(1, window / 2);
   const auto position = [&](int i) { return (i - window / 2) / half; };
   Eigen::MatrixXd powers(window, degree + 1);
   for (int i = 0; i < window; ++i)
     for (int p = 0; p <= degree; ++p) powers(i, p) = std::pow(position(i), p);
-  // Normal equations: at these degrees and on [-1, 1] they lose no more than a few digits.
+  // On [-1, 1] and at these degrees normal equations lose no more than a few digits.
   const Eigen::MatrixXd fit =
       markov::solve_columns(powers.transpose() * powers, powers.transpose());  // samples to coefficients
   weights_.resize(static_cast<std::size_t>(window) * static_cast<std::size_t>(window));

@@ -1,12 +1,12 @@
 #pragma once
-// Smoothing and differentiation of evenly sampled values by local polynomials.
+// Smooths and differentiates evenly sampled values by local polynomials.
 
 #include <span>
 #include <vector>
 
 namespace metastable::analysis {
 
-/// A. Savitzky, M. J. E. Golay, Anal. Chem. 36 (1964): the polynomial that fits a window of samples best, evaluated at
+/// Evaluates the polynomial that fits a window of samples best (A. Savitzky, M. J. E. Golay, Anal. Chem. 36 (1964)) at
 /// a sample. In the first and last half window the polynomial of the outermost whole window is evaluated off its
 /// centre.
 class SavitzkyGolay {
@@ -18,10 +18,10 @@ class SavitzkyGolay {
   SavitzkyGolay(int window, int degree, int derivative);
 
   int window() const { return window_; }
-  /// Weights of the window's samples for a value at sample `at` of the window (the centre: window / 2), per spacing
-  /// to the power of `derivative`.
+  /// Returns the weights of the window's samples for a value at sample `at` of the window (the centre: window / 2), per
+  /// spacing to the power of `derivative`.
   std::span<const double> weights(int at) const;
-  /// The filtered values, as many as there are. O(values x window).
+  /// Returns the filtered values, as many as there are. O(values x window).
   /// @param spacing  of the samples, > 0. @throws std::invalid_argument for fewer values than the window
   std::vector<double> apply(std::span<const double> values, double spacing) const;
 

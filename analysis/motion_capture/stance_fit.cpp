@@ -21,7 +21,7 @@ class Residuals {
 
   Eigen::VectorXd operator()(const Parameters& p) const {
     Eigen::VectorXd residual(static_cast<Eigen::Index>(time_.size()));
-    // Outwards from the collision, each sample from its neighbour, so that every stretch is integrated once.
+    // It goes outwards from the collision, each sample from its neighbour, so that every stretch is integrated once.
     const auto first_after =
         static_cast<std::size_t>(std::upper_bound(time_.begin(), time_.end(), p(0)) - time_.begin());
     dynamics::StanceState state{before_.end_angle_rad, p(2)};

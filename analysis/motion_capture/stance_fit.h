@@ -16,7 +16,7 @@ struct StanceFit {
   double residual_sd_rad = 0;  ///< of the samples
 };
 
-/// Least squares of time, angle, omega_minus and omega_plus: before the collision the stance motion of `before`
+/// Fits by least squares time, angle, omega_minus and omega_plus: before the collision the stance motion of `before`
 /// backwards from its end, after it that of `after` onwards from its start; a wheel that falls back lies still on both
 /// feet (omega_plus is 0 where it never left them). Levenberg-Marquardt from `guess` and from small omega_plus, the
 /// best of them; nothing if fewer than three samples lie on either side, the time leaves the samples, or it does not

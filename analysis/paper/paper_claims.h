@@ -9,7 +9,7 @@
 namespace metastable::analysis {
 
 enum class ClaimVerdict { reproduced, partly, not_reproduced, not_applicable };
-/// "reproduced", "partly", "not reproduced", "says nothing".
+/// Returns "reproduced", "partly", "not reproduced", "says nothing".
 std::string verdict_text(ClaimVerdict verdict);
 
 struct Finding {
@@ -34,8 +34,8 @@ struct Hypothesis {
   std::string text;
   std::vector<Finding> findings;  ///< one a variant; reproduced: the hypothesis holds
 };
-/// H1 to H3 by variance shares of the steady speed and of the steps (total indices over mean friction 0.3 to 0.55),
-/// with the tests of Figs. 6 and 7. A source matters where its total index exceeds 0.1.
+/// Judges H1 to H3 by variance shares of the steady speed and of the steps (total indices over mean friction 0.3 to
+/// 0.55), with the tests of Figs. 6 and 7. A source matters where its total index exceeds 0.1.
 std::vector<Hypothesis> paper_hypotheses(const std::vector<VariantStudy>& studies);
 
 }  // namespace metastable::analysis

@@ -25,7 +25,7 @@ struct Variant {
   RestReading reading = RestReading::goes_on;
   std::string name;  ///< "published, goes on", "published, rests", "coulomb", "settled"
 };
-/// `coulomb` once: at these slopes nothing rests under it. `settled` once: its wheel cannot go on from rest.
+/// `coulomb` is there once: at these slopes nothing rests under it. So is `settled`: its wheel cannot go on from rest.
 std::vector<Variant> paper_variants();
 
 /// Holds one simulated velocity profile.
@@ -62,7 +62,7 @@ struct PaperStudyOptions {
   int threads = 0;
   std::function<void()> progress = {};  ///< after each of paper_study_units() pieces of work; may throw to stop
 };
-/// Calls of `progress` by one study_variant().
+/// Counts the calls of `progress` by one study_variant().
 std::size_t paper_study_units();
 
 /// Says whether steady speeds of two profiles are alike. P is 1 where one of them has fewer than two values (all trials

@@ -50,7 +50,7 @@ StepBalance balance(std::string of, const std::vector<const Step*>& steps) {
   return b;
 }
 
-// Pearson's, over the steps that have the quantity.
+// Returns Pearson's correlation, over the steps that have the quantity.
 std::optional<double> correlation(const std::vector<Step>& steps,
                                   const std::function<std::optional<double>(const Step&)>& of) {
   double n = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;

@@ -25,7 +25,7 @@ constexpr double curve_end = 8;                // [rad/s]
 constexpr std::uint64_t longest_design = 300;  // collisions
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-// Landings of the setting's wheel, each followed.
+// Returns the landings of the setting's wheel, each followed.
 std::shared_ptr<const dynamics::SettledMap> followed(const Setting& setting) {
   dynamics::SettledMapOptions options;
   options.direct = true;
@@ -37,7 +37,7 @@ RestingCurve resting_curve(const dynamics::SettledMap& map, int leg, double eta)
   const double slowest = std::sqrt(map.motion().foot(leg).barrier_squared());
   const double sticks = map.sticking_friction(leg);
   for (int i = 0; i <= curve_points; ++i) {
-    // Closer where the wheel barely passes.
+    // Points lie closer where the wheel barely passes.
     const double share = static_cast<double>(i) / curve_points;
     const double omega = slowest + (curve_end - slowest) * share * share;
     const double friction = map.resting_friction(leg, omega, eta);
@@ -48,8 +48,8 @@ RestingCurve resting_curve(const dynamics::SettledMap& map, int leg, double eta)
   return curve;
 }
 
-// Collisions over rests of wheels rolled, each for so many collisions at most: once the launch is forgotten the rate of
-// rests stays, so that what is cut off changes nothing.
+// Returns collisions over rests of wheels rolled, each for so many collisions at most: once the launch is forgotten the
+// rate of rests stays, so that what is cut off changes nothing.
 Estimate rolled_steps(const Setting& setting, int trials, std::uint64_t seed, int threads) {
   const dynamics::SettledMotion motion = setting.motion();
   const dynamics::ContactNoise noise = setting.noise();

@@ -1,6 +1,6 @@
 #pragma once
-// How a wheel comes to rest under `settled`: below one friction its foot slides, below another it stops; and what a
-// designer changes about it.
+// Says how a wheel comes to rest under `settled`: below one friction its foot slides, below another it stops; and what
+// a designer changes about it.
 
 #include <cstdint>
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace metastable::analysis {
 
-/// One leg's landings.
+/// Holds one leg's landings.
 struct StoppingLeg {
   int leg = 0;
   double longer = 0;    ///< than the leg before it [m]
@@ -24,7 +24,7 @@ struct StoppingLeg {
   int rests = 0;        ///< of these
 };
 
-/// mu_r of one leg over omega-, at the mean of eta.
+/// Holds mu_r of one leg over omega-, at the mean of eta.
 struct RestingCurve {
   int leg = 0;
   std::vector<double> speed;     ///< omega- [rad/s], from where even a sticking foot rests
@@ -39,16 +39,16 @@ struct Stopping {
   int rests() const;
 };
 
-/// The paper's wheel at 7.02 deg under `settled` with eta ~ N(0.4, 0.05^2), mu ~ N(0.4, 0.03^2), J = 0.0025 kg m^2: the
-/// wheel of the engines (analysis/README.md), which rolls steadily and stops now and then.
+/// Returns the paper's wheel at 7.02 deg under `settled` with eta ~ N(0.4, 0.05^2), mu ~ N(0.4, 0.03^2), J = 0.0025 kg
+/// m^2: the wheel of the engines (analysis/README.md), which rolls steadily and stops now and then.
 Setting stopping_setting();
 
-/// Thresholds by landings that are followed, rests counted in trials rolled without an end of the ramp (at most 200
-/// collisions each).
+/// Finds the thresholds by landings that are followed, rests counted in trials rolled without an end of the ramp (at
+/// most 200 collisions each).
 /// @param trials >= 2; the same bits on any number of threads
 Stopping stopping(const Setting& setting, int trials, std::uint64_t seed, int threads);
 
-/// One thing changed about a setting, and what that buys.
+/// Holds one thing changed about a setting, and what that buys.
 struct DesignChange {
   std::string what, from, to;
   Setting setting;
@@ -56,9 +56,10 @@ struct DesignChange {
   double times = 1;  ///< as many as without the change
 };
 
-/// Inertia of the hub, tolerance of the legs, friction, restitution, slope, tips: the first entry is `base` itself. The
-/// steps are collisions over rests of `trials` wheels that are rolled, with the same random numbers for every change, at
-/// most 300 collisions each: collisions over rests, so that what is cut off hardly matters. Infinite where none rests.
+/// Changes the inertia of the hub, tolerance of the legs, friction, restitution, slope, tips: the first entry is `base`
+/// itself. The steps are collisions over rests of `trials` wheels that are rolled, with the same random numbers for
+/// every change, at most 300 collisions each: collisions over rests, so that what is cut off hardly matters. Infinite
+/// where none rests.
 /// @param base under `settled`; @param trials >= 1; the same bits on any number of threads
 /// @param progress called after each of design_change_count() changes; may throw to stop
 std::vector<DesignChange> design_changes(const Setting& base, int trials, std::uint64_t seed, int threads,

@@ -11,8 +11,8 @@
 
 namespace metastable::analysis {
 
-/// The stand-in's three conditions (stand_in_conditions()) run in the virtual laboratory, with a sensor noise of
-/// 0.008 rad/s, as an experiment.
+/// Returns the stand-in's three conditions (stand_in_conditions()) run in the virtual laboratory, with a sensor noise
+/// of 0.008 rad/s, as an experiment.
 /// @param trials  of each condition; 0: the paper's numbers
 /// @throws std::invalid_argument for effects out of range
 Experiment laboratory_stand_in(const std::vector<dynamics::Effect>& effects, std::uint64_t seed, int threads,

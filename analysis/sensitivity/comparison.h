@@ -1,5 +1,5 @@
 #pragma once
-// Two or more settings side by side, on common random numbers.
+// Puts two or more settings side by side, on common random numbers.
 
 #include <optional>
 #include <string>
@@ -15,9 +15,9 @@ struct Contrast {
   std::size_t against = 0, of = 0;  ///< indices: `of` compared with `against`
   std::optional<Estimate> ratio;    ///< expected steps of `of` over those of `against`; nothing if a side is infinite
   std::optional<Estimate> difference;  ///< expected steps of `of` minus those of `against`
-  /// Measured trials per setting, each of `collisions` collisions, after which a two-sided 5 % Welch test on the mean
-  /// number of steps within those collisions tells the two apart with 80 % power; nothing if they do not differ within
-  /// them.
+  /// Is the number of measured trials per setting, each of `collisions` collisions, after which a two-sided 5 % Welch
+  /// test on the mean number of steps within those collisions tells the two apart with 80 % power; nothing if they do
+  /// not differ within them.
   std::optional<double> trials_needed;
   std::string sentence;  ///< the contrast in words
 };
@@ -32,7 +32,7 @@ struct Comparison {
 /// @param collisions length of a measured trial, >= 1
 Comparison compare(const std::vector<Setting>& settings, const StudyOptions& options, int collisions = 16);
 
-/// The design behind Contrast::trials_needed, from the survival curves P(steps > n), n = 0 .. collisions.
+/// Is the design behind Contrast::trials_needed, from the survival curves P(steps > n), n = 0 .. collisions.
 /// n = (z_0.975 + z_0.8)^2 (var_a + var_b) / (mean_a - mean_b)^2 of min(steps, collisions + 1).
 std::optional<double> trials_to_tell_apart(const std::vector<double>& survival_a, const std::vector<double>& survival_b,
                                            int collisions);

@@ -1,5 +1,5 @@
 #pragma once
-// The numbers of a setting that may be varied one at a time.
+// Lists the numbers of a setting that may be varied one at a time.
 
 #include <string_view>
 
@@ -22,13 +22,13 @@ enum class Parameter {
   tip_radius,          ///< r [m], `settled` only
 };
 
-/// "slope", "restitution-mean", ... @throws std::invalid_argument naming them all
+/// Takes "slope", "restitution-mean", ... @throws std::invalid_argument naming them all
 Parameter parameter_from_name(std::string_view name);
 std::string_view parameter_name(Parameter parameter);
 std::string_view parameter_unit(Parameter parameter);   ///< "deg", "m", ...; "1" for pure numbers
 std::string_view parameter_label(Parameter parameter);  ///< for axes: "slope γ", "sd of friction μ", ...
 
-/// Its value in a setting, defaults that follow from other quantities filled in.
+/// Returns its value in a setting, defaults that follow from other quantities filled in.
 double parameter_value(const Setting& setting, Parameter parameter);
 /// Gives it another value; all that is not given and depends on it follows. Ranges are checked by Setting::problem().
 void set_parameter(Setting& setting, Parameter parameter, double value);

@@ -15,7 +15,8 @@ namespace {
 constexpr int strata = 8;                     // launches a draw
 constexpr std::uint32_t other_draws = 1024u;  // replicates of a study are fewer: these draws are not the chain's
 
-// m on the states of one phase: linear between the midpoints of cells, from differences that keep their digits.
+// Is m on the states of one phase: linear between the midpoints of cells, from differences that keep their
+// digits.
 class MeanOfPhase {
  public:
   MeanOfPhase(const markov::Adjoint& at, const markov::StateSpace& space, int phase) : grid_(space.grid(phase)) {
@@ -39,7 +40,7 @@ class MeanOfPhase {
   double lowest_ = 0;
 };
 
-// dM / d(scale, drag) of every draw of a phase, weights included, and dM / d(barrier, gain) of the phase.
+// Holds dM / d(scale, drag) of every draw of a phase, weights included, and dM / d(barrier, gain) of the phase.
 struct PhaseGradient {
   std::vector<dynamics::Contact> contact;
   std::vector<double> scale, drag;
@@ -59,7 +60,7 @@ class PhaseSlopes {
     }
   }
 
-  // `mass` launches of draw k from one state.
+  // Adds `mass` launches of draw k from one state.
   void add_landing(std::size_t k, double state, double root, double mass) {
     const dynamics::StepCoefficients& c = step_[k];
     const double after = c.scale * state - c.drag * root;
@@ -70,7 +71,7 @@ class PhaseSlopes {
     gradient.gain += weight;
   }
 
-  // Launches of draw k with the density density(x): what comes over the barrier begins or ends at x*.
+  // Adds launches of draw k with the density density(x): what comes over the barrier begins or ends at x*.
   template <class Density>
   void add_barrier(std::size_t k, const Density& density) {
     const dynamics::StepCoefficients& c = step_[k];

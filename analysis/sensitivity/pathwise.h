@@ -1,5 +1,5 @@
 #pragma once
-// The derivative of sampled expected steps along the draws: no differences of noisy solves.
+// Takes the derivative of sampled expected steps along the draws, without differences of noisy solves.
 
 #include <vector>
 
@@ -9,13 +9,13 @@
 
 namespace metastable::analysis {
 
-/// Two settings on either side of the one in question, `distance` apart in the parameter that moves.
+/// Holds two settings on either side of the one in question, `distance` apart in the parameter that moves.
 struct Neighbours {
   Setting minus, plus;
   double distance = 0;
 };
 
-/// d ln(expected steps from the launch) / d parameter for each pair of neighbours, on one sampled chain.
+/// Returns d ln(expected steps from the launch) / d parameter for each pair of neighbours, on one sampled chain.
 ///
 /// Given a draw, the next state is T(x) = scale x - drag sqrt(x) + gain beyond the x* where it comes over the barrier.
 /// With m the mean first passage (linear between the midpoints of cells), y the density of visits, and a the lowest

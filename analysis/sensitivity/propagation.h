@@ -9,7 +9,8 @@
 
 namespace metastable::analysis {
 
-/// What is known of a parameter: its standard error, > 0, in parameter_unit(). Errors are independent of each other.
+/// Is what is known of a parameter: its standard error, > 0, in parameter_unit(). Errors are independent of each
+/// other.
 struct StandardError {
   Parameter parameter = Parameter::slope;
   double value = 0;
@@ -19,7 +20,7 @@ struct StandardError {
 /// of a parameter that does not matter() to the setting
 void check_standard_errors(const Setting& setting, const std::vector<StandardError>& errors);
 
-/// What the parameters' standard errors alone make of a number of expected steps.
+/// Says what the parameters' standard errors alone make of a number of expected steps.
 struct Propagated {
   double log_sd = 0;  ///< standard error of ln(expected steps)
   Estimate interval;  ///< the value with its 95 % interval, numerical error left out
@@ -30,12 +31,12 @@ struct Propagated {
   std::vector<VarianceShare> shares;  ///< falling
 };
 
-/// Delta method in ln(steps): variance = sum of (derivative * standard error)^2. First order: trust it while the
-/// interval is not much wider than a factor of two.
+/// Applies the delta method in ln(steps): variance = sum of (derivative * standard error)^2. It is of first order:
+/// trust it while the interval is not much wider than a factor of two.
 Propagated propagate(double steps, const Sensitivities& sensitivities, const std::vector<StandardError>& errors);
 
-/// The same for the ratio `of` / `against` of two settings' expected steps. The slopes were measured one by one; all
-/// other parameters are the same wheel and contact on both ramps, and what they do to both cancels.
+/// Does the same for the ratio `of` / `against` of two settings' expected steps. The slopes were measured one by one;
+/// all other parameters are the same wheel and contact on both ramps, and what they do to both cancels.
 Propagated propagate_ratio(double ratio, const Sensitivities& of, const Sensitivities& against,
                            const std::vector<StandardError>& errors);
 

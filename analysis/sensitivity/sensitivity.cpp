@@ -21,10 +21,11 @@ constexpr Parameter all_parameters[] = {
     Parameter::friction_sd,  Parameter::leg_length,         Parameter::inertia,        Parameter::ramp_stiffness,
     Parameter::contact_mass, Parameter::radius_of_gyration, Parameter::tip_radius};
 
-// Steps, in parts of the width over which the parameter changes what happens.
+// These steps are in parts of the width over which the parameter changes what happens.
 constexpr double pathwise_step = 1e-3;
 constexpr double integrated_step = 2e-3;
-// Of the wheel and the slope under `settled`: each has a table of its own, whose error is divided by the step.
+// These are of wheel and slope under `settled`: each has a table of its own, whose error is divided by the
+// step.
 constexpr double table_step = 0.1, leg_table_step = 0.02;
 constexpr double tip_width = 0.01;       // [m]
 constexpr std::size_t table_panels = 4;  // times the coarsest nodes
@@ -50,7 +51,7 @@ Setting moved(const Setting& setting, const Sensitivity& one, double by) {
 // Returns the end of eta's range: 1, or what `settled` takes.
 double highest_restitution(const Setting& setting) { return setting.noise().restitution().upper(); }
 
-// Those that can be moved to both sides: a constant at the end of its range cannot.
+// Lists those that can be moved to both sides: a constant at the end of its range cannot.
 std::vector<Sensitivity> candidates(const Setting& setting, bool legs) {
   std::vector<Sensitivity> list;
   const auto at_end = [](const Spread& spread, double upper) {
@@ -101,7 +102,7 @@ std::vector<Sensitivity> by_paths(const Setting& setting, const Metastability& s
   return list;
 }
 
-// How far a parameter is moved to either side: its range may end before.
+// Says how far a parameter is moved to either side: its range may end before.
 struct Moves {
   double back = 0, forth = 0;
   bool central() const { return back == forth; }
@@ -115,8 +116,8 @@ Moves moves(const Setting& setting, const Sensitivity& one, double step) {
   return of;
 }
 
-// Differences of exact rows on nodes that move with the lowest state of a survivor: the densities begin there, and
-// nodes that stood still would lose what lies between.
+// Takes differences of exact rows on nodes that move with the lowest state of a survivor: the densities begin there,
+// and nodes that stood still would lose what lies between.
 class IntegratedRows {
  public:
   // @param problem  of the setting
@@ -177,8 +178,8 @@ bool of_contact(Parameter parameter) {
          parameter == Parameter::friction_mean || parameter == Parameter::friction_sd;
 }
 
-// Under `settled`: differences of rows, whatever the study was made with; a table each for a wheel or slope moved to
-// either side. Error: of the nodes, and of two tables where there are two.
+// Takes, under `settled`, differences of rows, whatever the study was made with, with a table each for a wheel or slope
+// moved to either side. The error is that of the nodes, and of two tables where there are two.
 std::vector<Sensitivity> by_tables(const Setting& setting, const Metastability& study, const StudyOptions& options) {
   const Problem problem = setting.problem({.threads = options.threads});
   const ExactRows rows(problem, options.tolerance, options.threads);

@@ -27,7 +27,7 @@ std::vector<double> axis_values(double first, double last, double step) {
   if (count >= 100000)
     throw std::invalid_argument(fmt::format("range {}:{}:{}: more than 100000 values", first, last, step));
   std::vector<double> values;
-  // Rounded to the decimals a reader typed, so that 5:12:0.25 gives 5.25 and not 5.2500000000000004.
+  // They are rounded to the decimals a reader typed, so that 5:12:0.25 gives 5.25 and not 5.2500000000000004.
   for (double i = 0; i <= count; ++i) values.push_back(std::stod(fmt::format("{:.12g}", first + i * step)));
   return values;
 }

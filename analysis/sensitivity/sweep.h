@@ -1,5 +1,5 @@
 #pragma once
-// Expected steps over a grid of settings.
+// Finds expected steps over a grid of settings.
 
 #include <cstddef>
 #include <exception>
@@ -21,22 +21,22 @@ struct SweepAxis {
 /// @throws std::invalid_argument for step <= 0, last < first or more than 100000 values
 std::vector<double> axis_values(double first, double last, double step);
 
-/// What a sweep says of one point.
+/// Holds what a sweep says of one point.
 struct SweepPoint {
   std::vector<double> at;           ///< one value per axis
   Metastability study;              ///< with its setting
   std::exception_ptr failure = {};  ///< set when a solver did not converge here (study.status is then solver_failed)
 };
 
-/// Number of points of the product of the axes. @throws std::invalid_argument if they are more than 1000000
+/// Returns the number of points of the product of the axes. @throws std::invalid_argument if they are more than 1000000
 std::size_t sweep_size(const std::vector<SweepAxis>& axes);
 
-/// The setting of point `index` (last axis fastest) and its coordinates.
+/// Returns the setting of point `index` (last axis fastest) and its coordinates.
 /// A launch that depends on the slope comes from `base`: sweeps keep base.initial_speed.
 Setting sweep_setting(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t index,
                       std::vector<double>* at = nullptr);
 
-/// Setting::describe() with the word "varies" in place of what the axes vary.
+/// Returns Setting::describe() with the word "varies" in place of what the axes vary.
 std::string sweep_description(const Setting& base, const std::vector<SweepAxis>& axes);
 
 /// Studies one point in brief (StudyOptions::brief), single-threaded. A solver that does not converge is no error here.

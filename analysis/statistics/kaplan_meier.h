@@ -10,8 +10,8 @@
 
 namespace metastable::analysis {
 
-/// One trial: it rested after collision `steps`, or it survived that one and was seen no further (censored: the end of
-/// the ramp, or of the recording).
+/// Is one trial: it rested after collision `steps`, or it survived that one and was seen no further (censored: the end
+/// of the ramp, or of the recording).
 struct ObservedSteps {
   int steps = 0;  ///< >= 1
   bool rested = false;
@@ -32,16 +32,17 @@ std::vector<SurvivalPoint> kaplan_meier(std::span<const ObservedSteps> trials);
 
 /// Estimates the expected steps before failure from such trials.
 struct ExpectedSteps {
-  /// Area under S up to `steady_from` - 1 collisions, and beyond it S / rate: the failure rate is taken as constant in
-  /// the steady state. 95 %: trials resampled for the first part, the Jeffreys distribution of the rate for the second.
+  /// Is the area under S up to `steady_from` - 1 collisions, and beyond it S / rate: the failure rate is taken as
+  /// constant in the steady state. Its 95 % come from trials resampled for the first part, the Jeffreys distribution of
+  /// the rate for the second.
   Estimate from_start;
   Estimate failure_rate;  ///< per steady collision; exact (Clopper and Pearson) 95 % interval
   int steady_rests = 0;   ///< behind failure_rate
   int steady_collisions = 0;
   std::string message;  ///< what the numbers rest on, where it is less than that
 };
-/// No rest in the steady state: from_start is infinite and its lower end a 95 % bound. No collision there: the mean of
-/// what is seen, exact if all trials rested, else a lower bound.
+/// Without a rest in the steady state from_start is infinite and its lower end a 95 % bound. Without a collision there
+/// it is the mean of what is seen, exact if all trials rested, else a lower bound.
 /// @param steady_from  number of the first collision of the steady state, >= 1
 ExpectedSteps expected_steps(std::span<const ObservedSteps> trials, int steady_from, std::uint64_t seed);
 

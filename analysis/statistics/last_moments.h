@@ -1,5 +1,5 @@
 #pragma once
-// How something fails, in numbers: what its last steps look like beside all others. Knows no wheel and no walker.
+// Says in numbers how something fails: what its last steps look like beside all others. It knows no wheel, no walker.
 
 #include <span>
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace metastable::analysis {
 
-/// Weighted median as value, 5 % and 95 % quantiles as ends.
+/// Returns the weighted median as value, 5 % and 95 % quantiles as ends.
 /// @param weights  >= 0, as many as values, some > 0 (otherwise std::invalid_argument)
 Estimate middle_90(std::span<const double> values, std::span<const double> weights);
 
-/// What steps are like: medians with the middle 90 %.
+/// Says what steps are like: medians with the middle 90 %.
 struct StepProfile {
   std::vector<Estimate> state;  ///< at the beginning of the step, one a number of the state
   std::vector<Estimate> noise;  ///< met in it
@@ -21,13 +21,13 @@ struct StepProfile {
       0;  ///< mean chance, at its beginning, of failing before being back in the middle of the regime
 };
 
-/// One step of a path: the state in which it begins, the noise that leads on to the next (or to failure).
+/// Is one step of a path: the state in which it begins, the noise that leads on to the next (or to failure).
 struct PathStep {
   int phase = 0;
   std::vector<double> state, noise;
 };
 
-/// The failures of one chain, from its last steps backwards.
+/// Holds the failures of one chain, from its last steps backwards.
 struct LastMoments {
   std::vector<std::string> state_names, noise_names;  ///< with units
   std::vector<StepProfile> last;                      ///< last[0]: the step that fails, last[1]: the one before ...

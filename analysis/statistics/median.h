@@ -14,7 +14,7 @@ inline double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Median absolute deviation of a normal times this is its standard deviation: 1 / Phi^-1(3/4).
+/// The median absolute deviation of a normal times this is its standard deviation: 1 / Phi^-1(3/4).
 inline constexpr double median_deviation_to_sd = 1.4826;
 
 }  // namespace metastable::analysis

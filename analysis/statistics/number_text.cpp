@@ -34,7 +34,7 @@ void set_mantissa(Decimal& decimal, std::string text) {
   decimal.mantissa = text.front() == '-' ? text.substr(1) : std::move(text);
 }
 
-// `number` in units of 10^exponent, rounded to a multiple of 10^unit.
+// Returns `number` in units of 10^exponent, rounded to a multiple of 10^unit.
 Decimal rounded(double number, int exponent, int unit) {
   Decimal decimal;
   decimal.infinite = std::isinf(number);
@@ -49,7 +49,7 @@ Decimal rounded(double number, int exponent, int unit) {
   return decimal;
 }
 
-// Of an interval with an infinite end, twice the finite half; 0 where there is no number.
+// Returns the width; of an interval with an infinite end, twice the finite half; 0 where there is no number.
 double width(const Estimate& e) {
   if (std::isnan(e.value) || std::isnan(e.lower) || std::isnan(e.upper)) return 0;
   const bool below = std::isfinite(e.lower), above = std::isfinite(e.upper);

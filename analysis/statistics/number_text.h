@@ -1,5 +1,5 @@
 #pragma once
-// Numbers, and numbers with their interval, as people read them.
+// Writes numbers, and numbers with their interval, as people read them.
 
 #include <string>
 
@@ -14,7 +14,7 @@ enum class NumberFormat {
   p_value,      ///< `digits` significant digits, and "< 10⁻¹²" below: chance levels are not followed further down
 };
 
-/// A number in decimals: −1.20×10⁷ is sign, mantissa "1.20" and power of ten 7.
+/// Is a number in decimals: −1.20×10⁷ is sign, mantissa "1.20" and power of ten 7.
 struct Decimal {
   bool negative = false;
   bool infinite = false;
@@ -31,21 +31,22 @@ struct DecimalEstimate {
   Decimal value, lower, upper;
 };
 
-/// Value and ends to the same decimals: as many as make the interval 3 to 30 units of the last one wide, and up to two
-/// more where an end would else be shown as 0 that is not. Where that is not enough, as with ends that lie powers of
-/// ten apart, each number has two significant digits. `format` and `digits` count where the interval has no width.
+/// Writes value and ends to the same decimals: as many as make the interval 3 to 30 units of the last one wide, and up
+/// to two more where an end would else be shown as 0 that is not. Where that is not enough, as with ends that lie
+/// powers of ten apart, each number has two significant digits. `format` and `digits` count where the interval has no
+/// width.
 /// @throws std::invalid_argument for NaN
 DecimalEstimate to_decimal(const Estimate& estimate, NumberFormat format, int digits);
 
-/// "1.23×10⁷", "−0.5", "infinite", "< 10⁻¹²"
+/// Returns "1.23×10⁷", "−0.5", "infinite", "< 10⁻¹²".
 std::string plain_text(const Decimal& decimal);
 /// @throws std::invalid_argument for NaN
 std::string format_number(double number, NumberFormat format, int digits);
 
-/// "1.442 (1.440 to 1.444)". @throws std::invalid_argument for NaN
+/// Returns "1.442 (1.440 to 1.444)". @throws std::invalid_argument for NaN
 std::string format_estimate(const Estimate& estimate, NumberFormat format = NumberFormat::significant, int digits = 3);
 
-/// "10⁻¹²": a power of ten as plain text.
+/// Returns "10⁻¹²", a power of ten as plain text.
 std::string power_of_ten(int exponent);
 
 }  // namespace metastable::analysis

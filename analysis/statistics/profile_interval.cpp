@@ -44,7 +44,7 @@ class Profile {
     path_ = {at, at + 1e-3 * direction};  // the second as the quadratic has it
   }
 
-  /// Half-width of the interval were the cost quadratic.
+  /// Returns the half-width of the interval were the cost quadratic.
   double first_guess() const { return level / std::sqrt(std::max(curvature_, 16.0)); }
 
   /// Returns sqrt(2 (profile - least)) at a value of the variable.
@@ -93,7 +93,7 @@ class Profile {
     return x;
   }
 
-  // Nothing where the cost is infinite.
+  // Returns nothing where the cost is infinite.
   std::optional<Minimum> descend(const Eigen::VectorXd& start) const {
     const auto point = [&](const std::vector<double>& z) {
       const Eigen::VectorXd x = start + axes_ * Eigen::Map<const Eigen::VectorXd>(z.data(), axes_.cols());
@@ -126,7 +126,7 @@ class Profile {
   std::optional<Minimum> better_;
 };
 
-// The end on one side and whether it is bounded.
+// Finds the end on one side and whether it is bounded.
 std::pair<double, bool> end(Profile& profile, double from, double from_root, double limit) {
   if (std::abs(limit - from) < 1e-9) return {limit, false};
   double inner = from, inner_root = from_root, outer = limit, outer_root = -1;  // -1: not known

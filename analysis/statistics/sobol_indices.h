@@ -11,7 +11,7 @@
 
 namespace metastable::analysis {
 
-/// Shares of the output's variance (Sobol' 1993). Sampling may put estimates a little outside [0, 1].
+/// Holds shares of the output's variance (Sobol' 1993). Sampling may put estimates a little outside [0, 1].
 struct SobolIndex {
   Estimate first;  ///< Var(E[output | group]) / Var(output): what the group does on its own
   Estimate total;  ///< E[Var(output | all other groups)] / Var(output): with its interactions
@@ -28,8 +28,8 @@ struct SobolOptions {
   int threads = 0;  ///< the same bits on any number
 };
 
-/// Pick-freeze on two independent matrices A and B of uniform inputs (Philox): first-order by Saltelli et al. (2010),
-/// total by Jansen (1999); 95 % t-intervals over 16 blocks. (groups + 2) x samples evaluations.
+/// Uses pick-freeze on two independent matrices A and B of uniform inputs (Philox): first-order by Saltelli et
+/// al. (2010), total by Jansen (1999); 95 % t-intervals over 16 blocks. (groups + 2) x samples evaluations.
 /// @param group_sizes  inputs of each group, in order
 /// @param model        (inputs in (0, 1), outputs to fill); called from several threads
 /// @throws std::invalid_argument for too few samples

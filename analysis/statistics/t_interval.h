@@ -11,7 +11,8 @@ struct TInterval {
   double half_width = 0;  ///< of the 95 % interval of the mean, Student's t
 };
 
-/// Half-width of the 95 % interval of a mean of `count` values, at least 2 (std::invalid_argument otherwise).
+/// Returns the half-width of the 95 % interval of a mean of `count` >= 2 values (std::invalid_argument
+/// otherwise).
 double t_half_width(double standard_error, std::size_t count);
 
 /// @param sample  independent, roughly normal values, at least 2 (std::invalid_argument otherwise)

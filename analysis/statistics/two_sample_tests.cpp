@@ -58,7 +58,7 @@ Pooled pooled(std::span<const double> a, std::span<const double> b) {
           std::sqrt(1 / ma.count + 1 / mb.count)};
 }
 
-// Noncentrality whose t distribution has `t` at that probability.
+// Finds the noncentrality whose t distribution has `t` at that probability.
 double noncentrality(double t, double df, double probability) {
   const auto excess = [&](double delta) {
     return boost::math::cdf(boost::math::non_central_t(df, delta), t) - probability;
@@ -132,7 +132,7 @@ EffectSize superiority(std::span<const double> a, std::span<const double> b) {
       of_a[i] += win;
       of_b[j] += win;
     }
-  // Whole counts, so that samples apart from each other are told as such.
+  // The counts are whole, so that samples apart from each other are told as such.
   const double value = std::accumulate(of_a.begin(), of_a.end(), 0.0) / (n * m);
   for (double& wins : of_a) wins /= m;
   for (double& wins : of_b) wins /= n;
@@ -173,7 +173,7 @@ DistributionTest kolmogorov_smirnov_test(std::span<const double> a, std::span<co
     test.p = std::clamp(p, 0.0, 1.0);
     return test;
   }
-  // outside[j]: probability that a random merging of the samples, now at (i, j), has come to the distance D.
+  // outside[j] is the probability that a random merging of the samples, now at (i, j), has come to the distance D.
   std::vector<double> outside(static_cast<std::size_t>(m) + 1, 0);
   for (std::int64_t i = 0; i <= n; ++i)
     for (std::int64_t j = 0; j <= m; ++j) {

@@ -20,19 +20,19 @@ struct TTest {
   double degrees_of_freedom = 0;
   double p = 1;
 };
-/// Student's t-test without (Welch 1947) and with the assumption of equal variances. Two constant samples: t and the
-/// difference are 0 and p = 1, or t is infinite and p = 0.
+/// Applies Student's t-test without (Welch 1947) and with the assumption of equal variances. For two constant samples t
+/// and the difference are 0 and p = 1, or t is infinite and p = 0.
 /// @param a, b  2 or more values each (std::invalid_argument otherwise; likewise below)
 TTest welch_t_test(std::span<const double> a, std::span<const double> b);
 TTest pooled_t_test(std::span<const double> a, std::span<const double> b);
 
-/// Hedges' g: the difference of the means over the pooled sd, with the factor 1 - 3/(4 df - 1) against its bias
+/// Returns Hedges' g, the difference of the means over the pooled sd, with the factor 1 - 3/(4 df - 1) against its bias
 /// (Hedges 1981); interval from the noncentral t distribution. Not finite where both samples are constant.
 EffectSize hedges_g(std::span<const double> a, std::span<const double> b);
 
-/// Probability that a value of `a` exceeds one of `b`, ties counted half (0.5: neither is larger). Interval from the
-/// variance of DeLong, DeLong and Clarke-Pearson (1988) on the logit scale; where one sample lies wholly above the
-/// other, from the exact binomial bound of the smaller sample. O(n m).
+/// Returns the probability that a value of `a` exceeds one of `b`, ties counted half (0.5: neither is larger). Interval
+/// from the variance of DeLong, DeLong and Clarke-Pearson (1988) on the logit scale; where one sample lies wholly above
+/// the other, from the exact binomial bound of the smaller sample. O(n m).
 EffectSize superiority(std::span<const double> a, std::span<const double> b);
 
 struct DistributionTest {

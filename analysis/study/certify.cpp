@@ -56,7 +56,7 @@ class Wheel final : public LandingSource {
   std::vector<dynamics::LandingBounds> bounds_;
 };
 
-// A state from which even fortunate noise leads no higher, above all launches and well above `lowest`.
+// Finds a state from which even fortunate noise leads no higher, above all launches and well above `lowest`.
 double top_state(const dynamics::WheelMap& map, const dynamics::TruncatedNormal& launch, double lowest) {
   const dynamics::TruncatedNormal &eta = map.noise().restitution(), &mu = map.noise().friction();
   const double fastest = launch.mean() + launch_noise * launch.sd() + 0.1;
@@ -73,7 +73,7 @@ double top_state(const dynamics::WheelMap& map, const dynamics::TruncatedNormal&
   return std::min(top, most);
 }
 
-// Where nodes have to begin for launches too slow to come from a step: less is as good as rest at the first one.
+// Says where nodes have to begin for launches too slow to come from a step: less is as good as rest at the first one.
 double lowest_of_launch(const dynamics::TruncatedNormal& launch, double lowest) {
   const double usual = std::max(0.0, launch.mean() - usual_noise * launch.sd());
   if (usual * usual >= lowest) return lowest;
@@ -81,7 +81,7 @@ double lowest_of_launch(const dynamics::TruncatedNormal& launch, double lowest) 
   return std::max(slow * slow, least_launch * lowest);
 }
 
-// Spacing in proportion to the state, as the noise of the landing is.
+// Spaces nodes in proportion to the state, as the noise of the landing is.
 std::vector<double> geometric(double lowest, double top, std::size_t cells) {
   std::vector<double> nodes;
   for (std::size_t i = 0; i < cells; ++i)
@@ -91,7 +91,7 @@ std::vector<double> geometric(double lowest, double top, std::size_t cells) {
   return nodes;
 }
 
-// Means over the launch of bounds that are linear between nodes and do not fall.
+// Takes means over the launch of bounds that are linear between nodes and do not fall.
 class LaunchMean {
  public:
   LaunchMean(const dynamics::TruncatedNormal& speed, const std::vector<double>& nodes) : speed_(speed), nodes_(nodes) {
@@ -103,7 +103,7 @@ class LaunchMean {
       const Interval x = dynamics::square(Interval(speed_.mean()));
       return x.lower < nodes_.front() ? 1 : at(v, x.lower).lower;
     }
-    // At least one step from below the first node.
+    // A launch below the first node takes at least one step.
     Interval sum = Interval(1) + (Interval(v.front()) - Interval(1)) * exceeding(nodes_.front());
     each_piece(v, [&](const Interval& rise, double, double to) {
       sum += Interval(std::max(0.0, rise.lower)) * exceeding(to);
@@ -234,7 +234,7 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
 
 namespace {
 
-// Seven digits, rounded away from what is enclosed.
+// Writes seven digits, rounded away from what is enclosed.
 std::string outward(double bound, bool up) {
   constexpr int digits = 7;
   std::string text = fmt::format("{:.{}e}", bound, digits - 1);

@@ -1,5 +1,5 @@
 #pragma once
-// Guaranteed bounds on a wheel's expected steps before failure, or why there are none.
+// Finds guaranteed bounds on a wheel's expected steps before failure, or says why there are none.
 
 #include <cstddef>
 #include <functional>
@@ -15,11 +15,11 @@ struct CertifyOptions {
   double tolerance = 0.01;        ///< wanted (upper - lower) / lower from the launch, > 0
   std::size_t largest_cells = 0;  ///< per phase, refinement stops here; 0: 1600 for one phase, 640 for more
   int threads = 0;                ///< 0: all cores. Results do not depend on it
-  /// Called now and then with the work done so far in [0, 1] and what is being done; may throw to stop.
+  /// It is called now and then with the work done so far in [0, 1] and what is being done, and may throw to stop.
   std::function<void(double, const std::string&)> progress = {};
 };
 
-/// lower <= expected steps <= upper of the model with a continuous state, in exact arithmetic.
+/// Says that lower <= expected steps <= upper of the model with a continuous state, in exact arithmetic.
 struct CertifiedSteps {
   bool exists = false;             ///< false: no bound but `reason`
   std::string reason;              ///< why there is no certificate, or no upper bound; empty if both exist
@@ -39,7 +39,7 @@ struct CertifiedSteps {
 /// @throws std::invalid_argument as Setting::problem(), and for a tolerance that is not above 0
 CertifiedSteps certify(const Setting& setting, const CertifyOptions& options = {});
 
-/// One line: "between 1294.1 and 1301.6 (width 0.58 %), guaranteed", or why not.
+/// Returns one line: "between 1294.1 and 1301.6 (width 0.58 %), guaranteed", or why not.
 std::string certificate_text(const CertifiedSteps& certified);
 
 }  // namespace metastable::analysis

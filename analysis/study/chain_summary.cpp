@@ -37,7 +37,7 @@ struct MeanSd {
   double mean = 0, sd = 0;
 };
 
-// Of the observable, states weighted by `mass` (any total).
+// Returns mean and sd of the observable, states weighted by `mass` (any total).
 MeanSd observe(const Problem& problem, std::span<const double> states, std::span<const double> mass) {
   double total = 0, first = 0, second = 0;
   for (std::size_t i = 0; i < states.size(); ++i) {
@@ -78,8 +78,8 @@ bool noise_free(const Problem& problem) {
   return true;
 }
 
-// Moduli per step of the eigenvalues of a chain watched once a revolution of `period` steps. lambda_1 alone for a map
-// without noise, and where Spectra does not converge (its message is then added to `message`).
+// Returns the moduli per step of the eigenvalues of a chain watched once a revolution of `period` steps. It is lambda_1
+// alone for a map without noise, and where Spectra does not converge (its message is then added to `message`).
 std::vector<double> moduli_per_step(const Problem& problem, const markov::Chain& revolution, int period, int count,
                                     double failure_rate, std::string& message) {
   const std::vector<double> first{1 - failure_rate};
@@ -126,7 +126,7 @@ void describe_violations(const Problem& problem, const markov::StateSpace& space
   }
 }
 
-// Of the quasi-stationary distribution, class by class.
+// Finds ln of a revolution's survival in the quasi-stationary distribution, class by class.
 double log_survival_of_a_revolution(const markov::ChainSolver& solver, const markov::QuasiStationary& quasi) {
   double log_survival = 0;
   for (const std::vector<std::uint32_t>& of_class : solver.period().classes) {
@@ -143,8 +143,8 @@ Accumulated accumulated(const markov::Moments& moments, const std::vector<double
   return total;
 }
 
-// Of the survivors among `states` alone (none: all). Cells that only a fast launch passes are wide enough to lead back
-// into themselves, which no wheel does; they would pass for a regime of their own.
+// Finds the regime of the survivors among `states` alone (none: all). Cells that only a fast launch passes are wide
+// enough to lead back into themselves, which no wheel does; they would pass for a regime of their own.
 markov::QuasiStationary regime_of(const markov::ChainSolver& solver, const std::vector<std::uint32_t>& states) {
   if (states.empty()) return markov::quasi_stationary(solver);
   const markov::ChainSolver inside(solver.chain().restricted_to(states));
@@ -162,7 +162,7 @@ markov::QuasiStationary regime_of(const markov::ChainSolver& solver, const std::
   return quasi;
 }
 
-// To the end of the course, where that is not too far.
+// Counts to the end of the course, where that is not too far.
 std::size_t survival_steps(const Problem& problem) {
   const auto course = static_cast<std::size_t>(problem.last_event.value_or(0)) + 1;
   return std::clamp(course, least_survival, most_survival);
@@ -309,7 +309,8 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   result.survivors.restart_mean = ever ? result.survivors.mean : std::numeric_limits<double>::quiet_NaN();
   result.survivors.restart_sd = ever ? result.survivors.sd : std::numeric_limits<double>::quiet_NaN();
 
-  // Until rest or for ever: the share of the launches that never rest, and the steps of the others.
+  // Launches are followed until rest or for ever: the share that never rests, and the steps of the
+  // others.
   double never = dot(launch.after, rolling), steps = 1;
   if (!mortal.empty()) {
     const markov::ChainSolver until(sampled.chain.restricted_to(mortal));
@@ -327,7 +328,7 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, infinite, infinite};
   result.steps.from_start = finite ? Estimate{steps, steps, steps} : result.steps.from_quasi_stationary;
 
-  // Forward from the launch: survival, and visits on the course.
+  // This goes forward from the launch: survival, and visits on the course.
   std::vector<double> alive = launch.after, visits(space.size(), 0.0);
   result.steps.survival = {1.0};
   const std::size_t shown = survival_steps(problem);

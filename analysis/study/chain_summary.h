@@ -1,5 +1,5 @@
 #pragma once
-// What one chain says: the numbers of a study that need no replicates.
+// Reads off one chain the numbers of a study that need no replicates.
 
 #include <cstdint>
 #include <span>
@@ -14,7 +14,7 @@
 
 namespace metastable::analysis {
 
-/// A chain whose every state reaches rest, solved once for all that is read off it.
+/// Is a chain whose every state reaches rest, solved once for all that is read off it.
 struct SolvedChain {
   /// @param regime  the states, ascending, among which the metastable regime is sought; none: all
   /// @throws std::domain_error, markov::ConvergenceError as markov::ChainSolver, markov::quasi_stationary
@@ -32,15 +32,15 @@ struct ChainSteps {
   double worst_start = 0;
 };
 
-/// Expected steps of a sampled chain. The worst start is the lowest state a survivor can have, at the phase where that
-/// is worst; its landings are drawn with `draws` (each at most 16384, the first four).
+/// Finds the expected steps of a sampled chain. The worst start is the lowest state a survivor can have, at the phase
+/// where that is worst; its landings are drawn with `draws` (each at most 16384, the first four).
 ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space, const SolvedChain& solved,
                        const std::vector<markov::DrawOptions>& draws);
 
-/// What a study says where rest is too rare for it. @param message  follows "rest is possible, but "
+/// Returns what a study says where rest is too rare for it. @param message  follows "rest is possible, but "
 Metastability rest_unresolved(const Problem& problem, const StudyOptions& options, const std::string& message);
 
-/// The middle of every cell.
+/// Returns the middle of every cell.
 std::vector<double> midpoints(const markov::StateSpace& space);
 
 /// Fills everything of `result` that is read off one chain (all but the estimates and their errors).
@@ -49,7 +49,7 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
                const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options,
                Metastability& result);
 
-/// The same for a chain with states that never come to rest. Expected steps are infinite unless all launches rest.
+/// Does the same for a chain with states that never come to rest. Expected steps are infinite unless all launches rest.
 void summarize_endless(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
                        const StudyOptions& options, Metastability& result);
 

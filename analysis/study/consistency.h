@@ -1,5 +1,5 @@
 #pragma once
-// Numbers of a study that must agree, compared before anything is printed.
+// Compares numbers of a study that must agree, before anything is printed.
 
 #include <string>
 
@@ -9,7 +9,8 @@
 
 namespace metastable::analysis {
 
-/// Two numbers that must agree and do not; the message holds both. The command line turns it into exit code 3.
+/// Says that two numbers must agree and do not; the message holds both. The command line turns it into exit
+/// code 3.
 class Contradiction : public markov::ConvergenceError {
  public:
   explicit Contradiction(const std::string& what) : ConvergenceError("contradiction: " + what) {}

@@ -1,5 +1,5 @@
 #pragma once
-// Which exact rows a problem gets: densities on nodes, or collocation.
+// Chooses which exact rows a problem gets: densities on nodes, or collocation.
 
 #include <cstddef>
 #include <utility>
@@ -20,16 +20,16 @@ class ExactRows {
   ExactRows(const Problem& problem, double tolerance, int threads);
 
   bool collocated() const { return collocated_; }
-  /// Of the expected steps, relative, however many the nodes.
+  /// Returns the rows' error of the expected steps, relative, however many the nodes.
   double error() const;
   /// Is rest out of the reach of doubles?
   bool unresolved() const { return ranges_.empty(); }
-  /// Nodes of the coarsest space, per phase.
+  /// Counts the nodes of the coarsest space, per phase.
   std::size_t coarsest() const;
-  /// coarsest() times `panels` nodes a phase; phase p moved by shift[p], if given.
+  /// Has coarsest() times `panels` nodes a phase; phase p moved by shift[p], if given.
   markov::NodeSpace space(std::size_t panels, const std::vector<double>& shift = {}) const;
   markov::IntegratedChain chain(const Problem& problem, const markov::NodeSpace& space) const;
-  /// Where one event from `state` at `phase` leads.
+  /// Says where one event from `state` at `phase` leads.
   markov::Launch row(const Problem& problem, const markov::NodeSpace& space, double state, int phase) const;
 
  private:

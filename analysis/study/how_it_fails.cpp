@@ -18,7 +18,7 @@ constexpr int steps_told = 6;
 constexpr std::size_t most_cells_told = 512, draws_told = 4096;
 constexpr double negligible_share = 1e-9;  // of a step's failures, in one state
 
-/// Draws of one phase with what each is worth as the noise of step k before failure.
+/// Holds the draws of one phase with what each is worth as the noise of step k before failure.
 struct NoiseOfPhase {
   markov::Draws draws;
   std::vector<dynamics::Contact> contact;
@@ -100,7 +100,7 @@ class Failures {
                        [&](const auto& share) { return share[i] > negligible_share; });
   }
 
-  /// Where every draw leads from a cell; -infinity for rest.
+  /// Says where every draw leads from a cell; -infinity for rest.
   std::vector<double> landings(std::size_t i, const markov::NoiseTable& table, const markov::Draws& draws) const {
     std::vector<double> next(draws.count());
     const markov::Grid& grid = space_.grid(space_.phase(i));
@@ -128,7 +128,7 @@ class Failures {
     }
   }
 
-  /// Step k before failure, or all steps of the regime (k = -1).
+  /// Describes step k before failure, or all steps of the regime (k = -1).
   StepProfile profile(const std::vector<double>& share, int k) const {
     StepProfile told;
     std::vector<double> speeds;
@@ -151,7 +151,7 @@ class Failures {
     return told;
   }
 
-  /// The likeliest path's step k, with the draw of the largest density that leads on.
+  /// Returns the likeliest path's step k, with the draw of the largest density that leads on.
   PathStep path_step(std::size_t k) const {
     const std::size_t i = last_.likeliest[k];
     const int phase = space_.phase(i), next_phase = (phase + 1) % space_.phases();

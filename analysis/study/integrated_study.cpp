@@ -37,8 +37,8 @@ double inner(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-// Nothing if the nodes are too few to see where the launch lands or to lead to rest, or so few that interpolation
-// makes nonsense of it.
+// Returns nothing if the nodes are too few to see where the launch lands or to lead to rest, or so few that
+// interpolation makes nonsense of it.
 std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::size_t panels) {
   const markov::NodeSpace space = rows.space(panels);
   markov::SampledChain chain = rows.chain(problem, space).chain;
@@ -67,9 +67,9 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
   return std::nullopt;
 }
 
-// The error left in one result after each refinement. Two levels may agree by chance, and the corner of the density
-// leaves an error that comes and goes with the nodes: so never less than the last change, and the one before has its
-// say. `rows` is the rows' own, which no node removes.
+// Follows the error left in one result after each refinement. Two levels may agree by chance, and the corner of the
+// density leaves an error that comes and goes with the nodes: so never less than the last change, and the one before
+// has its say. `rows` is the rows' own, which no node removes.
 class ErrorLeft {
  public:
   explicit ErrorLeft(double rows) : rows_(rows) {}
@@ -84,7 +84,7 @@ class ErrorLeft {
   double rows_, before_ = 0, error_ = 0;
 };
 
-// 1, 2, 3, 4, 6, 8, 12, 16, ...
+// Steps through 1, 2, 3, 4, 6, 8, 12, 16, ...
 std::size_t more(std::size_t panels) {
   const bool power = (panels & (panels - 1)) == 0;
   return panels == 1 ? 2 : power ? panels + panels / 2 : panels / 3 * 4;

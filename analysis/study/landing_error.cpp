@@ -20,7 +20,7 @@ constexpr std::size_t draws_a_replicate = 128;
 constexpr std::uint32_t of_landings = 1u << 20;  // the first of their randomisations
 constexpr double spread = 2;                     // [sd] of the scores by which memory is looked for
 
-// Expected steps between the states of a phase: straight lines.
+// Interpolates expected steps between the states of a phase: straight lines.
 class Between {
  public:
   Between(std::span<const double> states, std::span<const double> mean) : states_(states), mean_(mean) {}
@@ -35,7 +35,7 @@ class Between {
   std::span<const double> states_, mean_;
 };
 
-// Plain draws spread wider, with the weights that belong to that.
+// Makes plain draws that spread wider, with the weights that belong to that.
 markov::Draws spread_draws(int dimension, markov::DrawOptions options) {
   options.weighting = markov::Weighting::plain;
   markov::Draws draws = markov::make_draws(dimension, options);
@@ -70,15 +70,15 @@ class Events {
     std::partial_sum(visits_.begin(), visits_.end(), visits_.begin());
   }
 
-  // Of the states at a phase, in steps.
+  // Returns the worth of the states at a phase, in steps.
   Worth worth(int phase) const {
     const std::size_t first = static_cast<std::size_t>(phase % phases_) * per_phase_;
     return Between(states_.subspan(first, per_phase_),
                    std::span<const double>(solved_.mean).subspan(first, per_phase_));
   }
 
-  // Of every randomisation, relative to the expected steps from the launch; every draw is written to its place, so that
-  // threads change no bit.
+  // Returns the defect of every randomisation, relative to the expected steps from the launch; every draw is written to
+  // its place, so that threads change no bit.
   std::vector<double> sum(const std::vector<markov::Draws>& draws, int threads, const Defect& defect) const {
     const auto dimension = static_cast<std::size_t>(draws.front().dimension);
     std::vector<double> part(draws.size() * draws_a_replicate);

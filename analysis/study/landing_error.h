@@ -1,5 +1,5 @@
 #pragma once
-// What the expected steps owe to landings that are read from a table, and to states that do not tell all.
+// Says what the expected steps owe to landings that are read from a table, and to states that do not tell all.
 
 #include <span>
 
@@ -7,16 +7,16 @@
 
 namespace metastable::analysis {
 
-/// Both relative to the expected steps from the launch; 0 where the map has no such defect.
+/// Both are relative to the expected steps from the launch; 0 where the map has no such defect.
 struct LandingError {
   double table = 0;  ///< at least 0: by how much reading landings may move them
   Estimate memory;   ///< by how much they change by what the state leaves out
 };
 
-/// To first order the visits to every state times the mean difference in expected steps: between the true landing and
-/// the one read (AnyReturnMap::landing_defect), and between the landing after it with and without what the state leaves
-/// out (AnyReturnMap::memory_defect). By draws in eight randomisations: Student's 95 % half-width is part of
-/// `table`, and of the interval of `memory`, which is wider by its square for the second order.
+/// It is, to first order, the visits to every state times the mean difference in expected steps: between the true
+/// landing and the one read (AnyReturnMap::landing_defect), and between the landing after it with and without what the
+/// state leaves out (AnyReturnMap::memory_defect). Draws come in eight randomisations: Student's 95 % half-width is
+/// part of `table`, and of the interval of `memory`, which is wider by its square for the second order.
 /// Cost: some thousand landings followed.
 /// @param states as in summarize()
 LandingError landing_error(const Problem& problem, int phases, std::span<const double> states,

@@ -28,20 +28,21 @@ constexpr std::size_t first_samples = 4096;
 constexpr std::size_t most_endless = 2048;     // cells a phase
 constexpr double narrowest_integrated = 1e-3;  // sd of eta or mu: between its nodes rest is lost
 constexpr int sizes = 3;                       // cell sizes a ladder holds: cells, cells / 2, cells / 4
-// The extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
+// Is the extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
 constexpr double change_over_error = 3;
 
-// Error of order 2 in the cell size removed.
+// Removes the error of order 2 in the cell size.
 double extrapolate(double fine, double coarse) { return fine + (fine - coarse) / 3; }
 
-// Nested cells for the whole range, coarsest first.
+// Returns nested cells for the whole range, coarsest first.
 std::vector<markov::StateSpace> nested(markov::StateSpace coarsest) {
   std::vector<markov::StateSpace> spaces{std::move(coarsest)};
   while (spaces.size() < sizes) spaces.push_back(spaces.back().halved());
   return spaces;
 }
 
-// Everything sampled at one resolution: the chain of all replicates' draws per cell size, and each replicate's answer.
+// Holds one resolution's samples: the chain of all replicates' draws per cell size, and each replicate's
+// answer.
 struct Ladder {
   std::vector<markov::StateSpace> spaces;
   std::vector<markov::SampledChain> pooled;        // per cell size, coarsest first
@@ -61,7 +62,7 @@ class Study {
   }
 
  private:
-  // `beside`: some states never come to rest, but the launch does not reach them.
+  // `beside` says that some states never come to rest, but the launch does not reach them.
   Metastability finite(bool beside) {
     for (;;) {
       tell(0, "pilot");
@@ -79,7 +80,7 @@ class Study {
 
   bool can_look_deeper() const { return options_.weighting == markov::Weighting::weighted && options_.tail > 1e-300; }
 
-  // All replicates at one resolution, in batches of as many as there are threads; sums run in replicate order.
+  // Solves all replicates at one resolution, in batches of as many as there are threads; sums run in replicate order.
   Ladder climb(const Pilot& pilot, std::size_t cells, std::size_t samples, double work_before, double work_after) {
     Ladder ladder{nested(pilot.graded(cells >> (sizes - 1))), {}, {}};
     std::vector<markov::ChainPool> pools(sizes);
@@ -180,7 +181,7 @@ class Study {
     SolvedChain finest;
   };
 
-  // Expected steps with their errors from the ladder.
+  // Gives the expected steps with their errors from the ladder.
   Assessed assess(const Pilot& pilot, const Ladder& ladder, std::size_t cells, std::size_t samples) const {
     std::vector<markov::DrawOptions> draws;
     for (int r = 0; r < options_.replicates; ++r) draws.push_back(draw_options(options_, samples, r));
@@ -223,7 +224,7 @@ class Study {
     return {std::move(result), *std::move(finest)};
   }
 
-  // Some states never come to rest: no first passage, but a stationary regime.
+  // Answers where some states never come to rest: there is no first passage, but a stationary regime.
   Metastability endless() {
     Metastability result;
     result.status = Status::rest_unreachable;

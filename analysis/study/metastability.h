@@ -1,5 +1,5 @@
 #pragma once
-// The metastability study of one setting: expected steps before failure and what goes with them, with their errors.
+// Studies the metastability of one setting: expected steps before failure and what goes with them, with their errors.
 //
 // Example:
 //   #include <metastable/analysis/study/metastability.h>
@@ -32,7 +32,7 @@
 
 namespace metastable::analysis {
 
-/// How rows are made.
+/// Says how rows are made.
 enum class Method {
   sampled,     ///< by draws of the noise in every cell
   integrated,  ///< from the landing's density on Gauss-Legendre nodes (integrated_study.h)
@@ -55,7 +55,7 @@ struct StudyOptions {
   bool brief = false;             ///< leave out seconds, metres, spectrum, mixing and violated assumptions (sweeps do)
   std::size_t largest_cells = 1024;        ///< refinement stops here
   std::size_t largest_samples = 1u << 18;  ///< and here
-  /// Called now and then with the work done so far in [0, 1] and what is being done; may throw to stop.
+  /// It is called now and then with the work done so far in [0, 1] and what is being done, and may throw to stop.
   std::function<void(double, const std::string&)> progress = {};
   void validate() const;
 };
@@ -69,21 +69,21 @@ enum class Status {
   rest_unresolved,    ///< rest is possible, but beyond the draws: expected steps exceed from_start.lower
 };
 
-/// A value below which a share `level` of all launches stay.
+/// Is a value below which a share `level` of all launches stay.
 struct Quantile {
   double level = 0;  ///< in (0, 1)
   double value = 0;
 };
 
-/// Total of something accumulated from a launch until rest.
+/// Holds the total of something accumulated from a launch until rest.
 struct Accumulated {
   double mean = 0, sd = 0;
   std::vector<Quantile> quantiles;  ///< at 0.05, 0.25, 0.5, 0.75, 0.95; empty where a study could not resolve them
-  /// The quantile at one of these levels; nothing where it is not among them.
+  /// Returns the quantile at one of these levels; nothing where it is not among them.
   std::optional<double> quantile(double level) const;
 };
 
-/// What survivors look like at one phase (one landing leg).
+/// Says what survivors look like at one phase (one landing leg).
 struct PhaseDistribution {
   std::vector<double> edges;  ///< of the cells, in state units; cells + 1
   std::vector<double> mass;   ///< sums to one
@@ -97,7 +97,7 @@ struct ViolationShare {
       0;  ///< of all collisions from the launch to rest (to the end of `survival` where some never rest)
 };
 
-/// The steps before failure, and what goes with them until then.
+/// Holds the steps before failure, and what goes with them until then.
 struct StepsToRest {
   Estimate from_start;                 ///< expected steps before failure, from the launch
   Estimate from_quasi_stationary;      ///< the same from the metastable regime = 1 / Spectrum::failure_rate
@@ -113,11 +113,11 @@ struct StepsToRest {
   std::optional<Accumulated> metres;   ///< from the first foot to the last
   std::vector<double> survival;     ///< P(steps > n), n = 0, 1, ...: 64 values, or to the course's end (10000 at most)
   std::optional<double> reach_end;  ///< probability of surviving the last event of the course
-  /// State below which a launch may come to rest, when faster ones never do.
+  /// Is the state below which a launch may come to rest, when faster ones never do.
   std::optional<double> safe_state;
 };
 
-/// The eigenvalues of the chain: how fast it fails, and how fast it forgets its start.
+/// Holds the eigenvalues of the chain: they say how fast it fails, and how fast it forgets its start.
 struct Spectrum {
   Estimate failure_rate;                     ///< 1 - lambda_1 per step
   std::vector<double> moduli;                ///< per step, falling; lambda_1 alone for a map without noise
@@ -126,7 +126,7 @@ struct Spectrum {
   std::optional<int> total_variation_steps;  ///< from the launch to within StudyOptions::mixing_distance
 };
 
-/// The metastable regime: what survivors look like once the start is forgotten.
+/// Describes the metastable regime: what survivors look like once the start is forgotten.
 struct Survivors {
   std::vector<PhaseDistribution> by_phase;
   double mean = 0, sd = 0;  ///< of the observable over all phases (equal shares)
@@ -134,14 +134,14 @@ struct Survivors {
   double restart_mean = 0, restart_sd = 0;
 };
 
-/// One number of a chain, told in two ways that share little.
+/// Holds one number of a chain, told in two ways that share little.
 struct Agreement {
   std::string what;
   double one = 0, other = 0;
   double tolerance = 0;  ///< relative
 };
 
-/// What a study answers, and what it was made with.
+/// Holds what a study answers, and what it was made with.
 struct Metastability {
   std::optional<Setting> setting;  ///< studied; nothing for a return map of one's own
   Status status = Status::converged;
@@ -157,12 +157,13 @@ struct Metastability {
   std::vector<Agreement> agreements;       ///< of the finest chain, checked before the study is given (consistency.h)
 };
 
-/// Pilot grid, graded cells, replicated draws, three cell sizes, refinement until the tolerance is met.
+/// Studies by pilot grid, graded cells, replicated draws, three cell sizes, refinement until the tolerance
+/// is met.
 ///
 /// Expected steps and the failure rate are extrapolated (Richardson, order 2, in the logarithm) from the two finest
 /// cell sizes of the chain of all replicates' draws; everything else is read off that chain at the finest size.
-/// interval_95: t-interval over the replicates' extrapolations and, as an independent error, a third of the difference
-/// of the last two extrapolations of all draws.
+/// The 95 % interval is a t-interval over the replicates' extrapolations and, as an independent error, a third of the
+/// difference of the last two extrapolations of all draws.
 /// Method::integrated: integrated_study().
 /// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails or the results
 /// contradict each other (consistency.h)
@@ -173,13 +174,13 @@ Metastability study(const Problem& problem, const StudyOptions& options = {});
 /// friction below 1e-3 that is not 0
 void check_setting(const Setting& setting, Method method);
 
-/// The same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.
+/// Does the same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.
 /// @throws std::invalid_argument also as check_setting()
 Metastability study(const Setting& setting, const StudyOptions& options = {});
 
-/// "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.
+/// Returns "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.
 std::string status_text(Status status);
-/// "sampled", "integrated".
+/// Returns "sampled", "integrated".
 std::string_view method_name(Method method);
 /// @throws std::invalid_argument naming the two
 Method method_from_name(std::string_view name);

@@ -15,7 +15,7 @@ constexpr std::size_t pilot_cells = 96;
 constexpr std::size_t pilot_samples = 4096;
 constexpr double beyond_regime = 1e-13;  // share of the survivors
 
-// The lowest state with less than 1e-13 of the survivors above it, at any phase.
+// Finds the lowest state with less than 1e-13 of the survivors above it, at any phase.
 double top_of(const markov::StateSpace& space, const std::vector<double>& nu) {
   double top = 0;
   for (int p = 0; p < space.phases(); ++p) {
@@ -27,7 +27,8 @@ double top_of(const markov::StateSpace& space, const std::vector<double>& nu) {
   return top;
 }
 
-// Expected visits to each state in the steps after the launch: the transient that the cells must hold in every phase.
+// Counts expected visits to each state in the steps after the launch: the transient that cells must hold in
+// every phase.
 std::vector<double> early_visits(const markov::SampledChain& sampled) {
   constexpr int steps = 64;
   std::vector<double> now = sampled.launch.after, visits = now;

@@ -1,5 +1,5 @@
 #pragma once
-// What a metastability study needs: any return map with a launch. Nothing here knows a wheel.
+// States what a metastability study needs: any return map with a launch. Nothing here knows a wheel.
 
 #include <functional>
 #include <optional>
@@ -12,9 +12,10 @@ namespace metastable::analysis {
 struct Problem {
   markov::AnyReturnMap map;
   markov::LaunchState launch;
-  /// What is reported of a state (a wheel: omega = sqrt(x) [rad/s]).
+  /// Is what is reported of a state (a wheel: omega = sqrt(x) [rad/s]).
   std::function<double(double state)> observable = [](double state) { return state; };
-  /// Number of the event whose survival means that the end of the course is reached (a ramp: its last collision).
+  /// Numbers the event whose survival means that the end of the course is reached (a ramp: its last
+  /// collision).
   std::optional<int> last_event = {};
 };
 

@@ -43,7 +43,7 @@ RestReachability rest_reachability(const Problem& problem) {
     (safe(map, middle, phase) ? high : low) = middle;
   }
   result.safe_state = high;
-  // The best orbit of the launch, until it is safe or falls.
+  // This follows the best orbit of the launch, until it is safe or falls.
   double best = launch;
   for (int step = 0; step < 1000 * map.phases(); ++step) {
     if (step % map.phases() == 0 && best >= high) {

@@ -1,5 +1,5 @@
 #pragma once
-// Can the walker come to rest at all? Decided on the map's support, not on samples.
+// Says whether the walker can come to rest at all, decided on the map's support, not on samples.
 
 #include <optional>
 
@@ -9,9 +9,9 @@
 namespace metastable::analysis {
 
 struct RestReachability {
-  /// False: some launches never come to rest, whatever the noise does; expected steps are infinite.
+  /// It is false where some launches never come to rest, whatever the noise does: expected steps are infinite.
   bool certain = true;
-  /// Lowest state at the launch phase from which no sequence of noise leads to rest; nothing if there is none.
+  /// Is the lowest state at the launch phase from which no sequence of noise leads to rest; nothing if there is none.
   std::optional<double> safe_state;
 };
 
@@ -21,9 +21,9 @@ struct RestReachability {
 /// Assumes that landings rise with the state.
 RestReachability rest_reachability(const Problem& problem);
 
-/// Slope [deg] above which the setting's wheel has safe states (rest becomes unreachable from fast enough launches), by
-/// bisection to 1e-6 deg; nothing if there are none at any slope below alpha/2. The ramp's slope in `setting` is
-/// ignored.
+/// Finds the slope [deg] above which the setting's wheel has safe states (rest becomes unreachable from fast enough
+/// launches), by bisection to 1e-6 deg; nothing if there are none at any slope below alpha/2. The ramp's slope in
+/// `setting` is ignored.
 std::optional<double> safe_slope_deg(const Setting& setting);
 
 }  // namespace metastable::analysis

@@ -7,7 +7,7 @@
 
 namespace metastable::analysis {
 
-/// What else is known of a setting's rest, beside its study.
+/// Says what else is known of a setting's rest, beside its study.
 struct RestThresholds {
   std::optional<double> safe_speed;      ///< launches at least this fast never come to rest [rad/s]
   std::optional<double> safe_slope_deg;  ///< steeper ramps have such launches [deg]

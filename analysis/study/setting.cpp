@@ -136,7 +136,7 @@ std::string Setting::describe() const {
   if (law == dynamics::Law::coulomb && rebound_lost != 0) law_text += fmt::format(", rebound lost {}", rebound_lost);
   std::string text = fmt::format("{} deg, {}, {}, {}, omega_0 ~ N({}, {}^2) rad/s", slope_deg, legs, law_text, contact,
                                  initial_speed.mean, initial_speed.sd);
-  // The rest where it is not the paper's.
+  // What follows is said where it is not the paper's.
   const Setting paper;
   if (wheel.hub_mass != paper.wheel.hub_mass) text += fmt::format(", M = {} kg", wheel.hub_mass);
   if (wheel.inertia) text += fmt::format(", I = {} kg m^2", *wheel.inertia);

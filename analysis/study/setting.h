@@ -1,5 +1,5 @@
 #pragma once
-// One setting: a wheel, a ramp, a contact law with its noise, a launch. Defaults are the paper's.
+// Describes one setting: a wheel, a ramp, a contact law with its noise, a launch. Defaults are the paper's.
 
 #include <functional>
 #include <optional>
@@ -12,20 +12,20 @@
 
 namespace metastable::analysis {
 
-/// Mean and sd of the normal before truncation.
+/// Holds mean and sd of the normal before truncation.
 struct Spread {
   double mean = 0;
   double sd = 0;
 };
 
-/// Where landings under `settled` come from.
+/// Says where landings under `settled` come from.
 struct LandingOptions {
   bool direct = false;  ///< every landing followed instead of read from a table, hundreds of times slower
   int threads = 0;      ///< of the table, 0: all cores
   std::function<void(double share)> progress = {};  ///< of the table, from any thread
 };
 
-/// Everything that fixes the chain of one wheel on one ramp.
+/// Holds everything that fixes the chain of one wheel on one ramp.
 struct Setting {
   dynamics::Wheel wheel;
   double slope_deg = 7.02;    ///< gamma [deg], in (0, alpha/2)
@@ -41,23 +41,23 @@ struct Setting {
 
   dynamics::ContactNoise noise() const;
   dynamics::TruncatedNormal launch() const;
-  /// Wheel, ramp and stances; under `settled` nothing about collisions.
+  /// Returns wheel, ramp and stances; under `settled` it says nothing about collisions.
   /// @throws std::invalid_argument, one line naming the quantity, its value and its range
   dynamics::WheelMap map() const;
-  /// The wheel of the law `settled`, whatever `law` is. @throws as map()
+  /// Returns the wheel of the law `settled`, whatever `law` is. @throws as map()
   dynamics::SettledMotion motion() const;
   /// Ranges are those of dynamics/wheel/ranges.h; a ramp may also be infinitely long.
   /// @throws std::invalid_argument, one line naming the quantity, its value and its range
   void validate() const;
-  /// The generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on the
-  /// ramp. Under `settled` a table of landings is built, at most once for wheel and slope (SettledMap::of).
+  /// Returns the generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on
+  /// the ramp. Under `settled` a table of landings is built, at most once for wheel and slope (SettledMap::of).
   Problem problem(const LandingOptions& landings = {}) const;
-  /// One line that names every quantity, for captions and provenance.
+  /// Returns one line that names every quantity, for captions and provenance.
   std::string describe() const;
 };
 
-/// Launch speeds the paper measured: N(7.35, 0.19^2) at 7.02 deg and N(5.83, 0.28^2) at 9.59 deg (fast start) [rad/s];
-/// nothing for other slopes.
+/// Returns the launch speeds the paper measured: N(7.35, 0.19^2) at 7.02 deg and N(5.83, 0.28^2) at 9.59 deg (fast
+/// start) [rad/s]; nothing for other slopes.
 std::optional<Spread> paper_launch(double slope_deg);
 
 }  // namespace metastable::analysis

@@ -23,7 +23,7 @@ constexpr double node_of_no_weight = 1e-6;  // share of a step's falls
 constexpr double score_spacing = 0.2, score_spacing_of_several = 0.6, score_reach = 8.5;
 constexpr std::uint64_t offsets_of_scores = 0x6000;
 
-/// Scores tried from a node, where they lead, and what they are worth as the noise of step k before the fall.
+/// Holds scores tried from a node, where they lead, and what they are worth as the noise of step k before the fall.
 struct Tried {
   std::vector<double> score, next;
   std::vector<std::uint8_t> falls;
@@ -125,7 +125,7 @@ class Falls {
 
   double noise(std::size_t which, double score) const { return noises_[which].mean + noises_[which].sd * score; }
 
-  /// Of step k before the fall, or of all steps.
+  /// Describes step k before the fall, or all steps.
   StepProfile profile(const std::vector<double>& share, std::optional<std::size_t> k) const {
     StepProfile told;
     double all = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// How a walker falls: its last steps and the slopes it meets in them, and where in the section it is bound to fall.
+// Says how a walker falls: its last steps and the slopes it meets in them, and where in the section it must fall.
 
 #include <span>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace metastable::analysis {
 
-/// A node of the mesh.
+/// Is a node of the mesh.
 struct SectionPoint {
   std::vector<double> state;
   std::vector<double> place;  ///< along the principal axes of the noise [stationary sds]
@@ -25,23 +25,23 @@ struct WalkerFalls {
   double spacing = 0;  ///< of the nodes [stationary sds]
 };
 
-/// A noise by its name and unit, mean + sd z at the normal score z.
+/// Is a noise by its name and unit: mean + sd z at the normal score z.
 struct NamedNoise {
   std::string name;
   double mean = 0, sd = 1;
 };
 
-/// The last six steps of what starts at `start` (a state at phase 0), on the middle one of the study's meshes: states
-/// by nodes, noise by a lattice of scores 0.2 apart (of several scores, 0.6). The most likely path goes through nodes;
-/// its noise is that which leads nearest to the next node, and the least that fails. "The gait" is the noise-free
-/// orbit.
+/// Describes the last six steps of what starts at `start` (a state at phase 0), on the middle one of the study's
+/// meshes: states by nodes, noise by a lattice of scores 0.2 apart (of several scores, 0.6). The most likely path goes
+/// through nodes; its noise is that which leads nearest to the next node, and the least that fails. "The gait" is the
+/// noise-free orbit.
 /// @param noises  one for each score
 /// @throws std::invalid_argument for another number of noises; as markov::Mesh and markov::mesh_passage
 WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> start,
                          const std::vector<NamedNoise>& noises, const markov::MeshStudy& study,
                          const markov::MeshStudyOptions& options);
 
-/// The same for a walker that starts in its gait. @throws as study_walker
+/// Does the same for a walker that starts in its gait. @throws as study_walker
 WalkerFalls how_it_falls(const WalkerSetting& setting, const WalkerStudy& study,
                          const markov::MeshStudyOptions& options);
 

@@ -1,5 +1,5 @@
 #pragma once
-// A walker on rough ground: its gait, and how many steps it takes before it falls.
+// Studies a walker on rough ground: its gait, and how many steps it takes before it falls.
 
 #include <numbers>
 #include <string>
@@ -24,21 +24,21 @@ struct WalkerSetting {
   dynamics::Terrain terrain = dynamics::Terrain::fresh;
 
   dynamics::WalkerMap map() const;
-  /// One line, for provenance.
+  /// Returns one line, for provenance.
   std::string describe() const;
 };
 
-/// "simplest", "compass"
+/// Returns "simplest", "compass".
 const char* walker_name(Walker walker);
-/// The slope of the paper that it comes from: 0.009 rad, 3 deg.
+/// Returns the slope of the paper that it comes from: 0.009 rad, 3 deg.
 double walker_slope_deg(Walker walker);
-/// "fresh", "facets"
+/// Returns "fresh", "facets".
 const char* terrain_name(dynamics::Terrain terrain);
 /// @throws std::invalid_argument for a name that is none of "simplest", "compass"; of "fresh", "facets"
 Walker walker_from_name(const std::string& name);
 dynamics::Terrain terrain_from_name(const std::string& name);
 
-/// The walker's map in batches. States: as WalkerMap's. Section: 0 < half angle < pi/2.
+/// Returns the walker's map in batches. States: as WalkerMap's. Section: 0 < half angle < pi/2.
 markov::BatchMap batch_map(const dynamics::WalkerMap& map);
 
 struct WalkerStudy {
@@ -46,7 +46,7 @@ struct WalkerStudy {
   markov::MeshStudy passage;  ///< from the gait; the last slope is the mean
 };
 
-/// The state just after a strike in the gait, with the mean slope underfoot where the terrain remembers it.
+/// Returns the state just after a strike in the gait, with the mean slope underfoot where the terrain remembers it.
 std::vector<double> gait_state(const WalkerSetting& setting, const dynamics::Gait& gait);
 
 /// @throws std::invalid_argument for a setting out of range; std::domain_error where there is no gait;

@@ -27,7 +27,7 @@ struct WalkOptions {
   markov::Share progress = {};
 };
 
-/// Every walk starts in the gait; slopes by counter (Philox) at trial and step.
+/// Every walk starts in the gait; slopes come by counter (Philox) at trial and step.
 /// @throws as study_walker for the setting
 std::vector<Walk> simulate_walks(const WalkerSetting& setting, const WalkOptions& options);
 

@@ -1,5 +1,5 @@
 #pragma once
-// Intervals that surely hold the real result: every bound is moved outward past its rounding error.
+// Holds intervals that surely hold the real result: every bound is moved outward past its rounding error.
 
 #include <algorithm>
 #include <cmath>
@@ -30,12 +30,12 @@ inline double up(double v, double units = 1) { return v + (std::abs(v) * (units 
 inline Interval outward(double lower, double upper, double units = 1) { return {down(lower, units), up(upper, units)}; }
 }  // namespace rounding
 
-/// A computed constant within `relative` of the real number it stands for.
+/// Returns a computed constant within `relative` of the real number it stands for.
 inline Interval around(double value, double relative = 0x1p-46) {
   const double r = std::abs(value) * relative;
   return {rounding::down(value - r), rounding::up(value + r)};
 }
-/// The part two enclosures of the same number share.
+/// Returns the part two enclosures of the same number share.
 inline Interval common(const Interval& a, const Interval& b) {
   return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)};
 }
@@ -53,7 +53,7 @@ inline Interval operator*(const Interval& a, const Interval& b) {
   const double p = a.lower * b.lower, q = a.lower * b.upper, r = a.upper * b.lower, s = a.upper * b.upper;
   return rounding::outward(std::min(std::min(p, q), std::min(r, s)), std::max(std::max(p, q), std::max(r, s)));
 }
-/// 1/a; the whole line if a holds 0.
+/// Returns 1/a; the whole line if a holds 0.
 inline Interval inverse(const Interval& a) {
   if (a.lower > 0 || a.upper < 0) return rounding::outward(1 / a.upper, 1 / a.lower);
   return {-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
@@ -75,7 +75,7 @@ inline Interval exp(const Interval& a) {
   return {std::max(0.0, e.lower), e.upper};
 }
 inline Interval log(const Interval& a) { return rounding::outward(std::log(a.lower), std::log(a.upper), 4); }
-/// 1 - Phi(z), the upper tail of the standard normal; falls with z.
+/// Encloses 1 - Phi(z), the upper tail of the standard normal, which falls with z.
 inline Interval normal_tail(const Interval& z) {
   // The argument of erfc is rounded once more: a relative 2^-52 of it changes erfc(w) by at most 2 w^2 + 2 w times
   // that.

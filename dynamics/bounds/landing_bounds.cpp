@@ -64,7 +64,7 @@ class LandingBounds::Table {
     return drop / state;
   }
 
-  // q = 1/omega.
+  // Returns q = 1/omega.
   Interval speed(const Interval& state) const {
     const Interval q = inverse(sqrt(state));
     if (!(state.lower > 0 && q.lower >= q_.front() && q.upper <= q_.back()))
@@ -220,7 +220,7 @@ class LandingBounds::Table {
       throw NoBounds(error.what());
     }
     open_ = std::min(1.0, rounding::up(outside_.upper + beyond_));
-    // Least b and u over all mu: they rise from mu_c on, where both are 0.
+    // These are the least b and u over all mu: they rise from mu_c on, where both are 0.
     least_b_ = least_u_ = 0;
     for (const Shape& f : strip_shape_) {
       least_b_ = std::min(least_b_, f.b.lower);

@@ -15,15 +15,15 @@ namespace {
 
 namespace odeint = boost::numeric::odeint;
 
-// Speed out of the surface, speed down the ramp, normal work absorbed, normal work given back, friction's charge.
+// Holds speed out of the surface, speed down the ramp, normal work absorbed and given back, friction's charge.
 using State = std::array<double, 5>;
 
-// Friction's impulse per normal impulse (down the ramp) and what friction is charged per impulse and sliding speed.
+// Holds friction's impulse per normal impulse (down the ramp) and its charge per impulse and sliding speed.
 struct Mode {
   double ratio = 0, charged = 0;
 };
 
-// How the contact point answers an impulse: force through the centre of mass plus the turn it gives the body.
+// Says how the contact point answers an impulse: force through the centre of mass plus the turn it gives the body.
 class Body {
  public:
   explicit Body(const Impact& impact)
@@ -31,12 +31,12 @@ class Body {
         spin_(impact.mass * impact.gyration * impact.gyration),
         arm_x_(impact.behind),
         arm_y_(-impact.above) {}
-  // {up, along} per unit of normal impulse with `ratio` of it along.
+  // Returns {up, along} per unit of normal impulse with `ratio` of it along.
   std::pair<double, double> response(double ratio) const {
     const double turn = (arm_x_ * 1 - arm_y_ * ratio) / spin_;  // arm x impulse
     return {1 / mass_ + turn * arm_x_, ratio / mass_ - turn * arm_y_};
   }
-  // The ratio that keeps the point from sliding.
+  // Returns the ratio that keeps the point from sliding.
   double holding() const {
     const double driven = response(0).second;
     return -driven / (response(1).second - driven);
@@ -52,7 +52,7 @@ class March {
   March(const Impact& impact, const Body& body)
       : impact_(impact), body_(body), state_{-impact.approach, impact.along, 0, 0, 0} {}
 
-  // Until sliding stops (if it is watched for) or the collision is over.
+  // Goes on until sliding stops (if it is watched for) or the collision is over.
   void run(const Mode& mode, bool until_sliding_stops) {
     const auto [rise, drift] = body_.response(mode.ratio);
     const double sense = state_[1];
@@ -178,7 +178,7 @@ ImpactWork integrate_impact(const Impact& impact) {
 }
 
 double closed_time(double stiffness, double mass, double restitution) {
-  // The damping ratio whose rebound is `restitution` of the approach; time in units of sqrt(mass / stiffness).
+  // Finds the damping ratio whose rebound is `restitution` of the approach; time in units of sqrt(mass / stiffness).
   const double log_rebound = -std::log(std::max(restitution, std::numeric_limits<double>::min()));
   const double damping = log_rebound / std::hypot(std::numbers::pi, log_rebound);
   using Oscillator = std::array<double, 2>;
@@ -187,7 +187,7 @@ double closed_time(double stiffness, double mass, double restitution) {
   };
   odeint::runge_kutta_fehlberg78<Oscillator> stepper;
   Oscillator state{0, 1};
-  // Linear: the state may be scaled after every step, so that strong damping does not fade it out.
+  // It is linear: the state may be scaled after every step, so that strong damping does not fade it out.
   constexpr double step = 0.125;
   for (double time = 0;; time += step) {
     Oscillator next{};

@@ -5,7 +5,7 @@
 
 namespace metastable::dynamics {
 
-/// A body that is about to hit a surface with one point. "Along" is down the ramp, "up" is out of the surface.
+/// Is a body that is about to hit a surface with one point. "Along" is down the ramp, "up" is out of the surface.
 struct Impact {
   Law law = Law::published;  ///< published or coulomb
   double mass = 0;           ///< [kg]
@@ -22,7 +22,7 @@ struct Impact {
   double contact_mass = 0;   ///< in the Kelvin-Voigt contact [kg]; published
 };
 
-/// What it costs [J].
+/// Says what it costs [J].
 struct ImpactWork {
   double normal = 0;     ///< absorbed less given back
   double released = 0;   ///< given back by restitution
@@ -42,8 +42,8 @@ struct ImpactWork {
 /// Relative error about 1e-10. Some 100 Runge-Kutta steps of four numbers.
 ImpactWork integrate_impact(const Impact& impact);
 
-/// Time a Kelvin-Voigt contact of restitution eta is closed [s]: the damped oscillator integrated until it is back at
-/// zero. @param stiffness [N/m], mass [kg], restitution in [0, 1] (read as at least 2.2e-308)
+/// Returns the time a Kelvin-Voigt contact of restitution eta is closed [s]: the damped oscillator integrated until it
+/// is back at zero. @param stiffness [N/m], mass [kg], restitution in [0, 1] (read as at least 2.2e-308)
 double closed_time(double stiffness, double mass, double restitution);
 
 }  // namespace metastable::dynamics

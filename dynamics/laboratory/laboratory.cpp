@@ -36,10 +36,10 @@ Draws draws(std::uint64_t seed, std::uint64_t trial, std::uint64_t event, Stream
           uniform(bits[3])};
 }
 
-// Mean 0, sd 1 and the given skewness at a standard normal score: a shifted lognormal (mirrored, if negative).
+// Has mean 0, sd 1 and the given skewness at a standard normal score: a shifted lognormal (mirrored, if negative).
 double skewed(double skewness, double score) {
   if (skewness == 0) return score;
-  // skewness = (w + 2) sqrt(w - 1) with w = exp(s^2).
+  // It has skewness = (w + 2) sqrt(w - 1) with w = exp(s^2).
   const double target = std::abs(skewness);
   double low = 1, high = 3;
   for (int i = 0; i < 60; ++i) {
@@ -60,9 +60,9 @@ Wheel with_legs(Wheel wheel, const std::vector<double>& lengths) {
   return wheel;
 }
 
-// About a foot at the end of a leg, for a centre of mass at the hub [kg m^2]. Written here and not asked of the contact
-// laws, which are judged: what is stated holds about a foot at the mean length, and parallel axes lead from there to
-// the others; the paper's wheel has one inertia about all its feet.
+// Finds it about a foot at the end of a leg, for a centre of mass at the hub [kg m^2]. It is written here and not asked
+// of the contact laws, which are judged: what is stated holds about a foot at the mean length, and parallel axes lead
+// from there to the others; the paper's wheel has one inertia about all its feet.
 double foot_inertia(const Wheel& wheel, Law law, double radius_of_gyration, double length) {
   const double mass = wheel.hub_mass, mean = wheel.mean_leg_length();
   const bool one_for_all = law == Law::published;
@@ -187,7 +187,7 @@ class Laboratory::Roll {
     return std::move(trial_);
   }
 
-  // eta and mu of the collision that comes, effects included.
+  // Draws eta and mu of the collision that comes, effects included.
   Contact draw(int leg, double position, double speed) {
     const Draws d = draws(lab_.setup_.seed, index_, trial_.collisions.size() + 1, Stream::contact);
     const double fresh = trial_.collisions.empty() ? 1 : std::sqrt(1 - c_.memory * c_.memory);
@@ -225,10 +225,10 @@ class Laboratory::Roll {
     return contact;
   }
 
-  // Energy left in the wheel after the collision [J]; nothing is left of a foot that jams.
+  // Returns the energy left in the wheel after the collision [J]; nothing is left of a foot that jams.
   double collide(const Touch& touch, const Contact& contact, double factor) {
     const Point foot = tip(body_, touch.before, touch.leg), mass = centre_of_mass(body_, touch.before);
-    // Both feet on the ground: the ramp runs from one to the other. After a flight: as it is under the landing foot.
+    // With both feet on the ground the ramp runs from one to the other. After a flight it is as under the landing foot.
     const double rise =
         touch.flew ? surface_.rise(foot.x) : std::atan2(foot.z - touch.before.foot.z, foot.x - touch.before.foot.x);
     const Point along{std::cos(rise), std::sin(rise)}, up{-std::sin(rise), std::cos(rise)};
@@ -305,7 +305,7 @@ class Laboratory::Roll {
     return pose;
   }
 
-  // The old foot comes down again: nothing that a camera would call a collision.
+  // Lets the old foot come down again, which no camera would call a collision.
   Pose hop(const Touch& touch) { return next_pose(touch, collide(touch, contact_, 1)); }
 
   void report_after() {

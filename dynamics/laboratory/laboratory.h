@@ -1,5 +1,5 @@
 #pragma once
-// A virtual laboratory: wheels as they might really be, against which models of them are tested.
+// Is a virtual laboratory: wheels as they might really be, against which models of them are tested.
 //
 // Shares no formula with WheelMap or the contact laws: the stance is integrated in time (rolling_motion), the collision
 // over its impulse (impulse_collision). The balance of energy over a collision is the paper's: what the impulse does
@@ -27,13 +27,13 @@ struct LaboratoryCondition {
   int first_landing_leg = 0;
 };
 
-/// What is in the laboratory before effects are added.
+/// Says what is in the laboratory before effects are added.
 struct LaboratorySetup {
   Wheel wheel;
   Law law = Law::published;
   double restitution_mean = 0.4, restitution_sd = 0.1;  ///< eta, normal truncated to [0, 1]
   double friction_mean = 0.4, friction_sd = 0.1;        ///< mu, normal truncated to [0, inf)
-  /// Skewness of eta in (-2, 2): a shifted lognormal of the same mean and sd, cut at 0 and 1, replaces the normal.
+  /// Skews eta, in (-2, 2): a shifted lognormal of the same mean and sd, cut at 0 and 1, replaces the normal.
   double restitution_skewness = 0;
   double sensor_noise = 0;  ///< of every reported speed [rad/s]
   double smoothing = 0;     ///< reported speeds are means over this time before, or after, the collision [s]
@@ -60,7 +60,7 @@ struct LaboratoryTrial {
   std::size_t condition = 0;
   std::vector<LaboratoryCollision> collisions;
   Outcome outcome = Outcome::max_collisions;
-  /// The wheel's angle in continuous time, 0 at collision 1 [rad], rising; from at most 0.3 s before it to the next
+  /// Is the wheel's angle in continuous time, 0 at collision 1 [rad], rising; from at most 0.3 s before it to the next
   /// touch after the last collision, or to where the wheel turns back.
   std::vector<Moment> motion;
 };
@@ -88,7 +88,7 @@ class Laboratory {
   TruncatedNormal restitution_, friction_;
 };
 
-/// Where the wheel's angle stands at time t [s] of a trial (cubic Hermite between its moments).
+/// Says where the wheel's angle stands at time t [s] of a trial (cubic Hermite between its moments).
 double angle_at(const std::vector<Moment>& motion, double time);
 
 }  // namespace metastable::dynamics

@@ -1,5 +1,5 @@
 #pragma once
-// What a laboratory's effects change, as plain numbers: the catalogue's ids are read in one place.
+// Says what a laboratory's effects change, as plain numbers: the catalogue's ids are read in one place.
 
 #include <vector>
 
@@ -17,7 +17,7 @@ struct PatchChange {
   double friction_ratio = 1;
 };
 
-/// Neutral unless said otherwise; the symbols are those of the catalogue's `meaning`.
+/// All is neutral unless said otherwise; the symbols are those of the catalogue's `meaning`.
 struct LaboratoryChanges {
   NominalValues stated;  ///< contact distribution and leg lengths, effects included
   double launch_mean = 0, launch_sd = 0;
@@ -39,7 +39,7 @@ struct LaboratoryChanges {
   double hops_from = 0;  // omega- [rad/s]
   double vibration = 0, vibration_hz = 10;
   bool slip_reversal = false;
-  // outside the catalogue
+  // These are outside the catalogue.
   double slosh = 0, planks = 0, resonance = 0, stored = 0, spread = 0, plates = 0;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// Effects of the laboratory that no catalogue holds, so that a diagnosis can be asked about what it does not know.
+// Lists laboratory effects that no catalogue holds, so that a diagnosis can be asked about what it does not know.
 // They stay out of effect_catalogue() for good.
 
 #include <string>

@@ -14,7 +14,7 @@ class RampSurface {
     if (sag_ == 0 || along <= from_ || along >= to_) return 0;
     return -4 * sag_ * (along - from_) * (to_ - along) / ((to_ - from_) * (to_ - from_));
   }
-  /// Angle by which the surface rises down the ramp, against the plane [rad]; at a kink the mean of both sides.
+  /// Returns the angle by which it rises down the ramp, against the plane [rad]; at a kink the mean of both sides.
   double rise(double along) const;
 
  private:

@@ -37,19 +37,19 @@ class Stance {
     const Point arm = arm_at(s[0]);
     const double coupling = body_.fluid_coupling * (s[1] - s[2]);
     const double drag = body_.constant_drag + body_.linear_drag * s[1] + body_.quadratic_drag * s[1] * s[1];
-    // Gravity, (sin, -cos) of the slope in these axes, about the foot; turning down the ramp counts positive.
+    // Gravity is (sin, -cos) of the slope in these axes, about the foot; turning down the ramp counts positive.
     const double weight =
         body_.mass * body_.gravity * (arm.x * std::cos(body_.slope_rad) + arm.z * std::sin(body_.slope_rad));
     rate = {s[1], (weight - drag - coupling) / inertia_, body_.fluid_inertia > 0 ? coupling / body_.fluid_inertia : 0};
   }
 
   Pose pose(const RollingState& s) const { return {start_.foot, start_.leg, s[0], s[1], s[2]}; }
-  // How high the next leg's tip is over the surface.
+  // Says how high the next leg's tip is over the surface.
   double clearance(const RollingState& s) const {
     const Point at = tip(body_, pose(s), (start_.leg + 1) % body_.legs());
     return at.z - surface_.height(at.x);
   }
-  // What the ground's reaction normal to the surface is, over the mass [m/s^2].
+  // Returns what the ground's reaction normal to the surface is, over the mass [m/s^2].
   double reaction(const RollingState& s) const {
     RollingState rate{};
     (*this)(s, rate, 0);
@@ -80,7 +80,7 @@ Touch fly(const RollingBody& body, const RampSurface& surface, const Pose& lift,
   const Point arm{c.x - lift.foot.x, c.z - lift.foot.z};
   const Point velocity{lift.speed * arm.z, -lift.speed * arm.x};
   const Point pull{body.gravity * std::sin(body.slope_rad), -body.gravity * std::cos(body.slope_rad)};
-  // The pose at time t: the old foot moves with the body.
+  // Returns the pose at time t: the old foot moves with the body.
   const auto at = [&](double t) {
     Pose pose = lift;
     pose.angle_rad += lift.speed * t;
@@ -175,7 +175,7 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
   const Stance stance(body, surface, start, inertia);
   RollingState state{start.angle_rad, start.speed, start.fluid_speed};
   double time = 0;
-  // Small against the pendulum's time and against a radian: the method is of order 8.
+  // Steps are small against the pendulum's time and against a radian: the method is of order 8.
   const double length = body.leg_length[static_cast<std::size_t>(start.leg)];
   const double pendulum_time = std::sqrt(stance.inertia() / (body.mass * body.gravity * length));
   note(0, 0, start.speed);
@@ -198,7 +198,7 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
     };
     state = moved(step);
     time = began + step;
-    // The earliest of: it turns back, the next foot touches, the old one lifts.
+    // The earliest of these counts: it turns back, the next foot touches, the old one lifts.
     double first = step;
     enum { none, turned, touched, lifted } event = none;
     const auto look = [&](const auto& value, auto kind) {
@@ -257,8 +257,8 @@ Pose landing_pose(const RollingBody& body, const RampSurface& surface, int leg, 
   Pose pose;
   pose.leg = (leg + body.legs() - 1) % body.legs();
   pose.speed = pose.fluid_speed = speed;
-  // The stance foot stands uphill; the angle puts the landing tip onto the surface: found with the foot at the origin,
-  // where the chord must point along the line between both feet.
+  // The stance foot stands uphill; the angle puts the landing tip onto the surface: it is found with the foot at the
+  // origin, where the chord must point along the line between both feet.
   const auto chord = [&](double angle) {
     Pose trial;
     trial.leg = pose.leg;

@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// What rolls; all is in SI units.
+/// Describes what rolls; all is in SI units.
 struct RollingBody {
   std::vector<double> leg_length;  ///< [m], in the order they land
   double mass = 0;                 ///< [kg]
@@ -31,8 +31,8 @@ struct Point {
   double x = 0, z = 0;  ///< down the plane, out of it [m]
 };
 
-/// How the wheel stands on one foot, or just off it. `angle_rad` is how far the hub has passed over the foot's leg,
-/// from the normal of the plane [rad]; it grows as the wheel rolls down, at `speed` [rad/s].
+/// Says how the wheel stands on one foot, or just off it. `angle_rad` is how far the hub has passed over the foot's
+/// leg, from the normal of the plane [rad]; it grows as the wheel rolls down, at `speed` [rad/s].
 struct Pose {
   Point foot;
   int leg = 0;
@@ -41,12 +41,12 @@ struct Pose {
   double fluid_speed = 0;  ///< [rad/s]
 };
 
-/// Where hub, tip of a leg and centre of mass are in that pose.
+/// Say where hub, tip of a leg and centre of mass are in that pose.
 Point hub(const RollingBody& body, const Pose& pose);
 Point tip(const RollingBody& body, const Pose& pose, int leg);
 Point centre_of_mass(const RollingBody& body, const Pose& pose);
 
-/// What ends a roll.
+/// Says what ends a roll.
 enum class RollEnd { touch, rest };
 
 struct Touch {
@@ -60,27 +60,27 @@ struct Touch {
   bool flew = false;    ///< the foot had lifted
 };
 
-/// What a camera sees of the motion in one moment.
+/// Holds what a camera sees of the motion in one moment.
 struct Moment {
   double time = 0, turn_rad = 0, speed = 0;  ///< [s], [rad], [rad/s] since the start
 };
 
-/// Inertia about the foot in that pose [kg m^2]. @param inertia for a centre of mass at the hub [kg m^2]
+/// Returns the inertia about the foot in that pose [kg m^2]. @param inertia for a centre of mass at the hub [kg m^2]
 double inertia_about_foot(const RollingBody& body, const Pose& pose, double inertia);
 
-/// The next leg touching in a pose that stands on its foot, at time 0.
+/// Returns the next leg's touch in a pose that stands on its foot, at time 0.
 Touch touch_standing(const RollingBody& body, const Pose& pose, double inertia);
 
-/// From a pose to the next touch of a foot, or to rest. The pendulum equation with drags, by Runge-Kutta of order 8
-/// (relative error about 1e-11), touch, turning back and lift found as events; a wheel whose ground reaction vanishes
-/// flies on its parabola until a tip meets the surface.
+/// Goes from a pose to the next touch of a foot, or to rest. It solves the pendulum equation with drags, by Runge-Kutta
+/// of order 8 (relative error about 1e-11), touch, turning back and lift found as events; a wheel whose ground reaction
+/// vanishes flies on its parabola until a tip meets the surface.
 /// @param inertia about the foot, for a centre of mass at the hub [kg m^2]
 /// @param moments if given, gets the accepted steps
 Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& start, double inertia,
               std::vector<Moment>* moments = nullptr);
 
-/// The motion that led to a pose, backwards in time for at most `seconds`, to the start of that stance or to where the
-/// wheel was held: moments with rising, not positive times and turns, the last one at (0, 0).
+/// Returns the motion that led to a pose, backwards in time for at most `seconds`, to the start of that stance or to
+/// where the wheel was held: moments with rising, not positive times and turns, the last one at (0, 0).
 std::vector<Moment> run_up(const RollingBody& body, const RampSurface& surface, const Pose& end, double inertia,
                            double seconds);
 

@@ -107,7 +107,7 @@ class Quadrature {
     return curve_.coulomb() ? curve_.loss(k, curve_.end()) : infinity;
   }
 
-  // Losses that bound the landing at one eta: their crossing a level adds or takes away a root in mu.
+  // Returns a loss that bounds the landing at one eta: its crossing a level adds or takes away a root in mu.
   double bound(int which, double eta) const {
     const LossCurve::Coefficients k = curve_.at(eta);
     if (friction_.constant()) return at_friction(k, friction_.mean());
@@ -226,7 +226,7 @@ class Quadrature {
   double turn_guess_ = 0, rest_ = 0, usual_ = 0;  // exponent of the likeliest eta
 };
 
-// Between lower and upper, omega+^2 as a function of eta has its least (sign 1) or largest (-1) value nearby.
+// Says that between lower and upper omega+^2 as a function of eta has its least (sign 1) or largest (-1) value nearby.
 struct Turn {
   double lower, upper, sign;
 };
@@ -310,7 +310,7 @@ std::vector<double> states_of_extremes(const WheelMap& map, int phase, std::span
           for (const double eta : {1e-1, 1e-2, 1e-4, 1e-8, 1e-16})
             add(landing, [&](double) { return Contact{eta, mu}; });
         if (restitution.constant()) continue;
-        // Where the loss turns over eta: brackets from a grid at the lowest state, refined at each.
+        // These are states where the loss turns over eta: brackets come from a grid at the lowest, refined at each.
         for (const Turn& turn : turns(map, phase, mu))
           add(landing, [&](double state) {
             std::uintmax_t iterations = 100;

@@ -74,7 +74,7 @@ class Extremes {
 
   template <class F>
   static double improve(const std::vector<double>& grid, std::size_t at, double& x, double best, F f) {
-    // The two sides apart: there may be a kink at the grid point.
+    // The two sides are taken apart: there may be a kink at the grid point.
     for (const auto& [a, b] : {std::pair(at > 0 ? at - 1 : at, at), std::pair(at, std::min(at + 1, grid.size() - 1))}) {
       if (a == b) continue;
       std::uintmax_t iterations = 60;

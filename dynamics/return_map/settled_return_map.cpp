@@ -23,7 +23,7 @@ constexpr double slowest_launch = 0.1;   // of the slowest survivor's state; slo
 constexpr double speed_steps = 3;        // few tables serve all launches [rad/s]
 constexpr double most_speed = 20;        // of a table [rad/s]
 
-// f(place, weight) at the points of a rule on panels of [from, to]; a square root at either end is smooth to them.
+// Calls f(place, weight) at the points of a rule on panels of [from, to]; a square root at either end is smooth there.
 template <std::size_t order, class F>
 void by_rule(double from, double to, std::size_t panels, const F& f) {
   using Rule = boost::math::quadrature::gauss<double, order>;
@@ -38,7 +38,7 @@ void by_rule(double from, double to, std::size_t panels, const F& f) {
     }
 }
 
-// The same on as many panels as are needed, with fewer points where the whole is a small part of one.
+// Does the same on as many panels as are needed, with fewer points where the whole is a small part of one.
 template <class F>
 void over_panels(double from, double to, double panel, const F& f) {
   constexpr double narrow = 0.04;
@@ -100,7 +100,7 @@ std::optional<double> SettledReturnMap::landing(double state, int phase, std::sp
   return next;
 }
 
-// Points over eta, each with its mu_r: where either the landing or the rest from there counts.
+// Lists points over eta, each with its mu_r: where either the landing or the rest from there counts.
 std::vector<SettledReturnMap::EtaPoint> SettledReturnMap::restitutions(double omega, int phase) const {
   const TruncatedNormal &restitution = noise().restitution(), &friction = noise().friction();
   const auto resting = [&](double eta) { return resting_friction(phase, omega, eta); };
@@ -286,7 +286,7 @@ std::pair<double, double> SettledReturnMap::landing_range(double state, int phas
   return {least, most};
 }
 
-// Of the foot, at the speed that a sticking wheel keeps.
+// Finds the slide of the foot, at the speed that a sticking wheel keeps.
 double SettledReturnMap::mean_slide(int phase) const {
   const bool listed = noise().is_empirical();
   double state = 0.5 * (state_interval(phase).first + highest_state_);
@@ -338,7 +338,7 @@ double SettledReturnMap::worth(int phase, const Landing& landing, const std::fun
   return f(arrival(phase, {landing.carried_squared, landing.displacement, false}));
 }
 
-// mu_r of the landing that a rolling wheel is about to make.
+// Returns mu_r of the landing that a rolling wheel is about to make.
 double SettledReturnMap::resting_friction(const SettledRoll& roll, double restitution, double guess) const {
   const auto rests_at = [&](double mu) {
     SettledRoll one = roll;
@@ -453,7 +453,7 @@ void SettledReturnMap::Table::land(double origin, double width, std::span<const 
     const double t = std::sqrt((state - low) / (map_->highest_state_ - low)) * (curve_nodes - 1);
     const auto at = std::clamp<std::size_t>(static_cast<std::size_t>(t), 1, curve_nodes - 3);
     const float* y = &curve_[(first + k) * curve_nodes + at - 1];
-    // Through four neighbouring nodes.
+    // This reads through four neighbouring nodes.
     const double u = t - static_cast<double>(at), a = u + 1, c = u - 1, d = u - 2;
     const double value = -u * c * d / 6 * y[0] + a * c * d / 2 * y[1] - a * u * d / 2 * y[2] + a * u * c / 6 * y[3];
     next[k] = std::max(value, lowest_next);

@@ -1,5 +1,5 @@
 #pragma once
-// The wheel's stochastic return map under `settled`, on x = omega^2 just before a collision.
+// Makes the wheel's stochastic return map under `settled`, on x = omega^2 just before a collision.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,8 +16,8 @@
 
 namespace metastable::dynamics {
 
-/// Landings of the law `settled` under random (eta, mu), with the phases of WheelMap: one for equal legs, else one a
-/// leg. Every landing starts from a standing foot: (leg, omega-) is taken for the whole state (steady steps touch an
+/// Maps landings of the law `settled` under random (eta, mu), with the phases of WheelMap: one for equal legs, else one
+/// a leg. Every landing starts from a standing foot: (leg, omega-) is taken for the whole state (steady steps touch an
 /// unsettled foot in 0 to 0.1 % of all cases; "foot unsettled" counts them). Rest is mu < mu_r(omega-, eta), so that
 /// its probability is a normal's tail however small; above mu_c the landing is an atom. Satisfies markov::ReturnMap.
 class SettledReturnMap {
@@ -35,35 +35,37 @@ class SettledReturnMap {
   int phases() const { return geometry_.phases(); }
   int noise_dimension() const { return noise().dimension(); }
   std::optional<double> landing(double state, int phase, std::span<const double> score) const;
-  /// Gauss-Legendre panels over eta, the distribution function of mu in closed form; nothing for a correlated pair.
+  /// Takes Gauss-Legendre panels over eta, the distribution of mu in closed form; nothing for a correlated pair.
   std::optional<double> rest_probability(double state, int phase) const;
-  /// Panels over eta and, between mu_r and mu_c, over mu, cut where the landing crosses a break; one point an eta above
-  /// mu_c. @throws std::invalid_argument for correlated eta and mu (names the sampled method)
+  /// Takes panels over eta and, between mu_r and mu_c, over mu, cut where the landing crosses a break; one point an eta
+  /// above mu_c. @throws std::invalid_argument for correlated eta and mu (names the sampled method)
   double landing_points(double state, int phase, std::span<const double> breaks,
                         std::vector<std::pair<double, double>>& points) const;
-  /// States from which a sticking foot, at the mean of eta and some sds from it, lands at one of `next`.
+  /// Lists the states from which a sticking foot, at the mean of eta and some sds from it, lands at one of `next`.
   std::vector<double> states_of_extremes(int phase, std::span<const double> next) const;
-  /// {infimum, supremum} over the noise's support, by a grid over eta and the bounds of mu; -infinity stands for rest.
+  /// Returns {infimum, supremum} over the noise's support, by a grid over eta and mu's bounds; -infinity stands
+  /// for rest.
   std::pair<double, double> landing_range(double state, int phase) const;
-  /// Time of the stance as if the foot stood from the collision on [s].
+  /// Returns the time of the stance as if the foot stood from the collision on [s].
   double duration(double next_state, int phase) const { return geometry_.duration(next_state, phase); }
-  /// From this touch to the next one, the mean slide of the foot at its usual speed included [m].
+  /// Measures from this touch to the next one, the mean slide of the foot at its usual speed included [m].
   double advance(int phase) const { return advance_[static_cast<std::size_t>(phase)]; }
-  /// One draw of E[f(landing that is followed)] - E[f(landing)], with f(rest) = 0: its mean over the scores is what the
-  /// table does to E f. Nothing where landings are followed anyway.
+  /// Takes one draw of E[f(landing that is followed)] - E[f(landing)], with f(rest) = 0: its mean over the scores is
+  /// what the table does to E f. Nothing where landings are followed anyway.
   std::optional<double> landing_defect(double state, int phase, std::span<const double> score,
                                        const std::function<double(double next)>& f) const;
-  /// What the motion of a foot that has not settled when the next leg touches does to f after the next landing, f(rest)
-  /// being 0; 0 where the foot stands. The scores are those of both landings. Of what lies between the frictions below
-  /// which the wheel rests, on a moving foot and on a standing one, nothing is left to chance.
+  /// Takes one draw of what the motion of a foot that has not settled when the next leg touches does to f after the
+  /// next landing, f(rest) being 0; 0 where the foot stands. The scores are those of both landings. Of what lies
+  /// between the frictions below which the wheel rests, on a moving foot and on a standing one, nothing is left to
+  /// chance.
   std::optional<double> memory_defect(double state, int phase, std::span<const double> score,
                                       const std::function<double(double after_next)>& f) const;
-  /// "foot lifts" as under the other laws, just before the collision; "foot unsettled": the next leg touches while the
-  /// landed foot still hops or slides.
+  /// Names "foot lifts" as under the other laws, just before the collision; "foot unsettled": the next leg touches
+  /// while the landed foot still hops or slides.
   std::vector<std::string> assumptions() const;
   bool violates(int which, double state, int phase, std::span<const double> score) const;
 
-  /// Draws of one phase: each a curve over the states, from the slowest that survives it upwards.
+  /// Holds draws of one phase: each a curve over the states, from the slowest that survives it upwards.
   class Table {
    public:
     Table(const SettledReturnMap& map, int phase) : map_(&map), phase_(phase) {}
@@ -87,7 +89,7 @@ class SettledReturnMap {
   struct EtaPoint {
     double eta, weight, resting_friction;
   };
-  // From the table where there is one: below its speeds the wheel rests, above them it keeps the last one's share.
+  // Reads from the table where there is one: below its speeds the wheel rests, above them it keeps the last's share.
   MappedLanding land(int phase, double omega, const Contact& contact) const;
   double resting_friction(int phase, double omega, double eta) const;
   double next_state(int phase, double omega, const Contact& contact) const;  // rest_landing's value at rest

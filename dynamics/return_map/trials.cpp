@@ -24,7 +24,7 @@ std::array<double, 2> scores(std::uint64_t seed, std::uint64_t index, std::uint6
   return {score(bits[0]), score(bits[1])};
 }
 
-// Contact of collision `number` of a trial.
+// Returns the contact of collision `number` of a trial.
 Contact contact_at(const ContactNoise& noise, std::uint64_t seed, std::uint64_t index, std::uint64_t number) {
   const auto both = scores(seed, index, number);
   return noise.draw(std::span(both).first(static_cast<std::size_t>(noise.dimension())));
@@ -79,7 +79,7 @@ void check_ramp(double ramp_length) {
     throw std::invalid_argument(fmt::format("ramp_length: {} m is outside [0, inf]", ramp_length));
 }
 
-// A trial under `settled` as it unfolds.
+// Follows a trial under `settled` as it unfolds.
 class SettledTrial {
  public:
   SettledTrial(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,

@@ -39,14 +39,14 @@ struct TrialOptions {
 };
 
 /// Simulates trial `index` of a run: launch speed omega_0 ~ launch (truncated at 0) and (eta, mu) of each collision
-/// from Philox at counter (index, collision): the same bits whatever ran before and on however many threads.
+/// come from Philox at counter (index, collision): the same bits whatever ran before and on however many threads.
 /// @throws std::invalid_argument for options out of range
 Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
                      std::uint64_t index);
 
-/// The same under `settled`: the wheel is rolled event by event, with whatever motion its feet still have when the next
-/// leg touches. Before the first collision it stands on a foot with that collision's contact. `loss` is that of the
-/// whole landing: in impacts (normal), by friction (tangential), less what the foot's slide downhill gives back
+/// Does the same under `settled`: the wheel is rolled event by event, with whatever motion its feet still have when the
+/// next leg touches. Before the first collision it stands on a foot with that collision's contact. `loss` is that of
+/// the whole landing: in impacts (normal), by friction (tangential), less what the foot's slide downhill gives back
 /// (potential); omega_plus is the speed after the first impact; a wheel that chatters on two feet without end counts as
 /// one at rest, and the end of the ramp is reached when the next foot touches beyond it.
 /// @throws std::invalid_argument for options out of range, and without the rest rule
@@ -62,7 +62,7 @@ std::uint64_t steps_to_rest(const SettledMotion& motion, const ContactNoise& noi
 
 /// Returns the number of the last collision on a ramp of that length (foot 1 at 0 m): who survives it reaches the end.
 int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ramp_length);
-/// The same from the distances [m] from the foot of each phase to the next one's.
+/// Does the same from the distances [m] from the foot of each phase to the next one's.
 int last_collision_on_ramp(std::span<const double> advance, int first_phase, double ramp_length);
 
 }  // namespace metastable::dynamics

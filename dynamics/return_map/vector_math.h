@@ -11,7 +11,7 @@ namespace metastable::dynamics {
   constexpr double magic = 0x1.8p52;  // adding it leaves the rounded integer in the low bits
   const double shifted = x * 1.4426950408889634 + magic, count = shifted - magic;
   const double r = (x - count * 0x1.62e42fefa0000p-1) - count * 0x1.cf79abc9e3b3ap-40;
-  // Taylor's polynomial: |r| <= ln(2)/2 leaves 4e-17.
+  // Taylor's polynomial is enough: |r| <= ln(2)/2 leaves 4e-17.
   double p = 1.0 / 479001600;
   p = p * r + 1.0 / 39916800;
   p = p * r + 1.0 / 3628800;

@@ -88,7 +88,7 @@ class WheelMap {
   double duration(double next_state, int phase) const;
   /// Returns the chord from this foot to the next [m].
   double advance(int phase) const;
-  /// "foot lifts" (leg force would pull, just before this collision or just after it), "negative loss" (any
+  /// Names "foot lifts" (leg force would pull, just before this collision or just after it), "negative loss" (any
   /// of the law's losses is negative), "energy gain" (the total loss is negative).
   std::vector<std::string> assumptions() const;
   bool violates(int which, double state, int phase, std::span<const double> score) const;
@@ -117,7 +117,7 @@ class WheelMap {
   std::vector<Triangle> triangle_;  // of the collision in which leg p lands
   std::vector<Stance> stance_;      // on leg p after it
   struct FastDensities;
-  /// By phase; empty where PublishedDensity does not cover the map.
+  /// Holds them by phase; it is empty where PublishedDensity does not cover the map.
   const std::vector<PublishedDensity>& fast_densities() const;
   std::shared_ptr<FastDensities> fast_densities_;  // shared by copies
 };

@@ -42,7 +42,7 @@ double TimeSeries::falls_below_zero(double end) const {
   }
   if (!found) return end + 1;
   if (low == 0 && term[0] <= 0) {
-    // It starts at 0: positive for a while, or falling at once.
+    // It starts at 0, and is positive for a while or falls at once.
     double t = high;
     for (int halvings = 0; at(t) <= 0; ++halvings) {
       if (halvings == 40) return 0;
@@ -51,7 +51,7 @@ double TimeSeries::falls_below_zero(double end) const {
     }
     low = t;
   }
-  // Newton's steps kept inside the bracket.
+  // Newton's steps are kept inside the bracket.
   double t = (low + high) / 2;
   for (int i = 0; i < 100 && high - low > 1e-16 * end; ++i) {
     const double value = at(t);

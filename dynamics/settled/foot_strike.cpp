@@ -9,7 +9,7 @@ PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const Pl
                      double* rubbed_off) {
   if (rubbed_off != nullptr) *rubbed_off = 0;
   const double d = lever.behind, h = lever.height, k2 = lever.gyration_sq;
-  // The contact's response to an impulse (tangential, normal) per unit mass: [[along, -cross], [-cross, normal]].
+  // The contact's response to an impulse (tangential, normal) per unit mass is [[along, -cross], [-cross, normal]].
   const double along = 1 + h * h / k2, normal = 1 + d * d / k2, cross = d * h / k2;
   const double mu = contact.friction;
   double slip = lever.slip(before), lift = lever.lift(before);
@@ -19,7 +19,7 @@ PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const Pl
     return cross > 0 ? -1 : 1;
   };
   int way = direction(slip);
-  // Per unit of normal impulse: tangential impulse, gain of lift and of slip.
+  // These are per unit of normal impulse: tangential impulse, gain of lift and of slip.
   double drag = 0, rise = 0, drive = 0;
   const auto set_rates = [&] {
     drag = way == 0 ? cross / along : -way * mu;

@@ -16,13 +16,13 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
-// Far enough above mu_c that the foot sticks under its weight, too, on every slope with a barrier.
+// Is far enough above mu_c that the foot sticks under its weight, too, on every slope with a barrier.
 constexpr double sticks_by = 0.02;
 constexpr double smooth_restitution = 0.6;  // above it feet hop on to the next touch
 constexpr double rough_step = 0.05;         // between rows there
 constexpr std::size_t most_kept = 32;       // maps, of some 8 MB
 
-// How far a landing gets beyond the barrier: omega_eq^2 of the settled foot less the barrier's; its sign says rest.
+// Says how far a landing gets beyond the barrier: the settled foot's omega_eq^2 less the barrier's; its sign says rest.
 double beyond_barrier(const Landing& landing, double barrier) {
   constexpr double tiny = 1e-12;
   if (landing.end == LandingEnd::rest)
@@ -30,14 +30,14 @@ double beyond_barrier(const Landing& landing, double barrier) {
   return std::max((landing.settled_squared > 0 ? landing.settled_squared : landing.carried_squared) - barrier, tiny);
 }
 
-// Root of a rising function that changes sign in [low, high]: false position with the Illinois rule, bisection where
-// that is slow.
+// Finds the root of a rising function that changes sign in [low, high]: false position with the Illinois rule,
+// bisection where that is slow.
 template <class F>
 double rising_root(const F& value, double low, double at_low, double high, double at_high, double width) {
   int side = 0;
   for (int i = 0; i < 200 && high - low > width; ++i) {
     double at = i % 4 == 3 ? (low + high) / 2 : high - at_high * (high - low) / (at_high - at_low);
-    // Not closer to the ends than asked for: the bracket closes from both sides.
+    // It comes no closer to the ends than asked for: the bracket closes from both sides.
     at = std::clamp(at, low + width / 2, high - width / 2);
     const double v = value(at);
     if (v < 0) {
@@ -53,7 +53,7 @@ double rising_root(const F& value, double low, double at_low, double high, doubl
   return high;
 }
 
-// Evenly spread points in the unit cube (Roberts' sequence).
+// Returns evenly spread points in the unit cube (Roberts' sequence).
 double spread(std::size_t index, int dimension) {
   constexpr double g = 1.22074408460575947536;  // g^4 = g + 1
   const double step = std::pow(g, -dimension - 1);
@@ -135,7 +135,7 @@ std::shared_ptr<const SettledMap> SettledMap::of(const SettledWheel& wheel, cons
 }
 
 double SettledMap::standstill(int leg, double eta) const {
-  // Speeds so low that a sticking foot is carried back; none for a slope without barrier.
+  // These are speeds so low that a sticking foot is carried back; there are none for a slope without barrier.
   const double barrier = motion_.foot(leg).barrier_squared();
   if (!(barrier > 0)) return 0;
   const double mu = sticking_[static_cast<std::size_t>(leg)] + sticks_by;
@@ -155,7 +155,7 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
   const auto value = [&](double mu) { return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier); };
   double high = sticking_[static_cast<std::size_t>(leg)] + sticks_by, at_high = value(high);
   if (at_high < 0) return never;
-  // Around the guess, or step by step from above: at high omega and eta there are gaps in rest further down.
+  // Around the guess it searches, or step by step from above: at high omega and eta there are gaps in rest below.
   double low = high, at_low = at_high;
   constexpr double farthest = 4e-3;
   guess = std::min(guess, high);  // a table that says "rests at every mu" is tried where a foot sticks
@@ -198,7 +198,7 @@ double SettledMap::stopping_friction(int leg, double omega, double eta, int stri
   return high;
 }
 
-// The bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
+// Finds the bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
 // mu_c], log(1 + part / bend) shall have, too.
 void SettledMap::find_bend(SettledTable& table, int leg) const {
   const SettledRange& range = options_.range;
@@ -232,7 +232,7 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
     rate[j] = (found[1] - found[0]) / (omega[1] - omega[0]);
     at_0[j] = found[0] - rate[j] * omega[0];
   }
-  // The parabolas in eta through three values.
+  // These are the parabolas in eta through three values.
   const auto parabola = [&](const std::array<double, 3>& value, double* term) {
     if (!(eta[1] > eta[0])) {
       term[0] = value[0];
@@ -248,7 +248,7 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
   parabola(rate, &table.bend[3]);
 }
 
-// One row of a leg's table: all speeds and frictions at one restitution.
+// Tabulates one row of a leg's table: all speeds and frictions at one restitution.
 void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
   constexpr int stops = SettledTable::stops, piece = SettledTable::piece;
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
@@ -257,7 +257,7 @@ void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
   for (int i = 0; i < table.speeds; ++i) {
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     const auto at = static_cast<std::size_t>(row * table.speeds + i);
-    // Guessed from the parabola, and the cubic, through the speeds before: these stand evenly on the table's axis.
+    // The parabola, and the cubic, through the speeds before give a guess: these stand evenly on the table's axis.
     const auto [one, two, three, four] = before;
     const double parabola = 3 * (one - two) + three, cubic = 4 * (one + three) - 6 * two - four;
     double resting = i < 4 ? solve_resting(leg, omega, eta, one - (i > 0 ? 1e-3 : 0), 1e-3)

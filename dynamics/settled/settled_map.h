@@ -1,5 +1,5 @@
 #pragma once
-// The return map of the law `settled`: landings tabulated over speed, restitution and friction.
+// Makes the return map of the law `settled`: landings tabulated over speed, restitution and friction.
 
 #include <cstddef>
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace metastable::dynamics {
 
-/// Where a map is tabulated; landings elsewhere are followed directly.
+/// Says where a map is tabulated; landings elsewhere are followed directly.
 struct SettledRange {
   double omega_high = 9;                ///< [rad/s]; the lower end is where even a sticking foot rests
   double eta_low = 0, eta_high = 0.95;  ///< in [0, 0.95]
@@ -24,29 +24,29 @@ struct SettledMapOptions {
   bool direct = false;                                 ///< no table: every landing followed
   int speeds = 26, restitutions = 13, frictions = 20;  ///< nodes of the table per leg; restitutions up to 0.6
   int checks = 400;                                    ///< landings per leg that the table is held against
-  /// Calls the work for every index in [0, count), in any order, from any threads; default: one after the other.
+  /// Calls the work for every index in [0, count), in any order, from any threads; by default one after the other.
   std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)> executor;
   std::function<void(double share)> progress;  ///< called now and then, from any thread, one at a time
 };
 
-/// Table against direct landings at random points of its range. Feet settle, or are rough: eta above 0.6, or the next
-/// leg touches an unsettled foot at some node around.
+/// Holds the table against direct landings at random points of its range. Feet settle, or are rough: eta above 0.6, or
+/// the next leg touches an unsettled foot at some node around.
 struct SettledMapError {
   std::size_t landings = 0, rough = 0;
   std::size_t misjudged_rests = 0, rough_misjudged_rests = 0;
   double settled_rms = 0, settled_max = 0;  ///< of carried_squared / omega-^2
   double rough_rms = 0;                     ///< the same of rough feet
   double displacement_max = 0;              ///< [m], settled feet
-  /// Of mu_r, settled feet: the largest, and the median.
+  /// Are those of mu_r, settled feet: the largest, and the median.
   double resting_friction_max = 0, resting_friction_median = 0;
 };
 
-/// Landings by table. Const members may be called from any thread.
+/// Reads landings by table. Const members may be called from any thread.
 class SettledMap {
  public:
-  /// The map of this wheel on its slope: built at the first call and kept for the life of the process (the last 32 of
-  /// them; a map with other options is another map, executor and progress do not count). Table of the paper's wheel:
-  /// some 5 s on two cores.
+  /// Returns the map of this wheel on its slope: built at the first call and kept for the life of the process (the last
+  /// 32 of them; a map with other options is another map, executor and progress do not count). The table of the paper's
+  /// wheel takes some 5 s on two cores.
   /// @throws std::invalid_argument as SettledWheel::validate(), and for a range that is empty or out of bounds
   static std::shared_ptr<const SettledMap> of(const SettledWheel& wheel, const SettledMapOptions& options = {});
 
@@ -55,22 +55,22 @@ class SettledMap {
   const SettledRange& range() const { return options_.range; }
   bool direct() const { return options_.direct; }
 
-  /// mu_c of a leg: from here on a landing does not depend on mu (up to 1e-5 of omega^2 where feet settle).
+  /// Returns mu_c of a leg: from here on a landing does not depend on mu (up to 1e-5 of omega^2 where feet settle).
   double sticking_friction(int leg) const { return sticking_[static_cast<std::size_t>(leg)]; }
-  /// mu_r: the wheel rests below it and nowhere above it. 0: at no friction; infinity: at every one. It rests at every
-  /// mu below but for gaps at high eta and omega (0.45, 7 rad/s), where an old foot strikes.
+  /// Returns mu_r: the wheel rests below it and nowhere above it. 0 says at no friction, infinity at every one. It
+  /// rests at every mu below but for gaps at high eta and omega (0.45, 7 rad/s), where an old foot strikes.
   /// @param omega omega- [rad/s], > 0; @param eta in [0, 1)
   double resting_friction(int leg, double omega, double eta) const;
-  /// Some 2 us in the table's range (mu above mu_c is read as mu_c), 10 to 300 us outside.
+  /// Takes some 2 us in the table's range (mu above mu_c is read as mu_c), 10 to 300 us outside.
   /// @param leg in [0, legs)
   MappedLanding land(int leg, double omega, const Contact& contact) const;
-  /// The same, followed whatever the table holds.
+  /// Does the same, followed whatever the table holds.
   MappedLanding follow(int leg, double omega, const Contact& contact) const;
-  /// mu_r, found by landings that are followed. @param guess from which to start; 0: none
+  /// Returns mu_r, found by landings that are followed. @param guess from which to start; 0: none
   double followed_resting_friction(int leg, double omega, double eta, double guess = 0) const;
-  /// The table at one restitution, to read many landings from; nothing where there is no table.
+  /// Returns the table at one restitution, to read many landings from; nothing where there is no table.
   std::optional<SettledSlice> slice(int leg, double eta) const;
-  /// omega-^2 at the next touch [rad^2/s^2], for a landing that does not rest.
+  /// Returns omega-^2 at the next touch [rad^2/s^2], for a landing that does not rest.
   double next_squared(int leg, double carried_squared) const { return motion_.foot(leg).next_squared(carried_squared); }
   const SettledMapError& error() const { return error_; }
   double seconds() const { return seconds_; }  ///< that it took to build

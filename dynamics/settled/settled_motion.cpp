@@ -12,15 +12,15 @@
 namespace metastable::dynamics {
 namespace {
 
-// Shares of M g (mean length): kinetic energy that counts as none (1e-3 J for the paper's wheel) and the height under
-// the barrier that it cannot climb.
+// Are shares of M g (mean length): kinetic energy that counts as none (1e-3 J for the paper's wheel) and the height
+// under the barrier that it cannot climb.
 constexpr double still_share = 4.8e-4, deep_share = 4.8e-3;
 
-// The time for which a foot that lifts without speed is let go [s]; how far the wheel turns between two looks at where
-// its tips are [rad].
+// Are the time for which a foot that lifts without speed is let go [s]; how far the wheel turns between two looks at
+// where its tips are [rad].
 constexpr double lift_off = 1e-6, steady_turn = 0.1;
 
-// Sine and cosine, without the library's where the angle is small: hops ask for many.
+// Returns sine and cosine, without the library's where the angle is small: hops ask for many.
 std::pair<double, double> sine_cosine(double angle) {
   if (std::abs(angle) > 0.06) return {std::sin(angle), std::cos(angle)};
   const double q = angle * angle;
@@ -108,7 +108,7 @@ double SettledRoll::tip_along(int leg) const { return along_ - motion_->wheel().
 
 double SettledRoll::position() const { return tip_along(leg_); }
 
-// Per unit mass.
+// Returns it per unit mass.
 double SettledRoll::kinetic() const {
   return (velocity_.along * velocity_.along + velocity_.out * velocity_.out +
           motion_->wheel().gyration_sq() * velocity_.spin * velocity_.spin) /
@@ -117,14 +117,14 @@ double SettledRoll::kinetic() const {
 
 double SettledRoll::energy() const { return motion_->wheel().mass * (kinetic() - sine_ * along_ + cosine_ * height_); }
 
-// Top of the barrier over the foot of a leg [rad].
+// Returns the top of the barrier over the foot of a leg [rad].
 double SettledRoll::apex(int leg) const {
   const SettledWheel& wheel = motion_->wheel();
   const double part = wheel.tip_radius / wheel.length(leg) * sine_ / wheel.gravity;
   return -std::atan2(sine_, cosine_) - (part > 0 ? std::asin(part) : 0);
 }
 
-// No motion left, and far below the barrier.
+// Says that no motion is left, far below the barrier.
 bool SettledRoll::spent() const {
   const double scale = motion_->wheel().gravity * motion_->wheel().length(leg_);
   if (kinetic() > still_share * scale) return false;
@@ -132,7 +132,7 @@ bool SettledRoll::spent() const {
   return lean < 0 && 1 - std::cos(lean) > deep_share;
 }
 
-// Both feet on the ground, no spin: whether both are pressed, or which one alone.
+// Says, of both feet on the ground without spin, whether both are pressed, or which one alone.
 bool SettledRoll::two_feet_rest(int ahead, int back, int& loaded) const {
   const double s_ahead = lever(ahead).behind, s_back = lever(back).behind;
   const double mu_ahead = contact_of(ahead).friction, mu_back = contact_of(back).friction;
@@ -151,8 +151,8 @@ bool SettledRoll::two_feet_rest(int ahead, int back, int& loaded) const {
   return on_back > 0 && on_ahead > 0;
 }
 
-// A foot that sticks at this angle with this energy per unit mass keeps to the cone until the next leg touches or the
-// wheel turns back.
+// Says whether a foot that sticks at this angle with this energy per unit mass keeps to the cone until the next leg
+// touches or the wheel turns back.
 bool SettledRoll::stands_on(int leg, double angle, double energy) const {
   const StandingFoot& foot = motion_->foot(leg);
   const SettledWheel& wheel = motion_->wheel();
@@ -261,7 +261,7 @@ SettledRoll::Event SettledRoll::run(bool until_settled) {
   return Event::given_up;
 }
 
-// The foot that strikes; one that then hardly lifts stays down.
+// Strikes the foot; one that then hardly lifts stays down.
 void SettledRoll::strike_foot() {
   const double before = kinetic();
   const ContactLever at = lever(foot_);
@@ -276,7 +276,7 @@ void SettledRoll::strike_foot() {
   landing_.impact_loss += motion_->wheel().mass * (before - kinetic() - rubbed);
 }
 
-// Impacts at one moment: the foot that strikes, the other one on the ground if that is driven into it, and so on.
+// Goes through impacts at one moment: the foot that strikes, the other on the ground if driven into it, and so on.
 SettledRoll::Event SettledRoll::resolve() {
   const double slow = motion_->wheel().rest_speed;
   for (;;) {
@@ -309,7 +309,7 @@ SettledRoll::Event SettledRoll::resolve() {
   return Event::carries;
 }
 
-// One foot on the ground, until it lifts, jams, settles, rests, or another one touches.
+// Carries one foot on the ground, until it lifts, jams, settles, rests, or another one touches.
 SettledRoll::Event SettledRoll::carry(bool until_settled) {
   const SettledWheel& wheel = motion_->wheel();
   const StandingFoot& foot = motion_->foot(foot_);
@@ -332,7 +332,7 @@ SettledRoll::Event SettledRoll::carry(bool until_settled) {
     foot_ = leg;
     return Event::strikes;
   };
-  // A foot without slip: whether it lifts; else `way` says whether it sticks or which way it is driven.
+  // Says of a foot without slip whether it lifts; else `way` says whether it sticks or which way it is driven.
   const auto lifts = [&] {
     on.way = 0;
     const FootForces f = foot_forces(on, state.angle, state.spin);
@@ -368,7 +368,7 @@ SettledRoll::Event SettledRoll::carry(bool until_settled) {
       stands = false;
       if (spent()) return Event::rests;
     }
-    // One piece of the motion; what ends it is a value that falls below 0.
+    // This is one piece of the motion; what ends it is a value that falls below 0.
     const FootMotion motion = on.from(state);
     double when = std::min(motion.horizon, 0.3 / std::max(1.0, std::abs(state.spin)));
     if (when < 1e-9) return strikes(foot_);  // the pressure grows without bounds: slip jams
@@ -436,8 +436,8 @@ SettledRoll::Event SettledRoll::carry(bool until_settled) {
   }
 }
 
-// No foot on the ground: a parabola at constant spin (drag: constant acceleration over a millisecond), until a tip
-// touches.
+// Flies with no foot on the ground: a parabola at constant spin (drag: constant acceleration over a millisecond), until
+// a tip touches.
 SettledRoll::Event SettledRoll::fly() {
   const SettledWheel& wheel = motion_->wheel();
   const double turn = wheel.leg_angle();
@@ -459,7 +459,7 @@ SettledRoll::Event SettledRoll::fly() {
     }
     int touches = 0;
     bool found = false;
-    // Earliest touch of a leg before `first`.
+    // Finds the earliest touch of a leg before `first`.
     const auto look = [&](int leg, bool lifts) {
       const double length = wheel.length(leg), angle = angle_of(leg);
       const double sine = std::sin(angle), cosine = std::cos(angle);

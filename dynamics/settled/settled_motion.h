@@ -1,5 +1,5 @@
 #pragma once
-// The law `settled`: landings, steps and trials of a planar rigid wheel, followed event by event.
+// Follows the law `settled`: landings, steps and trials of a planar rigid wheel, event by event.
 
 #include <functional>
 #include <vector>
@@ -17,33 +17,33 @@ enum class LandingEnd {
   given_up    ///< more events than allowed (two feet that chatter at high eta)
 };
 
-/// What one landing does.
+/// Says what one landing does.
 struct Landing {
   LandingEnd end = LandingEnd::given_up;
-  /// omega^2 that a standing foot would have at the landing angle to reach the same spin at the next touch
+  /// Is omega^2 that a standing foot would have at the landing angle to reach the same spin at the next touch
   /// [rad^2/s^2]; below the barrier's at rest, 0 where the wheel rests on two feet or was given up.
   double omega_eq_squared = 0;
-  /// The same to bring the same angular momentum about the next foot: what the next landing depends on. Differs from
+  /// Is the same to bring the same angular momentum about the next foot: what the next landing depends on. Differs from
   /// omega_eq_squared only if the foot moves at the next touch: unsettled, or settled and sliding or lifting once more
   /// (`slips_late`: backward, at low mu). The next landing from a standing foot with this then is that from the
   /// moving one to 2e-5 rad/s (median; omega_eq_squared: 1e-3).
   double carried_squared = 0;
   bool slips_late = false;
-  /// omega_eq^2 when the foot began to stand, before any late slip; 0 if it never did [rad^2/s^2]. Continuous across
-  /// the friction below which the wheel rests, where it is the barrier's.
+  /// Is omega_eq^2 when the foot began to stand, before any late slip; 0 if it never did [rad^2/s^2]. It is continuous
+  /// across the friction below which the wheel rests, where it is the barrier's.
   double settled_squared = 0;
   double displacement =
       0;                  ///< of the foot from where it touched to where it stands, down the plane, without rolling [m]
   double omega_plus = 0;  ///< spin after the first impact [rad/s]
   double duration = 0;    ///< from touch to where the landing ended [s]
   int strikes = 0;        ///< impacts, the first one included
-  // Until the landing, or the step it belongs to, has ended; a bearing's drag on a sliding foot counts as friction.
+  // Hold until the landing, or its step, has ended; a bearing's drag on a sliding foot counts as friction.
   double friction_loss = 0;  ///< work of friction, in impacts and while feet slide [J]
   double impact_loss = 0;    ///< what impacts take besides [J]
   double slid = 0;           ///< of the landed foot down the plane, without rolling [m]
 };
 
-/// A landing and the way to the next touch.
+/// Is a landing and the way to the next touch.
 struct Step {
   Landing landing;
   bool touched = false;     ///< the next leg touches; else rest, or given up as `landing.end` has it
@@ -52,7 +52,7 @@ struct Step {
   double duration = 0;      ///< from touch to touch, or to rest [s]
 };
 
-/// A wheel with everything that does not change from landing to landing. Const members may be called from any thread.
+/// Holds a wheel with all that does not change from landing to landing. Const members may be called from any thread.
 class SettledMotion {
  public:
   /// @throws std::invalid_argument as SettledWheel::validate()
@@ -62,7 +62,8 @@ class SettledMotion {
   /// @param leg any whole number, counted around the wheel
   const StandingFoot& foot(int leg) const;
 
-  /// One landing from a foot that stands, until the landed foot has settled. 10 to 60 us at the default rest_speed.
+  /// Follows one landing from a standing foot, until the landed foot has settled. 10 to 60 us at the default
+  /// rest_speed.
   /// @param leg that lands; @param omega_minus [rad/s], > 0
   /// @param landed, old contact of the landing foot and of those behind it: eta in [0, 1), mu >= 0
   /// @throws std::invalid_argument for a speed or contact out of range, naming it
@@ -70,10 +71,10 @@ class SettledMotion {
   Landing land(int leg, double omega_minus, const Contact& contact) const {
     return land(leg, omega_minus, contact, contact);
   }
-  /// Speed at which the landed foot slips down the plane after its first `strikes` impacts [m/s]; 0 once it has stuck,
-  /// and if fewer follow. The landing is not smooth in mu where this becomes 0.
+  /// Returns the speed at which the landed foot slips down the plane after its first `strikes` impacts [m/s]; 0 once it
+  /// has stuck, and if fewer follow. The landing is not smooth in mu where this becomes 0.
   double slip_after(int leg, double omega_minus, const Contact& contact, int strikes) const;
-  /// The same and on to the next touch, the stance integrated in time.
+  /// Does the same and goes on to the next touch, the stance integrated in time.
   Step step(int leg, double omega_minus, const Contact& landed, const Contact& old) const;
   Step step(int leg, double omega_minus, const Contact& contact) const {
     return step(leg, omega_minus, contact, contact);
@@ -84,18 +85,18 @@ class SettledMotion {
   std::vector<StandingFoot> foot_;
 };
 
-/// A wheel rolled step by step with its complete state carried on: direct simulation of the law. Starts from a touch of
-/// a wheel that turns about a standing foot.
+/// Rolls a wheel step by step with its complete state carried on: direct simulation of the law. It starts from a touch
+/// of a wheel that turns about a standing foot.
 class SettledRoll {
  public:
   /// @param motion must outlive the roll; others as in SettledMotion::land
   SettledRoll(const SettledMotion& motion, int leg, double omega_minus, const Contact& landed, const Contact& old);
 
-  /// From the touch of leg() to the next one, which then is leg(): its contact has to be set before the next call.
+  /// Goes from the touch of leg() to the next one, which then is leg(): its contact has to be set before the next call.
   Step step();
-  /// The landing alone, until its foot has settled. Ends the roll unless it is `settled`.
+  /// Follows the landing alone, until its foot has settled. Ends the roll unless it is `settled`.
   Landing land();
-  /// As SettledMotion::slip_after. Ends the roll.
+  /// Does as SettledMotion::slip_after. Ends the roll.
   double slip_after(int strikes);
 
   int leg() const { return leg_; }                ///< that touches, counted on without end
@@ -129,10 +130,10 @@ class SettledRoll {
   int leg_;
   std::vector<Contact> contact_;  // of the last foothold of every leg
   double sine_, cosine_;          // of the slope, times gravity
-  // The hub, the angle of leg_ past the normal, the time.
+  // Hold the hub, the angle of leg_ past the normal, the time.
   double along_ = 0, height_ = 0, angle_ = 0, time_ = 0;
   PlaneVelocity velocity_;
-  // What the last event left: the foot that strikes or carries, another one on the ground.
+  // Hold what the last event left: the foot that strikes or carries, another one on the ground.
   int foot_ = 0, other_ = 0;
   bool has_other_ = false;
   int events_ = 0;

@@ -10,7 +10,7 @@ constexpr double crowding = 1.5;  // of nodes in speed, towards the slowest
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
-// Of the k-th of `size` weights: the product of k - j over all other j.
+// Returns, of the k-th of `size` weights, the product of k - j over all other j.
 constexpr double denominator(std::size_t k, std::size_t size) {
   constexpr double factorial[] = {1, 1, 2, 6, 24, 120};
   const std::size_t above = size - 1 - k;
@@ -55,7 +55,7 @@ SettledSlice::Stencil SettledSlice::stencil(double place, int count, std::size_t
   const int last = count - static_cast<int>(s.size);
   const int first = std::clamp(static_cast<int>(place) - static_cast<int>(s.size - 1) / 2, 0, last);
   s.first = index(first);
-  // The products of (t - j) / (k - j) over all j but k.
+  // These are the products of (t - j) / (k - j) over all j but k.
   const double t = place - first;
   double before = 1;
   for (std::size_t k = 0; k < s.size; ++k) {

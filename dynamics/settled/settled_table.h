@@ -1,5 +1,5 @@
 #pragma once
-// Landings of one leg under `settled`, kept at nodes of restitution, speed and friction, and read between them.
+// Keeps landings of one leg under `settled` at nodes of restitution, speed and friction, and reads between them.
 
 #include <array>
 #include <cstddef>
@@ -11,20 +11,20 @@ namespace metastable::dynamics {
 
 class SettledSlice;
 
-/// What a landing leaves.
+/// Says what a landing leaves.
 struct MappedLanding {
-  /// omega_eq^2 of the standing foot that carries the same angular momentum to the next touch [rad^2/s^2]
+  /// Is omega_eq^2 of the standing foot that carries the same angular momentum to the next touch [rad^2/s^2]
   /// (Landing::carried_squared); 0 at rest.
   double carried_squared = 0;
   double displacement = 0;  ///< of the foot down the plane [m]; 0 at rest
   bool rest = false;
 };
 
-/// One leg's table. By restitution the speed at which even a sticking foot rests; from there on, spread in speed, mu_r
-/// and the frictions mu_2, mu_3, ... from which slip stops in the second, third, ... impact: there the landing has a
-/// kink, between them it is smooth. Landings are kept on every piece [mu_c, mu_2], ... at a few even places, on the
-/// last one, down to mu_r, spread evenly in log(1 + part / bend), part = (mu - mu_r) / (its width), bend falling
-/// exponentially with omega: steep above mu_r, nearly straight in that scale.
+/// Is one leg's table. It holds by restitution the speed at which even a sticking foot rests; from there on, spread in
+/// speed, mu_r and the frictions mu_2, mu_3, ... from which slip stops in the second, third, ... impact: there the
+/// landing has a kink, between them it is smooth. Landings are kept on every piece [mu_c, mu_2], ... at a few even
+/// places, on the last one, down to mu_r, spread evenly in log(1 + part / bend), part = (mu - mu_r) / (its width), bend
+/// falling exponentially with omega: steep above mu_r, nearly straight in that scale.
 /// Between the nodes polynomials of degree 5 are read, straight lines in eta above smooth_eta. What is read is
 /// continuous, so that chains made of it converge; where feet are still unsettled the landings themselves jump.
 struct SettledTable {
@@ -55,9 +55,9 @@ struct SettledTable {
   SettledSlice slice(double eta) const;  ///< @param eta that holds()
 };
 
-/// The table at one restitution. Refers to the table.
+/// Is the table at one restitution. It refers to the table.
 class SettledSlice {
-  // Neighbouring nodes around a place on an axis and their weights: Lagrange's polynomial through them.
+  // Holds neighbouring nodes around a place on an axis and their weights: Lagrange's polynomial through them.
   static constexpr std::size_t smooth = 6, straight = 2;  // nodes
   struct Stencil {
     std::size_t first = 0, size = 0;
@@ -69,14 +69,14 @@ class SettledSlice {
 
   double lowest_speed() const { return standstill_ + SettledTable::clear_of_rest; }
   bool holds(double omega) const { return omega >= lowest_speed() && omega <= table_->omega_high; }
-  /// At one of its speeds.
+  /// Is the table at one of its speeds.
   class Place {
    public:
     double resting_friction() const { return edge_[SettledTable::stops]; }
-    /// mu_2, mu_3, ..., mu_r: where the landing has a kink.
+    /// Returns mu_2, mu_3, ..., mu_r: where the landing has a kink.
     std::span<const double> edges() const { return edge_; }
     MappedLanding land(double friction) const;  ///< friction above mu_c is read as mu_c
-    /// Are feet unsettled at some of the nodes around?
+    /// Says whether feet are unsettled at some of the nodes around.
     bool rough(double friction) const;
 
    private:
@@ -92,7 +92,7 @@ class SettledSlice {
   /// @param omega at least lowest_speed(); above the table's speeds the last one's share of omega^2 is kept
   Place at(double omega) const;
   double resting_friction(double omega) const;  ///< likewise
-  /// The least speed in [low, high] that `friction` survives; high if none.
+  /// Returns the least speed in [low, high] that `friction` survives; high if none.
   double slowest(double friction, double low, double high) const;
 
  private:

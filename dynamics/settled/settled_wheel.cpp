@@ -12,7 +12,7 @@
 namespace metastable::dynamics {
 namespace {
 
-// Angle past the normal of the leg `first` with both it and `second` on the plane, `between` ahead of it [rad].
+// Returns the angle past the normal of leg `first` with both it and `second` on the plane, `between` ahead of it [rad].
 double both_down(double first, double second, double between) {
   return std::atan2(first - second * std::cos(between), second * std::sin(between));
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The wheel of the law `settled`: a planar rigid body on a plane, its feet, and what bounds its landings.
+// Describes the wheel of the law `settled`: a planar rigid body on a plane, its feet, and what bounds its landings.
 
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// A planar rigid wheel on a plane of constant slope, SI units. The legs end in discs of radius r that reach to l_i
+/// Is a planar rigid wheel on a plane of constant slope, SI units. The legs end in discs of radius r that reach to l_i
 /// from the hub, so a standing foot rolls on its disc. (Of a rigid-body engine with tips of 0.5 mm this gives mean
 /// speeds and paces inside their errors; discs about the points at l_i are 0.003 rad/s and 0.5 mm off.)
 struct SettledWheel {
@@ -18,7 +18,7 @@ struct SettledWheel {
   double tip_radius = 0;                                 ///< r [m], in [0, shortest leg / 20]
   double gravity = 9.81;                                 ///< g [m/s^2], > 0
   double slope_rad = 0;                                  ///< gamma, in (0, pi / legs)
-  /// Torque against the spin: constant [N m], by omega [N m s], by omega |omega| [N m s^2]; all >= 0.
+  /// Is the torque against the spin: constant [N m], by omega [N m s], by omega |omega| [N m s^2]; all >= 0.
   double constant_drag = 0, linear_drag = 0, quadratic_drag = 0;
 
   double rest_speed = 1e-5;  ///< v_tol [m/s], > 0: a foot stays down once its bounce is slower
@@ -28,21 +28,21 @@ struct SettledWheel {
   bool operator==(const SettledWheel&) const = default;
   int legs() const { return static_cast<int>(leg_length.size()); }
   double leg_angle() const;
-  /// From the hub to the centre of a leg's tip, l_i - r [m]. @param leg any whole number, counted around the wheel
+  /// Spans the hub and the centre of a leg's tip, l_i - r [m]. @param leg any whole number, counted around the wheel
   double length(int leg) const;
   double gyration_sq() const { return radius_of_gyration * radius_of_gyration; }
   bool drags() const { return constant_drag > 0 || linear_drag > 0 || quadratic_drag > 0; }
-  /// Torque / M [m^2/s^2], against the spin.
+  /// Returns torque / M [m^2/s^2], against the spin.
   double drag(double spin) const;
   /// @throws std::invalid_argument naming the quantity, its value and the allowed range.
   void validate() const;
 };
 
-/// The wheel as the other laws have it, r_g as of contact_model(). @param slope gamma [rad]
+/// Returns the wheel as the other laws have it, r_g as of contact_model(). @param slope gamma [rad]
 /// @throws std::invalid_argument as validate() and contact_model()
 SettledWheel settled_wheel(const Wheel& wheel, double slope);
 
-/// A foot that stands, seen along its leg's angle a past the normal of the plane [rad]; energies per unit mass.
+/// Is a foot that stands, seen along its leg's angle a past the normal of the plane [rad]; energies per unit mass.
 class StandingFoot {
  public:
   /// @param leg any whole number, counted around the wheel
@@ -51,18 +51,18 @@ class StandingFoot {
   double landing_angle() const { return landing_; }  ///< a when it touches: the leg before it stands, too [rad]
   double next_angle() const { return next_; }        ///< a when the next leg touches [rad]
   double apex_angle() const { return apex_; }        ///< a at the top of the barrier [rad]
-  /// (J/M + distance^2 of hub and contact) [m^2].
+  /// Returns (J/M + distance^2 of hub and contact) [m^2].
   double inertia(double angle) const;
-  /// Of gravity, from the foot that stood upright at the origin [m^2/s^2].
+  /// Returns that of gravity, from the foot that stood upright at the origin [m^2/s^2].
   double potential(double angle) const;
   double energy(double angle, double spin) const { return inertia(angle) * spin * spin / 2 + potential(angle); }
   double spin_squared(double angle, double energy) const { return 2 * (energy - potential(angle)) / inertia(angle); }
-  /// omega-^2 at the next touch of a foot with omega_eq^2 at its landing angle, and back. No drag.
+  /// Returns omega-^2 at the next touch of a foot with omega_eq^2 at its landing angle, and back. No drag.
   double next_squared(double omega_eq_squared) const;
   double landing_squared(double next_squared) const;
-  /// Least omega_eq^2 that passes the barrier [rad^2/s^2].
+  /// Returns the least omega_eq^2 that passes the barrier [rad^2/s^2].
   double barrier_squared() const { return barrier_; }
-  /// From touch to touch of two standing feet [m]: chord of the next landing plus what the tip rolls.
+  /// Measures from touch to touch of two standing feet [m]: chord of the next landing plus what the tip rolls.
   double pace() const { return pace_; }
 
  private:
@@ -74,7 +74,7 @@ class StandingFoot {
 /// Restitutions above it make feet hop for longer than a step.
 inline constexpr double most_settled_restitution = 0.95;
 
-/// Friction from which a rolling wheel's landing on `leg` does not slip, mu_c = d h / (J/M + h^2).
+/// Returns the friction from which a rolling wheel's landing on `leg` does not slip, mu_c = d h / (J/M + h^2).
 double sticking_friction(const SettledWheel& wheel, int leg);
 
 }  // namespace metastable::dynamics

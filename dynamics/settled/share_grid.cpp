@@ -13,7 +13,7 @@ constexpr double sds = 4, least_width = 0.3;  // of the restitutions around thei
 constexpr double just_above = 1e-7;           // mu_r, of the first place
 constexpr double clear_of_sticking = 0.02;    // as in settled_map: here the foot sticks under its weight, too
 
-// All places of one leg at one restitution.
+// Fills all places of one leg at one restitution.
 void fill(LandingShares& grid, const SettledMap& map, int leg, int row) {
   LandingShares::Leg& of_leg = grid.legs[static_cast<std::size_t>(leg)];
   const double eta = grid.restitution.at(row);
@@ -40,7 +40,7 @@ void fill(LandingShares& grid, const SettledMap& map, int leg, int row) {
   }
 }
 
-// The highest speed up to which a sticking foot settles.
+// Finds the highest speed up to which a sticking foot settles.
 double settles_below(const SettledMap& map, int leg, double eta, double low, double high) {
   const double mu = map.sticking_friction(leg) + clear_of_sticking;
   constexpr int looks = 60;
@@ -53,7 +53,7 @@ double settles_below(const SettledMap& map, int leg, double eta, double low, dou
   return fine;
 }
 
-// By landings of a sticking foot with small torques; none where it does not get on.
+// Finds it by landings of a sticking foot with small torques; none where it does not get on.
 LandingShares::Drag drag_of(const SettledMotion& motion, int leg, double omega, double eta) {
   const Contact contact{eta, sticking_friction(motion.wheel(), leg) + clear_of_sticking};
   const Step free = motion.step(leg, omega, contact);

@@ -10,7 +10,7 @@
 
 namespace metastable::dynamics {
 
-/// Landings of this wheel on its slope, each followed. Some 70,000 of them, 2 to 3 s.
+/// Makes the landings of this wheel on its slope, each followed. Some 70,000 of them take 2 to 3 s.
 /// @param slowest, fastest  speeds omega- to be read [rad/s], 0 < slowest < fastest
 /// @param contact  nominal: LandingShares::Leg::settles_below is that at its mean restitution plus an sd; speeds above
 ///        it are not tabulated, nor restitutions beyond four sds

@@ -82,7 +82,7 @@ Gait find_gait(const TwoLinkWalker& walker, double slope_rad, const std::vector<
 }
 
 Gait find_gait(const TwoLinkWalker& walker, double slope_rad) {
-  // The published gaits: Garcia et al. at 0.009 rad, Goswami et al. at 3 deg.
+  // It starts from the published gaits: Garcia et al. at 0.009 rad, Goswami et al. at 3 deg.
   const bool compass = walker.dimension() == 3;
   const double published = compass ? std::numbers::pi / 60 : 0.009;
   const std::vector<double> known =

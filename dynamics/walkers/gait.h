@@ -1,5 +1,5 @@
 #pragma once
-// Periodic gaits on even ground: their fixed points by Newton's method, and how perturbations of them grow or fade.
+// Finds periodic gaits on even ground: fixed points by Newton's method, and how perturbations of them grow or fade.
 
 #include <complex>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// A gait that repeats itself after every step.
+/// Is a gait that repeats itself after every step.
 struct Gait {
   std::vector<double> state;                      ///< just after a strike, as TwoLinkWalker::step takes it
   std::vector<std::complex<double>> eigenvalues;  ///< of the step's derivative there, by falling modulus

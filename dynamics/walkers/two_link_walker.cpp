@@ -13,13 +13,13 @@ namespace {
 
 constexpr int order = 16;
 constexpr std::size_t width = 4;
-/// Four walkers side by side.
+/// Holds four walkers side by side.
 using Lanes = double __attribute__((vector_size(width * sizeof(double))));
 
-/// A quantity's Taylor coefficients.
+/// Holds a quantity's Taylor coefficients.
 using Series = std::array<Lanes, order + 1>;
 
-/// Angles, rates, and the sines and cosines that the equations need, of four walkers as series in time.
+/// Holds angles, rates, and the sines and cosines that the equations need, of four walkers as series in time.
 struct Motion {
   Series theta, psi, omega, nu;                   ///< stance and swing angle, their rates
   Series sin_theta, cos_theta;                    ///< of theta - gamma
@@ -210,10 +210,10 @@ Stride TwoLinkWalker::strike(const LegMotion& before) const {
   const double m = masses_.leg_mass, hip = masses_.hip_mass, a = masses_.foot_to_mass, b = masses_.mass_to_hip;
   const double l = a + b, apart = std::cos(2 * before.swing_angle);
   const double stance = before.stance_rate, swing = before.swing_rate;
-  // About the struck foot, before: hip, old swing leg, old stance leg.
+  // About the struck foot it is, before, that of the hip, the old swing leg and the old stance leg.
   const double momentum =
       hip * l * l * apart * stance + m * a * (l * apart * stance - b * swing) + m * a * stance * (l * apart - b);
-  // The new swing leg about the hip: b swing' = l cos(2 alpha) stance' - a stance.
+  // The new swing leg keeps its own about the hip: b swing' = l cos(2 alpha) stance' - a stance.
   const double carried = (l * apart - b) * a * stance;
   const double inertia = hip * l * l + m * a * a + m * l * (l - b * apart) - m * (l * apart - b) * l * apart;
   Stride after;

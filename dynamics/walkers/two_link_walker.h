@@ -1,6 +1,5 @@
 #pragma once
-// Passive walkers of two stiff legs joined at a hip, on a plane: one step, from just after a strike to just after the
-// next.
+// Steps passive walkers of two stiff legs joined at a hip, on a plane, from just after a strike to just after the next.
 
 #include <array>
 #include <cstdint>
@@ -9,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// The compass gait's masses and lengths (Goswami, Thuilot, Espiau 1998). A leg is a + b long.
+/// Holds the compass gait's masses and lengths (Goswami, Thuilot, Espiau 1998). A leg is a + b long.
 struct CompassOptions {
   double leg_mass = 5;        ///< m [kg], > 0, a point on each leg
   double hip_mass = 10;       ///< m_H [kg], >= 0
@@ -18,30 +17,30 @@ struct CompassOptions {
   double gravity = 9.81;      ///< g [m/s^2], > 0
 };
 
-/// Both legs just after a strike. The stance leg stands `half_angle_rad` behind the slope's normal, the swing leg as
-/// far before it; rates are those of the angles to the normal, negative when the hip moves downhill.
+/// Holds both legs just after a strike. The stance leg stands `half_angle_rad` behind the slope's normal, the swing leg
+/// as far before it; rates are those of the angles to the normal, negative when the hip moves downhill.
 struct Stride {
   double half_angle_rad = 0;  ///< half the angle between the legs [rad]
   double stance_rate = 0;     ///< [rad/s]
   double swing_rate = 0;      ///< [rad/s]
 };
 
-/// Both legs during a step, by their angles to the slope's normal [rad], rates [rad/s]. The hip is over the stance foot
-/// at angle 0, uphill of it at positive angles.
+/// Holds both legs during a step, by their angles to the slope's normal [rad], rates [rad/s]. The hip is over the
+/// stance foot at angle 0, uphill of it at positive angles.
 struct LegMotion {
   double time = 0;  ///< since the last strike [s]
   double stance_angle = 0, swing_angle = 0;
   double stance_rate = 0, swing_rate = 0;
 };
 
-/// The slope [rad] of the ground that the next strike is on, and of the ground on which both feet stand: both angles
-/// turn by the difference. Equal, if the ground is one plane that only tilts.
+/// Holds the slope [rad] of the ground that the next strike is on, and of the ground on which both feet stand: both
+/// angles turn by the difference. Equal, if the ground is one plane that only tilts.
 struct Ground {
   double slope = 0;
   double last_slope = 0;
 };
 
-/// Two legs of equal length with point masses, feet that neither slip nor bounce. The swing foot may pass through the
+/// Walks on two equal legs with point masses, feet that neither slip nor bounce. The swing foot may pass through the
 /// ground beside the stance foot (knees would prevent that); it strikes when it comes down before the stance foot.
 ///
 /// A slope turns gravity: the state stays in the slope's frame (of the ground ahead). With theta and psi the angles of
@@ -51,15 +50,15 @@ struct Ground {
 /// Integrated by Taylor series, four walkers at once; energy is kept to 1e-12 between strikes.
 class TwoLinkWalker {
  public:
-  /// The simplest walker (Garcia, Chatterjee, Ruina, Coleman 1998): all mass at the hip, feet of vanishing mass.
-  /// Lengths in legs, times in sqrt(l/g). The swing leg's rate after a strike follows from the stance leg's: its states
-  /// have two numbers (half angle, stance rate).
+  /// Returns the simplest walker (Garcia, Chatterjee, Ruina, Coleman 1998): all mass at the hip, feet of vanishing
+  /// mass. Lengths in legs, times in sqrt(l/g). The swing leg's rate after a strike follows from the stance leg's: its
+  /// states have two numbers (half angle, stance rate).
   static TwoLinkWalker simplest();
-  /// The compass gait: three numbers (half angle, stance rate, swing rate).
+  /// Returns the compass gait: three numbers (half angle, stance rate, swing rate).
   /// @throws std::invalid_argument naming the quantity and its range
   static TwoLinkWalker compass(const CompassOptions& options = {});
 
-  /// How many numbers a state has, 2 or 3: the first ones of Stride.
+  /// Says how many numbers a state has, 2 or 3: the first ones of Stride.
   int dimension() const { return dimension_; }
   /// Completes a state (its first dimension() numbers) to a stride.
   Stride stride(std::span<const double> state) const;
@@ -76,10 +75,10 @@ class TwoLinkWalker {
   std::optional<LegMotion> before_strike(const Stride& start, const Ground& ground) const;
   /// Returns the motion `time` >= 0 [s] after the last strike, whether or not a foot has struck by then.
   LegMotion at(const Stride& start, const Ground& ground, double time) const;
-  /// The strike: both feet on the ground, the angular momenta of the walker about the struck foot and of the new swing
-  /// leg about the hip stay what they were. `before` has stance_angle = -swing_angle.
+  /// Applies the strike: both feet on the ground, the angular momenta of the walker about the struck foot and of the
+  /// new swing leg about the hip stay what they were. `before` has stance_angle = -swing_angle.
   Stride strike(const LegMotion& before) const;
-  /// Mechanical energy [J] (of the simplest walker: per weight of the hip and length of a leg).
+  /// Returns the mechanical energy [J] (of the simplest walker: per weight of the hip and length of a leg).
   double energy(const LegMotion& motion, double slope) const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// A passive walker on rough ground as a stochastic return map, from just after one strike to just after the next.
+// Makes a passive walker on rough ground a stochastic return map, from just after one strike to just after the next.
 
 #include <cstdint>
 #include <span>
@@ -10,13 +10,13 @@
 
 namespace metastable::dynamics {
 
-/// How the slope varies. Every step meets a slope of its own, N(mean, sd^2), independent of all others.
+/// Says how the slope varies. Every step meets a slope of its own, N(mean, sd^2), independent of all others.
 enum class Terrain {
   fresh,  ///< a plane that tilts anew at every step; the state is the walker's
   facets  ///< facets: at the start of a step the feet still stand on the last one, whose slope is one more number
 };
 
-/// The walker's stochastic return map: one score a step, the slope's.
+/// Is the walker's stochastic return map: one score a step, the slope's.
 ///
 /// States are the walker's (half angle [rad], rates [rad/s]), with Terrain::facets followed by the slope [rad] of the
 /// facet under both feet. Thread-safe.
@@ -33,7 +33,7 @@ class WalkerMap {
   const TwoLinkWalker& walker() const { return walker_; }
   const Options& options() const { return options_; }
   int dimension() const;
-  /// What the numbers of a state are, with units.
+  /// Says what the numbers of a state are, with units.
   std::vector<std::string> names() const;
 
   /// Takes one step of each of scores.size() walkers (TwoLinkWalker::step).

@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// Independent truncated normals: eta on [0, 1], mu on [0, inf); means and sds are those before truncation.
+/// Holds independent truncated normals: eta on [0, 1], mu on [0, inf); means and sds are those before truncation.
 struct ContactSpread {
   double restitution_mean = 0.4;
   double restitution_sd = 0.1;  ///< > 0
@@ -16,7 +16,7 @@ struct ContactSpread {
   double friction_sd = 0.1;  ///< > 0
 };
 
-/// How one collision differs from what the law and the contact's distribution say.
+/// Says how one collision differs from what the law and the contact's distribution say.
 struct CollisionChange {
   double friction_ratio = 1;     ///< multiplies the mu drawn, > 0
   double friction_shift = 0;     ///< added to the mean of mu
@@ -31,13 +31,13 @@ struct SpeedDensity {
   double below = 0;    ///< P(omega+ <= that value), rest included
 };
 
-/// omega+ just after a collision of a rolling wheel (u0 = 0) with random (eta, mu): under `published` a sum over eta
-/// with mu in closed form (the root of (18)-(34) in mu), under `coulomb` a sum over mu with eta in closed form, the
-/// sticking collisions (mu >= mu_c) being one term. The sum is trapezoidal in the normal score, Gauss-Legendre where
-/// truncation, or the least restitution that can lose so little, cuts inside 4.6 sds. Error below 4e-4 of the peak
-/// while mu's mean is four sds above 0 (6e-3 of the probability is lost where it is two): smooth enough in every
-/// parameter for a likelihood of thousands of collisions to be climbed. LandingDensity is the exact, slower way. One
-/// value costs about a microsecond.
+/// Gives the density of omega+ just after a collision of a rolling wheel (u0 = 0) with random (eta, mu): under
+/// `published` a sum over eta with mu in closed form (the root of (18)-(34) in mu), under `coulomb` a sum over mu with
+/// eta in closed form, the sticking collisions (mu >= mu_c) being one term. The sum is trapezoidal in the normal score,
+/// Gauss-Legendre where truncation, or the least restitution that can lose so little, cuts inside 4.6 sds. Error below
+/// 4e-4 of the peak while mu's mean is four sds above 0 (6e-3 of the probability is lost where it is two): smooth
+/// enough in every parameter for a likelihood of thousands of collisions to be climbed. LandingDensity is the exact,
+/// slower way. One value costs about a microsecond.
 class CollisionDensity {
  public:
   /// @throws std::invalid_argument for `plastic`, which has neither eta nor mu, and for sds <= 0

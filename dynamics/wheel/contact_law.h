@@ -1,5 +1,5 @@
 #pragma once
-// One collision: what the landing foot's impulse takes out of the motion.
+// Says of one collision what the landing foot's impulse takes out of the motion.
 
 #include <string>
 #include <string_view>
@@ -12,7 +12,7 @@ namespace metastable::dynamics {
 
 enum class Law { published, coulomb, plastic, settled };
 
-/// "published", "coulomb", "plastic", "settled". @throws std::invalid_argument naming the four.
+/// Takes "published", "coulomb", "plastic", "settled". @throws std::invalid_argument naming the four.
 Law law_from_name(std::string_view name);
 std::string_view law_name(Law law);
 std::vector<std::string> law_names();
@@ -30,7 +30,7 @@ struct Collision {
   double slope_rad = 0;  ///< gamma
 };
 
-/// Energies of one collision [J]; each may be read on its own, total() is what the return map takes off.
+/// Holds the energies of one collision [J]; each may be read on its own, total() is what the return map takes off.
 struct Loss {
   double normal_pre = 0, normal_post = 0;          ///< D_n before and after slip stops (13), (19)
   double tangential_pre = 0, tangential_post = 0;  ///< D_t (16), (21)
@@ -44,7 +44,7 @@ struct Loss {
   double total() const { return normal() + tangential() + rebound - potential; }  ///< eps (34)
 };
 
-/// Physical constants a law takes from the wheel, resolved once (defaults filled in per law).
+/// Holds the physical constants a law takes from the wheel, resolved once (defaults filled in per law).
 struct ContactModel {
   Law law = Law::published;
   double mass = 0;  ///< M [kg]
@@ -60,7 +60,7 @@ struct ContactModel {
 /// @throws std::invalid_argument for rebound_lost outside [0, 1], or an inertia below M (mean L)^2 in that case
 ContactModel contact_model(const Wheel& wheel, Law law, double rebound_lost = 0);
 
-/// Energy lost in one collision under the model's law.
+/// Returns the energy lost in one collision under the model's law.
 ///   published: the paper's (4)-(34) as published_law.h reads them, any sign of u0
 ///   coulomb:   planar stick-slip with energetic restitution (Stronge 1990), any sign of u0, slip stop and reversal
 ///   plastic:   no slip, no rebound (McGeer 1990); the loss is that of the angular momentum balance about the foot
@@ -68,11 +68,11 @@ ContactModel contact_model(const Wheel& wheel, Law law, double rebound_lost = 0)
 /// @throws std::logic_error under `settled`, whose landing is a motion of its own (dynamics/settled)
 Loss collide(const ContactModel& model, const Collision& collision, const Contact& contact);
 
-/// Frictions at which the loss of a rolling wheel's collision (u0 = 0) changes its form as a function of mu, ascending.
+/// Returns, ascending, the frictions at which the loss of a rolling wheel's collision (u0 = 0) changes its form in mu.
 /// Between them it is smooth; beyond the last one (everywhere, if there is none) it is constant or the foot jams.
 std::vector<double> friction_breaks(const ContactModel& model, const Collision& collision);
 
-/// Inertia about the stance foot of leg length L [kg m^2].
+/// Returns the inertia about the stance foot of leg length L [kg m^2].
 ///   published: wheel.inertia, default M (mean L)^2, the same for every leg
 ///   others: M (r_g^2 + L^2); a given wheel.inertia is read as that of the mean leg and shifted by M (L^2 -
 ///   mean L^2)

@@ -1,5 +1,5 @@
 #pragma once
-// What restitution and friction are at each collision.
+// Says what restitution and friction are at each collision.
 
 #include <span>
 #include <string>
@@ -29,11 +29,11 @@ class ContactNoise {
   /// @throws std::invalid_argument for an empty list, eta outside [0, 1] or mu < 0 (with the index)
   static ContactNoise empirical(std::vector<Contact> pairs);
 
-  /// Standard normal scores used by draw(): 2 (normal) or 1 (empirical).
+  /// Counts the standard normal scores used by draw(): 2 (normal) or 1 (empirical).
   int dimension() const;
   /// @param score dimension() standard normal scores
   Contact draw(std::span<const double> score) const;
-  /// Smallest and largest values possible (mu's upper end is +infinity for a normal with sd > 0).
+  /// Holds the smallest and largest values possible (mu's upper end is +infinity for a normal with sd > 0).
   struct Support {
     double restitution_lower, restitution_upper, friction_lower, friction_upper;
   };

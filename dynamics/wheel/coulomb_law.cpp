@@ -22,7 +22,7 @@ class Contactor {
         r2_(coulomb_squared_gyration(model, c)),
         mass_(model.mass) {}
 
-  // downhill = +1: the foot slips downhill, friction pushes uphill; -1: the reverse
+  // With downhill = +1 the foot slips downhill, friction pushes uphill; -1 is the reverse.
   Mode slip(double downhill) const {
     const double coupling = x_ * y_, scale = 1 / (mass_ * r2_), mu = downhill * friction_;
     return {(r2_ + x_ * x_ - mu * coupling) * scale, (coupling - mu * (r2_ + y_ * y_)) * scale};

@@ -1,5 +1,5 @@
 #pragma once
-// Planar stick-slip collision with energetic restitution (Stronge 1990).
+// Solves the planar stick-slip collision with energetic restitution (Stronge 1990).
 
 #include "dynamics/wheel/contact_law.h"
 

@@ -1,6 +1,6 @@
 #pragma once
-// Effects that a model of the wheel may lack: their names, parameters and meaning. No formula lives here: the virtual
-// laboratory and the diagnosis each put them into their own equations.
+// Lists effects that a model of the wheel may lack: their names, parameters and meaning. No formula lives here: the
+// virtual laboratory and the diagnosis each put them into their own equations.
 
 #include <map>
 #include <optional>
@@ -21,17 +21,17 @@ struct EffectParameter {
   bool per_leg = false;  ///< a list, one value a leg
 };
 
-/// One effect. eta and mu stand for the restitution and friction drawn at a collision.
+/// Describes one effect. eta and mu stand for the restitution and friction drawn at a collision.
 struct EffectInfo {
   std::string id;
   std::string summary;
   std::vector<EffectParameter> parameters;
 };
 
-/// The one effect that is no missing physics: other contact parameters, which a recalibration refits.
+/// Is the one effect that is no missing physics: other contact parameters, which a recalibration refits.
 inline constexpr std::string_view contact_distribution_id = "contact_distribution";
 
-/// All effects, in a fixed order.
+/// Lists all effects, in a fixed order.
 const std::vector<EffectInfo>& effect_catalogue();
 /// @throws std::invalid_argument naming the id and all known ones
 const EffectInfo& effect_info(std::string_view id);
@@ -48,16 +48,16 @@ struct NominalValues {
   std::vector<double> leg_lengths;  ///< [m]
 };
 
-/// The effect with named values; a parameter that is not named is neutral.
+/// Makes the effect with named values; a parameter that is not named is neutral.
 /// @throws std::invalid_argument naming effect, parameter, value and allowed range: unknown id or parameter, a value
 ///         out of range, no whole number where one is needed, a list of the wrong length, from_m >= to_m
 Effect effect_from_values(std::string_view id, const std::map<std::string, std::vector<double>>& values,
                           const NominalValues& nominal);
 
-/// "leg_contact:leg=3,friction_ratio=1.4" (the colon and what follows may be absent; a list is written 0.15;0.151;...).
+/// Reads "leg_contact:leg=3,friction_ratio=1.4" (the colon and what follows may be absent; a list is 0.15;0.151;...).
 /// @throws std::invalid_argument as effect_from_values, and for text that cannot be read (quotes it)
 Effect effect_from_text(std::string_view text, const NominalValues& nominal);
-/// The inverse, with every value in as many digits as it needs.
+/// Does the inverse, with every value in as many digits as it needs.
 std::string effect_text(const Effect& effect);
 
 }  // namespace metastable::dynamics

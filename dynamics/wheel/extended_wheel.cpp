@@ -39,7 +39,7 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
     Leg leg;
     leg.triangle = triangle(first, second, wheel.leg_angle());
     leg.length = second;
-    // The stated wheel's: legs that differ from the stated lengths do not change what is known of the inertia.
+    // This is the stated wheel's: legs that differ from the stated lengths do not change what is known of the inertia.
     leg.before = stance_inertia(stated, model_.law, first);
     leg.inertia = stance_inertia(stated, model_.law, second);
     if (model_.law == Law::settled) {

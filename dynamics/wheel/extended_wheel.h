@@ -1,5 +1,5 @@
 #pragma once
-// The wheel's step with physical extensions: what each effect of the catalogue does inside the return map.
+// Makes the wheel's step with physical extensions: what each effect of the catalogue does inside the return map.
 
 #include <memory>
 #include <optional>
@@ -71,22 +71,22 @@ class ExtendedWheel {
   ExtendedWheel(const Wheel& wheel, double slope, Law law, const ContactSpread& contact, const Extension& extension,
                 std::shared_ptr<const LandingShares> landings = {});
 
-  /// Whether a landing is a motion of its own (`settled`): omega+ is then that after its first impact, and the next
-  /// three say the rest.
+  /// Says whether a landing is a motion of its own (`settled`): omega+ is then that after its first impact, and the
+  /// next three say the rest.
   bool settles() const { return landings_ != nullptr; }
-  /// The next omega-, and the slide where that was seen.
+  /// Finds the next omega-, and the slide where that was seen.
   /// @param blur  sd of its error [rad/s]
   NextTouch at_next_touch(const StepContext& context, double omega, const SeenOfLanding& seen, double blur,
                           double next) const;
-  /// P(rest) after a landing at speed omega [rad/s]. @param omega_plus  after the first impact, where it is known
+  /// Returns P(rest) after a landing at omega [rad/s]. @param omega_plus  after the first impact, where it is known
   double rest_share(const StepContext& context, double omega, std::optional<double> omega_plus) const;
-  /// A landing with a drawn contact: the next omega- [rad/s], nothing at rest, and the slide [m].
+  /// Is a landing with a drawn contact: the next omega- [rad/s], nothing at rest, and the slide [m].
   struct Drawn {
     std::optional<double> next;
     double displacement = 0;
   };
   Drawn land(const StepContext& context, double omega, const Contact& drawn, bool outlier) const;
-  /// Speed up to which the foot of a landing stands before the next one touches [rad/s].
+  /// Returns the speed up to which the foot of a landing stands before the next one touches [rad/s].
   double settles_below(int leg) const { return landings_->legs[index(leg)].settles_below; }
 
   /// Gives density of omega+ and probability of less, for a collision at speed omega [rad/s].

@@ -8,7 +8,7 @@
 namespace metastable::dynamics {
 namespace {
 
-// Index of the node below a value and the weight of the one above.
+// Returns the index of the node below a value and the weight of the one above.
 std::pair<int, double> between_nodes(const LandingShares::Axis& axis, double value) {
   const double at = std::clamp((value - axis.low) / (axis.high - axis.low), 0.0, 1.0) * (axis.count - 1);
   const int below = std::min(static_cast<int>(at), axis.count - 2);

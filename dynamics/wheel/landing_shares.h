@@ -1,5 +1,5 @@
 #pragma once
-// Landings of a rigid wheel (`settled`) on a coarse grid of speed, restitution and friction: fast enough for
+// Holds landings of a rigid wheel (`settled`) on a coarse grid of speed, restitution and friction: fast enough for
 // likelihoods of whole experiments. dynamics/settled/share_grid fills it.
 
 #include <array>
@@ -8,16 +8,16 @@
 
 namespace metastable::dynamics {
 
-/// What landings on one slope keep, leg by leg. Along the axes of speed and restitution values are read by straight
-/// lines, along friction on places that stand as the squares of even numbers between mu_r, where it is steep, and mu_c.
+/// Says what landings on one slope keep, leg by leg. Along the axes of speed and restitution values are read by
+/// straight lines, along friction at places as the squares of even numbers between mu_r, where it is steep, and mu_c.
 struct LandingShares {
   struct Axis {
     double low = 0, high = 1;
     int count = 2;
     double at(int i) const { return low + (high - low) * i / (count - 1); }
   };
-  /// What resisting torques take off the next omega-^2 of a foot that carries on `carried_squared`, per unit of torque:
-  /// constant, by omega, by omega^2. More than of a foot that stands, as the wheel turns slower while it hops.
+  /// Says what resisting torques take off the next omega-^2 of a foot that carries on `carried_squared`, per torque:
+  /// constant, by omega, by omega^2. It is more than of a standing foot, as the wheel turns slower while it hops.
   struct Drag {
     double carried_squared = 0;
     std::array<double, 3> lost{};
@@ -43,11 +43,11 @@ struct LandingShares {
   std::size_t cell(int leg, int speed, int restitution) const;
   double part(int place) const { return static_cast<double>(place) * place / ((parts - 1.0) * (parts - 1.0)); }
 
-  /// A landing's omega_eq^2 / omega-^2 and the slide of its foot [m].
+  /// Holds a landing's omega_eq^2 / omega-^2 and the slide of its foot [m].
   struct Kept {
     double share = 0, displacement = 0;
   };
-  /// One leg at one speed; beyond the axes the last values are kept. Refers to the grid.
+  /// Is one leg at one speed; beyond the axes the last values are kept. It refers to the grid.
   class Place {
    public:
     Place(const LandingShares& grid, int leg, double omega);

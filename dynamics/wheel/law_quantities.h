@@ -1,5 +1,5 @@
 #pragma once
-// Which quantities each contact law uses; the others have no meaning under it.
+// Says which quantities each contact law uses; the others have no meaning under it.
 
 #include <span>
 #include <string_view>
@@ -18,7 +18,7 @@ enum class LawQuantity {
   contact_mass         ///< m_c
 };
 
-/// The laws that use it, in the order of law_names().
+/// Returns the laws that use it, in the order of law_names().
 std::span<const Law> laws_with(LawQuantity quantity);
 bool uses(Law law, LawQuantity quantity);
 

@@ -1,5 +1,5 @@
 #pragma once
-// How a trial ends.
+// Says how a trial ends.
 
 namespace metastable::dynamics {
 

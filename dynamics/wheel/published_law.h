@@ -1,6 +1,6 @@
 #pragma once
-// The paper's contact law, (4)-(34): T. Nanayakkara, K. Byl, H. Liu, X. Song and T. Villabona, "Dominant Sources of
-// Variability in Passive Walking" (ICRA 2012).
+// Follows the paper's contact law, (4)-(34): T. Nanayakkara, K. Byl, H. Liu, X. Song and T. Villabona, "Dominant
+// Sources of Variability in Passive Walking" (ICRA 2012).
 //
 // Where the print cannot be meant, it is read so: (9) with u_comp = u0 - j mu v0 m_j/n_j; (11) with mu, as (21) follows
 // from it; in (28) t_r = T_r/2, and T_r in the third case; (37) with M for m; a foot that never stops slipping (zeta >=
@@ -22,7 +22,7 @@ namespace metastable::dynamics {
 /// most. O(1): one logarithm, three square roots.
 Loss published_loss(const ContactModel& model, const Collision& collision, const Contact& contact);
 
-/// {mu_c, (r^2 + x^2)/(x y)}; infinity where the hub is downhill of the landing foot, which then never jams.
+/// Returns {mu_c, (r^2 + x^2)/(x y)}; infinity where the hub is downhill of the landing foot, which then never jams.
 std::vector<double> published_friction_breaks(const Collision& collision);
 
 }  // namespace metastable::dynamics

@@ -15,7 +15,7 @@ METASTABLE_WIDE void find_friction_roots(const PublishedLoss& of, FrictionRoots&
     const double q0 = a * (alpha - loss * a);
     const double discriminant = q1 * q1 - 4 * q2 * q0, root = std::sqrt(discriminant > 0 ? discriminant : 0.0);
 
-    // One Newton step, no further than the quadratic's other side.
+    // It takes one Newton step, no further than the quadratic's other side.
     double mu = q1 <= 0 ? (root - q1) / (2 * q2) : -2 * q0 / (q1 + root);
     const auto slope = [&](double d) {
       return -alpha * b + (beta + delta * d) * (2 * c * mu - b) - delta * b * mu * (c * mu - b) + 2 * loss * b * d;

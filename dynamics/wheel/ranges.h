@@ -1,5 +1,5 @@
 #pragma once
-// What the quantities of a wheel, its ramp, its contacts and its motion may be.
+// Says what the quantities of a wheel, its ramp, its contacts and its motion may be.
 
 #include <limits>
 #include <string>
@@ -10,17 +10,17 @@ namespace metastable::dynamics {
 
 enum class Law;
 
-/// The values that a quantity may have.
+/// Holds the values that a quantity may have.
 struct Range {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
   bool low_open = false, high_open = false;  ///< an infinite end is always open
-  /// False for what is not finite.
+  /// Is false for what is not finite.
   bool holds(double value) const;
   std::string text() const;  ///< "[0.001, 100]", "(0, inf)"
 };
 
-/// The one table behind options, their help, and the files of an experiment: wide enough for any wheel that can be
-/// built, and narrow enough that no square or product of them leaves the doubles.
+/// This is the one table behind options, their help, and the files of an experiment: wide enough for any wheel that can
+/// be built, and narrow enough that no square or product of them leaves the doubles.
 namespace range {
 inline constexpr Range leg_length{.low = 0.001, .high = 100};       ///< [m]
 inline constexpr Range mass{.low = 1e-6, .high = 1e6};              ///< of the hub or the contact [kg]
@@ -45,15 +45,15 @@ inline constexpr Range position{.low = -1e6, .high = 1e6};          ///< [m]
 inline constexpr Range turned{.low = -1e9, .high = 1e9};            ///< unwrapped angle [rad]
 }  // namespace range
 
-/// Slopes of a wheel of `legs` legs: from 0.001 deg to half the angle between legs, which is left out [deg].
+/// Returns the slopes of a wheel of `legs` legs: from 0.001 deg to half the angle between legs, left out [deg].
 Range slope_range(int legs);
 
-/// Why the wheel's inertia about the stance foot is none, "" if nothing is wrong with it or it is not given: it is at
-/// least M (mean L)^2, that of the hub's mass alone, and its r_g at most three mean legs.
+/// Says why the wheel's inertia about the stance foot is none, "" if nothing is wrong with it or it is not given: it is
+/// at least M (mean L)^2, that of the hub's mass alone, and its r_g at most three mean legs.
 std::string inertia_objection(const Wheel& wheel);
-/// Likewise the radius of gyration: at most three mean legs, and under `settled` above 0.
+/// Says it of the radius of gyration: at most three mean legs, and under `settled` above 0.
 std::string gyration_objection(const Wheel& wheel, Law law);
-/// Likewise the tips' radius: in [0, shortest leg / 20].
+/// Says it of the tips' radius: in [0, shortest leg / 20].
 std::string tip_objection(const Wheel& wheel);
 
 }  // namespace metastable::dynamics

@@ -47,7 +47,7 @@ class Weights {
   double friction_mean_, friction_sd_, friction_mass_, low_, mass_;
 };
 
-// Student's with three degrees of freedom: a foot that slides far does so less surely than the grid says.
+// Is Student's density with three degrees of freedom: a foot that slides far does so less surely than the grid says.
 double slide_density(double z) {
   const double tail = 1 + z * z / 3;
   return 0.3675525969478614 / (tail * tail);
@@ -65,13 +65,13 @@ void restitutions(double from, double to, Use use) {
   for (std::size_t k = 0; k < at.size(); ++k) use(middle + half * at[k], half * Rule::weights()[k]);
 }
 
-// The contacts that give one omega+ of the first impact: mu as a function of eta up to the restitution at which the
-// foot sticks, where every friction above mu_c does.
+// Holds the contacts that give one omega+ of the first impact: mu as a function of eta up to the restitution at which
+// the foot sticks, where every friction above mu_c does.
 class FirstImpact {
  public:
   FirstImpact(const SettledLanding& landing, double omega_plus)
       : landing_(landing), lever_sq_(landing.gyration_sq + landing.ahead * landing.ahead) {
-    // The energy lost by the law itself, of which loss_ratio times as much was lost.
+    // This is the energy lost by the law itself, of which loss_ratio times as much was lost.
     const double share = omega_plus / landing.omega;
     const double own = 1 - (1 - share * share) / landing.loss_ratio;
     lost_ = 1 - std::sqrt(std::max(1e-6, own));
@@ -80,7 +80,7 @@ class FirstImpact {
   }
   double sticking_restitution() const { return lost_ / stuck_ - 1; }
   double sticking_rate() const { return rate_ / stuck_; }  // of that restitution with omega+
-  // mu, and its change with omega+.
+  // Returns mu, and its change with omega+.
   std::pair<double, double> friction(double eta) const {
     const double lost = lost_ / (1 + eta), arm = landing_.chord - lost * landing_.ahead;
     if (!(arm > 0)) return {0, 0};
@@ -103,7 +103,7 @@ class TouchSum {
         blur_(blur),
         at_(next) {}
 
-  // Landings that carry omega^2 spread evenly over [first, second], whose feet slide so far.
+  // Adds landings that carry omega^2 spread evenly over [first, second], whose feet slide so far.
   void add(double mass, double first, double second, double slide) {
     if (first > second) std::swap(first, second);
     const double barrier = landing_.barrier_squared;
@@ -158,7 +158,7 @@ class TouchSum {
   double all_ = 0, rest_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0;
 };
 
-// Landings whose first impact left omega+: cells around twelve restitutions, and the sticking foot.
+// Adds landings whose first impact left omega+: cells around twelve restitutions, and the sticking foot.
 void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share, double omega_plus) {
   const FirstImpact first(landing, omega_plus);
   const double eta_stuck = first.sticking_restitution(), critical = landing.sticking();
@@ -188,7 +188,7 @@ void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weig
   }
 }
 
-// All landings: for twelve restitutions cells of friction, and the sticking foot between its neighbours.
+// Adds all landings: for twelve restitutions cells of friction, and the sticking foot between its neighbours.
 void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
   constexpr int cells = 12;
   const double critical = landing.sticking(), off = critical - landing.place.leg().sticking;
@@ -200,7 +200,7 @@ void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weight
   restitutions(weights.least_restitution(), weights.most_restitution(), [&](double eta, double weight) {
     const double mass = share * weight * weights.restitution_density(eta);
     const double resting = landing.place.resting_friction(eta) + off, width = critical - resting;
-    // From somewhat below the grid's mu_r, that the wheel's own may be lower.
+    // It starts from somewhat below the grid's mu_r, that the wheel's own may be lower.
     const double start = resting - 0.1 * width;
     double above = weights.friction_above(start);
     LandingShares::Kept last = landing.carried({eta, start});

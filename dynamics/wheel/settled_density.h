@@ -1,6 +1,6 @@
 #pragma once
-// One landing of the law `settled` with random (eta, mu): densities of the speed after its first impact and of the
-// speed at the next touch.
+// Describes one landing of the law `settled` with random (eta, mu): densities of the speed after its first impact and
+// of the speed at the next touch.
 
 #include <array>
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace metastable::dynamics {
 
-/// A landing of a wheel that may differ from the grid's own.
+/// Is a landing of a wheel that may differ from the grid's own.
 struct SettledLanding {
   LandingShares::Place place;    ///< of the grid, at `omega`
   double omega = 0;              ///< omega- [rad/s]
@@ -25,44 +25,45 @@ struct SettledLanding {
   std::array<double, 3> dragged{};
   double next_ratio = 1;  ///< multiplies the next omega-
 
-  /// omega- at the next touch from omega_eq^2 [rad/s]; rising.
+  /// Returns omega- at the next touch from omega_eq^2 [rad/s]; rising.
   double next(double omega_eq_squared) const;
 
   double sticking() const { return ahead * height / (gyration_sq + height * height); }  ///< mu_c
-  /// omega+ / omega- of the first impact, which starts without slip.
+  /// Returns omega+ / omega- of the first impact, which starts without slip.
   double first_impact(const Contact& contact) const;
-  /// omega_eq^2 [rad^2/s^2] and the slide [m]: the grid's share at the same distance from mu_c, moved by what a plastic
-  /// landing of this wheel keeps more or less than one of the grid's.
+  /// Returns omega_eq^2 [rad^2/s^2] and the slide [m]: the grid's share at the same distance from mu_c, moved by what a
+  /// plastic landing of this wheel keeps more or less than one of the grid's.
   LandingShares::Kept carried(const Contact& contact) const;
 };
 
-/// mu = ratio N(mean, sd^2), mu >= 0, and eta = N(mean, sd^2) in [0, 1], at one landing; of one in so many another mu.
+/// Holds mu = ratio N(mean, sd^2), mu >= 0, and eta = N(mean, sd^2) in [0, 1], at one landing; of one in so many other
+/// mu.
 struct SettledContact {
   double restitution_mean = 0, restitution_sd = 0, friction_mean = 0, friction_sd = 0;
   double rare_share = 0, rare_ratio = 1;  ///< share of landings whose mu is rare_ratio times as large
 };
 
-/// What was measured of a landing beside omega- and the next one.
+/// Holds what was measured of a landing beside omega- and the next one.
 struct SeenOfLanding {
   std::optional<double> omega_plus = {};    ///< after the first impact [rad/s]
   std::optional<double> displacement = {};  ///< slide of the foot [m]
   double displacement_error = 1e-3;         ///< of what the landing says of it [m], > 0
 };
 
-/// Density and distribution function of omega+ of the first impact. Twelve restitutions, mu in closed form.
+/// Returns density and distribution function of omega+ of the first impact. Twelve restitutions, mu in closed form.
 SpeedDensity after_first_impact(const SettledLanding& landing, const SettledContact& contact, double omega_plus);
 
-/// What a landing says of the next touch.
+/// Says what a landing says of the next touch.
 struct NextTouch {
   SpeedDensity speed;        ///< of the next omega-, given the slide where that was seen
   double slide_density = 1;  ///< of the slide, where it was seen [1/m]
 };
 
-/// The next omega-, blurred by a normal error; no touch counts as below, but not beside a slide. One landing in 200 is
-/// taken as one that the law knows little of: its next speed is off by 0.2 rad/s. @param blur [rad/s], > 0
+/// Finds the next omega-, blurred by a normal error; no touch counts as below, but not beside a slide. One landing in
+/// 200 is taken as one that the law knows little of: its next speed is off by 0.2 rad/s. @param blur [rad/s], > 0
 NextTouch at_next_touch(const SettledLanding& landing, const SettledContact& contact, const SeenOfLanding& seen,
                         double blur, double next);
-/// P(no next touch).
+/// Returns P(no next touch).
 double rest_share(const SettledLanding& landing, const SettledContact& contact, std::optional<double> omega_plus);
 
 }  // namespace metastable::dynamics

@@ -105,7 +105,7 @@ std::optional<double> TruncatedNormal::beyond_bound(double a, double probability
 double TruncatedNormal::at_score(double score) const {
   if (constant()) return mean_;
   if (below_lower_ == 0 && above_upper_ == 0) return std::clamp(mean_ + sd_ * score, lower_, upper_);
-  // Untruncated tails at x: positive mixtures of those at the bounds, so nothing cancels.
+  // These are the untruncated tails at x: positive mixtures of those at the bounds, so nothing cancels.
   const double p = normal_cdf(score), q = normal_cdf(-score);
   if (const auto d = beyond_bound((lower_ - mean_) / sd_, p)) return lower_ + *d;
   if (const auto d = beyond_bound((mean_ - upper_) / sd_, q)) return upper_ - *d;

@@ -1,16 +1,16 @@
 #pragma once
-// Normal distribution cut to an interval, exact in both tails.
+// Cuts the normal distribution to an interval, exactly in both tails.
 
 #include <limits>
 #include <optional>
 
 namespace metastable::dynamics {
 
-/// Phi(z), with relative accuracy in the lower tail (erfc); the upper tail is normal_cdf(-z).
+/// Returns Phi(z), with relative accuracy in the lower tail (erfc); the upper tail is normal_cdf(-z).
 double normal_cdf(double z);
 /// Returns the density of the standard normal.
 double normal_density(double z);
-/// Score whose lower tail probability is p. @throws std::domain_error for p outside (0, 1)
+/// Returns the score whose lower tail probability is p. @throws std::domain_error for p outside (0, 1)
 double normal_quantile(double p);
 
 /// Represents N(mean, sd^2) conditioned on [lower, upper]. `mean` and `sd` are those of the untruncated normal.
@@ -28,16 +28,16 @@ class TruncatedNormal {
   double upper() const { return upper_; }
   bool constant() const { return sd_ == 0; }
 
-  /// P(from < X <= to), with relative accuracy wherever the interval lies; 0 if from >= to.
+  /// Returns P(from < X <= to), with relative accuracy wherever the interval lies; 0 if from >= to.
   double between(double from, double to) const;
   /// Return P(X <= x) and P(X > x), each with relative accuracy.
   double cdf(double x) const;
   double complement(double x) const;
   /// Returns the density at x, 0 outside [lower, upper]. @throws std::logic_error for a constant
   double density(double x) const;
-  /// x whose cdf is Phi(score) and whose complement is Phi(-score): monotone, within rounding of x (or of the sd, if
-  /// larger) for |score| up to 37, as long as the untruncated normal's tail at x exceeds 1e-307; within 1e-4 sd of a
-  /// bound within rounding of the distance from it.
+  /// Returns the x whose cdf is Phi(score) and whose complement is Phi(-score): monotone, within rounding of x (or of
+  /// the sd, if larger) for |score| up to 37, as long as the untruncated normal's tail at x exceeds 1e-307; within 1e-4
+  /// sd of a bound within rounding of the distance from it.
   double at_score(double score) const;
   /// Return mean and sd of the truncated variable itself.
   double truncated_mean() const;

@@ -1,5 +1,5 @@
 #pragma once
-// The rimless wheel and the ramp it rolls down.
+// Describes the rimless wheel and the ramp it rolls down.
 
 #include <optional>
 #include <span>
@@ -8,16 +8,16 @@
 
 namespace metastable::dynamics {
 
-/// Leg lengths of the paper's wheel [m], in the order they land (caption of Fig. 1).
+/// Returns the leg lengths of the paper's wheel [m], in the order they land (caption of Fig. 1).
 std::vector<double> paper_leg_lengths();
 
 /// Describes a rimless wheel. Defaults are the paper's, in SI units.
 struct Wheel {
   std::vector<double> leg_length = paper_leg_lengths();  ///< L_i [m], in the order they land; 3 or more, each > 0
   double hub_mass = 1.39;                                ///< M [kg], > 0
-  /// Inertia about the stance foot, I [kg m^2], > 0. Not given: see stance_inertia().
+  /// Is the inertia about the stance foot, I [kg m^2], > 0. Where it is not given see stance_inertia().
   std::optional<double> inertia;
-  /// Radius of gyration about the hub, r_g [m], >= 0. Not given: each law has its own default.
+  /// Is the radius of gyration about the hub, r_g [m], >= 0. Where it is not given, each law has its own default.
   std::optional<double> radius_of_gyration;
   double tip_radius = 0;               ///< r of the legs' round tips [m], in [0, shortest leg / 20]; `settled` only
   std::optional<double> contact_mass;  ///< m_c [kg] of the Kelvin-Voigt contact (25); default M
@@ -45,7 +45,7 @@ struct Triangle {
 /// @param first, second leg lengths [m]; @param leg_angle alpha [rad]
 Triangle triangle(double first, double second, double leg_angle);
 
-/// Steepest slope at which a wheel of `legs` legs still has a barrier, alpha / 2 [rad].
+/// Returns the steepest slope at which a wheel of `legs` legs still has a barrier, alpha / 2 [rad].
 double steepest_slope(int legs);
 
 }  // namespace metastable::dynamics

@@ -18,7 +18,7 @@ class ConvergenceError : public std::runtime_error {
   double residual() const { return residual_; }
 
  protected:
-  /// For failures that are no residual: the message as it is.
+  /// Takes the message of a failure that is no residual as it is.
   explicit ConvergenceError(const std::string& message) : std::runtime_error(message) {}
 
  private:
@@ -46,8 +46,8 @@ class Chain {
   Chain(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column, std::vector<double> value,
         std::vector<double> kill, double excess = 1e-9);
 
-  /// A chain on the nodes of an interpolation: its entries are weights of node values, some of them negative; row sums
-  /// and kill rates are probabilities all the same. Solvers take right sides of any sign then, and keep relative
+  /// Makes a chain on the nodes of an interpolation: its entries are weights of node values, some of them negative; row
+  /// sums and kill rates are probabilities all the same. Solvers take right sides of any sign then, and keep relative
   /// accuracy as long as the negative weights are few (Elimination says when they are not).
   /// @throws std::invalid_argument as the constructor does, but for negative entries
   static Chain interpolated(std::vector<std::size_t> row_start, std::vector<std::uint32_t> column,

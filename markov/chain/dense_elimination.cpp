@@ -13,10 +13,10 @@
 namespace metastable::markov::dense {
 namespace {
 
-/// Pivots that are no longer halved.
+/// So few pivots are no longer halved.
 constexpr std::size_t kFewPivots = 16;
 
-/// Where `pivots` are halved: at a multiple of kFewPivots.
+/// Returns where `pivots` are halved: at a multiple of kFewPivots.
 std::size_t half(std::size_t pivots) { return (pivots / 2 + kFewPivots - 1) / kFewPivots * kFewPivots; }
 
 constexpr std::size_t tile_rows = 6;
@@ -106,7 +106,7 @@ METASTABLE_WIDEST void eliminate_few_columns(Part rows, Part factor, std::size_t
 
 METASTABLE_WIDEST void visit_few_pivots(Part visits, std::size_t count, Part square, const double* exit,
                                         std::size_t pivots) {
-  // Rows side by side, transposed: the recursion runs down the pivots of each.
+  // It takes rows side by side, transposed: the recursion runs down the pivots of each.
   constexpr std::size_t lanes = 8;
   double lane[kFewPivots][lanes] = {};
   for (std::size_t first = 0; first < count; first += lanes) {

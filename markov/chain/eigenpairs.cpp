@@ -33,7 +33,7 @@ struct RawPairs {
   Eigen::MatrixXcd vectors;
 };
 
-/// x -> (Q^T - sigma I)^{-1} x, the operator Spectra iterates with: its eigenvectors are Q's left ones.
+/// Applies x -> (Q^T - sigma I)^{-1} x, the operator Spectra iterates with: its eigenvectors are Q's left ones.
 class TransposedShiftInvert {
  public:
   using Scalar = double;

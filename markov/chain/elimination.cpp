@@ -24,7 +24,7 @@ constexpr std::size_t kBlock = 128;
 /// Below this size, or below this fill of the square, the row-by-row elimination is used.
 constexpr std::size_t kBlockedSize = kBlock;
 constexpr double kBlockedFill = 0.6;
-/// Columns, and rows, of a full matrix that one thread takes at a time.
+/// So many columns, or rows, of a full matrix one thread takes at a time.
 constexpr std::size_t kColumnShare = 16 * dense::tile_columns, kRowShare = 96;
 std::size_t shares(std::size_t count, std::size_t share) { return (count + share - 1) / share; }
 
@@ -54,7 +54,8 @@ struct Elimination::Factors final : Elimination::Solver {
   std::vector<double> solve(std::span<const double> rhs) const override;
   std::vector<double> solve_left(std::span<const double> rhs) const override;
 
-  /// Row i, to be indexed by column low[i] .. high[i] (offset[i] >= i >= low[i]: no row is shorter than its diagonal).
+  /// Returns row i, indexed by column low[i] .. high[i] (offset[i] >= i >= low[i]: no row is shorter than its
+  /// diagonal).
   double* row(std::size_t i) { return entries.data() + offset[i] - low[i]; }
   const double* row(std::size_t i) const { return entries.data() + offset[i] - low[i]; }
   void check_right_side(std::span<const double> rhs) const;
@@ -75,8 +76,8 @@ struct Elimination::Factors final : Elimination::Solver {
   std::vector<std::size_t> top_;  ///< first row whose envelope reaches column n
 };
 
-/// Envelopes after fill; returns the number of entries. Only low[] can change: a pivot n adds columns below n to rows
-/// that reach at least to n.
+/// Finds the envelopes after fill; returns the number of entries. Only low[] can change: a pivot n adds columns below n
+/// to rows that reach at least to n.
 std::size_t Elimination::Factors::find_envelope(const Chain& chain) {
   const std::size_t n = chain.size();
   low.resize(n);

@@ -11,7 +11,7 @@
 
 namespace metastable::markov {
 
-/// Rest is so rare that probabilities or expected steps leave the range of double precision.
+/// Says that rest is so rare that probabilities or expected steps leave the range of double precision.
 class RestTooRare : public ConvergenceError {
  public:
   using ConvergenceError::ConvergenceError;

@@ -38,7 +38,7 @@ void SparseSolver::Factors::assemble(const Chain& chain, double sigma) {
   for (std::size_t i = 0; i < chain.size(); ++i) {
     const auto to = chain.columns(i);
     const auto probability = chain.values(i);
-    // 1 - stay, from the sum itself: one rounding less.
+    // It takes 1 - stay from the sum itself: one rounding less.
     const double sum = std::accumulate(probability.begin(), probability.end(), chain.kill(i));
     const double leaves = chain.interpolated() ? sum : std::min(1.0, sum);
     const auto diagonal = static_cast<SuiteSparse_long>(i);

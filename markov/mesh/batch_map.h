@@ -1,5 +1,5 @@
 #pragma once
-// Any stochastic return map of up to four dimensions: what meshes and simulations ask of it.
+// States what any stochastic return map of up to four dimensions is: what meshes and simulations ask of it.
 
 #include <cstdint>
 #include <functional>
@@ -16,8 +16,8 @@ class MapError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A stochastic return map, in batches: n states in rows of `dimension` numbers, scores in rows of `scores` independent
-/// standard normal numbers. The event at phase p is followed by the one at phase (p + 1) % phases.
+/// Is a stochastic return map, in batches: n states in rows of `dimension` numbers, scores in rows of `scores`
+/// independent standard normal numbers. The event at phase p is followed by the one at phase (p + 1) % phases.
 struct BatchMap {
   int dimension = 1;               ///< 1 to 4
   int scores = 1;                  ///< 1 or more; 0 for a map that draws for itself
@@ -28,20 +28,20 @@ struct BatchMap {
   std::function<void(int phase, std::span<const double> states, std::span<const double> scores, std::span<double> next,
                      std::span<std::uint8_t> failed)>
       step;
-  /// For maps with scores = 0, instead of `step`: each row draws with random words of its own (words[i]). Such maps can
-  /// be simulated only; meshes refuse them, because the tails of their noise cannot be weighted.
+  /// Serves maps with scores = 0 instead of `step`: each row draws with random words of its own (words[i]). Such maps
+  /// can be simulated only; meshes refuse them, because the tails of their noise cannot be weighted.
   std::function<void(int phase, std::span<const double> states, std::span<const std::uint64_t> words,
                      std::span<double> next, std::span<std::uint8_t> failed)>
       draw;
-  /// Whether a state lies in the section, where the map is defined; empty: everywhere. A mesh counts its nodes outside
-  /// as failed; a landing outside is an error.
+  /// Says whether a state lies in the section, where the map is defined; empty: everywhere. A mesh counts its nodes
+  /// outside as failed; a landing outside is an error.
   std::function<bool(int phase, std::span<const double> state)> inside;
 };
 
 /// @throws std::invalid_argument naming what is missing or out of range
 void require_map(const BatchMap& map);
 
-/// The same, and a state as long as it has dimensions to start from.
+/// Does the same, and wants a state as long as it has dimensions to start from.
 void require_start(const BatchMap& map, std::span<const double> start);
 
 /// Calls map.step and looks at what comes back.
@@ -49,11 +49,11 @@ void require_start(const BatchMap& map, std::span<const double> start);
 void checked_step(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> scores,
                   std::span<double> next, std::span<std::uint8_t> failed);
 
-/// The same for maps that draw for themselves.
+/// Does the same for maps that draw for themselves.
 void checked_draw(const BatchMap& map, int phase, std::span<const double> states, std::span<const std::uint64_t> words,
                   std::span<double> next, std::span<std::uint8_t> failed);
 
-/// A state as words: "half angle [rad] = 0.27, ...".
+/// Returns a state as words: "half angle [rad] = 0.27, ...".
 std::string describe_state(const BatchMap& map, std::span<const double> state);
 
 }  // namespace metastable::markov

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kTogether = 128;  // trials followed side by side
 constexpr std::uint64_t kStream = 0x2000;
 
-/// Trials first .. first + count - 1, all to their failures; stops early once `spent` exceeds the limit.
+/// Follows trials first .. first + count - 1, all to their failures; stops early once `spent` exceeds the limit.
 void follow(const BatchMap& map, std::span<const double> start, const SimulationOptions& options, std::size_t first,
             std::span<std::uint64_t> steps, std::atomic<std::uint64_t>& spent) {
   const auto d = static_cast<std::size_t>(map.dimension), s = static_cast<std::size_t>(map.scores);

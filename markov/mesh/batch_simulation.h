@@ -1,5 +1,5 @@
 #pragma once
-// Direct simulation of any return map, many trials at a time.
+// Simulates any return map directly, many trials at a time.
 
 #include <cstdint>
 #include <optional>
@@ -24,8 +24,8 @@ struct SimulatedSteps {
 };
 
 /// Follows every trial from `start` (a state at phase 0) to its failure; scores, or words for maps that draw for
-/// themselves, by counter (Philox) at trial and step. Nothing if most_steps do not suffice (a mean of the trials that
-/// ended would be too low).
+/// themselves, come by counter (Philox) at trial and step. It returns nothing if most_steps do not suffice (a mean of
+/// the trials that ended would be too low).
 /// @throws std::invalid_argument for options out of range; MapError as checked_step does
 std::optional<SimulatedSteps> simulate_steps(const BatchMap& map, std::span<const double> start,
                                              const SimulationOptions& options);

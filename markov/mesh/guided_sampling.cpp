@@ -31,7 +31,7 @@ class Guided {
     guide_ = failure_in_step(mesh, window_);
   }
 
-  /// How many samples go side by side: few steps of many states take a simulator less time than many of one.
+  /// Says how many samples go side by side: few steps of many states take a simulator less time than many of one.
   std::size_t together() const { return std::clamp<std::size_t>(4096 / lattice_.size(), 1, 64); }
 
   /// Writes the weights of the samples `first`, `first` + phases, ..., which meet the same phase in each step.
@@ -66,7 +66,7 @@ class Guided {
   }
 
  private:
-  /// Where a lattice of scores leads from one state.
+  /// Says where a lattice of scores leads from one state.
   struct Fan {
     std::span<const double> weight, next;
     std::span<const std::uint8_t> failed;
@@ -129,7 +129,7 @@ class Guided {
     return total / worth[chosen];
   }
 
-  /// The states of these samples after their burn-in; a sample that failed begins again.
+  /// Returns the states of these samples after their burn-in; a sample that failed begins again.
   std::vector<double> settled(std::uint64_t first, std::size_t count) const {
     const std::size_t d = start_.size(), s = static_cast<std::size_t>(map_.scores);
     std::vector<double> state, states, scores, next;
@@ -184,7 +184,7 @@ GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<
         "guided sampling: {} samples (16 or more), a window of {} steps (1 or more), a burn-in of {} (0 to 65535)",
         options.samples, options.window, options.burn_in));
   const Guided guided(map, mesh, start, options);
-  // Those that meet the same phases stand side by side.
+  // Samples that meet the same phases stand side by side.
   const auto phases = static_cast<std::size_t>(map.phases), share = guided.together();
   const std::size_t shares = (options.samples + share * phases - 1) / (share * phases);
   std::vector<double> weight(options.samples);

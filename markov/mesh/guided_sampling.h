@@ -1,5 +1,5 @@
 #pragma once
-// The failure rate by importance sampling that a mesh guides: unbiased however coarse the mesh is.
+// Finds the failure rate by importance sampling that a mesh guides: unbiased however coarse the mesh is.
 
 #include <cstdint>
 #include <span>
@@ -12,8 +12,8 @@ namespace metastable::markov {
 struct GuidedOptions {
   std::size_t samples = 2000;  ///< >= 16
   int burn_in = 60;            ///< steps of direct simulation from the start before each sample
-  /// Steps over which a sample is led to failure, >= 1, and well below the expected steps: where more than a third fail
-  /// within it, the rate that comes out is too low.
+  /// Counts the steps over which a sample is led to failure, >= 1, and well below the expected steps: where more than a
+  /// third fail within it, the rate that comes out is too low.
   int window = 12;
   std::uint64_t seed = 1;
   double score_spacing = 0.6, score_reach = 8.5;

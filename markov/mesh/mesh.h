@@ -1,6 +1,6 @@
 #pragma once
-// A return map of one to four dimensions as a sparse chain: nodes of a lattice in the principal axes of its noise, as
-// far as failures are worth it.
+// Makes a return map of one to four dimensions a sparse chain: nodes of a lattice in the principal axes of its noise,
+// as far as failures are worth it.
 
 #include <array>
 #include <cstdint>
@@ -42,7 +42,7 @@ class Mesh {
 
   std::size_t size() const { return kill_.size(); }
   std::size_t entries() const { return column_.size(); }
-  /// What growing it takes at most, rows and nodes.
+  /// Says what growing it takes at most, rows and nodes.
   std::size_t bytes() const { return bytes_; }
   int phases() const { return lattice_.phases(); }
   double cheapest_failure() const { return cheapest_failure_; }  ///< its action; exp(-action) is its order of rarity
@@ -54,11 +54,11 @@ class Mesh {
   std::span<const double> values(std::size_t row) const {
     return {value_.data() + row_start_[row], row_start_[row + 1] - row_start_[row]};
   }
-  /// Phase and state of a node.
+  /// Return phase and state of a node.
   int phase(std::size_t node) const { return NodeLattice::phase(key_[node]); }
   std::vector<double> state(std::size_t node) const { return lattice_.state(key_[node]); }
 
-  /// Nodes around a state with their weights; nodes that are not part of the mesh are left out.
+  /// Holds the nodes around a state with their weights; nodes that are not part of the mesh are left out.
   struct Corners {
     std::array<std::uint32_t, 5> node{};
     std::array<double, 5> weight{};
@@ -66,11 +66,11 @@ class Mesh {
   };
   Corners corners(int phase, std::span<const double> state) const;
 
-  /// y = x Q and y = Q x, diagonals included. O(entries).
+  /// Compute y = x Q and y = Q x, diagonals included. O(entries).
   void apply_left(std::span<const double> x, std::span<double> y) const;
   void apply(std::span<const double> x, std::span<double> y) const;
 
-  /// As a chain for the other solvers; what leaves the mesh counts as failed.
+  /// Returns it as a chain for the other solvers; what leaves the mesh counts as failed.
   Chain chain() const;
 
  private:

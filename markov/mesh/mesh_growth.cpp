@@ -19,14 +19,14 @@ constexpr std::uint32_t kTaken = MeshGrowth::no_row - 1;  // not a row yet
 constexpr std::size_t kFewestInChunk = std::size_t{1} << 16, kMostInChunk = std::size_t{1} << 23;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Probability that a normal score lies in (low, high), with relative accuracy in both tails.
+/// Returns the probability that a normal score lies in (low, high), with relative accuracy in both tails.
 double normal_mass(double low, double high) {
   const auto tail = [](double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); };
   return low > 0 ? tail(low) - tail(high) : tail(-high) - tail(-low);
 }
 
-/// One score: the probabilities of failing, from where between neighbouring scores failures begin and end. Bisects all
-/// edges of a batch together. `failed` and `score` hold m entries a node, ascending.
+/// Finds, of one score, the probabilities of failing, from where between neighbouring scores failures begin and end.
+/// It bisects all edges of a batch together. `failed` and `score` hold m entries a node, ascending.
 std::vector<double> masses_of_failure(const BatchMap& map, int phase, std::span<const double> states,
                                       std::span<const double> score, std::span<const std::uint8_t> failed,
                                       std::size_t m) {

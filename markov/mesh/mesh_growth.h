@@ -1,5 +1,5 @@
 #pragma once
-// A mesh while it grows, on one process or shared by ranks: a rank lands its own nodes and tells the others of theirs.
+// Grows a mesh, on one process or shared by ranks: a rank lands its own nodes and tells the others of theirs.
 
 #include <cstdint>
 #include <limits>
@@ -14,10 +14,10 @@
 
 namespace metastable::markov {
 
-/// The lattice of a mesh. @throws std::invalid_argument for options out of range, and phases without a frame
+/// Returns the lattice of a mesh. @throws std::invalid_argument for options out of range, and phases without a frame
 NodeLattice mesh_lattice(const BatchMap& map, std::vector<NoiseFrame> frames, const MeshOptions& options);
 
-/// What ranks that share a mesh say to one another; all of them call the same function at the same time.
+/// Carries what ranks that share a mesh say to one another; all of them call the same function at the same time.
 class Exchange {
  public:
   struct Note {
@@ -48,12 +48,12 @@ class MeshGrowth {
   /// @throws MapError, std::length_error as Mesh does, on all ranks alike
   void grow_from(std::span<const double> start);
 
-  /// Nodes that were met, by number; rows of those that this process landed, in the order of landing.
+  /// Give the nodes that were met, by number, and rows of those that this process landed, in the order of landing.
   std::size_t nodes() const { return key_.size(); }
   std::size_t rows() const { return row_.size(); }
   std::uint64_t key(std::uint32_t node) const { return key_[node]; }
   std::uint32_t node(std::uint64_t key) const { return table_.find(key); }  ///< NodeTable::none: never met
-  /// Row of a node; `no_row` for those that were never landed or belong to other ranks.
+  /// Returns the row of a node; `no_row` for those that were never landed or belong to other ranks.
   static constexpr std::uint32_t no_row = 0xffffffffU;
   std::uint32_t row(std::uint32_t node) const { return own_[node] ? row_of_[node] : no_row; }
   bool own(std::uint32_t node) const { return own_[node] != 0; }

@@ -35,7 +35,7 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
   while (settled < kInARow) {
     if (passage.products >= kProducts)
       throw ConvergenceError("mesh", last_failures, "survivors still change after 20000 products");
-    // One revolution: of those alive at its beginning, which fail in it, and how many steps they take.
+    // Of those alive at the beginning of a revolution this finds which fail in it, and how many steps they take.
     before = x;
     std::fill(met.begin(), met.end(), 0.0);
     double here = 1, failures = 0, taken = 0, here_lower = 1, failures_lower = 0, taken_lower = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// What a mesh says of failure, by products of its rows with distributions alone: nothing small is subtracted.
+// Reads what a mesh says of failure, by products of its rows with distributions alone: nothing small is subtracted.
 
 #include <functional>
 #include <span>
@@ -21,7 +21,7 @@ struct MeshPassage {
   int products = 0;
 };
 
-/// Rows as far as a process holds them, all of a mesh or a share of it.
+/// Holds rows as far as a process holds them, all of a mesh or a share of it.
 struct MassRows {
   int phases = 1;
   std::span<const double> kill, leave;                                             ///< of its own nodes
@@ -34,7 +34,7 @@ struct MassRows {
 /// @throws ConvergenceError if it does not within 20000 products
 MeshPassage follow_survivors(const MassRows& rows, std::vector<double> start, double settled_change = 1e-9);
 
-/// The same from a state at phase 0 of one mesh.
+/// Does the same from a state at phase 0 of one mesh.
 MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change = 1e-9);
 
 /// Returns u[n][i], n = 0 .. window: the probability that a walker at node i fails in exactly its (n+1)-th step.

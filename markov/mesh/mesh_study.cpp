@@ -23,14 +23,14 @@ constexpr double kSampledWindows = 3;  // of guided samples: within one, failure
 constexpr double kSampledFrom = 100;   // expected steps above which guided samples settle before they fail
 constexpr std::size_t kFewestTrials = 100;
 
-/// Coarsest spacings that the extrapolation was found to bear, by dimension.
+/// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
 double coarsest(int dimension) {
   constexpr std::array<double, 4> spacing{0.4, 0.5, 0.7, 1.4};
   return spacing[static_cast<std::size_t>(dimension - 1)];
 }
 
-/// The value at 0 of the polynomial in h^2 through the logs of sizes first .. last - 1, h^2 halving from each to the
-/// next.
+/// Returns the value at 0 of the polynomial in h^2 through the logs of sizes first .. last - 1, h^2 halving from each
+/// to the next.
 double at_zero(const std::vector<double>& by_size, std::size_t first, std::size_t last) {
   std::vector<double> row(by_size.begin() + static_cast<std::ptrdiff_t>(first),
                           by_size.begin() + static_cast<std::ptrdiff_t>(last));
@@ -45,7 +45,7 @@ struct Extrapolated {
   double log_value = 0, shift_error = 0, discretization_error = 0;
 };
 
-/// `logs[shift][size]`.
+/// Extrapolates `logs[shift][size]`.
 Extrapolated extrapolate(const std::vector<std::vector<double>>& logs) {
   const auto n = static_cast<double>(logs.size());
   const std::size_t sizes = logs.front().size();
@@ -61,7 +61,7 @@ Extrapolated extrapolate(const std::vector<std::vector<double>>& logs) {
   const double quantile = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
   e.shift_error = quantile * std::sqrt(spread / (n - 1) / n);
   e.discretization_error = std::abs(e.log_value - at_zero(mean, 1, sizes));
-  // Where a fourth size was asked for, the square is far off: what the extrapolation by three last moved.
+  // Where a fourth size was asked for the square is far off; the error is what the extrapolation by three last moved.
   if (sizes > 3)
     e.discretization_error = std::max(e.discretization_error,
                                       std::abs(at_zero(mean, sizes - 3, sizes) - at_zero(mean, sizes - 4, sizes - 1)));
@@ -83,7 +83,7 @@ std::string disagreement(const char* one, const MeshEstimate& a, const char* oth
       a.value, a.lower, a.upper, other, b.value, b.lower, b.upper);
 }
 
-/// One study while it is made.
+/// Makes one study.
 class Run {
  public:
   Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options)
@@ -105,7 +105,7 @@ class Run {
   MeshStudy run() {
     foresee_memory();
     parallel_for(sizes_ * shifts_ - 1, threads_, [&](std::size_t task) {
-      // The long ones first; the very last, the first shift of the coarsest size, has been made.
+      // The long ones come first; the very last, the first shift of the coarsest size, has been made.
       solve(sizes_ - 1 - task / shifts_, shifts_ - 1 - task % shifts_);
     });
     join();
@@ -132,7 +132,7 @@ class Run {
   }
 
   void foresee_memory() {
-    // Nodes by the spacing's power; entries a row grow by less than its root.
+    // Nodes grow by the spacing's power; entries a row grow by less than its root.
     const double coarse = static_cast<double>(solve(0, 0));
     const double growth = std::pow(std::sqrt(2.0), static_cast<double>(sizes_ - 1));
     const double finest = coarse * std::pow(growth, map_.dimension + 0.5);
@@ -205,7 +205,7 @@ class Run {
 
   void sample() {
     if (options_.guided_samples == 0 || study_.steps.value <= kSampledFrom) return;
-    // From the start to where failures keep their share: the time to forget the start, some times over.
+    // It goes from the start to where failures keep their share: the time to forget the start, some times over.
     const int forgets = 4 + static_cast<int>(std::ceil(4 * study_.mixing_steps));
     const int window = std::min(forgets, 200);
     if (study_.steps.value <= kSampledWindows * window) return;

@@ -1,5 +1,5 @@
 #pragma once
-// Expected steps of any return map with an interval, and what two independent ways say of it.
+// Finds expected steps of any return map with an interval, and what two independent ways say of it.
 
 #include <array>
 #include <cstdint>
@@ -25,11 +25,11 @@ struct MeshStudyOptions {
   std::size_t guided_samples = 4000;              ///< 0: none
   std::uint64_t simulated_steps = 2000000;        ///< direct simulation takes about so many steps; 0: none
   std::size_t most_bytes = std::size_t{3} << 30;  ///< of all meshes held at once
-  /// Called with the share of the work done, from any thread but one at a time; may throw to stop.
+  /// It is called with the share of the work done, from any thread but one at a time, and may throw to stop.
   std::function<void(double)> progress = {};
 };
 
-/// A number with its 95 % interval.
+/// Holds a number with its 95 % interval.
 struct MeshEstimate {
   double value = 0, lower = 0, upper = 0;
 };
@@ -46,18 +46,18 @@ struct MeshStudy {
   double mixing_steps = 0;
   std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
   double cheapest_failure = 0;
-  /// Relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization, and what
-  /// leaves the mesh.
+  /// Holds the relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization,
+  /// and what leaves the mesh.
   double shift_error = 0, discretization_error = 0, bracket = 0;
   std::vector<MeshSize> sizes;
   double expected_bytes = 0;                      ///< of all meshes held at once, as foreseen from the coarsest
   std::optional<MeshEstimate> guided, simulated;  ///< expected steps in the two other ways, where they reach
   std::size_t guided_samples = 0, simulated_trials = 0;
-  /// Empty, or says which ways disagree and that `steps` must not be used.
+  /// Is empty, or says which ways disagree and that `steps` must not be used.
   std::string disagreement;
 };
 
-/// Spacing of the scores that a study's meshes take.
+/// Returns the spacing of the scores that a study's meshes take.
 double study_score_spacing(const BatchMap& map);
 
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
@@ -74,7 +74,7 @@ double study_score_spacing(const BatchMap& map);
 /// noise_frames and mesh_passage do
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options = {});
 
-/// Ways that share little contradict each other: there is no number to give.
+/// Says that ways that share little contradict each other: there is no number to give.
 class Disagreement : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

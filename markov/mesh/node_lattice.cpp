@@ -6,7 +6,7 @@
 namespace metastable::markov {
 namespace {
 
-// Keys: 15 bits an axis, phases above.
+// Keys have 15 bits an axis, phases above.
 constexpr int kBits = 15;
 constexpr std::int32_t kHalf = 1 << (kBits - 1);
 constexpr int kBlockBits = 3;

@@ -1,5 +1,5 @@
 #pragma once
-// The nodes of a mesh: a lattice in the principal axes of the noise, phase by phase, each node with a key of its own.
+// Keeps the nodes of a mesh: a lattice in the principal axes of the noise, phase by phase, each node with its own key.
 
 #include <array>
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace metastable::markov {
 
-/// The corners of a simplex of nodes and what share of a point inside each of them takes; the first dimension + 1
+/// Holds the corners of a simplex of nodes and what share of a point inside each of them takes; the first dimension + 1
 /// count.
 struct NodeSimplex {
   std::array<std::uint64_t, 5> key{};
@@ -20,7 +20,7 @@ struct NodeSimplex {
 
 class NodeLattice {
  public:
-  /// A landing in units of the spacing; coordinates beyond the dimension are 0.
+  /// Holds a landing in units of the spacing; coordinates beyond the dimension are 0.
   using Point = std::array<double, 4>;
 
   NodeLattice() = default;
@@ -31,12 +31,12 @@ class NodeLattice {
   std::size_t dimension() const { return frames_.front().centre.size(); }
   const NoiseFrame& frame(int phase) const { return frames_.at(static_cast<std::size_t>(phase)); }
   static int phase(std::uint64_t key);
-  /// Edges of 8 nodes: keys of one block of them have this in common.
+  /// Returns what keys of one block of nodes, 8 along an edge, have in common.
   static std::uint64_t block(std::uint64_t key);
   std::vector<double> state(std::uint64_t key) const;
   /// Returns whether nodes reach as far as this state of a phase.
   bool locate(int phase, const double* state, Point& point) const;
-  /// Kuhn's simplex around a point; bit k of `flips` turns axis k around.
+  /// Finds Kuhn's simplex around a point; bit k of `flips` turns axis k around.
   void find_simplex(int phase, const Point& point, unsigned flips, NodeSimplex& out) const;
 
  private:
@@ -45,7 +45,7 @@ class NodeLattice {
   Point shift_{};
 };
 
-/// Open addressing from keys to numbers of nodes.
+/// Leads by open addressing from keys to numbers of nodes.
 class NodeTable {
  public:
   static constexpr std::uint32_t none = 0xffffffffU;

@@ -1,5 +1,5 @@
 #pragma once
-// The principal axes of a map's noise: in them, the linear response to the noise has unit variance in every direction.
+// Finds the principal axes of a map's noise, in which the linear response to it has unit variance in every direction.
 
 #include <array>
 #include <span>
@@ -9,7 +9,7 @@
 
 namespace metastable::markov {
 
-/// Coordinates u of one phase: state = centre + axes u, u = inverse (state - centre). Matrices are row-major.
+/// Holds the coordinates u of one phase: state = centre + axes u, u = inverse (state - centre). Matrices are row-major.
 struct NoiseFrame {
   std::vector<double> centre;  ///< the noise-free orbit's state
   std::vector<double> axes;    ///< dimension x dimension

@@ -1,5 +1,5 @@
 #pragma once
-// Scores of the noise on a lattice that reaches far into the tails, with their weights: never plain draws.
+// Puts scores of the noise on a lattice that reaches far into the tails, with their weights: never plain draws.
 
 #include <array>
 #include <cstddef>
@@ -9,9 +9,9 @@
 
 namespace metastable::markov {
 
-/// A lattice of normal scores within a ball, moved by an offset: the sum of weight * f(scores) is E f by the trapezoid
-/// rule, whose error for smooth f is far below rounding at spacings up to 0.6; over offsets spread evenly, it is
-/// unbiased for any f that the ball holds.
+/// Is a lattice of normal scores within a ball, moved by an offset: the sum of weight * f(scores) is E f by the
+/// trapezoid rule, whose error for smooth f is far below rounding at spacings up to 0.6; over offsets spread evenly, it
+/// is unbiased for any f that the ball holds.
 class ScoreLattice {
  public:
   /// @param scores   how many a step, >= 1
@@ -28,7 +28,8 @@ class ScoreLattice {
   std::vector<double> points_;  ///< whole multiples of the spacing
 };
 
-/// Four words, and as many evenly spread numbers of (0, 1), by counter (Philox): independent for different arguments.
+/// Return four words, and as many evenly spread numbers of (0, 1), by counter (Philox): independent for other
+/// arguments.
 std::array<std::uint64_t, 4> random_words(std::uint64_t seed, std::uint64_t stream, std::uint64_t a, std::uint64_t b);
 std::array<double, 4> uniforms(std::uint64_t seed, std::uint64_t stream, std::uint64_t a, std::uint64_t b);
 

@@ -7,7 +7,7 @@
 namespace metastable::markov {
 namespace {
 
-// sum_j q_ij (m_j - m_i) - k_i m_i: row i's share of (Q - I) m.
+// Returns sum_j q_ij (m_j - m_i) - k_i m_i, row i's share of (Q - I) m.
 double drift(const Adjoint& at, const Chain& chain, std::size_t i) {
   const auto columns = chain.columns(i);
   const auto values = chain.values(i);

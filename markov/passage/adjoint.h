@@ -1,5 +1,5 @@
 #pragma once
-// How the expected steps respond to small changes of a chain.
+// Says how the expected steps respond to small changes of a chain.
 
 #include <cstddef>
 #include <vector>
@@ -9,15 +9,15 @@
 
 namespace metastable::markov {
 
-/// What a first-order change of the expected steps M from a launch is made of: with m = (I - Q)^-1 1 and the row
+/// Holds what a first-order change of the expected steps M from a launch is made of: with m = (I - Q)^-1 1 and the row
 /// vector y = l (I - Q)^-1 of expected visits, dM = y dQ m + dl m.
 struct Adjoint {
   double steps = 0;            ///< M, the launch's own step counted
   std::vector<double> mean;    ///< m [steps], size n
   std::vector<double> visits;  ///< y, size n
   std::size_t reference = 0;   ///< the state visited most
-  /// m_i - m_reference [steps], as (time to the reference or rest) - P(rest before the reference) m_reference: where
-  /// rest is rare the differences are far smaller than the means and would be lost to their rounding.
+  /// Holds m_i - m_reference [steps], as (time to the reference or rest) - P(rest before the reference) m_reference:
+  /// where rest is rare the differences are far smaller than the means and would be lost to their rounding.
   std::vector<double> excess;
 };
 

@@ -30,7 +30,7 @@ class Rounding {
   Rounding(const LandingSource& source, int phase, const std::vector<double>& from, const std::vector<double>& to)
       : source_(source), phase_(phase), x_(from), e_(to) {}
 
-  // Bounds of C at (rest | mean over cell j) for node i, at index 0 | j + 1.
+  // Returns the bounds of C at (rest | mean over cell j) for node i, at index 0 | j + 1.
   std::vector<Range> node(std::size_t i) const {
     std::vector<Range> at(e_.size()), row(e_.size());
     for (std::size_t j = 0; j < e_.size(); ++j) at[j] = source_.below(phase_, x_[i], e_[j]);
@@ -62,7 +62,7 @@ class Rounding {
     std::vector<std::pair<double, double>> need(e_.size());
     const double w = up(x_[i + 1] - x_[i]), eighth = up(w * w / 8);
     for (std::size_t j = 0; j < e_.size(); ++j) {
-      // First order: C falls along x.
+      // To first order C falls along x.
       need[j] = {up(std::max(0.0, left[j].upper - right[j].upper)), up(std::max(0.0, left[j].lower - right[j].lower))};
       const Range edge = j == 0 ? Range{e_[0], e_[0]} : Range{e_[j - 1], e_[j]};
       if (const auto bend = source_.bend(phase_, {x_[i], x_[i + 1]}, edge)) {
@@ -180,7 +180,7 @@ void check(const std::vector<std::vector<double>>& nodes, int phases, double bey
   if (!(beyond > nodes.front().back())) throw std::invalid_argument("certify: `beyond` must lie above the last node");
 }
 
-// W(x) = jump + slope (x - K) that falls by one step on average wherever x > K.
+// Finds W(x) = jump + slope (x - K) that falls by one step on average wherever x > K.
 bool drift(const LandingSource& source, double top, double beyond, Certificate& certificate) {
   double rate = 0, extra = 0, stay = 0;
   for (int p = 0; p < source.phases(); ++p) {
@@ -222,7 +222,7 @@ Certificate certify(const LandingSource& source, std::vector<std::vector<double>
       const std::size_t n = nodes[p].size();
       rows[p].surplus.resize(n);
       for (std::size_t i = 0; i < n; ++i) {
-        // It rises with the state: taken at the next node.
+        // It rises with the state, so it is taken at the next node.
         const double x = nodes[p][std::min(i + 1, n - 1)];
         const double above = std::max(0.0, up(1 - source.below(static_cast<int>(p), x, top).lower));
         rows[p].surplus[i] = up(up(certificate.top_jump * above) +

@@ -43,9 +43,9 @@ struct Certificate {
   std::string no_upper;                    ///< why there is no upper bound; empty if there is one
 };
 
-/// The proof: if v >= 0 is bounded and v(x) <= 1 + E v(x') for all x, then v <= m; if v >= 0 and v(x) >= 1 + E v(x'),
-/// then v >= m (rest counts as v = 0; iterate n times and let n grow). Take v linear between nodes and not falling.
-/// Then
+/// The proof is this: if v >= 0 is bounded and v(x) <= 1 + E v(x') for all x, then v <= m; if v >= 0 and v(x) >= 1 + E
+/// v(x'), then v >= m (rest counts as v = 0; iterate n times and let n grow). Take v linear between nodes and not
+/// falling. Then
 ///     E v(x') = v_0 (1 - C(x, e_0)) + sum_j (v_{j+1} - v_j) (1 - mean of C(x, e) over e in [e_j, e_{j+1}]),
 /// so that upper bounds of C give lower bounds of E v, and the other way round. The means are the trapezoidal values
 /// less width^2/12 times the second derivative. Along x, with t the place in a cell [x_i, x_{i+1}], C(x) lies below (1

@@ -38,7 +38,7 @@ std::vector<Entry> entries(const Chain& chain, const Launch& launch) {
   return all;
 }
 
-// Shortest text that reads back as the same number, whatever the locale.
+// Returns the shortest text that reads back as the same number, whatever the locale.
 std::string text(double number) {
   char buffer[32];
   const auto end = std::to_chars(buffer, buffer + sizeof buffer, number).ptr;

@@ -172,7 +172,7 @@ double Survival::quantile(double p) const {
   const auto reached =
       std::partition_point(log_head_.begin(), log_head_.end(), [wanted](double log_p) { return log_p > wanted; });
   if (reached != log_head_.end()) return static_cast<double>(reached - log_head_.begin());
-  // In the tail: the last period of the head sinks below `wanted` after about this many periods.
+  // In the tail the last period of the head sinks below `wanted` after about this many periods.
   const auto last = static_cast<double>(log_head_.size() - 1);
   const double periods = std::floor((wanted - log_head_.back()) / log_factor_);
   double n = last + std::max(0.0, periods - 1) * period_;
@@ -184,8 +184,8 @@ double Survival::quantile(double p) const {
 
 namespace {
 
-/// What is known of the reward of the trials that come to rest at one step: a normal with their mean and variance. For
-/// a block of steps its mean is spread evenly over `width`.
+/// Holds what is known of the reward of the trials that come to rest at one step: a normal with their mean and
+/// variance. For a block of steps its mean is spread evenly over `width`.
 struct Component {
   double weight = 0;
   double mean = 0;
@@ -314,7 +314,7 @@ void RewardMixture::advance() {
   enter(mass, apply_left(chain_, first_), apply_left(chain_, second_));
 }
 
-/// The trials that come to rest at the next step.
+/// Returns the trials that come to rest at the next step.
 Component RewardMixture::absorb() const {
   const double failing = dot(mass_, chain_.kill());
   if (failing == 0) return {};

@@ -53,7 +53,7 @@ class Survival {
   /// Returns the least n with P(steps <= n) >= p, 0 < p < 1 (otherwise std::invalid_argument); rounded to double above
   /// 9e15.
   double quantile(double p) const;
-  /// Sum of P(steps > n) over all n, the tail in closed form: the expected steps, without a linear system [steps].
+  /// Sums P(steps > n) over all n, the tail in closed form: the expected steps, without a linear system [steps].
   double mean() const;
 
  private:

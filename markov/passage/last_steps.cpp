@@ -24,7 +24,7 @@ void require_size(const char* what, std::size_t given, const Chain& chain) {
     throw std::invalid_argument(fmt::format("last steps: {} has {} entries for {} states", what, given, chain.size()));
 }
 
-/// Log of the best path's density by its first state, and where it goes from there.
+/// Holds the log of the best path's density by its first state, and where it goes from there.
 class BestPath {
  public:
   BestPath(const Chain& chain, std::span<const double> measure) : chain_(chain), best_(chain.size()) {
@@ -50,7 +50,7 @@ class BestPath {
     next_.push_back(std::move(to));
   }
 
-  /// From where it is best to start when states are met in proportion to `visits`; the last step comes first.
+  /// Goes from where it is best to start when states are met in proportion to `visits`; the last step comes first.
   std::vector<std::uint32_t> path(std::span<const double> visits) const {
     std::size_t at = 0;
     double most = kNever;
@@ -73,7 +73,7 @@ class BestPath {
   std::vector<std::vector<std::uint32_t>> next_;
 };
 
-/// x = Q x + rhs by products, each from nothing: sums of non-negative numbers that only grow.
+/// Solves x = Q x + rhs by products, each from nothing: sums of non-negative numbers that only grow.
 std::vector<double> by_products(const Chain& chain, std::span<const double> rhs) {
   std::vector<double> x(rhs.begin(), rhs.end()), term(x);
   for (int product = 0; product < kProducts; ++product) {

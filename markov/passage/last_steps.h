@@ -1,5 +1,5 @@
 #pragma once
-// How a chain fails: its last steps before failure, and which of set and failure comes first.
+// Says how a chain fails: its last steps before failure, and which of set and failure comes first.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,17 +10,17 @@
 
 namespace metastable::markov {
 
-/// The last steps of walkers that fail; k = 0 is the step that fails, k = 1 the one before, and so on.
+/// Holds the last steps of walkers that fail; k = 0 is the step that fails, k = 1 the one before, and so on.
 struct LastSteps {
-  /// share[k][i]: probability that step k begins in state i. Each sums to one.
+  /// share[k][i] is the probability that step k begins in state i. Each sums to one.
   std::vector<std::vector<double>> share;
-  /// fails_in[k][i]: probability that a walker in state i fails in exactly its (k + 1)-th step from now.
+  /// fails_in[k][i] is the probability that a walker in state i fails in exactly its (k + 1)-th step from now.
   std::vector<std::vector<double>> fails_in;
-  /// The most likely path: the state in which each step begins, likeliest[k] that of step k.
+  /// Is the most likely path: the state in which each step begins, likeliest[k] that of step k.
   std::vector<std::uint32_t> likeliest;
 };
 
-/// Of walkers whose states are met in proportion to `visits`: with a quasi-stationary distribution, the flux into
+/// Tells of walkers whose states are met in proportion to `visits`: with a quasi-stationary distribution, the flux into
 /// failure of the metastable regime; with the expected visits after a launch, all its failures (but for those in the
 /// launch's own step). share[k] = visits * fails_in[k], fails_in[0] the kill rates, fails_in[k + 1] = Q fails_in[k]:
 /// nothing is subtracted.
@@ -32,7 +32,7 @@ struct LastSteps {
 LastSteps last_steps(const Chain& chain, std::span<const double> visits, int steps,
                      std::span<const double> measure = {});
 
-/// First passage to a set of states, or to failure if that comes first.
+/// Describes the first passage to a set of states, or to failure if that comes first.
 struct PassageTo {
   std::vector<double> reach;  ///< committor: probability of being in the set, now or later, before failing
   std::vector<double> fail;   ///< probability of failing before that; neither is one minus the other

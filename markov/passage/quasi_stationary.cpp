@@ -66,7 +66,7 @@ struct LeadingPair {
   double residual = 0;
 };
 
-/// True when no state can be visited twice: lambda_1 = 0.
+/// Is true when no state can be visited twice: lambda_1 = 0.
 bool never_returns(const Chain& chain) {
   const std::size_t n = chain.size();
   std::vector<std::size_t> sources(n, 0);

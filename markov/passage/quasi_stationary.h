@@ -12,10 +12,10 @@ namespace metastable::markov {
 
 /// Describes how survivors of an absorbing chain behave (Byl & Tedrake 2009, their lambda_2 is lambda_1 here).
 struct QuasiStationary {
-  /// Left eigenvector of lambda_1 (size n), which says what survivors look like. For period d it is the distribution
-  /// per class: each class's entries sum to one (one distribution per landing leg).
+  /// Is the left eigenvector of lambda_1 (size n), which says what survivors look like. For period d it is the
+  /// distribution per class: each class's entries sum to one (one distribution per landing leg).
   std::vector<double> distribution;
-  /// Right eigenvector, max 1, which is the relative long-run survival from each state.
+  /// Is the right eigenvector, max 1, which is the relative long-run survival from each state.
   std::vector<double> survival_weight;
   /// It is 1 - lambda_1 per step, with relative accuracy near rounding: for period d, 1 - (lambda of the
   /// revolution)^(1/d), evaluated as -expm1(log1p(-rate of the revolution) / d).
@@ -29,10 +29,10 @@ struct QuasiStationary {
 /// Iterates inversely with the subtraction-free factors, each time followed by one step of the chain (iterates stay
 /// positive; an iteration shrinks the rest by (1 - lambda_1) |lambda_2| / (lambda_1 |1 - lambda_2|)). A chain that
 /// cannot visit a state twice has lambda_1 = 0: failure_rate = 1, and the distribution is that of the last survivors
-/// (zero on classes they do not reach). O(n^2) an iteration for full rows. Where 500 iterations were not enough, because
-/// |lambda_2| is nearly lambda_1, shifts follow (Noda, Numer. Math. 17, 1971), each with an elimination.
-/// Where nobody survives (lambda_1 < 1e-13) the vectors are those of 100 iterations, settled or not; where hardly
-/// anybody does (lambda_1 < 1e-6), those of 500.
+/// (zero on classes they do not reach). O(n^2) an iteration for full rows. Where 500 iterations were not enough,
+/// because |lambda_2| is nearly lambda_1, shifts follow (Noda, Numer. Math. 17, 1971), each with an elimination. Where
+/// nobody survives (lambda_1 < 1e-13) the vectors are those of 100 iterations, settled or not; where hardly anybody
+/// does (lambda_1 < 1e-6), those of 500.
 /// @throws ConvergenceError("inverse iteration", residual, ...) after 10000 iterations of interpolated rows, or 100
 /// shifts of others.
 QuasiStationary quasi_stationary(const ChainSolver& solver);

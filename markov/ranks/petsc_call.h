@@ -1,5 +1,5 @@
 #pragma once
-// Failures of PETSc and SLEPc as exceptions.
+// Turns failures of PETSc and SLEPc into exceptions.
 
 namespace metastable::markov {
 

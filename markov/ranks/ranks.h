@@ -1,5 +1,5 @@
 #pragma once
-// The processes of one run under mpirun. MPI, PETSc and SLEPc stay in the .cpp files of this room.
+// Runs the processes of one run under mpirun. MPI, PETSc and SLEPc stay in the .cpp files of this room.
 
 #include <span>
 #include <string>
@@ -26,16 +26,16 @@ class Ranks : public Exchange {
   std::string first_text(const std::string& own) override;
 
   void add_up(std::span<double> values);
-  /// Sum of what the ranks before this one say.
+  /// Returns the sum of what the ranks before this one say.
   double sum_before(double own);
-  /// One number of every rank, in their order.
+  /// Returns one number of every rank, in their order.
   std::vector<double> gather(double own);
 
   /// Hands a text to rank 0 without waiting for it.
   void send(const std::string& text);
-  /// On rank 0: the next text of a rank, in the order in which it was sent. Waits for it, calling `waiting` meanwhile.
+  /// Returns, on rank 0, the next text of a rank, in the order it was sent. Waits for it, calling `waiting` meanwhile.
   std::string receive(int from, void (*waiting)());
-  /// Ends all ranks at once with this exit code: for a failure that the others do not see.
+  /// Ends all ranks at once with this exit code, for a failure that the others do not see.
   [[noreturn]] void abort(int exit_code);
 
  private:
@@ -44,7 +44,7 @@ class Ranks : public Exchange {
   std::vector<Sent> sent_;
 };
 
-/// Most memory that this process has held so far [bytes].
+/// Returns the most memory that this process has held so far [bytes].
 double peak_memory();
 
 }  // namespace metastable::markov

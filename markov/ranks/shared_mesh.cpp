@@ -68,8 +68,8 @@ std::vector<double> SharedMesh::numbers_of_others(const MeshGrowth& growth, doub
   return number;
 }
 
-/// Own columns are counted from the first own row, the others' from the first row of all. Gives back the entries of the
-/// grown mesh as it goes, so that no two copies of all are ever held.
+/// Own columns are counted from the first own row, the others' from the first row of all. Gives back the entries of
+/// the grown mesh as it goes, so that no two copies of all are ever held.
 void SharedMesh::take_rows(MeshGrowth& growth) {
   const std::size_t rows = growth.rows();
   const double first = ranks_.sum_before(static_cast<double>(rows));
@@ -118,7 +118,7 @@ void SharedMesh::take_rows(MeshGrowth& growth) {
 
 namespace {
 
-/// Spans as vectors of PETSc, for one product.
+/// Takes spans as vectors of PETSc, for one product.
 void multiply(PetscErrorCode product(Mat, Vec, Vec), Mat matrix, std::span<const double> x, std::span<double> y) {
   Vec from = nullptr, to = nullptr;
   const auto n = static_cast<PetscInt>(x.size());

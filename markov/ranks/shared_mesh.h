@@ -1,5 +1,5 @@
 #pragma once
-// One mesh across ranks: each lands its own nodes and keeps their rows, as a matrix of PETSc.
+// Shares one mesh across ranks: each lands its own nodes and keeps their rows, as a matrix of PETSc.
 
 #include <cstdint>
 #include <memory>
@@ -38,9 +38,9 @@ class SharedMesh {
   std::vector<double> state(std::size_t node) const { return lattice_.state(key_[node]); }
   Ranks& ranks() const { return ranks_; }
 
-  /// For follow_survivors(), by all ranks together.
+  /// Serves follow_survivors(), by all ranks together.
   MassRows rows() const;
-  /// y = x Q and y = Q x on own nodes, by all ranks together.
+  /// Compute y = x Q and y = Q x on own nodes, by all ranks together.
   void apply_left(std::span<const double> x, std::span<double> y) const;
   void apply(std::span<const double> x, std::span<double> y) const;
   Mat matrix() const { return matrix_; }

@@ -45,7 +45,7 @@ std::vector<double> copy_of(Vec vec) {
   return copy;
 }
 
-/// One solution while it is made.
+/// Makes one solution.
 class Solving {
  public:
   explicit Solving(const SharedMesh& mesh) : mesh_(mesh), phases_(static_cast<std::size_t>(mesh.phases())) {
@@ -68,7 +68,7 @@ class Solving {
     return sums;
   }
 
-  /// SLEPc's eigenvector of the largest real eigenvalue, made positive.
+  /// Returns SLEPc's eigenvector of the largest real eigenvalue, made positive.
   std::vector<double> eigenvector(Mat matrix) {
     OwnedEps eps;
     OwnedVec real, imaginary;
@@ -160,7 +160,7 @@ class Solving {
     Mat matrix;
     Vec pi, w;
   };
-  /// y = (I - Q) u + w (pi . u)
+  /// Computes y = (I - Q) u + w (pi . u).
   static PetscErrorCode deflated_product(Mat shell, Vec u, Vec y) {
     Deflated* d = nullptr;
     PetscCall(MatShellGetContext(shell, &d));
@@ -180,7 +180,7 @@ class Solving {
   }
 
   void steps() {
-    // Eigenvectors of one step: phase by phase, those of a revolution times `mass` and divided by it.
+    // Eigenvectors of one step are, phase by phase, those of a revolution times `mass` and divided by it.
     std::vector<double> mass(phases_, 1.0), pi = passage_.distribution, w = passage_.survival_weight;
     double masses = 1;
     for (std::size_t c = 1; c < phases_; ++c) {

@@ -1,5 +1,5 @@
 #pragma once
-// What a mesh across ranks says of failure, by SLEPc's eigenvectors and PETSc's linear solver.
+// Finds what a mesh across ranks says of failure, by SLEPc's eigenvectors and PETSc's linear solver.
 
 #include <vector>
 

@@ -28,8 +28,8 @@ constexpr double edge_ratio = 4;            // beyond the bulk
 constexpr const char* no_points =
     "method integrated: the map does not tell its landing's distribution; use the sampled method";
 
-// Expectations of the polynomials that are 1 at one node and 0 at the others of its panel: from moments of the Legendre
-// polynomials.
+// Finds the expectations of the polynomials that are 1 at one node and 0 at the others of its panel: from moments of
+// the Legendre polynomials.
 NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
   static const std::array<Legendre, NodeSpace::order> at_nodes = [] {
     std::array<Legendre, NodeSpace::order> all;
@@ -75,7 +75,7 @@ NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, 
   return row;
 }
 
-// Points that a row is made of. Of few of them, many do not matter; a map without noise has one.
+// Counts the points that a row is made of. Of few of them, many do not matter; a map without noise has one.
 std::size_t points_of_a_row(const AnyReturnMap& map) {
   std::vector<std::pair<double, double>> points;
   map.landing_points(map.state_interval(0).first + 1, 0, {}, points);
@@ -168,7 +168,7 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
   for (;;) {
     std::vector<std::pair<double, double>> ranges;
     for (int p = 0; p < phases; ++p) ranges.emplace_back(map.state_interval(p).first, upper);
-    // Equal cells, or as far apart as nodes where there is a bulk.
+    // Cells are equal, or as far apart as nodes where there is a bulk.
     const auto edge = [&](std::size_t phase, std::size_t cell) {
       const auto [from, to] = ranges[phase];
       const double share = static_cast<double>(cell) / cells;

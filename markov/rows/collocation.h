@@ -1,5 +1,5 @@
 #pragma once
-// The backward form of integrated rows, for any noise: collocation of the expected steps as a function of the start.
+// Makes the backward form of integrated rows, for any noise: it collocates the expected steps over the start.
 
 #include <limits>
 #include <utility>
@@ -16,20 +16,20 @@ namespace metastable::markov {
 /// @throws std::invalid_argument if the map tells no points (names the sampled method)
 IntegratedChain collocate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads = 1);
 
-/// Where one event from `state` at `phase` leads, as a launch.
+/// Says where one event from `state` at `phase` leads, as a launch.
 Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase);
 
-/// Ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings, found
-/// on cells; nothing if no state comes to rest with a probability that a double can hold.
+/// Finds ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings,
+/// found on cells; nothing if no state comes to rest with a probability that a double can hold.
 /// @throws std::invalid_argument as collocate()
 std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& map, const LaunchState& launch,
                                                           int threads,
                                                           double bulk = std::numeric_limits<double>::infinity());
 
-/// Edges for NodeSpace: the states within `ranges` from which extreme landings just come to rest, and, `generations` -
-/// 1 times, those from which extreme landings meet such a state; no generation that takes a phase beyond `most` edges,
-/// but for the first. As many for every phase (wide panels are halved). Beyond `bulk` over the lower edge, edges at
-/// equal ratios as well.
+/// Finds edges for NodeSpace: the states within `ranges` from which extreme landings just come to rest, and,
+/// `generations` - 1 times, those from which extreme landings meet such a state; no generation that takes a phase
+/// beyond `most` edges, but for the first. As many for every phase (wide panels are halved). Beyond `bulk` over the
+/// lower edge, edges at equal ratios as well.
 std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,
                                                    const std::vector<std::pair<double, double>>& ranges,
                                                    int generations,

@@ -17,13 +17,13 @@ constexpr std::size_t block_size = 1024;   // draws landed at a time
 constexpr std::size_t rows_together = 16;  // rows that share a block while it is in cache
 constexpr double mostly_rests = 0.95;      // launches whose few survivors may be those of a tail
 
-// Draws of one phase: phases and the launch have randomisations of their own.
+// Returns the draws of one phase: phases and the launch have randomisations of their own.
 DrawOptions draws_of_phase(DrawOptions options, int phase) {
   options.replicate = options.replicate * 1024u + static_cast<std::uint32_t>(phase);
   return options;
 }
 
-// Some draws of one phase, ready to be landed: those that survive from the lowest states first.
+// Holds some draws of one phase, ready to be landed: those that survive from the lowest states first.
 struct Block {
   std::unique_ptr<NoiseTable> table;
   std::vector<double> offset, weight;
@@ -59,7 +59,7 @@ std::vector<Block> make_blocks(const AnyReturnMap& map, int phase, const Draws& 
   return blocks;
 }
 
-// Grid::tally(), which does not know where its landings come from.
+// Does what Grid::tally() does, which does not know where its landings come from.
 template <class Origin>
 void tally(const Grid& grid, std::span<const double> landing, std::span<const double> weight, std::span<double> sums,
            const Origin& origin) {
@@ -160,7 +160,7 @@ Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const Launch
                   const DrawOptions& options, int threads) {
   const int next_phase = (launch.phase + 1) % space.phases();
   const auto noise = static_cast<std::size_t>(map.noise_dimension());
-  // `tails`: the launch's score is drawn as the noise is, not by equal shares.
+  // `tails` says that the launch's score is drawn as the noise is, not by equal shares.
   const auto land = [&](bool tails) {
     const Draws draws =
         make_draws(map.noise_dimension() + (tails ? 1 : 0), draws_of_phase(options, space.phases() + (tails ? 1 : 0)));

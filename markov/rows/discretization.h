@@ -1,5 +1,5 @@
 #pragma once
-// From a return map to a chain: sampled rows, launch row.
+// Leads from a return map to a chain: sampled rows, launch row.
 
 #include <cstddef>
 #include <span>
@@ -13,7 +13,7 @@
 
 namespace metastable::markov {
 
-/// A chain sampled from a return map, and what goes with it.
+/// Is a chain sampled from a return map, and what goes with it.
 ///
 /// A row is averaged over its cell: draw k starts at lower + width * offset[k] of every cell, with the cell offsets a
 /// further dimension of the same point set. All cells of one phase share their draws (common errors keep rows smooth in
@@ -35,18 +35,18 @@ struct Discretization {
   int threads = 1;
 };
 
-/// Rows of all phases and the launch row. Cost: size() x draws landings. Deterministic for any number of threads.
+/// Makes all phases' rows and the launch row. Cost: size() x draws landings. Deterministic for any number of threads.
 SampledChain discretize(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch,
                         const Discretization& options);
 
-/// The launch row alone: where event number 1 leads. Launches of which hardly any survive are drawn down to the tail
-/// as well, where draws are weighted: those few may go on for ever so long.
+/// Makes the launch row alone: where event number 1 leads. Launches of which hardly any survive are drawn down to the
+/// tail too, where draws are weighted: those few may go on for ever so long.
 Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const LaunchState& launch, const DrawOptions& draws,
                   int threads = 1);
 
-/// How often events violate each of the map's assumptions: [assumption][state], and for the launch [assumption] at the
-/// back (one extra entry: index size()). `draws.count` plain draws a state, another randomisation for each; states with
-/// mask[i] == 0 are left at 0.
+/// Says how often events violate each of the map's assumptions: [assumption][state], and for the launch [assumption] at
+/// the back (one extra entry: index size()). `draws.count` plain draws a state, another randomisation for each; states
+/// with mask[i] == 0 are left at 0.
 std::vector<std::vector<double>> violation_rates(const AnyReturnMap& map, const StateSpace& space,
                                                  const LaunchState& launch, std::span<const double> mask,
                                                  DrawOptions draws);

@@ -25,7 +25,7 @@ std::uint64_t philox_word(const DrawOptions& options, std::uint64_t stream, std:
   return Philox()(counter, key)[static_cast<std::size_t>(dimension) % 4];
 }
 
-// The centre of one of 2^52 equal cells: strictly inside (0, 1) and symmetric.
+// Returns the centre of one of 2^52 equal cells: strictly inside (0, 1) and symmetric.
 double unit_interval(std::uint64_t word) { return (static_cast<double>(word >> 12) + 0.5) * 0x1p-52; }
 
 double upper_tail_score(double probability) { return std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * probability); }

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t chunk = 256;
 
-// 1 + min(max((state - front) * scale, 0), most), cut to whole numbers; 0 for -infinity. Is every state a number?
+// Finds 1 + min(max((state - front) * scale, 0), most), cut to whole numbers; 0 for -infinity. Is every state a number?
 METASTABLE_WIDE bool find_buckets(std::span<const double> state, double front, double scale, double most,
                                   std::int32_t* bucket) {
   std::int64_t numbers = 0;
@@ -34,7 +34,7 @@ Grid::Grid(std::vector<double> edges) : edges_(std::move(edges)) {
       throw std::invalid_argument("grid: edges must be finite and strictly ascending");
   upper_.assign(edges_.begin() + 1, edges_.end());
   upper_.back() = std::numeric_limits<double>::quiet_NaN();  // nothing lies beyond the last cell, not even infinity
-  // Buckets narrower than the narrowest cell, unless cells differ so much that these would be too many.
+  // Buckets are narrower than the narrowest cell, unless cells differ so much that these would be too many.
   double narrowest = width(0);
   for (std::size_t i = 1; i < cells(); ++i) narrowest = std::min(narrowest, width(i));
   const double fine = std::ceil(1.001 * (edges_.back() - edges_.front()) / narrowest);
@@ -44,7 +44,7 @@ Grid::Grid(std::vector<double> edges) : edges_(std::move(edges)) {
   table_.resize(buckets + 1);
   std::uint32_t c = 0;
   for (std::size_t b = 0; b <= buckets; ++b) {
-    // A little below the bucket's start, so that rounding in cell() never begins beyond the right cell.
+    // It lies a little below the bucket's start, so that rounding in cell() never begins beyond the right cell.
     const double start = edges_.front() + (static_cast<double>(b) - 1e-6) / table_scale_;
     while (c + 1 < cells() && start >= edges_[c + 1]) ++c;
     table_[b] = c;
@@ -84,7 +84,7 @@ void Grid::tally(std::span<const double> state, std::span<const double> weight, 
     }
     return;
   }
-  // Without branches: a landing that cannot be foreseen costs no more than one that can.
+  // It does without branches: a landing that cannot be foreseen costs no more than one that can.
   std::array<std::int32_t, chunk> slot;
   const auto most = static_cast<double>(table_.size() - 1);
   const std::int32_t* const start = start_.data();

@@ -59,7 +59,7 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     highest_lower = std::max(highest_lower, least);
     highest = std::max(highest, most);
   }
-  // One upper edge for all phases: what the launch leaves high up at one phase comes by at the next.
+  // One upper edge serves all phases: what the launch leaves high up at one phase comes by at the next.
   const auto ranges = [&](double upper) {
     std::vector<std::pair<double, double>> all;
     for (int p = 0; p < map.phases(); ++p) all.emplace_back(map.state_interval(p).first, upper);
@@ -80,7 +80,7 @@ std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, cons
     }
     if (!rests) return {};
     const std::vector<double> quasi = survivors_or_visits(pilot.chain.chain, pilot.chain.launch.after);
-    // The lowest node that has at most the shares wanted at it and above it, at every phase.
+    // This finds the lowest node that has at most the shares wanted at it and above it, at every phase.
     std::size_t first = 0;
     for (int p = 0; p < space.phases(); ++p) {
       const std::size_t base = static_cast<std::size_t>(p) * space.nodes();

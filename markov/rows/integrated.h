@@ -21,8 +21,8 @@ IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const
 /// Returns where one event from `state` at `phase` leads, as a launch.
 Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase);
 
-/// Ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings, found
-/// on a coarse chain of exact rows; nothing if no state comes to rest with a probability that a double can hold.
+/// Finds ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings,
+/// found on a coarse chain of exact rows; nothing if no state comes to rest with a probability that a double can hold.
 /// @param bulk  of the NodeSpace that they are for
 /// @throws std::invalid_argument as integrate()
 std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads,

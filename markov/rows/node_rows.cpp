@@ -39,7 +39,7 @@ std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<cons
       for (int p = 0; p < panels; ++p)
         for (std::size_t k = 0; k < NodeSpace::order; ++k) {
           const double share = (p + 0.5 + 0.5 * gauss_abscissa(k)) / panels;
-          // Both ends by the squared sine: rows may have square roots there.
+          // Both ends go by the squared sine: rows may have square roots there.
           const double s = std::sin(std::numbers::pi / 2 * share);
           rule.push_back({cuts[i - 1] + (cuts[i] - cuts[i - 1]) * s * s,
                           gauss_weight(k) * (cuts[i] - cuts[i - 1]) / panels * std::sin(std::numbers::pi * share)});

@@ -12,9 +12,9 @@
 
 namespace metastable::markov {
 
-/// Gauss-Legendre nodes on panels of an interval per phase; states are numbered phase by phase, ascending. Panel edges
-/// lie at the squares of equal steps: close together near the lower edge, where survivors and rest meet; beyond the
-/// bulk, if one is given, at equal ratios.
+/// Holds Gauss-Legendre nodes on panels of an interval per phase; states are numbered phase by phase, ascending. Panel
+/// edges lie at the squares of equal steps: close together near the lower edge, where survivors and rest meet; beyond
+/// the bulk, if one is given, at equal ratios.
 class NodeSpace {
  public:
   static constexpr std::size_t order = 16;  ///< nodes a panel
@@ -43,7 +43,7 @@ class NodeSpace {
   std::span<const double> nodes(int phase) const;
   std::span<const double> weights(int phase) const;
   int phase(std::size_t state) const { return static_cast<int>(state / nodes()); }
-  /// The same ranges, without edges, with another number of panels.
+  /// Returns the same ranges, without edges, with another number of panels.
   NodeSpace with_panels(std::size_t panels) const { return NodeSpace(range_, panels, bulk_); }
   std::span<const double> edges(int phase) const;  ///< as given
   /// Finds, where `edges` were given, the panel that holds a state, and the place there in [-1, 1]. States outside
@@ -62,11 +62,11 @@ class NodeSpace {
   std::vector<double> node_, weight_;
 };
 
-/// Where `share` in [0, 1] of the panels of a range end: quadratic up to the bulk, exponential from there on, with one
-/// slope.
+/// Says where `share` in [0, 1] of the panels of a range end: quadratic up to the bulk, exponential from there on, with
+/// one slope.
 double graded_edge(std::pair<double, double> range, double bulk, double share);
 
-/// Legendre polynomials P_0 .. P_15 at t in [-1, 1].
+/// Holds the Legendre polynomials P_0 .. P_15 at t in [-1, 1].
 using Legendre = std::array<double, NodeSpace::order>;
 Legendre legendre(double t);
 /// Does the same at `lanes` places side by side.

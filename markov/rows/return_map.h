@@ -1,5 +1,5 @@
 #pragma once
-// The only thing markov/ knows of the world: a stochastic return map.
+// Defines the only thing markov/ knows of the world: a stochastic return map.
 //
 // Example:
 //   #include <metastable/analysis/study/metastability.h>
@@ -73,8 +73,8 @@ class NoiseTable {
   /// rest_landing where the system comes to rest. offset has the size of next.
   virtual void land(double origin, double width, std::span<const double> offset, std::size_t first,
                     std::span<double> next) const = 0;
-  /// No state below this one survives draw k: where landings rise with the state, the state that just does. -infinity
-  /// if unknown.
+  /// No state below this one survives draw k: where landings rise with the state, it is the state that just does.
+  /// -infinity if unknown.
   virtual double lowest_survivor(std::size_t) const { return rest_landing; }
   /// Puts draw order[k] in place k; order is a permutation. Nothing happens where lowest_survivor() is unknown.
   virtual void reorder(std::span<const std::uint32_t>) {}
@@ -116,14 +116,15 @@ class AnyReturnMap {
                                        std::vector<std::pair<double, double>>& points) const {
     return self_->landing_points(state, phase, breaks, points);
   }
-  /// Where landing() reads an approximation of the true landing: one draw of E[f(true landing)] - E[f(landing)],
+  /// Takes, where landing() reads an approximation of the true landing, one draw of E[f(true landing)] - E[f(landing)],
   /// f(rest) being 0; its mean over `noise` is that difference. Returns nothing if landing() is exact.
   std::optional<double> landing_defect(double state, int phase, std::span<const double> noise,
                                        const std::function<double(double next)>& f) const {
     return self_->landing_defect(state, phase, noise, f);
   }
-  /// Where the state does not tell all that the next event depends on: one draw of what the rest does to E[f(state two
-  /// events on)], f(rest) being 0. `noise` holds the scores of both events. Returns nothing if the state tells all.
+  /// Takes, where the state does not tell all that the next event depends on, one draw of what the rest does to
+  /// E[f(state two events on)], f(rest) being 0. `noise` holds the scores of both events. Returns nothing if the state
+  /// tells all.
   std::optional<double> memory_defect(double state, int phase, std::span<const double> noise,
                                       const std::function<double(double after_next)>& f) const {
     return self_->memory_defect(state, phase, noise, f);

@@ -37,7 +37,7 @@ double high_landing(const NoiseTable& table, std::span<const double> weight, dou
   return rest_landing;
 }
 
-// Widths over the lowest state.
+// Holds widths over the lowest state.
 struct Widths {
   double bulk = 0, launched = 0;
 };
@@ -73,8 +73,8 @@ Widths widths(const AnyReturnMap& map, const LaunchState& launch, double lowest,
   return {bulk, bulk};
 }
 
-// Of the end of the cells, in bulks: up to 1 it is the share of the bulk; beyond it, sparse cells on a logarithmic
-// scale.
+// Returns the place of the end of the cells, in bulks: up to 1 it is the share of the bulk; beyond it, sparse cells on
+// a logarithmic scale.
 double place(double end) { return end <= 1 ? end : 1 + sparse * std::log(end); }
 
 double highest_low(const AnyReturnMap& map) {

@@ -45,10 +45,10 @@ struct LaunchState {
 StateSpace covering_space(const AnyReturnMap& map, const LaunchState& launch, std::size_t cells, std::uint64_t seed,
                           double reach = 1.5);
 
-/// Width of the bulk over the lowest state where the landings of a fast launch lie far above it; infinity elsewhere.
+/// Returns the bulk's width over the lowest state where the landings of a fast launch lie far above it, else infinity.
 double bulk_below_launch(const AnyReturnMap& map, const LaunchState& launch, std::uint64_t seed);
 
-/// How many times the cells of the bulk it takes to hold the landings of a fast launch as well; 1 if the bulk does.
+/// Says how many times the cells of the bulk it takes to hold a fast launch's landings as well; 1 if the bulk does.
 double launch_cells(const AnyReturnMap& map, const LaunchState& launch, std::uint64_t seed);
 
 /// Cuts the same range so that cells are small where they matter. By Galerkin's argument the relative error of the

@@ -203,7 +203,7 @@ Command verify() {
           }};
 }
 
-// What CLI11 knows of the commands' options, for manual pages and completion.
+// Returns what CLI11 knows of the commands' options, for manual pages and completion.
 std::vector<ManualCommand> manual_of(const std::vector<CLI::App*>& subcommands) {
   std::vector<ManualCommand> manual;
   for (const CLI::App* sub : subcommands) {
@@ -219,7 +219,7 @@ std::vector<ManualCommand> manual_of(const std::vector<CLI::App*>& subcommands) 
   return manual;
 }
 
-// The options of one command, or of all, as a table.
+// Writes the options of one command, or of all, as a table.
 void write_options(const std::vector<ManualCommand>& manual, const Options& o, const std::string& line) {
   Table table{
       .id = "options", .title = "Options", .columns = {{"command"}, {"option"}, {"value"}, {"default"}, {"help"}}};

@@ -1,5 +1,5 @@
 #pragma once
-// The command line: parses, calls, and turns failures into exit codes.
+// Runs the command line: parses, calls, and turns failures into exit codes.
 
 #include <functional>
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace metastable::reports {
 
-/// Exit codes: 0 done; 2 wrong option, key, value or file, or an output that cannot be written (one line on standard
-/// error); 3 a computation failed: a solver, memory, a program that is not there; 130 or 143 interrupted.
+/// Returns the exit code: 0 done; 2 wrong option, key, value or file, or an output that cannot be written (one line on
+/// standard error); 3 a computation failed: a solver, memory, a program that is not there; 130 or 143 interrupted.
 int run(int argc, const char* const* argv);
 
-/// A program of commands of its own, parsed and ended in the same way.
+/// Is a program of commands of its own, parsed and ended in the same way.
 struct Program {
   std::string name, summary;
   std::vector<Command> commands;
@@ -21,7 +21,7 @@ struct Program {
 };
 int run(const Program& program, int argc, const char* const* argv);
 
-/// sweep; with `sharing`, its points are shared with other processes.
+/// Makes sweep; with `sharing`, its points are shared with other processes.
 Command sweep_command(const struct Sharing* sharing = nullptr);
 
 }  // namespace metastable::reports

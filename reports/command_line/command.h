@@ -1,5 +1,5 @@
 #pragma once
-// One command of the command line: its options, and its request from them.
+// Defines one command of the command line: its options, and its request from them.
 
 #include <functional>
 #include <string>
@@ -16,12 +16,12 @@ struct Command {
   std::string details = {};  ///< below the options in --help and on the manual page
 };
 
-/// import
+/// Makes import.
 Command import_command();
 
-/// blind
+/// Makes blind.
 std::vector<Command> blind_commands();
-/// simulate, collisions, describe, diagnose, effects, study and others: the commands about experiments.
+/// Makes simulate, collisions, describe, diagnose, effects, study and others: the commands about experiments.
 std::vector<Command> experiment_commands();
 
 }  // namespace metastable::reports

@@ -67,7 +67,7 @@ char separator_value(const std::string& text) {
   throw std::invalid_argument(fmt::format("--separator: '{}' is none of ',', ';' and tab", text));
 }
 
-// "a=b,c=d" as pairs.
+// Reads "a=b,c=d" as pairs.
 std::vector<std::pair<std::string, std::string>> pairs_value(const char* name, const std::string& text) {
   std::vector<std::pair<std::string, std::string>> pairs;
   std::istringstream stream(text);
@@ -80,7 +80,7 @@ std::vector<std::pair<std::string, std::string>> pairs_value(const char* name, c
   return pairs;
 }
 
-// Every option that states what a description would.
+// Refuses every option that states what a description would.
 void check_description_alone(const Options& o) {
   for (const char* name :
        {"slope", "conditions", "legs", "leg-count", "mass", "inertia", "radius-of-gyration", "tip-radius", "law",

@@ -22,7 +22,7 @@ std::string replaced(std::string text, std::string_view from, std::string_view t
   return text;
 }
 
-// The words an option takes, with a space between them, if its value lists words (capitals stand for something else).
+// Returns an option's words, with a space between them, if its value lists words (capitals stand for something else).
 std::string choices(const ManualOption& o) {
   const bool words = std::ranges::none_of(o.value, [](char c) { return c >= 'A' && c <= 'Z'; });
   return words && o.value.find('|') != std::string::npos ? replaced(o.value, "|", " ") : "";
@@ -121,7 +121,7 @@ std::string fish(const std::vector<ManualCommand>& commands) {
   return text;
 }
 
-// What troff would take for a command or an escape.
+// Escapes what troff would take for a command or an escape.
 std::string troff(std::string text) {
   text = replaced(replaced(std::move(text), "\\", "\\e"), "-", "\\-");
   if (text.starts_with(".") || text.starts_with("'")) text = "\\&" + text;

@@ -1,5 +1,5 @@
 #pragma once
-// Option texts to values, with messages that name the option and what it takes.
+// Turns option texts into values, with messages that name the option and what it takes.
 
 #include <cstdint>
 #include <string>
@@ -14,24 +14,24 @@ namespace metastable::reports {
 
 /// All throw std::invalid_argument: "--NAME: 'TEXT' is not ...", or "--NAME: NUMBER is outside RANGE".
 double number_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
-/// Whole number in [least, most].
+/// Reads a whole number in [least, most].
 std::uint64_t whole_value(std::string_view name, std::string_view text, std::uint64_t least, std::uint64_t most);
-/// "a,b,c" as numbers, at least one.
+/// Reads "a,b,c" as numbers, at least one.
 std::vector<double> list_value(std::string_view name, std::string_view text);
-/// "mean,sd", or "mean" alone for a constant; sd >= 0. "0,4" for a coefficient, which is hardly ever meant so, is
+/// Reads "mean,sd", or "mean" alone for a constant; sd >= 0. "0,4" for a coefficient, which is hardly ever meant so, is
 /// refused with a word on decimal points.
 analysis::Spread spread_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
-/// "first:last:step", a list "a,b,c", or one number: ascending values.
+/// Reads "first:last:step", a list "a,b,c", or one number: ascending values.
 std::vector<double> range_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
-/// "paper", one length (then `count` legs of it), or a comma list of 3 to 1000 [m].
+/// Reads "paper", one length (then `count` legs of it), or a comma list of 3 to 1000 [m].
 std::vector<double> legs_value(std::string_view name, std::string_view text, int count);
 /// Is it one length, of which a number of legs can be had?
 bool is_one_length(std::string_view text);
-/// Pairs from a CSV file with the header "restitution,friction"; errors name file, line and column.
+/// Reads pairs from a CSV file with the header "restitution,friction"; errors name file, line and column.
 std::vector<dynamics::Contact> contact_list(const std::string& file);
 
-/// Ids of effects from a comma list, or from a file with one a line (# starts a comment); each once, in that order.
-/// Errors name the id and the known ones, in a file the line too.
+/// Reads ids of effects from a comma list, or from a file with one a line (# starts a comment); each once, in that
+/// order. Errors name the id and the known ones, in a file the line too.
 std::vector<std::string> catalogue_value(std::string_view name, const std::string& text);
 
 }  // namespace metastable::reports

@@ -1,5 +1,5 @@
 #pragma once
-// The options of one command, as texts; CLI11 stays in the .cpp.
+// Holds the options of one command, as texts; CLI11 stays in the .cpp.
 
 #include <cstdint>
 #include <map>
@@ -15,8 +15,8 @@ class App;
 
 namespace metastable::reports {
 
-/// Given on the command line, in a --config file, or left at their default. What a text means is checked when it is
-/// read; messages name the option (std::invalid_argument).
+/// Holds what was given on the command line or in a --config file, or is left at its default. What a text means is
+/// checked when it is read; messages name the option (std::invalid_argument).
 class Options {
  public:
   explicit Options(CLI::App& command) : command_(command) {}
@@ -25,22 +25,22 @@ class Options {
   /// Its number, its mean and sd, or each number of its list must lie in the range, which the help states.
   void add(const std::string& name, const std::string& value, const std::string& fallback, const std::string& help,
            const dynamics::Range& range);
-  /// An option without a value; `true` or `false` in a file.
+  /// Adds an option without a value; `true` or `false` in a file.
   void add_flag(const std::string& name, const std::string& help);
-  /// The options of what draws random numbers (default 1) and of what runs in parallel (default 0: all cores).
+  /// Add the options of what draws random numbers (default 1) and of what runs in parallel (default 0: all cores).
   void add_seed();
   void add_threads();
-  /// The option of what can be written as JSON, which is every command.
+  /// Adds the option of what can be written as JSON, which is every command.
   void add_json();
   /// Takes the default off an option that was added: what it says must be given, or is not said.
   void drop_default(const std::string& name);
-  /// What the command is about, given by its place on the command line; required.
+  /// Adds what the command is about, given by its place on the command line, which is required.
   void add_place(const std::string& name, const std::string& help);
-  /// Likewise, and may be left out.
+  /// Adds it likewise, and it may be left out.
   void add_optional_place(const std::string& name, const std::string& help);
-  /// One or more of those.
+  /// Adds one or more of those.
   void add_places(const std::string& name, const std::string& help);
-  /// Keys of the file that the command line did not give.
+  /// Reads the keys of the file that the command line did not give.
   void read(const std::string& file);
   /// Nothing that was given may be empty. @throws std::invalid_argument
   void check_given() const;
@@ -49,17 +49,17 @@ class Options {
   bool has(const std::string& name) const { return texts_.contains(name); }
   bool given(const std::string& name) const { return !texts_.at(name).empty(); }
   const std::vector<std::string>& all(const std::string& name) const { return texts_.at(name); }
-  /// The one value of an option: given once, or its default ("" if it has none).
+  /// Returns the one value of an option: given once, or its default ("" if it has none).
   std::string text(const std::string& name) const;
   bool flag(const std::string& name) const;
   double number(const std::string& name) const;
   std::uint64_t whole(const std::string& name, std::uint64_t least, std::uint64_t most) const;
-  /// A whole number that is an int; 0 <= least, most <= INT_MAX.
+  /// Returns a whole number that is an int; 0 <= least, most <= INT_MAX.
   int count(const std::string& name, int least, int most) const;
   std::uint64_t seed() const;
   int threads() const;
   analysis::Spread spread(const std::string& name) const;
-  /// The range an option was added with; any number for others.
+  /// Returns the range an option was added with; any number for others.
   const dynamics::Range& range(const std::string& name) const;
 
  private:

@@ -39,7 +39,7 @@ dynamics::Wheel wheel(const Options& options) {
   return wheel;
 }
 
-// What some laws only know. --contact-list stands for eta and mu together.
+// Lists what some laws only know. --contact-list stands for eta and mu together.
 constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
     {"restitution", dynamics::LawQuantity::restitution},
     {"friction", dynamics::LawQuantity::friction},
@@ -146,7 +146,7 @@ void check_slope(const analysis::Setting& setting) {
                                             setting.slope_deg, range.text()));
 }
 
-// All but slope and launch speed.
+// Reads all but slope and launch speed.
 analysis::Setting common_setting(const Options& options) {
   analysis::Setting setting;
   setting.wheel = wheel(options);

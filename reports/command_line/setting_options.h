@@ -1,5 +1,5 @@
 #pragma once
-// Options that several commands share: wheel, contact, course, study.
+// Reads options that several commands share: wheel, contact, course, study.
 
 #include <cstddef>
 #include <functional>
@@ -16,7 +16,7 @@
 namespace metastable::reports {
 
 void add_slope(Options& options);
-/// What experiment.toml can state of a wheel and its contact, and the rest.
+/// Adds what experiment.toml can state of a wheel and its contact, and the rest.
 void add_stated_wheel(Options& options);
 void add_stated_contact(Options& options);
 void add_wheel(Options& options);
@@ -28,18 +28,18 @@ void add_standard_errors(Options& options);
 /// @param given  by the name of the option
 /// @throws std::invalid_argument for the first one given that has no meaning under the law
 void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std::string&)>& given);
-/// Before the launch is asked for: a slope that no launch can save is named as such. @throws std::invalid_argument
+/// Checks before the launch is asked for: a slope that no launch can save is named so. @throws std::invalid_argument
 void check_slope(const analysis::Setting& setting);
-/// What the options above say, as far as the command has them: all but slope and launch speed.
+/// Reads what the options above say, as far as the command has them: all but slope and launch speed.
 analysis::Setting common_setting(const Options& options);
-/// `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
+/// Reads `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
 analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);
 /// Reads --slope and --initial-speed too, and checks them.
 analysis::Setting one_setting(const Options& options);
-/// One a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
+/// Makes one setting a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
 std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least);
 analysis::StudyOptions study_options(const Options& options);
-/// The standard errors above 0 that were given, checked against the setting. @throws std::invalid_argument
+/// Reads the standard errors above 0 that were given, checked against the setting. @throws std::invalid_argument
 std::vector<analysis::StandardError> standard_errors(const Options& options, const analysis::Setting& setting);
 
 }  // namespace metastable::reports

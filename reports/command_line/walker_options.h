@@ -1,5 +1,5 @@
 #pragma once
-// Options of the walkers on two legs, in the commands that take them.
+// Reads options of the walkers on two legs, in the commands that take them.
 
 #include <string>
 #include <vector>
@@ -9,15 +9,15 @@
 
 namespace metastable::reports {
 
-/// --walker, --slope-sd, --terrain and, for those commands that hold meshes, --spacing and --memory.
+/// Adds --walker, --slope-sd, --terrain and, for those commands that hold meshes, --spacing and --memory.
 /// @param sd  what --slope-sd takes: "DEG", "DEG,DEG,..." or "RANGE"
 void add_walker(Options& options, const std::string& sd, bool meshes = true);
 
-/// Whether --walker is given. @throws std::invalid_argument for options that have a meaning with it only
+/// Says whether --walker is given. @throws std::invalid_argument for options that have a meaning with it only
 bool asks_for_walker(const Options& options);
 
-/// The settings, study and files; slopes from --slope or --slopes, and --slope-sd, each a number, a list (one for each
-/// setting, or one for all) or, for sweeps, a range.
+/// Reads the settings, study and files; slopes come from --slope or --slopes, and --slope-sd, each a number, a list
+/// (one for each setting, or one for all) or, for sweeps, a range.
 /// @param own  options that this command has beyond those of all walkers
 /// @throws std::invalid_argument for values out of range, and for options of the wheel
 WalkerRequest walker_request(const Options& options, const std::string& command_line,

@@ -75,7 +75,7 @@ int case_number(const fs::path& folder) {
   return number;
 }
 
-// The numbers of the cases that are complete, ascending.
+// Returns the numbers of the cases that are complete, ascending.
 std::vector<int> case_numbers(const Places& places) {
   std::vector<int> numbers;
   if (fs::is_directory(places.cases))
@@ -118,7 +118,7 @@ void write_case(const Places& places, const analysis::BlindCase& made, const std
   write_file(folder / "seal.txt", sha256(truth) + "\n");  // last: without it there is no case
 }
 
-// Runs a program to its end; its standard output goes nowhere, its errors to a file. The exit code.
+// Runs a program to its end; its standard output goes nowhere, its errors to a file. It returns the exit code.
 int run_program(const std::vector<std::string>& words, const fs::path& errors) {
   std::vector<char*> arguments;
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -149,8 +149,8 @@ FileLock lock_answers(const Places& places) {
   return lock;
 }
 
-// Last line of the errors beside an answer that the tool failed to give; a tool that was killed with this program, or
-// still runs, leaves none.
+// Begins the last line of the errors beside an answer that the tool failed to give; a tool that was killed with this
+// program, or still runs, leaves none.
 constexpr std::string_view failed_line = "exit code ";
 constexpr int interrupted_code = 128 + SIGINT;
 
@@ -346,7 +346,7 @@ BlindOpened open_blind(const BlindRequest& request, Unanswered unanswered) {
 
 namespace {
 
-// On the progress line; the first of Ctrl-C and SIGTERM stops.
+// Shows cases on the progress line; the first of Ctrl-C and SIGTERM stops.
 CaseProgress shown_progress(const std::string& label, std::optional<Progress>& line) {
   return {[&line, label](std::size_t all, std::size_t had) {
             line.emplace(label, all);

@@ -11,7 +11,7 @@
 
 namespace metastable::reports {
 
-/// Told of cases as they are done, by functions that may throw to stop; `check` and `done` from any thread.
+/// Is told of cases as they are done, by functions that may throw to stop; `check` and `done` from any thread.
 struct CaseProgress {
   std::function<void(std::size_t all, std::size_t had)> begin;  ///< `had` of them were done before
   std::function<void()> check, done;
@@ -33,7 +33,7 @@ struct BlindAnswered {
 /// that Ctrl-C ended has not answered.
 BlindAnswered answer_blind(const BlindRequest& request, const CaseProgress& progress);
 
-/// What becomes of cases that have no answer when the truths are opened, which ends the run.
+/// Says what becomes of cases that have no answer when the truths are opened, which ends the run.
 enum class Unanswered { refused, left_out };
 struct BlindOpened {
   std::vector<Table> tables;
@@ -46,7 +46,7 @@ struct BlindOpened {
 /// sealed folder whose name is not that of a case
 BlindOpened open_blind(const BlindRequest& request, Unanswered unanswered = Unanswered::refused);
 
-/// The same, telling on standard output what came of it.
+/// Do the same, telling on standard output what came of it.
 void run_blind_make(const BlindRequest& request);
 void run_blind_answer(const BlindRequest& request);
 void run_blind_open(const BlindRequest& request, Unanswered unanswered = Unanswered::refused);

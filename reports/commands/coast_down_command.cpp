@@ -17,7 +17,7 @@ namespace {
 
 constexpr double clearly = 5;  // standard errors from which on a loss proportional to omega is there
 
-// Even or odd blocks: what one half says can be checked on the other.
+// Keeps even or odd blocks: what one half says can be checked on the other.
 void keep(analysis::CoastDownRun& run, const std::string& which) {
   if (which == "all") return;
   std::vector<std::vector<analysis::Revolution>> kept;

@@ -72,8 +72,8 @@ void say_comparison(Answer& answer, const analysis::CollisionComparison& c) {
   answer.say("  omega_plus, stance fit:  {}", text(c.fit_after));
 }
 
-// Trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two files
-// would put the rest too early.
+// Names trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two
+// files would put the rest too early.
 void say_cut_rests(Answer& answer, const analysis::ExperimentSource& source, const std::string& collisions,
                    const std::vector<analysis::MeasuredAngle>& angles, const std::vector<char>& cut,
                    std::size_t limit) {

@@ -5,8 +5,8 @@
 
 namespace metastable::reports {
 
-/// angle.csv of a folder to its collisions.csv, with details beside it; says how many were found, and how far the
-/// speeds are from those of a collisions.csv that was there before.
+/// Turns angle.csv of a folder into its collisions.csv, with details beside it; says how many were found, and how far
+/// the speeds are from those of a collisions.csv that was there before.
 /// @throws analysis::InputError, OutputError, std::invalid_argument (user errors: exit code 2)
 void run_collisions(const CollisionsRequest& request);
 

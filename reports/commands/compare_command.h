@@ -14,7 +14,7 @@ namespace metastable::reports {
 
 void run_compare(const CompareRequest& request);
 
-/// What `compare` finds, and its renderings.
+/// Holds what `compare` finds, and its renderings.
 struct CompareAnswer {
   analysis::Comparison comparison;
   std::vector<analysis::RestThresholds> thresholds;  ///< a setting each

@@ -12,12 +12,12 @@
 
 namespace metastable::reports {
 
-/// What an experiment folder's trials show: tables on the terminal (Markdown), or a folder with tables, figures and a
-/// page. @throws analysis::InputError, OutputError, std::invalid_argument (user errors: exit code 2)
+/// Shows an experiment folder's trials: in tables on the terminal (Markdown), or a folder with tables,
+/// figures and a page. @throws analysis::InputError, OutputError, std::invalid_argument (user errors: exit code 2)
 void run_describe(const DescribeRequest& request);
 
-/// What `describe` finds, with its tables for the terminal: conditions, and where there are such, tests, fits, laws and
-/// their landings.
+/// Holds what `describe` finds, with its tables for the terminal: conditions, and where there are such, tests, fits,
+/// laws and their landings.
 struct DescribeAnswer {
   analysis::Description description;
   std::optional<analysis::LawComparison> laws;

@@ -20,8 +20,8 @@
 namespace metastable::reports {
 namespace {
 
-// A folder made before the work, so that a place that cannot be written to is refused at once; gone again if the work
-// fails before anything is in it.
+// Is a folder made before the work, so that a place that cannot be written to is refused at once; gone again if the
+// work fails before anything is in it.
 class FolderIfDone {
  public:
   explicit FolderIfDone(const std::filesystem::path& folder) : folder_(folder) {

@@ -11,7 +11,7 @@ namespace metastable::reports {
 
 void run_diagnose(const DiagnoseRequest& request);
 
-/// Page, figures and tables of a diagnosis into `folder`. @param title  of the experiment
+/// Writes page, figures and tables of a diagnosis into `folder`. @param title  of the experiment
 void write_diagnosis(const analysis::Diagnosis& diagnosis, const std::string& title, const Provenance& provenance,
                      const std::string& folder);
 

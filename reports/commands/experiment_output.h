@@ -1,5 +1,5 @@
 #pragma once
-// Experiment folders that commands create.
+// Writes experiment folders that commands create.
 
 #include <filesystem>
 
@@ -8,7 +8,7 @@
 
 namespace metastable::reports {
 
-/// A folder that holds no experiment yet and gets one, whole or not at all.
+/// Is a folder that holds no experiment yet and gets one, whole or not at all.
 class ExperimentOutput {
  public:
   /// @throws OutputError if the folder holds a file of an experiment already, or nothing can be written there: at once

@@ -21,7 +21,7 @@
 namespace metastable::reports {
 namespace {
 
-// What one file holds, whatever its kind.
+// Holds what one file tells, whatever its kind.
 struct ForeignFile {
   std::vector<ImportedRow> rows;
   std::vector<MappedColumn> map;

@@ -1,5 +1,5 @@
 #pragma once
-// metastable import: a CSV or MAT file to an experiment folder.
+// metastable import makes an experiment folder of a CSV or MAT file.
 
 #include <map>
 #include <optional>
@@ -13,7 +13,7 @@
 
 namespace metastable::reports {
 
-/// metastable import
+/// Holds what `metastable import` is asked.
 struct ImportRequest {
   std::string file, out;
   std::string json;  ///< file, "-" for standard output, "" for none

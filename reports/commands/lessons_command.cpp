@@ -38,7 +38,7 @@ Diagnosis diagnosed(const Experiment& experiment, const std::string& what, const
 
 Cell steps_cell(double steps) { return steps > 0 ? Cell(steps) : Cell(""); }
 
-// One diagnosis a row.
+// Puts one diagnosis a row.
 Table answers(const std::string& id, const std::string& title, const std::string& what) {
   return {
       .id = id,
@@ -179,7 +179,7 @@ Figure balance_figure(const std::string& id, const analysis::StepBalances& b) {
   return figure;
 }
 
-// The page as its sections are written.
+// Holds the page as its sections are written.
 class Lessons {
  public:
   explicit Lessons(const LessonsRequest& request)

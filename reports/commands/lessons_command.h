@@ -1,5 +1,5 @@
 #pragma once
-// `metastable lessons`: worked examples of the diagnosis, on the paper's wheel and on measured trials.
+// `metastable lessons` shows worked examples of the diagnosis, on the paper's wheel and on measured trials.
 
 #include "reports/commands/request.h"
 

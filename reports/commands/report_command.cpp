@@ -24,7 +24,7 @@ namespace {
 constexpr std::array<double, 4> energy_spreads = {0.05, 0.1, 0.15, 0.2};  // Fig. 8
 constexpr int energy_collisions = 16;                                     // of a trial
 
-// The report as it grows: files in the folder, sections of the page.
+// Writes the report as it grows: files in the folder, sections of the page.
 class Report {
  public:
   explicit Report(const ReportRequest& request)
@@ -109,7 +109,7 @@ class Report {
             std::move(maps), {});
   }
 
-  // Of the law that real wheels obey, or of the next one before it under which this ramp's wheel fails.
+  // Shows them of the law that real wheels obey, or of the next one before it under which this ramp's wheel fails.
   void last_steps(const analysis::Setting& setting, const std::vector<Studied>& studied) {
     for (auto one = studied.rbegin(); one != studied.rend(); ++one) {
       const analysis::Setting& of = *one->study.setting;
@@ -128,7 +128,7 @@ class Report {
     }
   }
 
-  // One table and one map of expected steps over two axes.
+  // Shows one table and one map of expected steps over two axes.
   void grid(const std::string& id, const std::string& heading, const std::string& title, const std::string& reading,
             const analysis::Setting& base, const analysis::SweepAxis& down, const analysis::SweepAxis& across) {
     std::vector<analysis::Metastability> studies;
@@ -172,7 +172,7 @@ class Report {
          {analysis::Parameter::friction_mean, analysis::axis_values(0.2, 0.5, 0.1)});
   }
 
-  // Energies of single impacts: a landing under settled is many, with slides between.
+  // Shows the energies of single impacts: a landing under settled is many, with slides between.
   void energies() {
     if (request_.settings.front().law == dynamics::Law::settled)
       return progress_.advance(study_units * energy_spreads.size());

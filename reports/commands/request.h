@@ -1,5 +1,5 @@
 #pragma once
-// What the command line asks for, as data: one struct a command.
+// Holds what the command line asks for, as data: one struct a command.
 
 #include <optional>
 #include <string>
@@ -20,7 +20,7 @@
 
 namespace metastable::reports {
 
-/// metastable steps
+/// Asks for `metastable steps`.
 struct StepsRequest {
   analysis::Setting setting;
   analysis::StudyOptions study;
@@ -33,7 +33,7 @@ struct StepsRequest {
   std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to the expected steps
 };
 
-/// metastable compare
+/// Asks for `metastable compare`.
 struct CompareRequest {
   std::vector<analysis::Setting> settings;  ///< one a slope
   analysis::StudyOptions study;
@@ -43,7 +43,7 @@ struct CompareRequest {
   std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to expected steps and ratios
 };
 
-/// metastable sweep
+/// Asks for `metastable sweep`.
 struct SweepRequest {
   analysis::Setting setting;
   std::vector<analysis::SweepAxis> axes;
@@ -54,7 +54,7 @@ struct SweepRequest {
   const struct Sharing* sharing = nullptr;  ///< with other processes
 };
 
-/// metastable simulate
+/// Asks for `metastable simulate`.
 struct SimulateRequest {
   analysis::Setting setting;
   int trials = 50;
@@ -68,7 +68,7 @@ struct SimulateRequest {
   std::string json = {};  ///< as of StepsRequest
 };
 
-/// metastable simulate --reality
+/// Asks for `metastable simulate --reality`.
 struct RealityRequest {
   std::vector<analysis::RealityCondition> conditions;
   analysis::RealityOptions reality;
@@ -79,7 +79,7 @@ struct RealityRequest {
   std::string json = {};  ///< as of StepsRequest
 };
 
-/// metastable collisions
+/// Asks for `metastable collisions`.
 struct CollisionsRequest {
   std::string folder;
   analysis::FinderOptions finder;
@@ -90,7 +90,7 @@ struct CollisionsRequest {
   std::string json = {};  ///< as of StepsRequest
 };
 
-/// metastable blind
+/// Asks for `metastable blind`.
 struct BlindRequest {
   std::string folder;                 ///< of the run: cases, answers
   std::string sealed;                 ///< folder of the truths; "": beside the run, with "-sealed" added
@@ -103,7 +103,7 @@ struct BlindRequest {
   std::string json = {};  ///< as of StepsRequest
 };
 
-/// metastable coast-down
+/// Asks for `metastable coast-down`.
 struct CoastDownRequest {
   std::vector<std::string> logs;
   analysis::CoastDownOptions options;
@@ -117,7 +117,7 @@ struct CoastDownRequest {
   std::string json = {};  ///< as of StepsRequest
 };
 
-/// metastable describe
+/// Asks for `metastable describe`.
 struct DescribeRequest {
   std::string folder;
   std::string out;  ///< folder for tables, figures and the page; "": tables on the terminal only
@@ -128,7 +128,7 @@ struct DescribeRequest {
   std::string json = {};  ///< as of StepsRequest
 };
 
-/// metastable study
+/// Asks for `metastable study`.
 struct StudyRequest {
   std::string data;  ///< experiment folder; "": the simulated stand-in
   std::string out = "study";
@@ -137,7 +137,7 @@ struct StudyRequest {
   std::string json = {};  ///< as of StepsRequest
 };
 
-/// metastable diagnose
+/// Asks for `metastable diagnose`.
 struct DiagnoseRequest {
   std::string folder;
   std::string json;  ///< file, "-" for standard output, "" for none
@@ -146,7 +146,7 @@ struct DiagnoseRequest {
   std::string command;
 };
 
-/// metastable lessons
+/// Asks for `metastable lessons`.
 struct LessonsRequest {
   std::vector<std::string> data;  ///< experiment folders to be diagnosed under each law
   std::string out = "lessons";
@@ -156,12 +156,12 @@ struct LessonsRequest {
   std::string json = {};  ///< as of StepsRequest
 };
 
-/// metastable effects
+/// Asks for `metastable effects`.
 struct EffectsRequest {
   std::string json;  ///< as of DiagnoseRequest
 };
 
-/// metastable report
+/// Asks for `metastable report`.
 struct ReportRequest {
   std::vector<analysis::Setting> settings;  ///< one a ramp
   analysis::StudyOptions study;

@@ -19,7 +19,7 @@ markov::Share begun(const BeginPart& begin, const char* name) {
   return [tell = begin(name), name](double share) { tell(share, name); };
 }
 
-// As it is given, and tells of its part.
+// Takes it as it is given, and tells of its part.
 std::optional<analysis::CameraOptions> filmed(std::optional<analysis::CameraOptions> camera, const BeginPart& begin) {
   if (camera) camera->progress = begun(begin, "recording angles");
   return camera;

@@ -14,7 +14,7 @@ namespace metastable::reports {
 void run_simulate(const SimulateRequest& request);
 void run_reality(const RealityRequest& request);
 
-/// The texts of an experiment folder, and what there is to say of it, a line a condition.
+/// Holds the texts of an experiment folder, and what there is to say of it, a line a condition.
 struct SimulatedExperiment {
   analysis::ExperimentSource source;
   std::vector<std::string> said;

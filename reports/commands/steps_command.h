@@ -14,7 +14,7 @@ namespace metastable::reports {
 
 void run_steps(const StepsRequest& request);
 
-/// What `steps` finds, and its renderings.
+/// Holds what `steps` finds, and its renderings.
 struct StepsAnswer {
   analysis::Metastability study;
   analysis::RestThresholds thresholds;

@@ -22,7 +22,7 @@ namespace {
 
 using analysis::PaperExperiments;
 
-// The panels of all variants, one variant after the other.
+// Makes the panels of all variants, one variant after the other.
 template <typename Make>
 std::vector<Figure> all_variants(const Studies& studies, const Make& make) {
   std::vector<Figure> all;

@@ -12,7 +12,7 @@
 namespace metastable::reports {
 namespace {
 
-// Everything the numbers depend on; a partial file with another head belongs to another sweep.
+// States everything the numbers depend on; a partial file with another head belongs to another sweep.
 std::string head(const SweepRequest& request) {
   const analysis::StudyOptions& study = request.study;
   std::string text = fmt::format("# sweep: {}\n# axes:", analysis::sweep_description(request.setting, request.axes));

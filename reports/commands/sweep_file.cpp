@@ -26,8 +26,8 @@ constexpr std::size_t most_lines = 8;         // of a figure
 constexpr std::size_t most_map_columns = 16;  // of a heat map with a number in every cell
 constexpr std::size_t most_map_rows = 16;
 
-// Complete rows behind the head of a file, none if there is no such file; a last line without its end was cut short and
-// is dropped, and so is a head. @throws OutputError if it is another sweep's
+// Returns the complete rows behind the head of a file, none if there is no such file; a last line without its end was
+// cut short and is dropped, and so is a head. @throws OutputError if it is another sweep's
 std::vector<std::string> rows_of(const std::filesystem::path& file, const std::string& head, const char* otherwise) {
   if (!std::filesystem::exists(file)) return {};
   if (std::filesystem::is_directory(file)) throw OutputError(file, "is a folder");
@@ -46,7 +46,7 @@ std::vector<std::string> rows_of(const std::filesystem::path& file, const std::s
   return rows;
 }
 
-// Column `index` behind the coordinates: 0 expected steps, 1 and 2 its interval.
+// Returns column `index` behind the coordinates: 0 expected steps, 1 and 2 its interval.
 double value_of(const std::string& row, std::size_t index) {
   std::size_t at = 0;
   for (std::size_t i = 0; i < index; ++i) at = row.find(',', at) + 1;
@@ -55,14 +55,14 @@ double value_of(const std::string& row, std::size_t index) {
   return text == "infinite" ? std::numeric_limits<double>::infinity() : std::stod(text);
 }
 
-// Nothing if no point has a finite number of steps.
+// Returns nothing if no point has a finite number of steps.
 std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
   const std::vector<SweepFileAxis>& axes = sweep.axes;
   Figure figure;
   figure.id = "sweep";
   figure.title = "Expected steps before failure";
   figure.provenance = sweep.provenance;
-  // The two axes shown; further ones stay at their first value.
+  // These two axes are shown; further ones stay at their first value.
   const SweepFileAxis& across = axes.front();
   const std::size_t second = axes.size() > 1 ? 1 : 0;
   std::size_t stride = 1, stride_second = 1;
@@ -117,7 +117,7 @@ std::size_t size_of(const SweepFile& sweep) {
   return size;
 }
 
-// The rows as a table; its columns are named by the last line of the head.
+// Returns the rows as a table; its columns are named by the last line of the head.
 Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
   const auto split = [](std::string_view line) {
     std::vector<std::string> fields(1);
@@ -160,7 +160,7 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   if (had < size) {
     const FileLock lock(partial, FileLock::Missing::create);
     if (!lock.held()) throw OutputError(partial, "another sweep is writing it");
-    // Read again: the other one may have ended in between.
+    // They are read again: the other one may have ended in between.
     rows = rows_of(out, sweep.head, "holds another sweep");
     if (rows.empty()) rows = rows_of(partial, sweep.head, "belongs to another sweep");
     had = rows.size();

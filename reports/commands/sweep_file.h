@@ -1,5 +1,5 @@
 #pragma once
-// A sweep's file of rows, which grows point by point and is taken up again, and its figure.
+// Writes a sweep's file of rows, which grows point by point and is taken up again, and its figure.
 
 #include <cstddef>
 #include <functional>
@@ -27,7 +27,7 @@ struct SweepFile {
 /// expected steps and the ends of their interval ("infinite", empty where a solver failed), then anything.
 using SweepRows = std::function<void(std::size_t had, const std::function<void(const std::string& row)>& add)>;
 
-/// Processes that share the points of a sweep. The first of them writes all files.
+/// Holds processes that share the points of a sweep. The first of them writes all files.
 struct Sharing {
   int rank = 0, ranks = 1;
   std::function<std::size_t(std::size_t)> first_says;  ///< on all: the number that the first one has
@@ -39,7 +39,7 @@ struct Sharing {
 /// @throws OutputError for a file of another sweep; Interrupted, saying how many points were kept
 void run_sweep_file(const SweepFile& sweep, const SweepRows& compute);
 
-/// The same, points taken in turns by the processes; the bytes are those of one.
+/// Does the same, points taken in turns by the processes; the bytes are those of one.
 /// @param row_of  computes a point's row
 void share_sweep_file(const SweepFile& sweep, const Sharing& sharing,
                       const std::function<std::string(std::size_t point)>& row_of);

@@ -1,5 +1,5 @@
 #pragma once
-// metastable verify: how accurate the program is, measured by itself.
+// metastable verify measures how accurate the program is.
 
 #include <string>
 

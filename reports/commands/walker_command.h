@@ -1,5 +1,5 @@
 #pragma once
-// steps, compare, sweep, simulate and report with --walker.
+// Runs steps, compare, sweep, simulate and report with --walker.
 
 #include <cstddef>
 #include <optional>
@@ -13,7 +13,7 @@
 
 namespace metastable::reports {
 
-/// What all of them have.
+/// Holds what all of them have.
 struct WalkerRequest {
   std::vector<analysis::WalkerSetting> settings;  ///< one or more
   markov::MeshStudyOptions study;
@@ -26,7 +26,7 @@ struct WalkerRequest {
   const struct Sharing* sharing = nullptr;  ///< of a sweep, with other processes
 };
 
-/// What `steps` and `compare` find; moments where they were asked for.
+/// Holds what `steps` and `compare` find; moments where they were asked for.
 struct WalkerAnswer {
   std::vector<analysis::WalkerStudy> studies;  ///< a setting each
   std::optional<analysis::LastMoments> moments;
@@ -43,16 +43,16 @@ std::string walker_answer_text(const WalkerRequest& request, const WalkerAnswer&
 ///         do)
 void run_walker_steps(const WalkerRequest& request);
 
-/// Every setting, and the ratio of the later ones' expected steps to the first one's.
+/// Prints every setting, and the ratio of the later ones' expected steps to the first one's.
 void run_walker_compare(const WalkerRequest& request);
 
-/// Expected steps over slopes and their sds; taken up again like every sweep.
+/// Writes expected steps over slopes and their sds; it is taken up again like every sweep.
 void run_walker_sweep(const WalkerRequest& request);
 
-/// walks.csv (every step) and trials.csv in a new folder.
+/// Writes walks.csv (every step) and trials.csv in a new folder.
 void run_walker_simulate(const WalkerRequest& request);
 
-/// The page of walkers: numbers, section, last steps.
+/// Writes the page of walkers: numbers, section, last steps.
 void run_walker_report(const WalkerRequest& request);
 
 }  // namespace metastable::reports

@@ -1,5 +1,5 @@
 #pragma once
-// The figures of `metastable describe`.
+// Draws the figures of `metastable describe`.
 
 #include <optional>
 #include <string>
@@ -10,17 +10,17 @@
 
 namespace metastable::reports {
 
-/// A mean profile with its standard error as a band, as two series of one colour.
+/// Adds a mean profile with its standard error as a band, as two series of one colour.
 void add_profile(Figure& figure, const std::vector<analysis::SpeedSummary>& profile, const std::string& label,
                  int colour);
-/// An empty figure of speeds over collisions.
+/// Returns an empty figure of speeds over collisions.
 Figure profile_figure(const std::string& id, const std::string& title, const Provenance& provenance);
 
 Figure profiles_figure(const analysis::Description& description, const Provenance& provenance);
-/// Nothing where no outcome is known.
+/// Returns nothing where no outcome is known.
 std::optional<Figure> survival_curves_figure(const analysis::Description& description, const Provenance& provenance);
 Figure measured_map_figure(const analysis::ConditionDescription& condition, const Provenance& provenance);
-/// Nothing where no leg is known.
+/// Returns nothing where no leg is known.
 std::optional<Figure> legs_figure(const analysis::Description& description, const Provenance& provenance);
 
 }  // namespace metastable::reports

@@ -1,5 +1,5 @@
 #pragma once
-// The tables of `metastable describe`, from a finished description.
+// Makes the tables of `metastable describe`, from a finished description.
 
 #include <string>
 
@@ -9,13 +9,13 @@
 
 namespace metastable::reports {
 
-/// Trials, steady speed, return map and survival of each condition.
+/// Lists trials, steady speed, return map and survival of each condition.
 Table conditions_table(const analysis::Description& description, const Provenance& provenance);
-/// Mean speed and standard error at each collision, all conditions side by side.
+/// Lists mean speed and standard error at each collision, all conditions side by side.
 Table profiles_table(const analysis::Description& description, const Provenance& provenance);
-/// Speed per landing leg.
+/// Lists speed per landing leg.
 Table legs_table(const analysis::Description& description, const Provenance& provenance);
-/// Every test on every pair of conditions.
+/// Lists every test on every pair of conditions.
 Table tests_table(const analysis::Description& description, const Provenance& provenance);
 /// Lists survival step by step.
 Table survival_table(const analysis::Description& description, const Provenance& provenance);
@@ -23,12 +23,12 @@ Table survival_table(const analysis::Description& description, const Provenance&
 Table fits_table(const analysis::Description& description, const Provenance& provenance);
 /// Puts measured beside predicted: speeds, spread, share of trials that rest.
 Table laws_table(const analysis::LawComparison& comparison, const Provenance& provenance);
-/// What landings leave, leg by leg, beside `settled`.
+/// Says what landings leave, leg by leg, beside `settled`.
 Table landings_table(const std::vector<analysis::LegRow>& legs, const Provenance& provenance);
 
-/// Mean of two values or more with its t-interval.
+/// Returns the mean of two values or more with its t-interval.
 Estimate mean_interval(const analysis::SpeedSummary& s);
-/// A p-value; empty where the test has none.
+/// Shows a p-value; empty where the test has none.
 Cell p_cell(double p);
 
 }  // namespace metastable::reports

@@ -38,7 +38,7 @@ Figure panel(const std::string& id, const std::string& title,
   return figure;
 }
 
-// The lines of one panel.
+// Draws the lines of one panel.
 template <class Runs, class Run>
 std::vector<const analysis::StudiedProfile*> lines(const Runs& runs, analysis::StudiedProfile Run::*profile) {
   std::vector<const analysis::StudiedProfile*> all;

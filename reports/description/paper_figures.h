@@ -1,5 +1,5 @@
 #pragma once
-// The figures of `metastable study`, as the paper draws them: mean profiles, standard errors as bands.
+// Draws the figures of `metastable study`, as the paper draws them: mean profiles, standard errors as bands.
 
 #include <vector>
 

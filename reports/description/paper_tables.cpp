@@ -10,13 +10,13 @@ namespace {
 using analysis::StudiedProfile;
 using analysis::VariantStudy;
 
-// Mean steady speed over trials, with its interval.
+// Shows the mean steady speed over trials, with its interval.
 Cell steady_cell(const std::vector<double>& trial_means) {
   if (trial_means.size() < 2) return "";
   return mean_interval(analysis::speed_summary(trial_means));
 }
 
-// Whether its steady speeds can be tested.
+// Says whether its steady speeds can be tested.
 bool reaches_steady(const StudiedProfile& profile) { return profile.steady.size() >= 2; }
 
 Cell sd_cell(double sd) { return sd > 0 ? Cell(sd) : Cell(""); }
@@ -47,7 +47,7 @@ std::string finding_text(const analysis::Finding& finding) {
   return analysis::verdict_text(finding.verdict) + ": " + finding.ours;
 }
 
-// The verdict on a claim under one variant. @throws std::out_of_range if it was not studied
+// Returns the verdict on a claim under one variant. @throws std::out_of_range if it was not studied
 analysis::ClaimVerdict verdict_of(const analysis::Claim& claim, const Studies& studies, dynamics::Law law,
                                   analysis::RestReading reading) {
   std::size_t at = 0;
@@ -93,7 +93,7 @@ Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& s
     row.emplace_back("");
     table.rows.push_back(std::move(row));
   };
-  // Figures first: at 7.02 deg with sds of 0.1.
+  // Figures come first, at 7.02 deg with sds of 0.1.
   add("steady speed [rad/s]", [&](const VariantStudy& s) {
     const std::vector<double>& means = s.usual_spreads().profile.trial_means;
     if (means.size() < 2) return std::string("none gets there");

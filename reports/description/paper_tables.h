@@ -1,5 +1,5 @@
 #pragma once
-// The tables of `metastable study`.
+// Makes the tables of `metastable study`.
 
 #include <vector>
 
@@ -12,13 +12,13 @@ using Studies = std::vector<analysis::VariantStudy>;
 
 Table claims_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
                    const analysis::PaperExperiments& experiments, const Provenance& provenance);
-/// The main numbers, and the claims whose verdict differs between the variants (of paper_variants(), in order).
+/// Lists the main numbers, and the claims whose verdict differs between the variants (of paper_variants(), in order).
 Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
                     const analysis::PaperExperiments& experiments, const Provenance& provenance);
 Table readings_table(const std::vector<analysis::Claim>& claims, const Provenance& provenance);
 Table hypotheses_table(const std::vector<analysis::Hypothesis>& hypotheses, const Studies& studies,
                        const Provenance& provenance);
-/// First-order and total indices over mean friction.
+/// Lists first-order and total indices over mean friction.
 Table variance_table(const Studies& studies, const Provenance& provenance);
 Table fig4_table(const Studies& studies, const analysis::PaperExperiments& experiments, const Provenance& provenance);
 Table fig6_table(const Studies& studies, const Provenance& provenance);

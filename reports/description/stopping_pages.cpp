@@ -15,7 +15,7 @@ using analysis::StoppingLeg;
 constexpr double shown_sds = 3.5;
 constexpr int density_points = 80, density_colour = 4, others_colour = 6;  // of the palette (figure.cpp)
 
-// The density of mu as a hill on the bottom of a figure.
+// Draws the density of mu as a hill on the bottom of a figure.
 Series density(const Stopping& stopping, double bottom, double top) {
   const auto [mean, sd] = stopping.setting.friction;
   Series hill{fmt::format("density of μ ~ N({}, {}²)", mean, sd), Style::band, {}, {}, {}, {}, density_colour};

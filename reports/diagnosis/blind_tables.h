@@ -1,5 +1,5 @@
 #pragma once
-// The grades of a blind check as tables.
+// Makes tables of the grades of a blind check.
 
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace metastable::reports {
 
-/// Measures with their Wilson intervals beside the aims; confusion; calibration; ambiguity groups; every case.
+/// Lists measures with their Wilson intervals beside the aims; confusion; calibration; ambiguity groups; every case.
 std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::vector<analysis::BlindTruth>& truths,
                                 const std::vector<std::optional<analysis::BlindAnswer>>& answers,
                                 const Provenance& provenance);

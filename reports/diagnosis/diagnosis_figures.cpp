@@ -39,7 +39,7 @@ struct ModelMap {
   const GapMap* map;
 };
 
-// Cells of one phase as rows, models and aspects as columns.
+// Draws cells of one phase as rows, models and aspects as columns.
 Figure map_figure(const std::vector<ModelMap>& models, bool stances, const std::string& id, const std::string& title) {
   std::vector<std::string> rows;  // as the map orders them
   std::map<std::pair<std::string, std::size_t>, double> scores;

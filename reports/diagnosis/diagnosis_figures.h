@@ -1,5 +1,5 @@
 #pragma once
-// The figures of a diagnosis; all without provenance. Nothing where there is nothing to draw.
+// Draws the figures of a diagnosis; all without provenance. There is none where there is nothing to draw.
 
 #include <vector>
 
@@ -8,8 +8,8 @@
 
 namespace metastable::reports {
 
-/// Scores of the map's cells under the three models, a figure for the collisions and one for the stances (or one for
-/// whole steps).
+/// Draws scores of the map's cells under the three models, a figure for the collisions and one for the stances (or one
+/// for whole steps).
 std::vector<Figure> map_figures(const analysis::Diagnosis& diagnosis);
 /// Draws the mean speed by collision, measured and simulated, a figure a condition.
 std::vector<Figure> profile_figures(const analysis::Diagnosis& diagnosis);

@@ -1,5 +1,5 @@
 #pragma once
-// A diagnosis and the catalogue of effects as JSON.
+// Writes a diagnosis and the catalogue of effects as JSON.
 
 #include <string>
 
@@ -8,11 +8,11 @@
 
 namespace metastable::reports {
 
-/// The result of `diagnose`, indented, with a final line end. "infinite" is written as a string, what is not known as
-/// null; numbers have as many digits as a double holds. Keys as in the README ("diagnose --json").
+/// Writes the result of `diagnose`, indented, with a final line end. "infinite" is written as a string, what is not
+/// known as null; numbers have as many digits as a double holds. Keys as in the README ("diagnose --json").
 std::string diagnosis_json(const analysis::Diagnosis& diagnosis, const Provenance& provenance);
 
-/// The result of `effects`: id, summary and parameters (name, unit, neutral, lower, upper, meaning) of each effect.
+/// Writes `effects`' result: id, summary and parameters (name, unit, neutral, lower, upper, meaning) of each effect.
 std::string effects_json();
 
 }  // namespace metastable::reports

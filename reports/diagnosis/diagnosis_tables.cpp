@@ -28,7 +28,7 @@ std::string short_number(double value) {
   return std::isnan(value) ? "unknown" : format_number(value, NumberFormat::general, 3);
 }
 
-// A number whose 90 % interval may not be known.
+// Shows a number whose 90 % interval may not be known.
 Cell with_interval(double value, double lower, double upper) {
   if (std::isnan(value) || std::isnan(lower) || std::isnan(upper)) return known(value);
   return Estimate{value, lower, upper};
@@ -46,7 +46,7 @@ Cell unless_hopeless(double value) {
   return known(value);
 }
 
-// "leg 4, friction_ratio 0.879 (0.864 to 0.894)"; a list without its intervals.
+// Returns "leg 4, friction_ratio 0.879 (0.864 to 0.894)"; a list without its intervals.
 std::string parameters_text(const std::vector<EstimatedParameter>& parameters) {
   std::string text;
   for (std::size_t i = 0; i < parameters.size(); ++i) {

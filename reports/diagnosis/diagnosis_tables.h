@@ -1,5 +1,5 @@
 #pragma once
-// The tables of a diagnosis.
+// Makes the tables of a diagnosis.
 
 #include <string_view>
 #include <vector>
@@ -12,15 +12,15 @@ namespace metastable::reports {
 /// Causes less probable are in the files only, in no figure and on no terminal.
 inline constexpr double worded_probability = 0.0005;
 
-/// Adjusted p-value below which a cell of the map counts as beyond chance.
+/// Is the adjusted p-value below which a cell of the map counts as beyond chance.
 constexpr double where_level = 0.05;
-/// The cells beyond chance, by rising adjusted p-value, then by falling statistic.
+/// Lists the cells beyond chance, by rising adjusted p-value, then by falling statistic.
 std::vector<analysis::GapCell> beyond_chance(const analysis::GapMap& map);
 
-/// The unit of an effect's parameter, "" for a ratio and for what the catalogue does not hold.
+/// Returns the unit of an effect's parameter, "" for a ratio and for what the catalogue does not hold.
 std::string_view effect_unit(std::string_view effect, std::string_view parameter);
 
-/// All without provenance. A table of nothing has no rows.
+/// All come without provenance. A table of nothing has no rows.
 Table data_table(const analysis::Diagnosis& diagnosis);     ///< what was there; the notes below it
 Table gap_table(const analysis::Diagnosis& diagnosis);      ///< p-values
 Table contact_table(const analysis::Diagnosis& diagnosis);  ///< recalibrated parameters

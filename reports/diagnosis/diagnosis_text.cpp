@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t most_cells = 10, most_causes = 8;
 
-// One effect a line, with the one that is most like it.
+// Lists one effect a line, with the one that is most like it.
 Table visibility_lines(const analysis::Diagnosis& d) {
   Table table{.id = "visibility",
               .title = "What these data could have seen (the size most experiments like this one find)",

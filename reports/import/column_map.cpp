@@ -55,7 +55,7 @@ std::string known(std::span<const std::string> names) {
                      names.size() > most ? ", ..." : "");
 }
 
-// The unit that a name ends with.
+// Returns the unit that a name ends with.
 const Unit* unit_of(std::string_view name, std::span<const Unit> units) {
   if (const std::size_t star = name.rfind('*'); star != std::string_view::npos && star + 1 == name.size()) {
     name.remove_suffix(1);
@@ -76,7 +76,7 @@ struct Split {
   std::string_view name, unit;
 };
 
-// "w [deg/s]" as name and unit; the unit is empty where there are no brackets at the end.
+// Reads "w [deg/s]" as name and unit; the unit is empty where there are no brackets at the end.
 Split split_unit(std::string_view text) {
   const std::size_t open = text.rfind('[');
   if (open == std::string_view::npos || !text.ends_with(']')) return {text, {}};
@@ -85,7 +85,7 @@ Split split_unit(std::string_view text) {
   return {name, text.substr(open + 1, text.size() - open - 2)};
 }
 
-// The columns whose names are the pattern with a whole number for its *, in the order of the numbers.
+// Returns the columns whose names are the pattern with a whole number for its *, in the order of the numbers.
 std::vector<std::size_t> numbered_columns(std::string_view pattern, std::span<const std::string> names,
                                           int first_collision) {
   const std::size_t star = pattern.find('*');

@@ -1,5 +1,5 @@
 #pragma once
-// Which column or variable of a foreign file tells what, and in which unit.
+// Finds which column or variable of a foreign file tells what, and in which unit.
 
 #include <cstddef>
 #include <span>
@@ -30,7 +30,7 @@ struct MappedColumn {
   std::string name;  ///< as in the file, or as requested with a * for the collision's number
   std::string unit;  ///< "" of what has none
   double scale = 1;  ///< to SI
-  /// Indices of the names; of a pattern with * one a collision, in their order.
+  /// Holds the indices of the names; of a pattern with * one a collision, in their order.
   std::vector<std::size_t> columns = {};
   bool numbered = false;  ///< by a *
 };

@@ -33,7 +33,7 @@ class CsvRows {
     row.angle = value(Role::angle, number);
   }
 
-  // Whether any of the columns of this number is filled.
+  // Says whether any of the columns of this number is filled.
   bool any(std::size_t number) const {
     for (const MappedColumn& column : map_)
       if (column.numbered && number < column.columns.size() && !unknown(csv_.text(column.columns[number]))) return true;

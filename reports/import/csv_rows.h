@@ -1,5 +1,5 @@
 #pragma once
-// Rows of one CSV file in long form (a row a collision) or wide form (a row a trial, columns numbered by collision).
+// Reads one CSV file in long form (a row a collision) or wide form (a row a trial, columns numbered by collision).
 
 #include <string>
 #include <string_view>

@@ -67,12 +67,12 @@ bool told_of_conditions(const std::vector<ImportedRow>& rows) {
   return std::ranges::any_of(rows, [](const ImportedRow& row) { return row.condition.has_value(); });
 }
 
-// The fields that every file of a folder begins a row with.
+// Returns the fields that every file of a folder begins a row with.
 std::string begin_of(const ImportedRow& row, long trial, bool condition) {
   return fmt::format("{}{}", condition ? csv_field(row.condition.value_or("")) + "," : "", trial);
 }
 
-// "rest" or another outcome of each trial, in the order of the trials' first rows; empty if none is told.
+// Holds "rest" or another outcome of each trial, in the order of the trials' first rows; empty if none is told.
 struct Outcomes {
   std::string csv;
   std::vector<std::string> places;  // of each line behind the header
@@ -118,7 +118,7 @@ std::string less(const std::optional<double>& value, int first) {
   return value ? fmt::format("{}", *value - first) : "";
 }
 
-// A defect of the folder's files, said of the line of the foreign file that it comes from.
+// Says a defect of the folder's files of the line of the foreign file that it comes from.
 // @param file  that all of them are from
 std::string in_terms_of(const std::string& defect, const std::string& name, const std::string& file,
                         const std::vector<std::string>& places) {

@@ -1,5 +1,5 @@
 #pragma once
-// Rows of a foreign file to the files of an experiment folder.
+// Turns rows of a foreign file into the files of an experiment folder.
 
 #include <map>
 #include <string>

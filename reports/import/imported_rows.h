@@ -1,5 +1,5 @@
 #pragma once
-// What a foreign file tells, collision by collision (or camera frame by camera frame), with the place of each.
+// Holds what a foreign file tells, collision by collision (or camera frame by camera frame), with the place of each.
 
 #include <optional>
 #include <string>

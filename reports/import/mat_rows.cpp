@@ -66,7 +66,7 @@ std::vector<double> as_doubles(const matvar_t& v) {
   return {data, data + elements(v)};
 }
 
-// Numbers in the order of MATLAB's linear index; nothing where they are none.
+// Returns the numbers in the order of MATLAB's linear index; nothing where they are none.
 std::optional<std::vector<double> > numbers_of(const matvar_t& v) {
   if (v.isComplex) return std::nullopt;
   switch (v.class_type) {
@@ -97,7 +97,7 @@ std::optional<std::vector<double> > numbers_of(const matvar_t& v) {
   }
 }
 
-// A text of one row; nothing where it is none.
+// Returns a text of one row; nothing where it is none.
 std::optional<std::string> text_of(const matvar_t& v) {
   if (v.class_type != MAT_C_CHAR || v.rank != 2 || v.dims[0] > 1) return std::nullopt;
   std::string text;
@@ -133,7 +133,7 @@ std::string kind(const matvar_t& v) {
   }
 }
 
-// One array of numbers or one text, with the name that MATLAB would give it.
+// Is one array of numbers or one text, with the name that MATLAB would give it.
 struct Piece {
   std::string place;
   std::vector<double> numbers;
@@ -141,7 +141,7 @@ struct Piece {
   std::size_t rows = 0, columns = 0;
 };
 
-// What a path leads to: one array, or one an element of a struct or cell array.
+// Holds what a path leads to: one array, or one an element of a struct or cell array.
 struct Found {
   std::vector<Piece> pieces;
   bool each = false;  // a piece a trial
@@ -257,7 +257,7 @@ Text text_member(Role role) {
                                  : &ImportedRow::outcome;
 }
 
-// One trial's numbers of a role, with MATLAB's name of each.
+// Holds one trial's numbers of a role, with MATLAB's name of each.
 struct Series {
   std::vector<double> values;
   std::string place;    // "trials(3).omega"
@@ -269,7 +269,7 @@ struct Series {
   }
 };
 
-// What a role is told by.
+// Says what a role is told by.
 struct Told {
   MappedColumn column;
   Found found;
@@ -322,7 +322,7 @@ class MatTrials {
  private:
   enum class Shape { each, columns, rows, vectors };
 
-  // One trial's numbers. @param length  of the main role's, padding included; 0 while that is not known
+  // Returns one trial's numbers. @param length  of the main role's, padding included; 0 while that is not known
   Series series(const Told& told, std::size_t trial, std::size_t length) const {
     if (told.found.each) {
       if (shape_ != Shape::each || told.found.pieces.size() != trials_)
@@ -346,7 +346,7 @@ class MatTrials {
     return one;
   }
 
-  // A text, or a number as its shortest text, of one trial or of one row of vectors; one text is of all.
+  // Returns a text, or a number as its shortest text, of one trial or of one row of vectors; one text is of all.
   std::string text(const Told& told, std::size_t index, std::size_t count) const {
     const Piece& piece = told.found.each && index < told.count() ? told.found.pieces[index] : told.first();
     if (!told.found.each && piece.text) return *piece.text;

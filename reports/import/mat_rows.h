@@ -1,5 +1,5 @@
 #pragma once
-// Rows of a MAT file (MATLAB): structs, cells, matrices or vectors. libmatio stays inside the .cpp.
+// Reads rows of a MAT file (MATLAB): structs, cells, matrices or vectors. libmatio stays inside the .cpp.
 
 #include <string>
 #include <string_view>

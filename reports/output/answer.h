@@ -1,5 +1,5 @@
 #pragma once
-// What a command says: lines on standard output and, where --json asks for it, facts, tables and files as JSON.
+// Gives what a command says: lines on standard output and, where --json asks for it, facts, tables and files as JSON.
 
 #include <fmt/format.h>
 

@@ -22,14 +22,14 @@
 namespace metastable::reports {
 namespace {
 
-// Okabe and Ito's palette without its yellow, which is too light for lines.
+// Is Okabe and Ito's palette without its yellow, which is too light for lines.
 constexpr std::array<std::string_view, 7> palette{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
                                                   "#E69F00", "#56B4E9", "#000000"};
 constexpr std::array<int, 7> point_types{7, 5, 9, 11, 13, 6, 4};
 constexpr std::string_view font_family = "Helvetica,Arial,sans-serif";
 
-/// A gnuplot string that nothing in it can end or expand. Single quotes expand nothing but cannot begin or end with a
-/// quote of the text; double ones hold it, and all that they would expand, as octal numbers.
+/// Makes a gnuplot string that nothing in it can end or expand. Single quotes expand nothing but cannot begin or end
+/// with a quote of the text; double ones hold it, and all that they would expand, as octal numbers.
 std::string quote(std::string_view text) {
   const char mark = text.find('\'') == std::string_view::npos ? '\'' : '"';
   std::string quoted(1, mark);
@@ -44,7 +44,7 @@ std::string quote(std::string_view text) {
   return quoted + mark;
 }
 
-/// The text as the label of a tick, where gnuplot looks for a number format.
+/// Returns the text as the label of a tick, where gnuplot looks for a number format.
 std::string tick(std::string_view text) {
   std::string doubled;
   for (const char c : text) doubled += c == '%' ? std::string("%%") : std::string(1, c);
@@ -182,7 +182,7 @@ struct LabelFit {
   int digits = 0;
 };
 
-/// The most digits, at most map.digits, with which every label fits its cell in a font one can read.
+/// Finds the most digits, at most map.digits, with which every label fits its cell in a font one can read.
 LabelFit fit_labels(const HeatMap& map, int width, int height) {
   constexpr double glyph_width = 0.6;  // of a digit, by the font's size
   std::size_t longest_name = 6;

@@ -35,22 +35,22 @@ struct Series {
   std::vector<double> y = {};  ///< a point that is not finite leaves a gap
   std::vector<double> lower = {};
   std::vector<double> upper = {};
-  /// 0, 1, 2, ... of the palette (Okabe and Ito: told apart by the colour-blind too). Not given: the series' position.
-  /// Give a band and its line the same.
+  /// Is 0, 1, 2, ... of the palette (Okabe and Ito: told apart by the colour-blind too). Not given, it is the series'
+  /// position. Give a band and its line the same.
   std::optional<int> colour = {};
 };
 
-/// A thin line across the whole figure, at a fixed x (vertical) or y.
+/// Is a thin line across the whole figure, at a fixed x (vertical) or y.
 struct ReferenceLine {
   bool vertical = true;
   double at = 0;
   std::string label = {};
 };
-/// The diagonal y = x over the range of the x axis, e.g. for a return map.
+/// Is the diagonal y = x over the range of the x axis, e.g. for a return map.
 enum class Diagonal { no, yes };
 
-/// Numbers on a grid as coloured, labelled cells: one row of `value` for each y, one column for each x. Cells keep
-/// one size whatever the spacing of x and y. Infinite cells are grey and say so; NaN cells are empty.
+/// Holds numbers on a grid as coloured, labelled cells: one row of `value` for each y, one column for each x. Cells
+/// keep one size whatever the spacing of x and y. Infinite cells are grey and say so; NaN cells are empty.
 struct HeatMap {
   std::vector<double> x;
   std::vector<double> y;
@@ -61,11 +61,11 @@ struct HeatMap {
   NumberFormat format = NumberFormat::significant;  ///< of the labels; fixed: `digits` decimals
   std::vector<std::string> x_names = {};            ///< shown instead of x, one a column; empty: the numbers
   std::vector<std::string> y_names = {};            ///< likewise, one a row
-  /// Not 0: colours from blue over white to red, white at 0 and full at -limit and +limit; beyond, the full colour.
+  /// If not 0, colours go from blue over white to red, white at 0, full at -limit, +limit and beyond.
   double limit = 0;
 };
 
-/// Named horizontal bars from zero, the first on top, each with its value at the end.
+/// Holds named horizontal bars from zero, the first on top, each with its value at the end.
 struct BarChart {
   std::vector<std::string> name;
   std::vector<double> value;
@@ -92,11 +92,11 @@ struct Figure {
   Provenance provenance = {};            ///< the SVG's <desc>
 };
 
-/// The gnuplot script that draws the figure to standard output.
+/// Returns the gnuplot script that draws the figure to standard output.
 /// @throws std::invalid_argument naming figure and series when the vectors' lengths do not match
 std::string gnuplot_script(const Figure& figure);
 
-/// The figure as a standalone SVG: the same bytes for the same figure (and version of gnuplot) on any machine.
+/// Returns the figure as a standalone SVG: the same bytes for the same figure (and version of gnuplot) on any machine.
 /// Takes about 30 ms. @throws std::runtime_error if gnuplot is missing or fails; std::invalid_argument as above
 std::string render_svg(const Figure& figure);
 

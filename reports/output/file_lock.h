@@ -1,5 +1,5 @@
 #pragma once
-// A file that one process at a time may write.
+// Locks a file that one process at a time may write.
 
 #include <filesystem>
 

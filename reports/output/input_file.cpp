@@ -27,7 +27,7 @@ std::string read_file(const std::filesystem::path& path) {
   const auto refuse = [&](const std::string& why) {
     throw std::invalid_argument(path.string() + ": cannot be read" + why);
   };
-  // Not blocking: while nobody writes into a pipe, Ctrl-C ends the program.
+  // It is opened without blocking: while nobody writes into a pipe, Ctrl-C ends the program.
   const Descriptor file{::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)};
   struct stat status {};
   if (file.number < 0 || ::fstat(file.number, &status) != 0) refuse(": " + std::system_category().message(errno));

@@ -1,12 +1,12 @@
 #pragma once
-// Input files that options name.
+// Reads input files that options name.
 
 #include <filesystem>
 #include <string>
 
 namespace metastable::reports {
 
-/// The whole of a file or a pipe; waiting for a pipe ends at Ctrl-C.
+/// Returns the whole of a file or a pipe; waiting for a pipe ends at Ctrl-C.
 /// @throws std::invalid_argument "PATH: cannot be read", for a folder and a device too; Interrupted (interrupt.h)
 std::string read_file(const std::filesystem::path& path);
 

@@ -1,16 +1,16 @@
 #pragma once
-// Ctrl-C and SIGTERM as an exception, so that temporaries are removed and nothing is left half-written.
+// Makes Ctrl-C and SIGTERM an exception, so that temporaries are removed and nothing is left half-written.
 
 #include <stdexcept>
 #include <string>
 
 namespace metastable::reports {
 
-/// Thrown by check_interrupt(). The command line turns it into exit code 130 (SIGINT) or 143 (SIGTERM).
+/// Is thrown by check_interrupt(). The command line turns it into exit code 130 (SIGINT) or 143 (SIGTERM).
 class Interrupted : public std::runtime_error {
  public:
   explicit Interrupted(int signal);
-  /// The same interruption, with what became of the work: "interrupted: ...".
+  /// Is the same interruption, with what became of the work: "interrupted: ...".
   Interrupted(const Interrupted& one, const std::string& more);
   int exit_code() const { return exit_code_; }
 

@@ -29,7 +29,7 @@ fs::path temporary_name(const fs::path& target) {
          ("." + target.filename().string() + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".tmp");
 }
 
-// Temporaries of the same target whose writer was killed.
+// Removes temporaries of the same target whose writer was killed.
 void remove_left_behind(const fs::path& target) {
   const std::string begin = "." + target.filename().string() + ".";
   std::error_code error;

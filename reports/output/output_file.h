@@ -1,5 +1,5 @@
 #pragma once
-// Output files that are either whole or not there.
+// Writes output files that are either whole or not there.
 
 #include <filesystem>
 #include <fstream>
@@ -9,7 +9,7 @@
 
 namespace metastable::reports {
 
-/// An output that cannot be written; the message names the path and the reason. A user error: exit code 2.
+/// Says that an output cannot be written; the message names the path and the reason. It is a user error: exit code 2.
 class OutputError : public std::invalid_argument {
  public:
   OutputError(const std::filesystem::path& path, const std::string& reason);

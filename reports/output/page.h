@@ -19,7 +19,7 @@ struct PageLink {
   std::string href;  ///< relative to the page, e.g. "tables/ramps.csv"
 };
 
-/// A table and the files that hold it.
+/// Holds a table and the files that hold it.
 struct PageTable {
   Table table;
   std::vector<PageLink> files = {};

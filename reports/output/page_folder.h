@@ -1,5 +1,5 @@
 #pragma once
-// A page that grows section by section, with its tables and figures as files beside it.
+// Writes a page that grows section by section, with its tables and figures as files beside it.
 
 #include <filesystem>
 #include <string>
@@ -12,15 +12,15 @@
 
 namespace metastable::reports {
 
-/// index.html, tables/<id>.csv, .md and .tex, figures/<id>.svg in one folder. Each file is whole or not there; the page
-/// comes last.
+/// Writes index.html, tables/<id>.csv, .md and .tex, figures/<id>.svg in one folder. Each file is whole or not there;
+/// the page comes last.
 class PageFolder {
  public:
   /// Creates the folder and the one of tables (that of figures comes with the first of them). @throws OutputError
   explicit PageFolder(const std::filesystem::path& folder);
 
   Page& page() { return page_; }  ///< for title, intro and provenance
-  /// A section, its tables and figures written at once. @throws as the renderings and write_file() do
+  /// Adds a section, its tables and figures written at once. @throws as the renderings and write_file() do
   void section(const std::string& id, const std::string& heading, const std::string& reading,
                const std::vector<Figure>& figures, std::vector<Table> tables);
   void write_index() const;

@@ -1,5 +1,5 @@
 #pragma once
-// A progress line for long work.
+// Shows a progress line for long work.
 
 #include <chrono>
 #include <cstddef>
@@ -9,11 +9,11 @@
 
 namespace metastable::reports {
 
-/// True if standard error is a terminal.
+/// Returns true if standard error is a terminal.
 bool stderr_is_terminal();
 
-/// "label  37 % (37 of 100), about 12 s left" on one line of a terminal, redrawn at most ten times a second and wiped
-/// at the end. Writes nothing where there is no terminal. advance() may be called from any thread.
+/// Shows "label  37 % (37 of 100), about 12 s left" on one line of a terminal, redrawn at most ten times a second and
+/// wiped at the end. Writes nothing where there is no terminal. advance() may be called from any thread.
 class Progress {
  public:
   /// Writes on standard error. @param total units of work, >= 1

@@ -1,5 +1,5 @@
 #pragma once
-// Seals of blind cases and digests of their answers: SHA-256 by OpenSSL's libcrypto, which stays in the .cpp.
+// Makes seals of blind cases and digests of their answers: SHA-256 by OpenSSL's libcrypto, which stays in the .cpp.
 
 #include <string>
 #include <string_view>
@@ -7,10 +7,10 @@
 
 namespace metastable::reports {
 
-/// SHA-256 of the text as 64 hexadecimal digits. @throws std::runtime_error if the library fails
+/// Returns the SHA-256 of the text as 64 hexadecimal digits. @throws std::runtime_error if the library fails
 std::string sha256(std::string_view text);
 
-/// One answer in the record: which case, when, the digest of its file, and a digest of all of it with the record
+/// Is one answer in the record: which case, when, the digest of its file, and a digest of all of it with the record
 /// before.
 struct RecordedAnswer {
   int number = 0;
@@ -19,11 +19,12 @@ struct RecordedAnswer {
   std::string chain;
 };
 
-/// The entry that follows `previous` (the chain of the one before; "" for the first).
+/// Makes the entry that follows `previous` (the chain of the one before; "" for the first).
 RecordedAnswer record_answer(const std::string& previous, int number, const std::string& time, std::string_view answer);
 
-/// One line of the record, and the record from its lines. @throws std::invalid_argument naming `file` and the line for
-/// text that is no entry, times that fall, a case that was answered before, and an entry that its chain does not fit
+/// Write one line of the record, and read it from its lines. @throws std::invalid_argument naming `file` and
+/// the line for text that is no entry, times that fall, a case that was answered before, and an entry that its chain
+/// does not fit
 std::string record_line(const RecordedAnswer& entry);
 std::vector<RecordedAnswer> read_record(const std::string& file, std::string_view text);
 

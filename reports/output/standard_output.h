@@ -1,5 +1,5 @@
 #pragma once
-// Standard output: sentences that fit the terminal, and whether all was written.
+// Writes standard output: sentences that fit the terminal, and whether all was written.
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@ namespace metastable::reports {
 /// Prints text; on a terminal as fitted() (text_table.h) to its width, else as it is.
 void say_text(std::string_view text);
 
-/// The same of a formatted text. A line has to be said as a whole.
+/// Does the same for a formatted text. A line has to be said as a whole.
 template <typename... T>
 void say(fmt::format_string<T...> format, T&&... values) {
   say_text(fmt::format(format, std::forward<T>(values)...));

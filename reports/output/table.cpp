@@ -72,7 +72,7 @@ std::string heading(const Column& column, std::string_view suffix = "") {
   return column.unit.empty() ? text : text + " [" + column.unit + "]";
 }
 
-/// A cell as people read it. `escape` is for text, `number` for a Decimal.
+/// Writes a cell as people read it. `escape` is for text, `number` for a Decimal.
 template <typename Escape, typename Number>
 std::string show(const Cell& cell, const Column& column, Escape escape, Number number) {
   struct Visitor {
@@ -289,7 +289,7 @@ constexpr std::size_t latex_many_columns = 6;   // beyond, smaller type
 constexpr std::size_t latex_very_many_columns = 8;
 constexpr double latex_share = 0.6;  // of the line, for all columns of wrapped text
 
-// How a table fits a page.
+// Says how a table fits a page.
 struct LatexLayout {
   std::string packages = "booktabs", columns;
   std::vector<bool> wrapped;  // by column
@@ -330,7 +330,7 @@ std::string breakable(const std::string& text) {
   return out;
 }
 
-// Long names in several lines, units below. Braces: a [ right after \\ would be read as its optional argument.
+// Long names take several lines, units stand below. Braces: a [ right after \\ would be read as its optional argument.
 std::string latex_heading(const Column& column, bool text) {
   std::string lines;
   std::size_t length = 0;

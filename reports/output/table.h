@@ -1,5 +1,5 @@
 #pragma once
-// A table as data, and its renderings: CSV, Markdown, LaTeX (booktabs) and HTML.
+// Holds a table as data, and renders it as CSV, Markdown, LaTeX (booktabs) and HTML.
 
 #include <concepts>
 #include <cstdint>
@@ -13,20 +13,20 @@
 
 namespace metastable::reports {
 
-/// What made a result. Carried by every table, figure and page.
+/// Says what made a result. It is carried by every table, figure and page.
 struct Provenance {
   std::string command;   ///< command line that reproduces it
   std::string settings;  ///< the settings in full; may have several lines
   std::uint64_t seed = 0;
   std::string version;  ///< version()
 };
-/// "command: ...", "settings: ..." (one entry for each of its lines), "seed: ...", "version: ..."; empty parts left
-/// out.
+/// Returns "command: ...", "settings: ..." (one entry for each of its lines), "seed: ...", "version: ..."; empty parts
+/// left out.
 std::vector<std::string> provenance_lines(const Provenance& provenance);
 
 /// Ends may be infinite.
 using analysis::Estimate;
-// How numbers are shown.
+// These say how numbers are shown.
 using analysis::Decimal;
 using analysis::DecimalEstimate;
 using analysis::format_estimate;
@@ -35,22 +35,22 @@ using analysis::NumberFormat;
 using analysis::plain_text;
 using analysis::to_decimal;
 
-/// Normal 95 % interval.
+/// Returns the normal 95 % interval.
 inline Estimate with_error(double value, double standard_error) {
   const double half = analysis::normal_95 * standard_error;
   return {value, value - half, value + half};
 }
-/// Rendered as the word "infinite".
+/// Is rendered as the word "infinite".
 struct Infinite {};
 
-/// A number that says too little to be shown: CSV has it, people read what there is to say.
+/// Is a number that says too little to be shown: CSV has it, people read what there is to say.
 struct NotShown {
   Estimate number;   ///< equal ends: without an interval
   std::string said;  ///< "not known: ..."
 };
 
-/// One cell: text, whole number, number, number with interval, or infinite. Empty text: an empty cell. An infinite
-/// double is shown as "infinite" too; a NaN is refused when the table is rendered.
+/// Is one cell: text, whole number, number, number with interval, or infinite. An empty text is an empty cell. An
+/// infinite double is shown as "infinite" too; a NaN is refused when the table is rendered.
 class Cell {
  public:
   Cell(std::string text) : value_(std::move(text)) {}
@@ -93,17 +93,17 @@ struct Table {
 /// header "name [unit]", then the rows at full precision. A column with intervals becomes three: "name [unit]",
 /// "name low95 [unit]", "name high95 [unit]", the level being the column's. Infinite is the word "infinite".
 std::string to_csv(const Table& table);
-/// One field of such a file: in quotes where it holds a comma, a quote or a line end, or starts with '#'.
+/// Returns one field of such a file: in quotes where it holds a comma, a quote or a line end, or starts with '#'.
 std::string csv_field(const std::string& text);
-/// Title as bold text, pipe table, notes, provenance.
+/// Writes the title as bold text, pipe table, notes, provenance.
 std::string to_markdown(const Table& table);
-/// A floating table for \usepackage{booktabs}, any engine: everything but ASCII is turned into commands where LaTeX
-/// has one. Provenance in comments and in the visible note.
+/// Writes a floating table for \usepackage{booktabs}, any engine: everything but ASCII is turned into commands where
+/// LaTeX has one. Provenance stands in comments and in the visible note.
 std::string to_latex(const Table& table);
-/// A <figure> with id "table-<id>" holding the <table>, for page.h.
+/// Writes a <figure> with id "table-<id>" holding the <table>, for page.h.
 std::string to_html(const Table& table);
 
-/// &, <, >, " and ' as entities.
+/// Writes &, <, >, " and ' as entities.
 std::string escape_html(std::string_view text);
 
 }  // namespace metastable::reports

@@ -1,5 +1,5 @@
 #pragma once
-// Tables as JSON, for programs.
+// Writes tables as JSON, for programs.
 
 #include <string>
 #include <vector>
@@ -8,10 +8,10 @@
 
 namespace metastable::reports {
 
-/// {"schema": 1, "tables": {ID: {"title", "notes", "columns": [{"name", "unit"}], "rows": [[...]]}}, "provenance"},
-/// with a final line end. A cell is a text, a number, {"value", "low", "high"} with the ends of its interval,
-/// "infinite", or null where it is empty or what it says is {"not_shown": "..."}. Numbers have as many digits as a
-/// double holds.
+/// Writes {"schema": 1, "tables": {ID: {"title", "notes", "columns": [{"name", "unit"}], "rows": [[...]]}},
+/// "provenance"}, with a final line end. A cell is a text, a number, {"value", "low", "high"} with the ends of its
+/// interval, "infinite", or null where it is empty or what it says is {"not_shown": "..."}. Numbers have as many digits
+/// as a double holds.
 std::string tables_json(const std::vector<Table>& tables, const Provenance& provenance);
 
 }  // namespace metastable::reports

@@ -34,7 +34,7 @@ std::string cell_text(const Cell& cell, const Column& column) {
   return std::visit(Visitor{column}, cell.value());
 }
 
-// `text` cut behind each character of `marks`, spaces dropped.
+// Returns `text` cut behind each character of `marks`, spaces dropped.
 Lines pieces(const std::string& text, std::string_view marks) {
   Lines all(1);
   for (const char c : text) {
@@ -54,7 +54,7 @@ std::size_t longest(const Lines& texts) {
 
 constexpr std::string_view in_names = "_+-";  // a long name may break behind these
 
-// Lines of at most `width` characters as far as words allow. A name that is longer breaks too.
+// Returns lines of at most `width` characters as far as words allow. A name that is longer breaks too.
 Lines broken(const std::string& text, std::size_t width) {
   Lines lines;
   for (const std::string& word : pieces(text, "")) {
@@ -127,7 +127,7 @@ std::vector<std::vector<Shown>> parts(const std::vector<Shown>& columns, std::si
   return all;
 }
 
-// The columns in lines, all rows of them.
+// Writes the columns in lines, all rows of them.
 std::string side_by_side(std::vector<Shown> columns, std::size_t rows, std::size_t width) {
   fit(columns, width);
 
@@ -191,7 +191,7 @@ std::string wrapped(const std::string& text, const std::string& indent, std::siz
 
 namespace {
 
-// A line broken at spaces, its text from byte `said` on below itself, `column` characters in.
+// Returns a line broken at spaces, its text from byte `said` on below itself, `column` characters in.
 std::string hanging(std::string_view line, std::size_t said, std::size_t column, std::size_t width) {
   const std::string rest = wrapped(std::string(line.substr(said)), std::string(column, ' '), width);
   return std::string(line.substr(0, said)) + rest.substr(column, rest.size() - column - 1);

@@ -5,10 +5,10 @@
 
 namespace metastable::reports {
 
-/// "0.2.0", or "0.2.0+g1a2b3c4d5e" ("-dirty": with changes since that commit) if it was built from a git clone.
+/// Returns "0.2.0", or "0.2.0+g1a2b3c4d5e" ("-dirty": with changes since that commit) if it was built from a git clone.
 std::string version();
 
-/// What `metastable --version` prints: version(), the compiler, and the libraries with their versions.
+/// Returns what `metastable --version` prints: version(), the compiler, and the libraries with their versions.
 std::string version_text();
 
 }  // namespace metastable::reports

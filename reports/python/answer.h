@@ -1,5 +1,5 @@
 #pragma once
-// Results as Python gets them, and their arrays.
+// Gives results as Python gets them, and their arrays.
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -17,7 +17,7 @@
 
 namespace metastable::reports::python {
 
-/// A read-only array of the values as they lie in memory, which `keep` owns.
+/// Makes a read-only array of the values as they lie in memory, which `keep` owns.
 /// @param stride  from one to the next [bytes]
 template <typename T>
 py::array array_view(const T* first, std::size_t count, std::shared_ptr<const void> keep,
@@ -36,8 +36,8 @@ py::array array_of(std::vector<T> values) {
   return array_view(held->data(), held->size(), held);
 }
 
-/// What metastable._results.Result is made from: the command line's JSON and text, tables as HTML, and arrays in the
-/// place of the lists at these keys of the JSON ("a.b" for b within a).
+/// Makes what metastable._results.Result is made from: the command line's JSON and text, tables as HTML, and arrays in
+/// the place of the lists at these keys of the JSON ("a.b" for b within a).
 inline py::dict answer(const std::string& json, const std::string& text, const std::string& html,
                        py::dict arrays = py::dict()) {
   py::dict all;
@@ -61,7 +61,7 @@ inline BeginPart parts_of(Call& call) {
   };
 }
 
-/// What each file of this folder adds to the module.
+/// Adds what each file of this folder adds to the module.
 void add_blind(py::module_& module);
 void add_studies(py::module_& module);
 void add_experiments(py::module_& module);

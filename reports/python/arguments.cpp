@@ -30,7 +30,7 @@ T cast_as(const char* name, const char* wanted, const py::object& value) {
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-// An array of `dimensions`; what cannot be one is of the wrong kind.
+// Makes an array of `dimensions`; what cannot be one is of the wrong kind.
 Numbers converted(const char* name, const char* wanted, const py::object& value, py::ssize_t dimensions) {
   Numbers array;
   try {

@@ -1,5 +1,5 @@
 #pragma once
-// Python's keyword arguments as the library's options.
+// Reads Python's keyword arguments as the library's options.
 
 #include <pybind11/pybind11.h>
 
@@ -18,7 +18,7 @@ namespace metastable::reports::python {
 
 namespace py = pybind11;
 
-/// Arguments by name; None stands for one that is not given. Everything throws py::type_error naming the argument
+/// Holds arguments by name; None stands for one that is not given. Everything throws py::type_error naming the argument
 /// where it is of the wrong kind, and std::invalid_argument where it is out of range.
 class Arguments {
  public:
@@ -43,17 +43,17 @@ class Arguments {
   py::dict values_;
 };
 
-/// The fields of metastable.Setting, checked, and refused where the law has no use for them.
+/// Reads the fields of metastable.Setting, checked, and refused where the law has no use for them.
 analysis::Setting setting_of(const Arguments& fields);
-/// The fields of metastable.WalkerSetting, checked.
+/// Reads the fields of metastable.WalkerSetting, checked.
 analysis::WalkerSetting walker_setting_of(const Arguments& fields);
-/// The options of metastable.study(), checked.
+/// Reads the options of metastable.study(), checked.
 analysis::StudyOptions study_options_of(const Arguments& options);
-/// Those of a walker's study.
+/// Reads those of a walker's study.
 markov::MeshStudyOptions mesh_options_of(const Arguments& options);
-/// Standard errors by name of the parameter, "friction_mean".
+/// Reads standard errors by name of the parameter, "friction_mean".
 std::vector<analysis::StandardError> standard_errors_of(const Arguments& options, const analysis::Setting& setting);
-/// "friction-mean" for friction_mean, "slope" for slope_deg.
+/// Returns "friction-mean" for friction_mean, "slope" for slope_deg.
 std::string parameter_of(const std::string& argument);
 
 }  // namespace metastable::reports::python

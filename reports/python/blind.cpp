@@ -1,4 +1,4 @@
-// The blind check of the diagnosis.
+// Binds the blind check of the diagnosis.
 
 #include <fmt/format.h>
 
@@ -58,7 +58,7 @@ class Cases {
   std::atomic<std::size_t> all_ = 0, done_ = 0;
 };
 
-// What `work` (make_blind, answer_blind) tells of the run that the options name.
+// Returns what `work` (make_blind, answer_blind) tells of the run that the options name.
 template <typename Work>
 auto of_cases(const Work& work, const py::dict& options, const std::string& command, const py::object& progress) {
   const BlindRequest request = blind_request_of(options, command);

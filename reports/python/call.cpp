@@ -45,7 +45,7 @@ void Call::run(const std::function<void()>& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
-// In the caller's thread, holding the lock.
+// Runs in the caller's thread, holding the lock.
 void Call::serve(const Asked* asked) {
   if (stopped_) return;
   try {

@@ -1,5 +1,5 @@
 #pragma once
-// A computation off the interpreter's lock: its progress, its interruption, and the Python it needs in between.
+// Runs a computation off the interpreter's lock: its progress, its interruption, and the Python it needs in between.
 
 #include <pybind11/pybind11.h>
 

@@ -1,4 +1,4 @@
-// Chains that people bring: a sparse matrix with kill rates.
+// Binds chains that people bring: a sparse matrix with kill rates.
 
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@ namespace {
 using Index = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using Number = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// A chain with its factors, made at the first question that needs them.
+/// Is a chain with its factors, made at the first question that needs them.
 class HeldChain {
  public:
   HeldChain(markov::Chain chain, int threads) : chain_(std::move(chain)), threads_(threads) {}
@@ -44,7 +44,7 @@ class HeldChain {
   std::optional<markov::QuasiStationary> quasi_;
 };
 
-// Rows of compressed storage, columns ascending; the diagonal is looked at and left out.
+// Takes rows of compressed storage, columns ascending; the diagonal is looked at and left out.
 HeldChain chain_of(const Index& starts, const Index& columns, const Number& values, const Number& kill, int threads) {
   const auto n = static_cast<std::size_t>(kill.size());
   std::vector<std::size_t> row_start{0};
@@ -78,9 +78,9 @@ struct Bounds {
   std::vector<double> lower, upper;
 };
 
-// Bounds of the expected steps m, (I - Q) m = 1: with v the answer and r = v - Q v, v / max r <= m <= v / min r,
-// because (I - Q)^-1 has no negative entry. r in extended precision, as kill v + sum q (v_i - v_j), with the rounding
-// of that.
+// Returns bounds of the expected steps m, (I - Q) m = 1: with v the answer and r = v - Q v, v / max r <= m <= v / min
+// r, because (I - Q)^-1 has no negative entry. It takes r in extended precision, as kill v + sum q (v_i - v_j), with
+// the rounding of that.
 Bounds enclosed(const markov::Chain& chain, const std::vector<double>& v) {
   constexpr long double eps = std::numeric_limits<long double>::epsilon();
   long double low = std::numeric_limits<long double>::infinity(), high = 0;

@@ -1,4 +1,4 @@
-// Experiments: read, simulated, or made of arrays; described and diagnosed.
+// Binds experiments: read, simulated, or made of arrays; described and diagnosed.
 
 #include <fmt/format.h>
 
@@ -28,7 +28,7 @@
 namespace metastable::reports::python {
 namespace {
 
-/// An experiment with the texts it was read from.
+/// Is an experiment with the texts it was read from.
 struct Held {
   analysis::ExperimentSource source;
   analysis::Experiment experiment;
@@ -51,7 +51,7 @@ HeldExperiment of_simulation(SimulatedExperiment made) {
 
 void write(const Held& held, const std::string& folder) { ExperimentOutput(folder).write(held.source); }
 
-// Columns as they are measured; NaN or -1 where nothing is known.
+// Holds columns as they are measured; NaN or -1 where nothing is known.
 struct CollisionRow {
   std::int64_t condition, trial, collision, leg;
   double time, position, omega_minus, omega_plus;
@@ -100,7 +100,7 @@ py::dict trials_of(const Held& held) {
   return columns;
 }
 
-// A field of a CSV file; what is not known is left empty.
+// Returns a field of a CSV file; what is not known is left empty.
 std::string field_of(const py::handle& value) {
   if (value.is_none()) return "";
   if (py::isinstance<py::float_>(value)) {

@@ -1,4 +1,4 @@
-// Walkers of the library, and any simulator that takes its noise as normal scores, on meshes.
+// Binds walkers of the library, and any simulator that takes its noise as normal scores, on meshes.
 
 #include <fmt/format.h>
 
@@ -36,7 +36,7 @@ WalkerRequest walker_request_of(const py::list& settings, const Arguments& given
   return request;
 }
 
-// One setting: `steps --walker`; several: `compare --walker`.
+// Does `steps --walker` for one setting, `compare --walker` for several.
 py::dict study_walkers(const py::list& settings, const py::dict& options, const std::string& command,
                        const py::object& progress) {
   const WalkerRequest request = walker_request_of(settings, Arguments(options), command);
@@ -56,7 +56,7 @@ py::dict study_walkers(const py::list& settings, const py::dict& options, const 
                 arrays);
 }
 
-// States of one kind in rows; Python may keep them.
+// Returns states of one kind in rows; Python may keep them.
 py::array_t<double> rows_of(std::span<const double> values, std::size_t rows) {
   py::array_t<double> array({rows, values.size() / rows});
   std::memcpy(array.mutable_data(), values.data(), values.size_bytes());
@@ -97,7 +97,7 @@ void take_failed(const py::object& returned, std::span<std::uint8_t> failed) {
   for (std::size_t i = 0; i < failed.size(); ++i) failed[i] = flags.data()[i] ? 1 : 0;
 }
 
-/// A simulator written in Python.
+/// Is a simulator written in Python.
 struct PythonMap {
   py::object step;
   std::string name;
@@ -125,7 +125,7 @@ PythonMap map_of(const py::dict& fields) {
   return map;
 }
 
-// The map as the library takes it: Python is asked through `call`.
+// Returns the map as the library takes it: Python is asked through `call`.
 markov::BatchMap batch_of(const PythonMap& python, Call& call) {
   markov::BatchMap map;
   map.dimension = python.dimension;

@@ -1,4 +1,4 @@
-// The Python module metastable._metastable: private; what people import is the package around it.
+// Makes the Python module metastable._metastable: private; what people import is the package around it.
 
 #include <pybind11/pybind11.h>
 

@@ -1,4 +1,4 @@
-// study, compare and sweep of settings.
+// Binds study, compare and sweep of settings.
 
 #include <fmt/format.h>
 
@@ -74,7 +74,7 @@ py::dict compare(const py::list& settings, const py::dict& options, const Comman
   return answer(compare_answer_json(request, found), compare_answer_text(request, found), html);
 }
 
-// The columns of a sweep, as the command line names them.
+// Holds the columns of a sweep, as the command line names them.
 struct Columns {
   std::vector<std::vector<double>> at;
   std::vector<double> steps, low, high, quasi, rate, mean, sd, reach_end;

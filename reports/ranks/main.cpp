@@ -1,4 +1,4 @@
-// metastable-mpi: what of `metastable` runs on several machines, under mpirun.
+// metastable-mpi runs what of `metastable` goes on several machines, under mpirun.
 
 #include <fmt/format.h>
 

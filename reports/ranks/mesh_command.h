@@ -16,8 +16,8 @@ struct SharedMeshRequest {
   std::string command;  ///< the command line, for provenance
 };
 
-/// One mesh of a walker across all ranks: expected steps from the gait by products and by PETSc, failure rate, and the
-/// memory of each rank. @throws markov::Disagreement where the two ways lie more than 1e-7 apart; as
+/// Solves one mesh of a walker across all ranks: expected steps from the gait by products and by PETSc, failure rate,
+/// and the memory of each rank. @throws markov::Disagreement where the two ways lie more than 1e-7 apart; as
 /// markov::SharedMesh, follow_survivors() and shared_passage()
 void run_shared_mesh(const SharedMeshRequest& request, markov::Ranks& ranks);
 

@@ -1,5 +1,5 @@
 #pragma once
-// How something fails, for the terminal, as JSON, as table and figures.
+// Shows how something fails, for the terminal, as JSON, as table and figures.
 
 #include <cstddef>
 #include <string>
@@ -11,14 +11,15 @@
 
 namespace metastable::reports {
 
-/// The last steps one below the other, and all steps of the regime.
+/// Lists the last steps one below the other, and all steps of the regime.
 Table last_moments_table(const analysis::LastMoments& moments, const std::string& id, const Provenance& provenance);
-/// That table, the shares of the legs and the most likely path; or why there is nothing.
+/// Writes that table, the shares of the legs and the most likely path; or why there is nothing.
 /// @param phase  what a phase is called, "leg"
 std::string last_moments_text(const analysis::LastMoments& moments, const std::string& phase, std::size_t width);
-/// An object, as text.
+/// Writes an object, as text.
 std::string last_moments_json(const analysis::LastMoments& moments);
-/// Each number of the state and each noise over the last steps: median and middle 90 %, those of all steps beside them.
+/// Draws state and noise, number by number, over the last steps: median and middle 90 %, those of all steps beside
+/// them.
 std::vector<Figure> last_moments_figures(const analysis::LastMoments& moments, const std::string& id,
                                          const Provenance& provenance);
 

@@ -124,7 +124,7 @@ Figure return_map_figure(const analysis::Setting& setting, const Provenance& pro
   figure.series.push_back(cloud);
   if (cloud.x.empty()) return figure;
 
-  // Mean of sqrt(x') over the draws that survive, all legs together.
+  // This is the mean of sqrt(x') over the draws that survive, all legs together.
   const markov::AnyReturnMap map = setting.problem().map;
   const markov::Draws draws = markov::make_draws(
       map.noise_dimension(), {.count = mean_draws, .seed = provenance.seed, .weighting = markov::Weighting::plain});

@@ -1,5 +1,5 @@
 #pragma once
-// The figures of `metastable report`, from finished studies.
+// Draws the figures of `metastable report`, from finished studies.
 
 #include <string>
 #include <vector>
@@ -10,17 +10,17 @@
 
 namespace metastable::reports {
 
-/// Quasi-stationary densities of the speed before a collision, all legs together, one curve a setting.
+/// Draws quasi-stationary densities of the speed before a collision, all legs together, one curve a setting.
 Figure density_figure(const std::vector<Studied>& settings, const Provenance& provenance);
 
-/// P(steps > n) on a logarithmic axis, one curve a setting.
+/// Draws P(steps > n) on a logarithmic axis, one curve a setting.
 Figure survival_figure(const std::vector<Studied>& settings, const Provenance& provenance);
 
 /// Draws the speed before a collision against the speed before the next: a cloud of simulated steps and the mean of the
 /// survivors.
 Figure return_map_figure(const analysis::Setting& setting, const Provenance& provenance);
 
-/// Expected steps over two parameters as a labelled map. Arguments as grid_table().
+/// Draws expected steps over two parameters as a labelled map. Takes arguments as grid_table().
 Figure grid_figure(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
                    const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,
                    const Provenance& provenance);

@@ -1,5 +1,5 @@
 #pragma once
-// The tables of `metastable report`, from finished studies.
+// Makes the tables of `metastable report`, from finished studies.
 
 #include <string>
 #include <vector>
@@ -12,24 +12,24 @@
 
 namespace metastable::reports {
 
-/// A study of a setting with what else is known of its rest.
+/// Holds a study of a setting with what else is known of its rest.
 struct Studied {
   analysis::Metastability study;
   analysis::RestThresholds thresholds;
 };
 
-/// All ramps under all laws side by side: quantities down, settings across.
+/// Puts all ramps under all laws side by side: quantities down, settings across.
 Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance);
 
-/// One sentence: under which of these laws some trials rest on every ramp and others do not.
+/// Says in one sentence under which of these laws some trials rest on every ramp and others do not.
 std::string laws_text(const std::vector<Studied>& columns);
 
-/// Expected steps over two parameters; `studies` row by row (`down` slow, `across` fast).
+/// Lists expected steps over two parameters; `studies` row by row (`down` slow, `across` fast).
 Table grid_table(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
                  const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,
                  const Provenance& provenance);
 
-/// Energy losses at equal spreads 0.05 k of eta and mu, k = 1 .. 4, beside the figures printed with the paper's Fig. 8.
+/// Lists energy losses at equal spreads 0.05 k of eta and mu, k = 1 .. 4, beside those printed with the paper's Fig. 8.
 Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Provenance& provenance);
 
 }  // namespace metastable::reports

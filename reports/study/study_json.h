@@ -1,5 +1,5 @@
 #pragma once
-// Results as JSON.
+// Writes results as JSON.
 
 #include <optional>
 #include <string>
@@ -16,7 +16,7 @@
 
 namespace metastable::reports {
 
-/// What `steps` finds beyond the study, where it is asked for.
+/// Holds what `steps` finds beyond the study, where it is asked for.
 struct StepsExtras {
   std::optional<analysis::CertifiedSteps> certified = {};
   std::optional<analysis::Sensitivities> sensitivities = {};
@@ -24,18 +24,18 @@ struct StepsExtras {
   std::optional<analysis::Propagated> propagated = {};  ///< from the parameters' standard errors
 };
 
-/// What `compare` finds beyond the comparison; empty without standard errors.
+/// Holds what `compare` finds beyond the comparison; empty without standard errors.
 struct CompareExtras {
   std::vector<analysis::Propagated> steps = {};   ///< a setting each
   std::vector<analysis::Propagated> ratios = {};  ///< a contrast each
 };
 
-/// The result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as many
-/// digits as a double holds. Keys as in the README ("steps --json").
+/// Writes the result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as
+/// many digits as a double holds. Keys as in the README ("steps --json").
 std::string steps_json(const analysis::Metastability& study, const analysis::RestThresholds& thresholds,
                        const Provenance& provenance, const StepsExtras& extras = {});
 
-/// The result of `compare`: "settings" (each as in steps_json) and "contrasts".
+/// Writes the result of `compare`: "settings" (each as in steps_json) and "contrasts".
 std::string compare_json(const analysis::Comparison& comparison,
                          const std::vector<analysis::RestThresholds>& thresholds, const Provenance& provenance,
                          const CompareExtras& extras = {});

@@ -1,5 +1,5 @@
 #pragma once
-// A study's progress callback on a progress line.
+// Shows a study's progress callback on a progress line.
 
 #include <functional>
 #include <optional>
@@ -9,19 +9,19 @@
 
 namespace metastable::reports {
 
-/// Units to give Progress for one study.
+/// Counts the units to give Progress for one study.
 inline constexpr std::size_t study_units = 1000;
 
-/// A callback for analysis::StudyOptions::progress that moves `progress` by up to study_units over the study. The
-/// callback refers to `progress`; it throws Interrupted after Ctrl-C.
+/// Returns a callback for analysis::StudyOptions::progress that moves `progress` by up to study_units over the study.
+/// The callback refers to `progress`; it throws Interrupted after Ctrl-C.
 std::function<void(double, const std::string&)> study_progress(Progress& progress);
 
-/// Told the share of the work done and what is being done; may throw to stop. As analysis::StudyOptions::progress.
+/// Is told the share of the work done and what is being done; may throw to stop. As analysis::StudyOptions::progress.
 using Tell = std::function<void(double, const std::string&)>;
 /// Begins to show a part of the work under this name, and ends with the part before it.
 using BeginPart = std::function<Tell(const std::string& name)>;
 
-/// The parts of a command on one progress line after another, of study_units each.
+/// Shows the parts of a command on one progress line after another, of study_units each.
 class ProgressParts {
  public:
   BeginPart begin();

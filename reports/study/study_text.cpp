@@ -11,7 +11,7 @@
 namespace metastable::reports {
 namespace {
 
-// The significant digits that a relative error leaves, six at most; three where none is known.
+// Shows the significant digits that a relative error leaves, six at most; three where none is known.
 std::string show(double value, double error) {
   if (std::isinf(value)) return "infinite";
   const int digits = error > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(error))), 2, 6) : 3;

@@ -1,5 +1,5 @@
 #pragma once
-// A study in words and numbers for the terminal, and its words shared with tables and pages.
+// Writes a study in words and numbers for the terminal, and its words shared with tables and pages.
 
 #include <cstddef>
 #include <string>
@@ -11,23 +11,23 @@
 
 namespace metastable::reports {
 
-/// Everything `metastable steps` prints.
+/// Writes everything `metastable steps` prints.
 std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds);
 
-/// What the words of study_text() mean: a line each, or with `more` what stands behind them as well; lines of at most
-/// `width` characters.
+/// Says what the words of study_text() mean: a line each, or with `more` what stands behind them as well; lines of at
+/// most `width` characters.
 std::string words_text(const analysis::Metastability& study, bool more, std::size_t width);
 
-/// The sensitivities as a table, ranked, or why there are none.
+/// Writes the sensitivities as a table, ranked, or why there are none.
 std::string sensitivities_text(const analysis::Sensitivities& sensitivities);
 
-/// "3.9 to 4.6 (from friction-mean 93 %, slope 7 %)": the interval of the parameters' standard errors alone.
+/// Writes "3.9 to 4.6 (from friction-mean 93 %, slope 7 %)": the interval of the parameters' standard errors alone.
 std::string propagated_text(const analysis::Propagated& propagated);
 
 /// Writes "4.256 (95 % interval 4.254 to 4.258)", or "infinite".
 std::string estimate_text(const analysis::Estimate& estimate);
 
-/// What the thresholds mean, one sentence.
+/// Says what the thresholds mean, one sentence.
 std::string thresholds_text(const analysis::RestThresholds& thresholds);
 
 }  // namespace metastable::reports

@@ -21,7 +21,7 @@ std::string walker_label(const StudiedWalker& walker) {
                      walker.setting.slope_deg, walker.setting.slope_sd_deg);
 }
 
-/// The points with the largest weights that hold together `most_of` them.
+/// Finds the points with the largest weights that hold together `most_of` them.
 std::vector<std::size_t> heaviest(const std::vector<analysis::SectionPoint>& points,
                                   double analysis::SectionPoint::*weight) {
   std::vector<std::size_t> order(points.size());

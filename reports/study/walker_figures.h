@@ -1,5 +1,5 @@
 #pragma once
-// What `report --walker` shows, from finished studies.
+// Draws what `report --walker` shows, from finished studies.
 
 #include <string>
 #include <vector>
@@ -11,28 +11,28 @@
 
 namespace metastable::reports {
 
-/// A walker's study with how it falls.
+/// Holds a walker's study with how it falls.
 struct StudiedWalker {
   analysis::WalkerSetting setting;
   analysis::WalkerStudy study;
   analysis::WalkerFalls falls;
 };
 
-/// The walkers side by side: quantities down, settings across.
+/// Puts the walkers side by side: quantities down, settings across.
 Table walkers_table(const std::vector<StudiedWalker>& columns, const Provenance& provenance);
 
-/// Steps on each size of mesh: how the answer was extrapolated.
+/// Lists steps on each size of mesh: how the answer was extrapolated.
 Table meshes_table(const StudiedWalker& walker, const std::string& id, const Provenance& provenance);
 
-/// P(steps > n) on a logarithmic axis, one curve a walker.
+/// Draws P(steps > n) on a logarithmic axis, one curve a walker.
 Figure walker_survival_figure(const std::vector<StudiedWalker>& walkers, const Provenance& provenance);
 
-/// The section by half angle and stance rate over half angle. One: where a walker recovers and where it is bound to
-/// fall (other axes of the noise: within a spacing of the gait); two: where all its steps and its last steps begin.
+/// Draws the section by half angle and stance rate over half angle. One: where a walker recovers and where it is bound
+/// to fall (other axes of the noise: within a spacing of the gait); two: where all its steps and its last steps begin.
 /// Both with the most likely path.
 std::vector<Figure> section_figures(const StudiedWalker& walker, const std::string& id, const Provenance& provenance);
 
-/// "-0.1990 ± 0.5445 i, 0.1314"
+/// Returns "-0.1990 ± 0.5445 i, 0.1314".
 std::string eigenvalues_text(const dynamics::Gait& gait);
 
 }  // namespace metastable::reports

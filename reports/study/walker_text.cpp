@@ -68,7 +68,7 @@ std::string finished(WalkerJson json, const std::optional<LastMoments>& moments,
   return json.dump(2) + "\n";
 }
 
-/// The ratio of b's expected steps to a's; the errors of the two are taken as independent.
+/// Returns the ratio of b's expected steps to a's; the errors of the two are taken as independent.
 MeshEstimate ratio(const MeshEstimate& a, const MeshEstimate& b) {
   const double value = b.value / a.value;
   return {value, value * std::exp(-std::hypot(std::log(b.value / b.lower), std::log(a.upper / a.value))),

@@ -1,5 +1,5 @@
 #pragma once
-// A study of a walker, or of any return map on meshes, for the terminal and as JSON.
+// Writes a study of a walker, or of any return map on meshes, for the terminal and as JSON.
 
 #include <cstddef>
 #include <optional>
@@ -13,39 +13,39 @@
 
 namespace metastable::reports {
 
-/// study_walker(), refused where independent ways contradict each other.
+/// Does study_walker(), refused where independent ways contradict each other.
 /// @throws as analysis::study_walker(); markov::Disagreement
 analysis::WalkerStudy agreed_walker(const analysis::WalkerSetting& setting, const markov::MeshStudyOptions& options,
                                     const Tell& tell);
 
-/// A study of a map that has no gait to tell of.
+/// Holds a study of a map that has no gait to tell of.
 struct MapStudy {
   std::string name;
   markov::MeshStudy passage;
 };
 
-/// Keys as in the README ("steps --json", with --walker), with a final line end.
+/// Writes keys as in the README ("steps --json", with --walker), with a final line end.
 std::string walker_json(const analysis::WalkerSetting& setting, const analysis::WalkerStudy& study,
                         const std::optional<analysis::LastMoments>& moments, const Provenance& provenance);
-/// The same without "gait".
+/// Does the same without "gait".
 std::string map_json(const MapStudy& study, const std::optional<analysis::LastMoments>& moments,
                      const Provenance& provenance);
-/// "settings" and "contrasts", each with the ratio of its expected steps to those of the first.
+/// Writes "settings" and "contrasts", each with the ratio of its expected steps to those of the first.
 std::string walkers_json(const std::vector<analysis::WalkerSetting>& settings,
                          const std::vector<analysis::WalkerStudy>& studies, const Provenance& provenance);
 
-/// Everything `steps --walker` prints. @param width  of a line [characters]
+/// Writes everything `steps --walker` prints. @param width  of a line [characters]
 std::string walker_text(const analysis::WalkerSetting& setting, const analysis::WalkerStudy& study,
                         const std::optional<analysis::LastMoments>& moments, std::size_t width);
 std::string map_text(const MapStudy& study, const std::optional<analysis::LastMoments>& moments, std::size_t width);
-/// Everything `compare --walker` prints.
+/// Writes everything `compare --walker` prints.
 std::string walkers_text(const std::vector<analysis::WalkerSetting>& settings,
                          const std::vector<analysis::WalkerStudy>& studies);
 
-/// The same as a table: quantities down.
+/// Does the same as a table: quantities down.
 Table mesh_table(const std::string& name, const markov::MeshStudy& study, const Provenance& provenance);
 
-/// "agreed", "mesh_alone"
+/// Returns "agreed", "mesh_alone".
 const char* walker_status(const markov::MeshStudy& study);
 
 }  // namespace metastable::reports

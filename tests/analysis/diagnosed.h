@@ -1,5 +1,5 @@
 #pragma once
-// Experiments for the tests of the diagnosis.
+// Makes experiments for the tests of the diagnosis.
 
 #include <span>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace metastable::analysis::test {
 
-/// The design of an experiment on the 9.59 and 7.02 deg ramps, its speeds still to be drawn.
+/// Returns the design of an experiment on the 9.59 and 7.02 deg ramps, its speeds still to be drawn.
 inline Experiment wheel_design(std::size_t trials, std::size_t collisions, bool speeds_after = true) {
   Experiment e;
   e.contact = {dynamics::Law::published, {0.54, 0.045}, {0.352, 0.043}};

@@ -1,5 +1,5 @@
 #pragma once
-// Experiment folders that several tests read.
+// Reads experiment folders that several tests read.
 
 #include <filesystem>
 
@@ -7,7 +7,7 @@
 
 namespace metastable::analysis {
 
-/// The simulated stand-in of the paper's three experiments.
+/// Returns the simulated stand-in of the paper's three experiments.
 inline Experiment stand_in_folder() {
   return read_experiment(std::filesystem::path(METASTABLE_TEST_DATA) / "stand-in");
 }

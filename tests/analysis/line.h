@@ -1,5 +1,5 @@
 #pragma once
-// A transition model of which everything is known in closed form.
+// Makes a transition model of which everything is known in closed form.
 
 #include <cmath>
 #include <memory>
@@ -12,10 +12,10 @@
 
 namespace metastable::analysis::test {
 
-// Spread evenly over 0.1 to 0.2 s.
+// Is spread evenly over 0.1 to 0.2 s.
 inline double since_previous(std::size_t i) { return 0.1 + 0.1 * std::fmod(0.618034 * static_cast<double>(i), 1); }
 
-// y = mean + slope w + noise: everything about it is known in closed form.
+// Models y = mean + slope w + noise: everything about it is known in closed form.
 class Line : public TransitionModel {
  public:
   Line(std::vector<double> y, std::vector<double> w) : y_(std::move(y)), w_(std::move(w)) {

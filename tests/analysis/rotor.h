@@ -1,11 +1,11 @@
 #pragma once
-// A rotor coasting down, for the tests of the diagnosis.
+// Makes a rotor coasting down, for the tests of the diagnosis.
 
 #include "analysis/experiment/experiment.h"
 
 namespace metastable::analysis::test {
 
-/// Sixteen runs of 40 revolutions from 13, 18, 23 and 28 rad/s, their speeds still to be drawn.
+/// Returns sixteen runs of 40 revolutions from 13, 18, 23 and 28 rad/s, their speeds still to be drawn.
 inline Experiment coasting_rotor() {
   Experiment e;
   e.system = System::coast_down;

@@ -1,4 +1,4 @@
-// Mean first passage on a full chain by subtraction-free elimination.
+// Times the mean first passage on a full chain by subtraction-free elimination.
 
 #include <benchmark/benchmark.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using namespace metastable::markov;
 
-// Rows of uniform random numbers; rest takes 1e9 steps.
+// Has rows of uniform random numbers; rest takes 1e9 steps.
 Chain full_chain(std::size_t n) {
   constexpr double rest = 1e-9;
   std::mt19937_64 engine(1);

@@ -1,4 +1,4 @@
-// Expected steps of the paper's wheel from exact rows, by the digits asked for.
+// Times expected steps of the paper's wheel from exact rows, by the digits asked for.
 
 #include <benchmark/benchmark.h>
 
@@ -25,7 +25,7 @@ analysis::Setting wheel(int legs) {
   return setting;
 }
 
-// The whole study, everything `metastable steps` prints, refined until the tolerance is met.
+// Times the whole study, everything `metastable steps` prints, refined until the tolerance is met.
 void integrated_study(benchmark::State& state) {
   const analysis::Problem problem = wheel(static_cast<int>(state.range(1))).problem();
   const analysis::StudyOptions options{.method = analysis::Method::integrated,
@@ -36,8 +36,8 @@ void integrated_study(benchmark::State& state) {
   state.counters["nodes"] = nodes;
 }
 
-// Expected steps of the paper's wheel, its eight legs at 7.02 deg, to eight digits and nothing else: the range of the
-// nodes, rows on 48 of them a leg, one solve. On 128: 4.251111596; the error is 4e-9.
+// Times expected steps of the paper's wheel, its eight legs at 7.02 deg, to eight digits and nothing else: the range of
+// the nodes, rows on 48 of them a leg, one solve. On 128 it is 4.251111596; the error is 4e-9.
 void expected_steps(benchmark::State& state) {
   analysis::Setting setting;
   setting.initial_speed = *analysis::paper_launch(7.02);
@@ -52,7 +52,7 @@ void expected_steps(benchmark::State& state) {
   state.counters["error"] = std::abs(steps / 4.251111596 - 1);
 }
 
-// Rows and one solve on given nodes.
+// Times rows and one solve on given nodes.
 void integrated_rows(benchmark::State& state) {
   const analysis::Problem problem = wheel(1).problem();
   const auto ranges = markov::node_ranges(problem.map, problem.launch, 1);

@@ -1,4 +1,4 @@
-// What this machine does at best of the two operations that no sampled chain can do without.
+// Times what this machine does at best of the two operations that no sampled chain can do without.
 
 #include <benchmark/benchmark.h>
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t count = 1024;  // numbers that stay in the first cache
 
-// sums[slot[k]] += weight[k] with slots known beforehand: the least that counting a landing takes.
+// Times sums[slot[k]] += weight[k] with slots known beforehand: the least that counting a landing takes.
 void count_landings(benchmark::State& state) {
   std::vector<double> sums(1001, 0.0), weight(count, 0.5);
   std::vector<std::int32_t> slot(count);
@@ -41,7 +41,7 @@ void square_roots(benchmark::State& state) {
       static_cast<double>(count) * 1e-9, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
-// A landing found and counted, without the landing itself.
+// Times a landing found and counted, without the landing itself.
 void tally(benchmark::State& state) {
   const auto grid = metastable::markov::Grid::uniform(16, 72, 1000);
   std::vector<double> sums(1001, 0.0), weight(count, 0.5), x(count);

@@ -1,4 +1,4 @@
-// How often the intervals of mesh studies hold what simulations say: ten settings, 20 seeds each.
+// Counts how often the intervals of mesh studies hold what simulations say: ten settings, 20 seeds each.
 //   mesh_coverage [seeds] [first setting] [settings]
 
 #include <fmt/format.h>

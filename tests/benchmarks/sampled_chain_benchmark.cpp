@@ -1,4 +1,4 @@
-// The sampled chain of the paper's contact: cells, draws, legs and threads varied one at a time.
+// Times the sampled chain of the paper's contact: cells, draws, legs and threads varied one at a time.
 
 #include <benchmark/benchmark.h>
 
@@ -9,7 +9,7 @@ namespace {
 
 using namespace metastable;
 
-// `legs` legs, all different (one: all equal).
+// Has `legs` legs, all different (one: all equal).
 analysis::Setting wheel(int legs) {
   analysis::Setting setting;
   setting.wheel.leg_length.assign(8, 0.1519);
@@ -20,7 +20,7 @@ analysis::Setting wheel(int legs) {
   return setting;
 }
 
-// Share of the pairs (cell, draw) that are landed: the other draws rest wherever in the cell they start.
+// Returns the share of the pairs (cell, draw) that are landed: the other draws rest wherever in the cell they start.
 double landed_share(const analysis::Problem& problem, const markov::StateSpace& space, std::size_t samples) {
   const markov::Draws draws = markov::make_draws(problem.map.noise_dimension(), {.count = samples});
   const auto table = problem.map.tabulate(0, draws.score);

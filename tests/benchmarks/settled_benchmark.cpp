@@ -1,4 +1,4 @@
-// The law `settled`: landings followed and read, the table, a study from it.
+// Times the law `settled`: landings followed and read, the table, a study from it.
 
 #include <benchmark/benchmark.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 using namespace metastable;
 
-// mu ~ N(0.4, 0.03^2), eta ~ N(0.4, 0.05^2), J = 0.0025 kg m^2: what the engines were given.
+// Has mu ~ N(0.4, 0.03^2), eta ~ N(0.4, 0.05^2), J = 0.0025 kg m^2: what the engines were given.
 analysis::Setting engine_wheel() {
   analysis::Setting setting;
   setting.law = dynamics::Law::settled;
@@ -34,7 +34,7 @@ dynamics::SettledWheel wheel(const analysis::Setting& setting) {
   return dynamics::settled_wheel(setting.wheel, setting.slope_deg * std::numbers::pi / 180);
 }
 
-// Over speeds, restitutions and frictions of steady rolling.
+// Goes over speeds, restitutions and frictions of steady rolling.
 template <class Land>
 void landings(benchmark::State& state, const Land& land) {
   std::size_t k = 0;
@@ -57,7 +57,7 @@ void landings_read(benchmark::State& state) {
   landings(state, [&](int leg, double omega, const dynamics::Contact& c) { return map->land(leg, omega, c); });
 }
 
-// Each time on another slope: tables are kept.
+// It goes to another slope each time: tables are kept.
 void table(benchmark::State& state) {
   analysis::Setting setting = engine_wheel();
   static double slope_deg = setting.slope_deg;
@@ -67,7 +67,7 @@ void table(benchmark::State& state) {
   }
 }
 
-// The whole study, everything `metastable steps` prints, from the table; under `published` beside it.
+// Times the whole study, everything `metastable steps` prints, from the table; under `published` beside it.
 void study(benchmark::State& state, dynamics::Law law) {
   analysis::Setting setting = engine_wheel();
   setting.law = law;
@@ -78,7 +78,7 @@ void study(benchmark::State& state, dynamics::Law law) {
   for (auto _ : state) benchmark::DoNotOptimize(analysis::study(problem, options));
 }
 
-// Once: these take seconds.
+// Runs each once: these take seconds.
 void once(benchmark::internal::Benchmark* of) {
   of->UseRealTime()->MeasureProcessCPUTime()->Unit(benchmark::kSecond)->Iterations(1);
 }

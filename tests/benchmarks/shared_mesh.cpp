@@ -1,5 +1,5 @@
-// One mesh of three dimensions across the ranks of mpirun, of a map that costs next to nothing: what rows, products and
-// solvers take by themselves. Expected steps are known from quadrature in one dimension.
+// Times one mesh of three dimensions across the ranks of mpirun, of a map that costs next to nothing: what rows,
+// products and solvers take by themselves. Expected steps are known from quadrature in one dimension.
 //   mpirun -n 2 shared_mesh SPACING [SCORE_SPACING]
 
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 namespace metastable::markov {
 namespace {
 
-/// x' = x / 2 + 1 + 0.5 z, failed where x' <= 0, and two numbers that follow x.
+/// Maps x' = x / 2 + 1 + 0.5 z, failed where x' <= 0, and two numbers that follow x.
 BatchMap cheap_map() {
   BatchMap map;
   map.dimension = 3;

@@ -1,4 +1,4 @@
-// A study, a comparison, simulated trials, their diagnosis, a return map and a chain of one's own, through the
+// Makes a study, a comparison, simulated trials, their diagnosis, a return map and a chain of one's own, through the
 // installed headers and libraries. consumer FOLDER: writes the simulated trials there as an experiment folder.
 #include <metastable/analysis/experiment/experiment_folder.h>
 #include <metastable/analysis/likelihood/diagnose.h>
@@ -31,7 +31,7 @@ bool inside(const analysis::Estimate& estimate, double value, double slack) {
   return estimate.lower - slack <= value && value <= estimate.upper + slack;
 }
 
-// Direct simulation: 4.26 and 6.17 steps with equal legs (tests/analysis/study/known_answers_test.cpp).
+// Direct simulation gives 4.26 and 6.17 steps with equal legs (tests/analysis/study/known_answers_test.cpp).
 analysis::Setting equal_legs(double slope_deg) {
   analysis::Setting setting;
   setting.wheel.leg_length.assign(8, 0.1519);
@@ -46,7 +46,7 @@ void study_and_compare() {
   check(inside(*pair.contrasts[0].ratio, 6.17 / 4.26, 0.01), "a comparison");
 }
 
-// Wheels with less friction than their experiment believes: to be found, and no missing physics.
+// Wheels have less friction than their experiment believes: that is to be found, and no missing physics.
 void simulate_and_diagnose(const std::filesystem::path& folder) {
   const analysis::Setting believed = equal_legs(9.59);
   analysis::Setting real = believed;

@@ -1,5 +1,5 @@
 #pragma once
-// What several tests of dynamics/ share.
+// Holds what several tests of dynamics/ share.
 
 #include <rapidcheck.h>
 
@@ -14,29 +14,29 @@ namespace metastable::dynamics::test {
 
 inline constexpr double degree = std::numbers::pi / 180;
 
-/// Uniform real in [lower, upper], ends included now and then.
+/// Returns a uniform real in [lower, upper], ends included now and then.
 inline double uniform(double lower, double upper) {
-  // At full size: RapidCheck's ranges start small otherwise.
+  // It draws at full size: RapidCheck's ranges start small otherwise.
   const int n = *rc::gen::resize(rc::kNominalSize, rc::gen::inRange(0, (1 << 20) + 1));
   return lower + (upper - lower) * n / (1 << 20);
 }
 
-/// Eight equal legs of the paper's mean length.
+/// Has eight equal legs of the paper's mean length.
 inline Wheel even_wheel() {
   Wheel wheel;
   wheel.leg_length.assign(8, 0.1519);
   return wheel;
 }
 
-/// The paper's contact: eta and mu ~ N(0.4, 0.1^2).
+/// Is the paper's contact: eta and mu ~ N(0.4, 0.1^2).
 inline const ContactNoise paper_noise = ContactNoise::normal(0.4, 0.1, 0.4, 0.1);
 
-/// The return map of eight equal legs.
+/// Returns the return map of eight equal legs.
 inline WheelMap wheel_map(Law law, double slope_deg, const ContactNoise& noise, double rebound_lost = 0) {
   return WheelMap(even_wheel(), slope_deg * degree, law, noise, rebound_lost);
 }
 
-/// A collision between two legs at v0 = c omega and u0.
+/// Makes a collision between two legs at v0 = c omega and u0.
 inline Collision make_collision(double first, double second, double omega, double tangential,
                                 double slope = 7.02 * degree, double angle = std::numbers::pi / 4) {
   const Triangle t = triangle(first, second, angle);
@@ -52,7 +52,7 @@ inline Collision make_collision(double first, double second, double omega, doubl
   return c;
 }
 
-/// The message of the invalid_argument that f throws; a note if it throws nothing.
+/// Returns the message of the invalid_argument that f throws; a note if it throws nothing.
 template <class F>
 std::string message_of(F f) {
   try {

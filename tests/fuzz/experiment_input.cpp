@@ -69,7 +69,7 @@ void check_angles(const std::vector<analysis::MeasuredAngle>& angles) {
   }
 }
 
-// Whether it was taken; a refusal must say why.
+// Says whether it was taken; a refusal must say why.
 template <typename Read>
 bool taken(const Read& read) {
   try {

@@ -1,5 +1,5 @@
 #pragma once
-// One input of the fuzz target: the files of an experiment folder in one text.
+// Reads one input of the fuzz target: the files of an experiment folder in one text.
 
 #include <cstddef>
 #include <cstdint>

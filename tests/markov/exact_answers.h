@@ -1,5 +1,5 @@
 #pragma once
-// Exact answers for small chains: rational and 100-digit arithmetic.
+// Gives exact answers for small chains: rational and 100-digit arithmetic.
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <boost/multiprecision/cpp_int.hpp>
@@ -13,7 +13,7 @@ namespace metastable::markov::reference {
 using Rational = boost::multiprecision::cpp_rational;
 using Long = boost::multiprecision::cpp_bin_float_100;
 
-/// I - Q in the given arithmetic, the probability of staying taken exactly as implied by the stored numbers.
+/// Returns I - Q in the given arithmetic, the probability of staying taken exactly as implied by the stored numbers.
 template <typename Number>
 std::vector<std::vector<Number>> generator(const Chain& chain) {
   const std::size_t n = chain.size();
@@ -47,7 +47,7 @@ std::vector<Number> gauss(std::vector<std::vector<Number>> matrix, std::vector<N
   return rhs;
 }
 
-/// Mean first-passage times, rounded to double once, from the arithmetic Number.
+/// Returns mean first-passage times, rounded to double once, from the arithmetic Number.
 template <typename Number>
 std::vector<double> exact_means(const Chain& chain) {
   std::vector<double> means;
@@ -57,7 +57,7 @@ std::vector<double> exact_means(const Chain& chain) {
   return means;
 }
 
-/// 1 - lambda_1 by inverse iteration in 100 digits, stopped when 30 of them stand.
+/// Returns 1 - lambda_1 by inverse iteration in 100 digits, stopped when 30 of them stand.
 inline double exact_failure_rate(const Chain& chain) {
   const auto matrix = generator<Long>(chain);
   std::vector<Long> x(chain.size(), Long(1));

@@ -1,5 +1,5 @@
 #pragma once
-// A return map whose landings are known in closed form, and expected steps from rows on nodes.
+// Makes a return map whose landings are known in closed form, and expected steps from rows on nodes.
 
 #include <cmath>
 #include <limits>
@@ -15,7 +15,7 @@
 
 namespace metastable::markov::testing {
 
-/// x' = x / 2 + 1 + sd z, rest where x' <= 0; as many phases as wanted, all alike.
+/// Maps x' = x / 2 + 1 + sd z, rest where x' <= 0; as many phases as wanted, all alike.
 struct Linear {
   double sd = 0.3;
   int count = 1;
@@ -45,7 +45,7 @@ inline LaunchState linear_launch() {
   return {[](double score) { return 2 + 0.1 * score; }, 0};
 }
 
-/// Expected steps from the launch.
+/// Returns the expected steps from the launch.
 inline double steps(const IntegratedChain& rows) {
   const ChainSolver solver(rows.chain.chain);
   const std::vector<double> mean = mean_first_passage(solver);

@@ -1,11 +1,11 @@
 #pragma once
-// What an illegal input is told.
+// Says what an illegal input is told.
 
 #include <string>
 
 namespace metastable::markov::testing {
 
-/// The message of the Error that `call` throws; empty when it throws none.
+/// Returns the message of the Error that `call` throws; empty when it throws none.
 template <typename Error, typename Call>
 std::string message_of(const Call& call) {
   try {

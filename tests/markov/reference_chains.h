@@ -1,5 +1,5 @@
 #pragma once
-// Chains to test with; exact answers for them are in exact_answers.h.
+// Makes chains to test with; exact answers for them are in exact_answers.h.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace metastable::markov::reference {
 
-/// Birth and death on 0 .. n-1: `up` and `down` with probability of staying left over; down from 0 is rest, and
+/// Makes birth and death on 0 .. n-1: `up` and `down` with probability of staying left over; down from 0 is rest, and
 /// up from n-1 is rest too when `both_ends`, otherwise not taken.
 inline Chain birth_death(std::size_t n, double up, double down, bool both_ends) {
   std::vector<std::size_t> start{0};
@@ -33,7 +33,7 @@ inline Chain birth_death(std::size_t n, double up, double down, bool both_ends) 
   return Chain(std::move(start), std::move(column), std::move(value), std::move(kill));
 }
 
-/// A full chain with random entries, staying included, whose kill rates are of the order of `kill_scale`.
+/// Makes a full chain with random entries, staying included, whose kill rates are of the order of `kill_scale`.
 inline Chain random_chain(std::size_t n, unsigned seed, double kill_scale) {
   std::mt19937_64 engine(seed);
   std::uniform_real_distribution<double> uniform(0.01, 1);
@@ -47,7 +47,7 @@ inline Chain random_chain(std::size_t n, unsigned seed, double kill_scale) {
   return Chain::from_dense(n, matrix, kill);
 }
 
-/// A chain of `period` classes of `states` each, full from class to class; state s of class c has the number
+/// Makes a chain of `period` classes of `states` each, full from class to class; state s of class c has the number
 /// s * period + c, so that classes are not contiguous.
 inline Chain cyclic_chain(std::size_t period, std::size_t states, unsigned seed, double kill_scale) {
   std::mt19937_64 engine(seed);

@@ -1,5 +1,5 @@
 #pragma once
-// The program as its users meet it: arguments in, exit code and streams out.
+// Runs the program as its users meet it: arguments in, exit code and streams out.
 
 #include <gtest/gtest.h>
 

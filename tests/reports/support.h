@@ -1,5 +1,5 @@
 #pragma once
-// What several tests of reports/ share.
+// Holds what several tests of reports/ share.
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -11,13 +11,13 @@
 
 namespace metastable::reports::test {
 
-/// The whole of a file; empty if it cannot be read.
+/// Returns the whole of a file; empty if it cannot be read.
 inline std::string read(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// What f prints on standard output. What it throws is passed on.
+/// Returns what f prints on standard output. What it throws is passed on.
 template <class F>
 std::string printed(F f) {
   testing::internal::CaptureStdout();
@@ -30,7 +30,7 @@ std::string printed(F f) {
   return testing::internal::GetCapturedStdout();
 }
 
-/// A test with an empty folder of its own, which goes with it.
+/// Is a test with an empty folder of its own, which goes with it.
 class InFolder : public testing::Test {
  protected:
   void SetUp() override {

@@ -16,7 +16,7 @@ namespace {
 
 const dynamics::NominalValues paper{0.54, 0.045, 0.352, 0.043, dynamics::paper_leg_lengths()};
 
-// A power that grows like the square of the distance from neutral.
+// Gives a power that grows like the square of the distance from neutral.
 double square_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects) {
   const Setting& s = design.conditions.front().setting;
   const dynamics::NominalValues stated = stated_values(s.restitution, s.friction, s.wheel.leg_length);
@@ -139,7 +139,7 @@ TEST(BlindCases, LeftOutEffectsAreNotInTheCatalogueGiven) {
   EXPECT_THROW(blind_kind("some"), std::invalid_argument);
 }
 
-// The laboratory and the likelihood of the diagnosis, which share no formula, on the same effects.
+// The laboratory and the likelihood of the diagnosis, which share no formula, agree on the same effects.
 TEST(EffectPower, GrowsLikeTheSquareOfTheSize) {
   PowerDesign design;
   Setting base;

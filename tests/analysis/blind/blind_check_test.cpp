@@ -1,4 +1,4 @@
-// The diagnosis on sealed cases, small: `metastable blind` is the full check, and its report has the intervals.
+// Puts the diagnosis on sealed cases, small: `metastable blind` is the full check, and its report has the intervals.
 
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ std::vector<Outcome> check(const std::vector<BlindPlan>& plans, std::uint64_t se
   return outcomes;
 }
 
-// The first plans of that kind; of effects, those that no other imitates closely, at 4x.
+// Returns the first plans of that kind; of effects, those that no other imitates closely, at 4x.
 std::vector<BlindPlan> plans_of(BlindKind kind, std::size_t count, std::uint64_t seed) {
   const std::vector<std::string> distinct{"leg_contact",   "contact_memory",   "friction_patch",
                                           "initial_speed", "hub_eccentricity", "ramp_vibration"};

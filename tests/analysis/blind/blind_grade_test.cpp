@@ -8,7 +8,7 @@
 namespace metastable::analysis::test {
 namespace {
 
-// Brown, Cai and DasGupta (2001), Statist. Sci. 16, eq. (4): computed by hand for 0 and 8 of 10.
+// These are by Brown, Cai and DasGupta (2001), Statist. Sci. 16, eq. (4), computed by hand for 0 and 8 of 10.
 TEST(BlindGrade, WilsonIntervals) {
   const auto [a, b] = wilson({0, 10});
   EXPECT_NEAR(a, 0, 1e-12);
@@ -112,7 +112,7 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
   expect(g, "  in the first of the set", 2, 4);
   expect(g, "effect outside the catalogue confidently misnamed", 1, 3);
   expect(g, "effect outside the catalogue called unexplained", 1, 3);
-  // leg_lengths shares the sets of leg_contact in this run: its own ambiguity group.
+  // leg_lengths shares the sets of leg_contact in this run: it is its own ambiguity group.
   expect(g, "left-out effect confidently misnamed", 1, 3);
   expect(g, "left-out effect unexplained, or of its ambiguity group", 2, 3);
 }

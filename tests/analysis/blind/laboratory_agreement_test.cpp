@@ -64,7 +64,7 @@ void expect_found(const dynamics::Effect& effect, const std::vector<std::string>
   }
 }
 
-// Every effect of the catalogue that has a size, drawn as for a blind case.
+// Lists every effect of the catalogue that has a size, drawn as for a blind case.
 std::vector<SizedEffect> sized_effects() {
   std::vector<SizedEffect> effects;
   for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
@@ -75,7 +75,7 @@ std::vector<SizedEffect> sized_effects() {
   return effects;
 }
 
-// The least size, doubled from where the blind search begins, that raises the log likelihood of its trials by 16.
+// Finds the least size, doubled from where the blind search begins, that raises the log likelihood of its trials by 16.
 dynamics::Effect clearly_seen(const SizedEffect& sized) {
   for (double size = sized.start;; size = std::min(2 * size, sized.largest)) {
     const dynamics::Effect effect = sized.at(size);

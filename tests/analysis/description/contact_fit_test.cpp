@@ -17,7 +17,7 @@ namespace {
 
 using Status = ContactFit::Status;
 
-// Trials as an experiment, through the same text a folder holds.
+// Makes trials an experiment, through the same text a folder holds.
 Experiment simulated(Setting setting, int trials, std::uint64_t seed) {
   const ExperimentFiles files =
       experiment_files(setting, simulate_trials(setting, {.trials = trials, .collisions = 16, .seed = seed}), "t", {});
@@ -42,7 +42,7 @@ TEST(Minimize, FindsRosenbrocksValley) {
   EXPECT_NEAR(smooth.at[1], 1, 1e-6);
 }
 
-// The curves of the fast likelihood against the exact density of the landing and probability of rest.
+// Holds the curves of the fast likelihood against the exact density of the landing and probability of rest.
 TEST(ContactFit, FastLikelihoodAgreesWithTheExactDensity) {
   Setting published = stand_in_setting(), coulomb;
   published.slope_deg = 5;  // some trials rest
@@ -61,7 +61,7 @@ TEST(ContactFit, FastLikelihoodAgreesWithTheExactDensity) {
       EXPECT_EQ(fast.impossible(), 0u);
       EXPECT_GT(fast.possible_rests(), 0u);
       std::vector<ContactParameters> points{{0.54, 0.045, 0.352, 0.043}, {0.4, 0.1, 0.4, 0.1}};
-      // A sliver of eta below 1, thinner than the likelihood's grid: its rests once had a probability above 1.
+      // A sliver of eta below 1 is thinner than the likelihood's grid: its rests once had a probability above 1.
       if (setting.law == dynamics::Law::published) points.push_back({1.02, 0.01, 0.4, 0.1});
       for (const ContactParameters& p : points) {
         const double exact = contact_log_likelihood(experiment, {0}, options, p);
@@ -96,7 +96,7 @@ TEST(ContactFit, RecoversTheStandInAlongWhatCanBeKnown) {
     distance += along * along / (direction.sd * direction.sd);
   }
   EXPECT_LT(distance, 13.3);  // chi^2 with 4 degrees of freedom, 99 %
-  // Better than the truth, by less than chance allows: an absolute check of the maximum.
+  // The fit is better than the truth, by less than chance allows: an absolute check of the maximum.
   const double at_truth = contact_log_likelihood(experiment, {2}, {}, truth);
   const ContactFit steps = fit_contact(experiment, {2}, {.intervals = false});
   EXPECT_GT(steps.log_likelihood, at_truth - 0.2);
@@ -131,7 +131,7 @@ TEST(ContactFit, IntervalsHoldWhateverIsAsLikely) {
       const ContactFit fit = fit_contact(experiment, {0}, options);
       const ContactParameters truth = {setting.restitution.mean, setting.restitution.sd, setting.friction.mean,
                                        setting.friction.sd};
-      // Seeds with which it has.
+      // With these seeds it has.
       ASSERT_LT(2 * (fit.log_likelihood - contact_log_likelihood(experiment, {0}, options, truth)), 3.7);
       for (std::size_t i = 0; i < 4; ++i) {
         EXPECT_LE(fit.lower_95[i], truth[i]) << contact_parameter_names[i] << ", seed " << seed;

@@ -29,7 +29,7 @@ TEST(Description, OfTheStandIn) {
   EXPECT_EQ(starts.all_collisions->count_a, 204u);
   EXPECT_EQ(description.conditions[2].survival->rests, 3u);
   EXPECT_TRUE(std::isinf(description.conditions[0].survival->expected.from_start.value));
-  // 194.95 expected steps: see kaplan_meier_test.
+  // There are 194.95 expected steps: see kaplan_meier_test.
   EXPECT_LT(description.conditions[2].survival->expected.from_start.lower, 194.95);
   EXPECT_GT(description.conditions[2].survival->expected.from_start.upper, 194.95);
 }
@@ -76,14 +76,14 @@ TEST(LawComparison, KnowsTheLawThatMadeTheTrials) {
     } else if (row.source != "measured") {
       EXPECT_LT(*row.p_speed, 1e-6) << row.condition << row.source;
     }
-    // 1 - P(steps > 16) of `metastable steps --restitution 0.54,0.045 --friction 0.352,0.043 --json -`.
+    // It is 1 - P(steps > 16) of `metastable steps --restitution 0.54,0.045 --friction 0.352,0.043 --json -`.
     if (row.source == "published, as given") {
       EXPECT_NEAR(row.rest_share.value, 0.06348, 4 * std::sqrt(0.06348 * 0.93652 / 400));
     }
   }
 }
 
-// Trials of `settled` leg by leg beside the same law and beside one with less friction.
+// Puts trials of `settled` leg by leg beside the same law and beside one with less friction.
 TEST(LawComparison, LandingsLegByLegTellFriction) {
   Setting setting;
   setting.law = dynamics::Law::settled;

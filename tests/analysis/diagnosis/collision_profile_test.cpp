@@ -16,7 +16,7 @@ Fit at_nominal(const TransitionModel& model) {
   return fit;
 }
 
-// The measured speeds' means and standard errors, by hand from the trials.
+// The measured speeds' means and standard errors are taken by hand from the trials.
 TEST(CollisionProfile, MeasuredMeansAreThoseOfTheTrials) {
   Experiment e = test::wheel_design(7, 3);  // four trials on the first ramp, three on the second
   for (std::size_t t = 0; t < 7; ++t)
@@ -47,7 +47,7 @@ TEST(CollisionProfile, FewerThanThreeTrialsHaveNoMean) {
     EXPECT_EQ(p.condition, 0U);
 }
 
-// Launches that are faster by 0.5 rad/s, on the same random numbers: the first means differ by just that.
+// Launches are faster by 0.5 rad/s, on the same random numbers: the first means differ by just that.
 TEST(CollisionProfile, SimulatedMeansAreTheModels) {
   const auto model = wheel_transitions(test::wheel_design(200, 3));
   Fit chosen = at_nominal(*model);

@@ -111,7 +111,7 @@ void expect_size_of_the_cause(const GapMap& map) {
   EXPECT_NEAR(cell->size, -0.87, 0.2);
 }
 
-// One diagnosis (each test is a process of its own): name, size, what it closes, and the map's place and sizes.
+// One diagnosis has (each test is a process of its own) name, size, what it closes, and the map's place and sizes.
 TEST(Diagnosis, NamesTheCauseItsSizeItsPlaceAndWhatItCloses) {
   const Diagnosis d = diagnose(*data({{"leg_contact", {{3, 0}, {1.3}}}}, 23), quick());
   expect_named(d);
@@ -157,7 +157,7 @@ TEST(Diagnosis, TriesThePairsAskedFor) {
   EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
 }
 
-// Noise of the contact that grows with speed: two effects on its mean that cancel one another take its shape.
+// Noise of the contact grows with speed here: two effects on its mean that cancel one another take its shape.
 TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   auto conditions = stand_in_conditions(stand_in_setting());
   const dynamics::LaboratorySetup setup =
@@ -210,7 +210,7 @@ TEST(Diagnosis, RefusesOptionsOutOfRange) {
   EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
 }
 
-// The second system: a rotor with a torque that its nominal losses lack.
+// The second system is a rotor with a torque that its nominal losses lack.
 TEST(Diagnosis, NamesTheTorqueOnARotor) {
   const auto design = coast_down_transitions(test::coasting_rotor());
   const auto dragged =

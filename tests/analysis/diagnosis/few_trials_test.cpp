@@ -1,4 +1,4 @@
-// What a diagnosis may say of a handful of trials.
+// Checks what a diagnosis may say of a handful of trials.
 
 #include <gtest/gtest.h>
 
@@ -67,7 +67,7 @@ TEST(FewTrials, SayWhatTheyCannotAndHowManyWouldDo) {
     }
 }
 
-// Steps before failure: where nothing failed, as many trials as make a rest likely under the model.
+// Steps before failure are asked: where nothing failed, as many trials as make a rest likely under the model.
 TEST(FewTrials, OfWhichNoneRestedGiveALowerEndOnly) {
   const Diagnosis d = without_gap(12, 6, 3);
   const NotPossible* steps = find(d, "observed steps before failure");

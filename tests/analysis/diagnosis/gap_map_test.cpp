@@ -34,7 +34,7 @@ TEST(GapMap, FindsTheCellThatIsShiftedAndNothingInNone) {
   EXPECT_GT(gap_map(plain, fit(plain, {3, -0.7}, {}), 500, 1).p_value, 0.02);
 }
 
-// The cell that stands out most where `shift` (event) is added to noise of 0.5.
+// Returns the cell that stands out most where `shift` (event) is added to noise of 0.5.
 template <class Shift>
 GapCell first_cell(unsigned seed, Shift shift) {
   std::mt19937_64 generator(seed);

@@ -13,7 +13,7 @@
 namespace metastable::analysis {
 namespace {
 
-// A torque that the nominal losses lack: held out, its fit closes the gap; recalibration alone does not.
+// There is a torque that the nominal losses lack: held out, its fit closes the gap; recalibration alone does not.
 TEST(GapShrinkage, TheTrueEffectClosesTheGap) {
   const auto design = coast_down_transitions(test::coasting_rotor());
   const EffectTerm truth = test::term(*design, "rolling_resistance", {}, {0.02});
@@ -39,7 +39,7 @@ TEST(GapShrinkage, WithoutRivalsTheLastModelIsTheRecalibratedOne) {
     EXPECT_EQ(one.with_effect, one.recalibrated) << one.measure;
 }
 
-// 40 rests in 10,000 collisions; 20 expected as given, 39 with the effect. Poisson limits of 40: 30.2 and 52.07.
+// 40 rests come in 10,000 collisions; 20 expected as given, 39 with the effect. Poisson limits of 40: 30.2 and 52.07.
 TEST(RestShrinkage, SharesAreThoseOfCounts) {
   StepsBeforeFailure steps;
   steps.observed_lower = 10000 / 52.07;

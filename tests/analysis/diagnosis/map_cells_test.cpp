@@ -23,7 +23,7 @@ std::vector<MapCell> of_facet(const std::vector<MapCell>& cells, const std::stri
   return some;
 }
 
-// 400 transitions in trials of 4.
+// It has 400 transitions in trials of 4.
 const test::Line straight = test::line(0, 3);
 
 TEST(MapCells, RangesSplitAllEventsIntoEqualCounts) {
@@ -91,7 +91,7 @@ TEST(MapCells, SwingsAreCosinesAndSinesOfTheTime) {
     fastest = std::max(fastest, frequency);
     double squares = 0;
     for (const double w : cell.weights) squares += w * w;
-    // Over evenly spread times; the slowest swing is no whole number of turns.
+    // It goes over evenly spread times; the slowest swing is no whole number of turns.
     EXPECT_NEAR(squares / static_cast<double>(cell.weights.size()), 0.5, 0.1) << cell.at;
   }
   EXPECT_GT(swings, 10);

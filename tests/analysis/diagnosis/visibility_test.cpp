@@ -16,7 +16,7 @@ namespace {
 
 using test::line;
 
-// What the data hold on a slope: the squares of w about its mean, over the noise's variance.
+// Returns what the data hold on a slope: the squares of w about its mean, over the noise's variance.
 double information(const std::vector<double>& w, double sd) {
   double sum = 0, squares = 0;
   for (const double one : w) {
@@ -70,7 +70,7 @@ TEST(Visibility, SaysWhatHidesAnEffect) {
   EXPECT_EQ(visibility(scan, {&untold}).front().undecidable, "not scanned");
 }
 
-// y = mean + a w + b v + noise with v of a given correlation with w, and changed experiments with others.
+// Models y = mean + a w + b v + noise with v of a given correlation with w, and changed experiments with others.
 class Plane : public test::Line {
  public:
   Plane(double correlation, unsigned seed) : Line(drawn(seed, 0.5), drawn(seed + 1, 1)) {
@@ -139,7 +139,7 @@ TEST(Visibility, AnEffectLooksLikeAnotherByTheShareThatItExplains) {
   }
 }
 
-// The closed form: what of the cause's slope is left beside the other's, squared, over the noise's variance.
+// The closed form is what of the cause's slope is left beside the other's, squared, over the noise's variance.
 TEST(NextExperiment, SeparatesByWhatTheRivalCannotTakeUp) {
   const Plane model(0.95, 11);
   const double size = 0.3;

@@ -14,7 +14,7 @@
 namespace metastable::analysis::test {
 namespace {
 
-// Tick times of a drum that is driven up and then coasts: omega^2 loses 0.15 + 0.002 omega^2 a revolution, with noise.
+// Returns tick times of a drum driven up that then coasts: omega^2 loses 0.15 + 0.002 omega^2 a revolution, with noise.
 std::vector<double> ticks(double constant, double quadratic, double noise_sd, unsigned seed) {
   std::mt19937_64 bits(seed);
   std::normal_distribution<double> normal;

@@ -14,7 +14,7 @@ using Strings = std::vector<std::string>;
 
 constexpr CsvColumn columns[] = {{"name"}, {"count", true}, {"speed"}};
 
-// The rows' names and the defects of a text.
+// Holds the rows' names and the defects of a text.
 struct Reading {
   Strings names, defects;
 };

@@ -160,7 +160,7 @@ TEST(Experiment, RefusesWhatNoWheelCanHave) {
   };
   EXPECT_EQ(of("1.39", "1e250"), "experiment.toml:2:15: wheel.hub_mass_kg: 1e+250 is outside [1e-06, 1e+06]");
   EXPECT_EQ(of("0.151", "1e5"), "experiment.toml:3:24: wheel.leg_lengths_m[1]: 100000 is outside [0.001, 100]");
-  // The inertia about the hub, where that about the foot is asked for.
+  // It is the inertia about the hub, where that about the foot is asked for.
   EXPECT_EQ(
       of("hub_mass_kg = 1.39\n", "inertia_kg_m2 = 0.0035\nhub_mass_kg = 1.39\n"),
       "experiment.toml:2:17: wheel.inertia_kg_m2: 0.0035 kg m^2 is below M (mean L)^2 = 0.03138 kg m^2, the least "

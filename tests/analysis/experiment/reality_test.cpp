@@ -41,7 +41,7 @@ TEST(Reality, FolderIsReadBackByTheStrictReader) {
   EXPECT_EQ(experiment.columns.omega_plus, Presence::all);
   EXPECT_TRUE(experiment.columns.outcomes);
   EXPECT_EQ(experiment.sensor.noise_sd, 0.01);
-  // Shuffled: conditions take turns.
+  // When shuffled, conditions take turns.
   int turns = 0;
   for (std::size_t t = 1; t < experiment.trials.size(); ++t)
     turns += experiment.trials[t].condition != experiment.trials[t - 1].condition;
@@ -95,7 +95,7 @@ void expect_same(const Experiment& a, const Experiment& b) {
   }
 }
 
-// In memory, with the digits of the files, for every subset of what may be left unsaid and for laws with a gyration.
+// They agree, with the digits of the files, for every subset of what may be left unsaid and for laws with a gyration.
 TEST(Reality, ExperimentInMemoryIsTheOneReadBackFromItsFiles) {
   for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb})
     for (std::size_t subset = 0; subset < std::size_t{1} << droppable().size();
@@ -146,7 +146,7 @@ TEST(Reality, SameSeedSameBytesOnAnyNumberOfThreads) {
   EXPECT_NE(make(two, {}).files.collisions_csv, a.files.collisions_csv);
 }
 
-// The camera's way to the speeds: angle.csv through the finder of collisions, against the true ones.
+// Follows the camera's way to the speeds: angle.csv through the finder of collisions, against the true ones.
 TEST(Reality, CollisionsFoundInTheAngleAreTheTrueOnes) {
   const RealityFiles made = make({}, {.camera = CameraOptions{}});
   const Experiment truth = read(made);

@@ -13,7 +13,7 @@
 namespace metastable::analysis {
 namespace {
 
-// What a real rig does to omega^2 in a revolution, and to the ticks of its counter.
+// Says what a real rig does to omega^2 in a revolution, and to the ticks of its counter.
 struct Rig {
   double constant = 0.09, linear = 0.006, quadratic = 0.0015;
   double tyre = 0;       // swing of the loss with a tyre that turns 3.34 times a revolution [rad^2/s^2]
@@ -50,7 +50,7 @@ Diagnosis diagnosed(const CoastDownRun& nominal, bool linear, const std::vector<
                   options);
 }
 
-// A tyre pressed on the drum: a constant torque fifteen times the nominal constant loss, and a little more that grows
+// A tyre pressed on the drum is a constant torque fifteen times the nominal constant loss, and a little more that grows
 // with the speed. `rough`: the tyre is out of round, and the frame rings at one speed, which the catalogue does not
 // hold.
 const Rig tyre{.constant = 2.1, .linear = 0.006, .quadratic = 0.0021};

@@ -20,7 +20,7 @@ WheelHypothesis hypothesis(double trial_friction_sd = 0) {
   return h;
 }
 
-// One trial whose speeds are next to exact and whose stances are those of the stated wheel.
+// Makes one trial whose speeds are next to exact and whose stances are those of the stated wheel.
 WheelRuns exact_runs(const std::vector<double>& after, double first = 5.4) {
   Experiment e = test::wheel_design(1, after.size());
   e.sensor.noise_sd = 1e-7;
@@ -73,8 +73,8 @@ TEST(TrialFollower, SeesExactSpeedsAsTheModelsOwnDensities) {
   EXPECT_EQ(collisions, 3);
 }
 
-// The trial's own friction by a fine trapezoidal sum over all of its collisions at once, where the follower takes five
-// nodes and weighs them anew at each.
+// Takes the trial's own friction by a fine trapezoidal sum over all of its collisions at once, where the follower takes
+// five nodes and weighs them anew at each.
 TEST(TrialFollower, IntegratesTheTrialsOwnFriction) {
   const double sd = 0.02;
   const WheelRuns measured = exact_runs({3.5, 3.2, 3.3, 3.1});
@@ -161,7 +161,7 @@ TEST(TrialFollower, EveryEventHasItsDensityWhateverWasMeasured) {
             EXPECT_EQ(chances[i] > 0, is_contact(events[i].kind));
             at_risk += chances[i] > 0;
           }
-          // One a collision, but for a last one of which nothing is known.
+          // There is one a collision, but for a last one of which nothing is known.
           const std::size_t unknown = !outcomes && (rests || !speeds_after) ? 3 : 0;
           EXPECT_EQ(at_risk, 9 - unknown);
           EXPECT_EQ(of_kind(measured, EventKind::launch).size(), launches ? 3U : 0U);

@@ -15,7 +15,7 @@
 namespace metastable::analysis {
 namespace {
 
-// Trials simulated under the nominal model, with this noise on every speed, printed with so many digits.
+// Reads trials simulated under the nominal model, with this noise on every speed, printed with so many digits.
 WheelRuns printed(double noise, int digits, std::optional<double> stated) {
   Setting setting = paper_setting(7.02, false);
   ExperimentFiles files = experiment_files(setting, simulate_trials(setting, {.trials = 60, .seed = 5}), "printed", {});
@@ -55,7 +55,7 @@ TEST(WheelRuns, LegsThatWereNotNotedAreFoundFromTheStances) {
   const auto data = design->simulate(nominal_values(*design), {}, 3);
   Experiment e = test::wheel_design(20, 10);
   e.columns.leg = Presence::none;
-  // The simulated speeds, without legs.
+  // These are the simulated speeds, without legs.
   std::size_t event = 0;
   for (MeasuredTrial& trial : e.trials)
     for (std::size_t k = 0; k < trial.collisions.size(); ++k) trial.collisions[k].leg.reset();
@@ -108,7 +108,7 @@ TEST(WheelRuns, PositionsAndTimesThatWereNotMeasuredAreCompleted) {
       EXPECT_NEAR(context.position, chord * static_cast<double>(k), 1e-12);
       ASSERT_EQ(context.since_previous.has_value(), k > 0);
       if (k == 0) continue;
-      // pi/4 at speeds that lie above the slowest of the stance and below the fastest reported.
+      // It turns pi/4 at speeds that lie above the slowest of the stance and below the fastest reported.
       EXPECT_GT(*context.since_previous, std::numbers::pi / 4 / 5.5);
       EXPECT_LT(*context.since_previous, std::numbers::pi / 4 / 2.5);
     }

@@ -44,8 +44,8 @@ TEST(WheelTransitions, FitsFindTheSizesOfEffects) {
   }
 }
 
-// Trials rolled event by event under `settled`, with feet that hop and slide; next speeds after odd legs are reported
-// so much too fast, those after even ones too slow [rad/s].
+// Makes transitions of trials rolled event by event under `settled`, with feet that hop and slide; next speeds after
+// odd legs are reported so much too fast, those after even ones too slow [rad/s].
 std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off, double form_error = 0) {
   Setting stated;
   stated.law = dynamics::Law::settled;

@@ -16,7 +16,7 @@ struct Score {
   double peak_bias = 0, bias = 0, sd = 0, plus_bias = 0, plus_sd = 0, time_sd = 0;
 };
 
-// Simulated trials, recorded and found again.
+// Scores simulated trials that are recorded and found again.
 Score score(const Setting& setting, double rate, double noise, const FinderOptions& options = {}) {
   const auto trials = simulate_trials(setting, {.trials = 60, .collisions = 16, .seed = 11});
   const dynamics::WheelMap map = setting.map();
@@ -54,7 +54,7 @@ Score score(const Setting& setting, double rate, double noise, const FinderOptio
   return s;
 }
 
-// The demand: 99 % of the collisions at 120 Hz and 0.2 mrad. Bias and spread as measured, with room of about two.
+// The demand is 99 % of the collisions at 120 Hz and 0.2 mrad. Bias and spread are as measured, with room of about two.
 TEST(CollisionFinder, FindsTheCollisionsOfAnOrdinaryCamera) {
   for (const double slope : {7.02, 9.59}) {
     const Score s = score(paper_setting(slope, false), 120, 0.0002);
@@ -104,7 +104,7 @@ TEST(CollisionFinder, StopsAtTheNumberAskedForAndFindsTheApex) {
   EXPECT_EQ(all.stopped, "no peak near the leg angle behind collision 16");
 }
 
-// A speed that rises and falls by itself: no wheel, but peaks where they are known.
+// A speed rises and falls by itself: no wheel, but peaks where they are known.
 TEST(CollisionFinder, CountsPeaksBetweenCollisionsAsBounces) {
   const dynamics::WheelMap map = paper_setting(9.59, true).map();
   AngleRecording recording;
@@ -112,7 +112,7 @@ TEST(CollisionFinder, CountsPeaksBetweenCollisionsAsBounces) {
   constexpr double rate = 1000, step = 0.2;
   for (int i = 0; i < 1400; ++i) {
     const double t = i / rate, phase = std::fmod(t, step) / step;
-    // 45 degrees a step; half way through the steps a smaller tooth.
+    // It turns 45 degrees a step; half way through the steps a smaller tooth.
     const double tooth = phase < 0.6 ? 1.5 * phase / 0.6 : (phase - 0.6) / 0.4 * 2.6;
     recording.time.push_back(t);
     recording.angle_rad.push_back(angle);

@@ -7,7 +7,7 @@
 namespace metastable::analysis {
 namespace {
 
-// The tables of Savitzky and Golay (1964), as corrected by Steinier, Termonia and Deltour (Anal. Chem. 44, 1972).
+// Savitzky and Golay (1964) have these tables, as corrected by Steinier, Termonia and Deltour (Anal. Chem. 44, 1972).
 TEST(SavitzkyGolay, GivesThePublishedWeights) {
   const auto expect = [](const SavitzkyGolay& filter, std::vector<double> weights, double divisor) {
     const std::span<const double> found = filter.weights(filter.window() / 2);

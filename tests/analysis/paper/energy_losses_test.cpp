@@ -9,10 +9,10 @@
 namespace metastable::analysis {
 namespace {
 
-// The paper's Fig. 8: tangential net loss N(0.05, 0.03^2) J at spreads of 0.05 and N(0.11, 0.19^2) J at 0.2, normal
-// loss about 0.17 J with sds of 0.06 to 0.10 J. Trials that go on where x' < 0 (x' = 0 then) come close: the numbers
-// below, to the three digits that simulations of these trials gave. Ending a trial there gives 0.120 (0.194) and 0.165
-// (0.109).
+// The paper's Fig. 8 has a tangential net loss N(0.05, 0.03^2) J at spreads of 0.05 and N(0.11, 0.19^2) J at 0.2,
+// normal loss about 0.17 J with sds of 0.06 to 0.10 J. Trials that go on where x' < 0 (x' = 0 then) come close: the
+// numbers below, to the three digits that simulations of these trials gave. Ending a trial there gives 0.120 (0.194)
+// and 0.165 (0.109).
 TEST(EnergyLosses, FigureEightOfThePaper) {
   Setting setting = paper_setting(7.02, false);
   setting.restitution.sd = setting.friction.sd = 0.05;

@@ -55,7 +55,7 @@ TEST(PaperStudy, ReadingsAndLawsDiffer) {
   EXPECT_EQ(coulomb.usual_spreads().profile.rest_share, 0);
   EXPECT_EQ(coulomb.usual_spreads().profile.steady.size(), 200u * 4);
   EXPECT_GT(settled.usual_spreads().profile.rest_share, 0.8);
-  // Fig. 8 (energy_losses_test.cpp: spreads of 0.05 and 0.2), to the sampling error of 200 trials.
+  // This is Fig. 8 (energy_losses_test.cpp: spreads of 0.05 and 0.2), to the sampling error of 200 trials.
   EXPECT_NEAR(goes_on.fig8.front().losses.tangential_net.mean, 0.066,
               4 * goes_on.fig8.front().losses.tangential_net.standard_error + 5e-4);
   EXPECT_NEAR(goes_on.fig8.back().losses.normal.mean, 0.141,

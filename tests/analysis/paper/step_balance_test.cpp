@@ -48,7 +48,7 @@ TEST(StepBalance, FindsWhatStepsLackAndWhatItGoesWith) {
   ASSERT_EQ(b.slides.size(), 5u);
   EXPECT_NEAR(*b.slides[0].slide, 0.001, 1e-9);
   EXPECT_EQ(b.legs.size(), 8u);
-  // A point mass and equal legs: cos^2 of the leg angle.
+  // A point mass and equal legs keep cos^2 of the leg angle.
   e.wheel.leg_length.assign(8, 0.15);
   e.wheel.radius_of_gyration = 1e-9;
   EXPECT_NEAR(step_balances(e).conditions[0].plastic, 0.5, 1e-6);

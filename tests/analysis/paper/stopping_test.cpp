@@ -7,7 +7,7 @@
 namespace metastable::analysis {
 namespace {
 
-// Of stopping_setting(), by an independent prototype's direct simulation (standard error 1.7).
+// Holds the steps of stopping_setting(), by an independent prototype's direct simulation (standard error 1.7).
 constexpr double base_steps = 83.9;
 
 TEST(Stopping, TheLegAfterTheShortestSlidesAndRestsMost) {

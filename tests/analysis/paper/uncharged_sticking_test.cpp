@@ -23,7 +23,7 @@ TEST(UnchargedSticking, IsThePublishedLawBelowTheCriticalFriction) {
   const dynamics::WheelMap map = equal_legs().map();
   const UnchargedSticking uncharged(map);
   const double critical = uncharged.sticking_friction(0);
-  // x = L cos(beta), y = L sin(beta), beta = 67.5 deg.
+  // Here x = L cos(beta), y = L sin(beta), beta = 67.5 deg.
   const double beta = 3 * std::numbers::pi / 8, s = std::sin(beta);
   EXPECT_NEAR(critical, std::cos(beta) * s / (1 + s * s), 1e-12);
   for (const double omega : {2.0, 5.0}) {

@@ -27,7 +27,7 @@ TEST(WorkedExamples, WithoutTheChargeOnStickingRestIsRarer) {
   for (const ChargeOnSticking& ramp : ramps) {
     EXPECT_GT(ramp.uncharged.lower, ramp.published.upper);
     EXPECT_TRUE(std::isinf(ramp.coulomb.value));
-    // mu ~ N(0.4, 0.1^2) on [0, inf), of which 3e-5 of the normal is cut off.
+    // It is of mu ~ N(0.4, 0.1^2) on [0, inf), of which 3e-5 of the normal is cut off.
     EXPECT_NEAR(ramp.share_above, 0.5 * std::erfc((ramp.critical_friction - 0.4) / 0.1 / std::sqrt(2.0)), 1e-4);
   }
   EXPECT_NEAR(ramps[0].published.value, 4.2585, 0.05 * 4.2585);  // integrated_study_test.cpp

@@ -26,7 +26,7 @@ TEST(Comparison, ASettingAgainstItselfDiffersByNothing) {
   const Comparison comparison =
       compare({paper_setting(7.02, true), paper_setting(7.02, true)}, {.cells = 64, .samples = 1024});
   EXPECT_DOUBLE_EQ(comparison.contrasts[0].ratio->value, 1.0);
-  // Common random numbers: nothing is left but the discretization errors.
+  // With common random numbers nothing is left but the discretization errors.
   EXPECT_NEAR(comparison.contrasts[0].ratio->upper, std::exp(2 * comparison.studies[0].steps.discretization_error),
               1e-9);
   EXPECT_FALSE(comparison.contrasts[0].trials_needed);
@@ -44,7 +44,7 @@ TEST(Comparison, NoRatioWhereOneSideIsInfinite) {
   EXPECT_TRUE(contrast.trials_needed);  // trials that rest tell it from one that does not
 }
 
-// Two geometric lifetimes, failure 0.5 and 0.25 a step, seen for 2 collisions: min(T, 3) has means 1.75 and 2.3125.
+// Of two geometric lifetimes, failure 0.5 and 0.25 a step, seen for 2 collisions, min(T, 3) has means 1.75 and 2.3125.
 TEST(Comparison, TrialsToTellApartByHand) {
   const std::vector<double> a{1, 0.5, 0.25}, b{1, 0.75, 0.5625};
   const double var_a = (1 + 3 * 0.5 + 5 * 0.25) - 1.75 * 1.75, var_b = (1 + 3 * 0.75 + 5 * 0.5625) - 2.3125 * 2.3125;

@@ -1,4 +1,4 @@
-// The adjoint against differences of full solves, against itself by two methods, and against scaling laws.
+// Holds the adjoint against differences of full solves, against itself by two methods, and against scaling laws.
 
 #include "analysis/sensitivity/sensitivity.h"
 
@@ -22,7 +22,7 @@ Sensitivities by_adjoint(const Setting& setting, const StudyOptions& options) {
   return sensitivities(study(setting, options), options);
 }
 
-// d ln M / d parameter by re-solving on either side, with rows integrated.
+// Takes d ln M / d parameter by re-solving on either side, with rows integrated.
 double by_solves(const Setting& setting, Parameter parameter, double step) {
   double log_steps[2];
   for (int side : {0, 1}) {
@@ -53,7 +53,7 @@ TEST(Sensitivity, SampledAgreesWithDifferencesOfFullSolves) {
   }
 }
 
-// 1.46e7 steps. The values are central differences of full solves with 128 integrated nodes. To reproduce:
+// It takes 1.46e7 steps. The values are central differences of full solves with 128 integrated nodes. To reproduce:
 // `metastable steps --legs 0.1519 --initial-speed 7.35,0.19 --method integrated --cells 128 --friction 0.3,0.03` with
 // --slope 7.019 and 7.021, then with --friction 0.2999,0.03 and 0.3001,0.03, then 0.3,0.02999 and 0.3,0.03001.
 TEST(Sensitivity, RareFailureKeepsItsDigits) {
@@ -100,7 +100,7 @@ TEST(Sensitivity, CoulombAgreesWithDifferencesOfFullSolves) {
   for (const Sensitivity& one : all.ranked) EXPECT_NE(one.parameter, Parameter::ramp_stiffness);
 }
 
-// A mean of 0 cannot be lowered: moved up alone.
+// A mean of 0 cannot be lowered: it is moved up alone.
 TEST(Sensitivity, AMeanAtTheEndOfItsRange) {
   Setting setting = paper_setting(7.02, true);
   setting.restitution = {0, 0.1};
@@ -115,7 +115,7 @@ TEST(Sensitivity, AMeanAtTheEndOfItsRange) {
   EXPECT_NEAR(one.derivative, std::log(steps(0.002) / steps(0)) / 0.002, 0.02 * std::abs(one.derivative));
 }
 
-// All legs longer by one factor: the sum over the legs one by one.
+// All legs longer by one factor give the sum over the legs one by one.
 TEST(Sensitivity, LegsOneByOneAddUpToTheirCommonScale) {
   const Setting setting = paper_setting(9.59, false);
   const Sensitivities all = by_adjoint(setting, {.cells = 64, .samples = 2048, .replicates = 2});

@@ -12,8 +12,8 @@
 namespace metastable::analysis {
 namespace {
 
-// Freireich et al. (1963), 6-MP arm, weeks to relapse (+: censored); survival and standard errors as tabulated in
-// Kalbfleisch and Prentice, "The Statistical Analysis of Failure Time Data".
+// Returns Freireich et al. (1963), 6-MP arm, weeks to relapse (+: censored); survival and standard errors as tabulated
+// in Kalbfleisch and Prentice, "The Statistical Analysis of Failure Time Data".
 std::vector<ObservedSteps> six_mp() {
   std::vector<ObservedSteps> trials;
   for (const int t : {6, 6, 6, 7, 10, 13, 16, 22, 23}) trials.push_back({t, true});
@@ -41,7 +41,7 @@ TEST(KaplanMeier, GivesTheSixMpArm) {
     EXPECT_LT(point.lower, point.survival);
     EXPECT_GT(point.upper, point.survival);
   }
-  // R: survfit(..., conf.type = "log-log") at week 23.
+  // In R it is survfit(..., conf.type = "log-log") at week 23.
   EXPECT_NEAR(points[22].lower, 0.188, 5e-4);
   EXPECT_NEAR(points[22].upper, 0.680, 5e-4);
 }
@@ -69,7 +69,7 @@ TEST(KaplanMeier, SaysWhereThereIsOnlyABound) {
   EXPECT_THROW(kaplan_meier(std::vector<ObservedSteps>{{0, true}}), std::invalid_argument);
 }
 
-// Trials of the stand-in's wheel at 7.02 deg: 194.95 expected steps (`metastable steps`, interval 194.63 to 195.27).
+// The stand-in's wheel takes at 7.02 deg 194.95 expected steps (`metastable steps`, interval 194.63 to 195.27).
 TEST(KaplanMeier, IntervalsCoverTheChainsExpectedSteps) {
   Setting setting = stand_in_setting();
   int covered = 0;

@@ -1,4 +1,4 @@
-// Numbers rounded to what their interval knows.
+// Checks numbers rounded to what their interval knows.
 
 #include "analysis/statistics/number_text.h"
 
@@ -58,8 +58,8 @@ std::size_t decimals_of(const Decimal& d) {
   return point == std::string::npos ? 0 : d.mantissa.size() - point - 1;
 }
 
-// Of intervals of any size and place: rounding moves no number by more than a sixth of the width, and value and ends
-// have the same decimals and power of ten.
+// This holds for intervals of any size and place: rounding moves no number by more than a sixth of the width, and value
+// and ends have the same decimals and power of ten.
 TEST(NumberText, RoundingStaysWithinWhatTheIntervalKnows) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> exponent(-12, 12), relative(-3, 0.3), side(0, 1);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double half_quantile = 1.9207294103470619;  // of chi^2 with one degree of freedom at 0.95, halved
 
-// n normal values of mean 2 and sd 0.5 (maximum likelihood): minus ln likelihood in the mean and ln sd.
+// Takes n normal values of mean 2 and sd 0.5 (maximum likelihood): minus ln likelihood in the mean and ln sd.
 constexpr double n = 12;
 double normal_sample(const std::vector<double>& x, std::vector<double>& gradient) {
   const double off = x[0] - 2, square = (0.25 + off * off) * std::exp(-2 * x[1]);
@@ -27,7 +27,7 @@ Minimum least() {
 const Eigen::MatrixXd hessian{{n / 0.25, 0}, {0, 2 * n}};
 
 TEST(ProfileInterval, OfANormalSamplesMeanAndSd) {
-  // The mean's profile is n/2 ln(1 + (m - 2)^2 / 0.25): a closed form, wider than the curvature's 1.96 sd / sqrt(n).
+  // The mean's profile is n/2 ln(1 + (m - 2)^2 / 0.25), a closed form, wider than the curvature's 1.96 sd / sqrt(n).
   const auto both = profile_intervals(normal_sample, {{least(), hessian}}, {-10, -10}, {10, 10});
   const ProfileInterval &mean = both[0], &sd = both[1];
   const double half = 0.5 * std::sqrt(std::expm1(2 * half_quantile / n));
@@ -47,7 +47,7 @@ TEST(ProfileInterval, SaysWhereTheRangeEndsFirst) {
   EXPECT_TRUE(mean.bounded_above);
 }
 
-// A ridge: the sum is known to 0.01, the difference to 1 only.
+// On a ridge the sum is known to 0.01, the difference to 1 only.
 TEST(ProfileInterval, FollowsARidge) {
   const auto ridge = [](const std::vector<double>& x, std::vector<double>& gradient) {
     const double sum = (x[0] + x[1]) / 0.01, difference = x[0] - x[1];
@@ -64,7 +64,7 @@ TEST(ProfileInterval, FollowsARidge) {
   }
 }
 
-// Two wells, at -2 and, higher by 0.5, at 2; between them the cost is well above the level.
+// There are two wells, at -2 and, higher by 0.5, at 2; between them the cost is well above the level.
 TEST(ProfileInterval, SpansAllModes) {
   const auto wells = [](const std::vector<double>& x, std::vector<double>& gradient) {
     const double well = x[0] * x[0] - 4;
@@ -80,7 +80,7 @@ TEST(ProfileInterval, SpansAllModes) {
   const ProfileInterval both = profile_intervals(wells, modes, {-5, -5}, {5, 5})[0];
   EXPECT_LT(one.upper, -1);
   EXPECT_EQ(both.lower, one.lower);
-  // On the far side of the second well, where it has risen by 1.92 over the first.
+  // It ends on the far side of the second well, where it has risen by 1.92 over the first.
   EXPECT_NEAR(std::pow(both.upper * both.upper - 4, 2) + 0.125 * (both.upper + 2) - modes[0].minimum.value,
               half_quantile, 0.08);
 }

@@ -11,7 +11,7 @@
 namespace metastable::analysis {
 namespace {
 
-// Ishigami and Homma (1990) with a = 7, b = 0.1: indices in closed form.
+// Is Ishigami and Homma's function (1990) with a = 7, b = 0.1: indices in closed form.
 void ishigami(std::span<const double> u, std::span<double> out) {
   double x[3];
   for (std::size_t i = 0; i < 3; ++i) x[i] = std::numbers::pi * (2 * u[i] - 1);
@@ -28,14 +28,14 @@ TEST(SobolIndices, OfIshigami) {
     const SobolIndex& index = result[0].group[g];
     EXPECT_NEAR(index.first.value, first[g], 0.015);
     EXPECT_NEAR(index.total.value, total[g], 0.015);
-    // 95 %, widened by half: four of six would pass by the definition of the interval alone.
+    // Half-widths of 95 % are widened by half: four of six would pass by the definition of the interval alone.
     EXPECT_LT(std::abs(index.total.value - total[g]), 1.5 * (index.total.upper - index.total.value) + 1e-12);
   }
 }
 
 TEST(SobolIndices, AGroupHoldsItsInteractions) {
   const auto result = sobol_indices({2, 1}, 1, ishigami, {.samples = 1 << 15});
-  // x1 and x2 together: S1 + S2 (x1 and x2 do not interact), total 1 - S3.
+  // x1 and x2 together have S1 + S2 (x1 and x2 do not interact), and total 1 - S3.
   EXPECT_NEAR(result[0].group[0].first.value, 0.7563, 0.02);
   EXPECT_NEAR(result[0].group[0].total.value, 1, 0.02);
 }
@@ -59,7 +59,7 @@ TEST(VarianceSources, AreThoseOfTheWheel) {
   const VarianceSources coulomb = variance_of_trials(setting, 0.000687, {.samples = 512, .threads = 1});
   EXPECT_TRUE(coulomb.steps.group.empty());  // never rests at 7.02 deg
   EXPECT_DOUBLE_EQ(coulomb.steps.mean, 32);
-  // Constant contact: only the launch and the legs are left.
+  // With constant contact only the launch and the legs are left.
   Setting constant = setting;
   constant.restitution.sd = constant.friction.sd = 0;
   const VarianceSources few = variance_of_trials(constant, 0.000687, {.samples = 512});

@@ -10,7 +10,8 @@
 namespace metastable::analysis {
 namespace {
 
-// Student (1908), Cushny and Peebles' sleep data; the results are those of R's t.test(extra ~ group, data = sleep).
+// Cushny and Peebles (Student 1908) gave these sleep data; the results are those of R's t.test(extra ~ group, data =
+// sleep).
 const std::vector<double> group_1 = {0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0};
 const std::vector<double> group_2 = {1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4};
 
@@ -49,7 +50,7 @@ TEST(TwoSampleTests, ConstantSamplesHaveAnAnswer) {
   EXPECT_THROW(welch_t_test(a, std::vector<double>{1.0}), std::invalid_argument);
 }
 
-// All ways to split the ranks 1..n+m.
+// Goes through all ways to split the ranks 1..n+m.
 template <typename Use>
 void each_split(int n, int m, const Use& use) {
   std::vector<int> chosen(static_cast<std::size_t>(n + m), 0);
@@ -85,7 +86,7 @@ TEST(TwoSampleTests, KolmogorovsLimitFollowsTheExactCount) {
   EXPECT_NEAR(limit / exact, 1, 0.35);  // 20 values moved, and the limit's own error
 }
 
-// Scholz and Stephens: over all splits of distinct values the mean of A^2 is 1 and its variance their (4).
+// By Scholz and Stephens, over all splits of distinct values the mean of A^2 is 1 and its variance their (4).
 TEST(TwoSampleTests, AndersonDarlingHasItsMeanAndIsCalibrated) {
   double count = 0, sum = 0, rejected = 0, five = 0;
   each_split(6, 7, [&](const auto& x, const auto& y) {
@@ -100,7 +101,7 @@ TEST(TwoSampleTests, AndersonDarlingHasItsMeanAndIsCalibrated) {
   EXPECT_NEAR(five / count, 0.25, 0.02);
 }
 
-// Percentage points: numerical inversion (Imhof) of sum chi^2_1 / (j (j + 1)), j = 1, 2, ...
+// The percentage points come from numerical inversion (Imhof) of sum chi^2_1 / (j (j + 1)), j = 1, 2, ...
 TEST(TwoSampleTests, AndersonDarlingsLimit) {
   EXPECT_NEAR(anderson_darling_tail(1.933), 0.0999943, 2e-5);
   EXPECT_NEAR(anderson_darling_tail(2.492), 0.0500225, 2e-5);

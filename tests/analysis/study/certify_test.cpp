@@ -1,4 +1,4 @@
-// Guaranteed bounds around expected steps that other methods give.
+// Checks guaranteed bounds around expected steps that other methods give.
 
 #include "analysis/study/certify.h"
 
@@ -18,7 +18,7 @@ Setting with_friction(double slope_deg, bool equal, Spread friction) {
 }
 
 TEST(Certify, HoldsTheKnownAnswers) {
-  // From the integrated method, stable to the digits given.
+  // Comes from the integrated method, stable to the digits given.
   struct Known {
     double slope_deg;
     Spread friction;
@@ -39,7 +39,7 @@ TEST(Certify, HoldsThePapersLegs) {
   const CertifiedSteps c = certify(with_friction(9.59, false, {0.4, 0.1}), {.largest_cells = 80});
   ASSERT_TRUE(c.exists) << c.reason;
   EXPECT_EQ(c.from_state.nodes.size(), 8U);
-  // 400 cells: 6.129061 to 6.139277.
+  // 400 cells give 6.129061 to 6.139277.
   EXPECT_LT(c.lower, 6.1391);
   EXPECT_GT(c.upper, 6.1292);
   EXPECT_LT(c.width(), 0.05);

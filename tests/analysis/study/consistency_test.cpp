@@ -66,7 +66,7 @@ TEST(Consistency, IntervalAndCertificateOverlap) {
   EXPECT_NO_THROW(require_consistent(sound(), certified));
 }
 
-// Two ways that share the return map alone: draws in cells, and exact rows on nodes.
+// These are two ways that share the return map alone: draws in cells, and exact rows on nodes.
 TEST(Consistency, SampledAndIntegratedOverlapAtEveryLaunchSpeed) {
   Setting setting = paper_setting(7.02, true);
   const auto of = [&](Method method) {

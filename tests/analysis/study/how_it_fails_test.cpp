@@ -1,4 +1,4 @@
-// How the wheel fails, against trials followed collision by collision.
+// Checks how the wheel fails against trials followed collision by collision.
 
 #include "analysis/study/how_it_fails.h"
 

@@ -40,8 +40,8 @@ Metastability integrated(const Setting& setting, double tolerance, std::size_t c
 }
 
 TEST(IntegratedStudy, GivesTheKnownAnswersOfThePapersWheel) {
-  // Direct simulation: 4.26 and 6.17 (tests/dynamics/return_map/trials_test.cpp); sampled and
-  // extrapolated: 4.2585(1), 6.1746(2).
+  // Direct simulation gives 4.26 and 6.17 (tests/dynamics/return_map/trials_test.cpp); sampling and extrapolation
+  // 4.2585(1), 6.1746(2).
   const Metastability flat = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-3);
   EXPECT_EQ(flat.method, Method::integrated);
   EXPECT_EQ(flat.status, Status::converged);
@@ -52,7 +52,7 @@ TEST(IntegratedStudy, GivesTheKnownAnswersOfThePapersWheel) {
 }
 
 TEST(IntegratedStudy, GivesEightDigitsWithFewNodes) {
-  // LandingDensity, an adaptive integral for each pair of nodes, on 256 nodes of equal panels: 4.2584828629.
+  // LandingDensity, an adaptive integral for each pair of nodes, gives 4.2584828629 on 256 nodes of equal panels.
   const Metastability result = integrated(equal_legs(7.02, {0.4, 0.1}), 1e-8);
   EXPECT_EQ(result.status, Status::converged);
   EXPECT_LE(result.cells, 128u);
@@ -60,7 +60,7 @@ TEST(IntegratedStudy, GivesEightDigitsWithFewNodes) {
 }
 
 TEST(IntegratedStudy, IsRightWhereFailuresAreRare) {
-  // Sampled and extrapolated: 46577.7(50).
+  // Sampled and extrapolated it is 46577.7(50).
   EXPECT_NEAR(integrated(equal_legs(9.59, {0.3, 0.05}), 1e-3).steps.from_start.value, 46577.7, 5);
 }
 
@@ -97,7 +97,7 @@ TEST(IntegratedStudy, ComparisonsHaveNoSamplingError) {
   EXPECT_LT(ratio.upper - ratio.lower, 0.1);
 }
 
-// Where two levels once agreed by chance, or the changes fell faster than the error.
+// These are settings where two levels once agreed by chance, or the changes fell faster than the error.
 TEST(IntegratedStudy, IntervalsHoldTheValueOfATighterTolerance) {
   struct Case {
     double slope_deg;
@@ -141,15 +141,15 @@ TEST(IntegratedStudy, TakesCoulomb) {
   setting.initial_speed = {4.5, 0.2};
   const Metastability result = integrated(setting, 1e-8);
   EXPECT_EQ(result.status, Status::converged);
-  // Direct simulation: 24.68 (s.e. 0.03), tests/dynamics/return_map/trials_test.cpp. The digits: 24 panels of 16 nodes
-  // between edges of three generations, and 30 points a panel of eta and mu: 24.67743312.
+  // Direct simulation gives 24.68 (s.e. 0.03), tests/dynamics/return_map/trials_test.cpp. The digits are of 24 panels
+  // of 16 nodes between edges of three generations, and 30 points a panel of eta and mu: 24.67743312.
   EXPECT_NEAR(result.steps.from_start.value, 24.68, 0.09);
   EXPECT_NEAR(result.steps.from_start.value / 24.67743312, 1, 1e-9);
   EXPECT_NEAR(result.steps.distribution.mean / result.steps.from_start.value, 1, 1e-12);
   EXPECT_LT(result.steps.solver_disagreement, 1e-12);
 }
 
-// Constant friction, constant restitution, spreads that reach their bounds.
+// Friction or restitution is constant, or spreads reach their bounds.
 TEST(IntegratedStudy, TakesAnyNoise) {
   struct Case {
     dynamics::Law law;
@@ -172,9 +172,9 @@ TEST(IntegratedStudy, TakesAnyNoise) {
   }
 }
 
-// metastable steps --restitution 0.4,0.2 --friction 0.45,0 --legs 0.1519 --tolerance 0.001: 3.33529 (3.33441
+// metastable steps --restitution 0.4,0.2 --friction 0.45,0 --legs 0.1519 --tolerance 0.001 says 3.33529 (3.33441
 // to 3.33617).
-// The paper's Fig. 6.
+// It is the paper's Fig. 6.
 TEST(IntegratedStudy, OfConstantFrictionAgreesWithSampling) {
   Setting setting = equal_legs(7.02, {0.45, 0});
   setting.restitution = {0.4, 0.2};

@@ -1,4 +1,4 @@
-// Expected steps that were obtained elsewhere, by other means.
+// Checks expected steps that were obtained elsewhere, by other means.
 
 #include <gtest/gtest.h>
 
@@ -23,9 +23,9 @@ struct Row {
 
 class PublishedWheel : public testing::TestWithParam<Row> {};
 
-// Direct simulation of whole trials (tests/dynamics/return_map/trials_test.cpp does it again): equal legs of 0.1519 m,
-// `published`, eta ~ N(0.4, 0.1^2). The figures have three digits; half a unit of the third is allowed beside their
-// error.
+// This is by direct simulation of whole trials (tests/dynamics/return_map/trials_test.cpp does it again): equal legs of
+// 0.1519 m, `published`, eta ~ N(0.4, 0.1^2). The figures have three digits; half a unit of the third is allowed beside
+// their error.
 TEST_P(PublishedWheel, ExpectedStepsAreInsideTheStudysOwnInterval) {
   const Row row = GetParam();
   Setting setting = paper_setting(row.slope_deg, true);
@@ -41,7 +41,7 @@ INSTANTIATE_TEST_SUITE_P(KnownAnswers, PublishedWheel,
                          testing::Values(Row{7.02, 0.4, 0.1, 4.26, 0.0022}, Row{9.59, 0.4, 0.1, 6.17, 0.0018},
                                          Row{7.02, 0.3, 0.05, 1.30e3, 0.005}, Row{9.59, 0.3, 0.05, 4.66e4, 0.005}));
 
-// Direct simulation of whole trials: 24.68 steps (s.e. 0.03), likewise.
+// Direct simulation of whole trials gives 24.68 steps (s.e. 0.03), likewise.
 TEST(KnownAnswers, CoulombOnAGentleSlope) {
   StudyOptions options;
   options.tolerance = 0.003;
@@ -50,8 +50,8 @@ TEST(KnownAnswers, CoulombOnAGentleSlope) {
               3 * 0.03 + 0.5 * (result.steps.from_start.upper - result.steps.from_start.lower));
 }
 
-// The wheel of Byl and Tedrake (IJRR 28, 2009) at a mean slope of 8 deg: its integral equation solved with numbers of
-// sixty digits. tests/markov/rows/rough_terrain_test.cpp solves it once more, in double precision.
+// These are for the wheel of Byl and Tedrake (IJRR 28, 2009) at a mean slope of 8 deg: its integral equation solved
+// with numbers of sixty digits. tests/markov/rows/rough_terrain_test.cpp solves it once more, in double precision.
 struct Rough {
   double sd_deg, rate, from_quasi_stationary, from_fixed_point;
 };
@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(KnownAnswers, RoughTerrain,
                                          Rough{1.5, 1.5280057867965971e-6, 654447.78327473479, 654449.43992398285},
                                          Rough{1.0, 1.1990367683962527e-12, 834002781530.65289, 834002781532.82850}));
 
-// To 1e-3 at 2 deg on sampled cells, with the kill rates from the error function.
+// It agrees to 1e-3 at 2 deg on sampled cells, with the kill rates from the error function.
 TEST(KnownAnswers, RoughTerrainOnSampledCellsToOneInAThousand) {
   const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = 2 * degree});
   const double start = wheel.fixed_point();
@@ -106,7 +106,7 @@ TEST(KnownAnswers, RoughTerrainOnSampledCellsToOneInAThousand) {
   EXPECT_NEAR(steps / 4326.1846791959863, 1.0, 1e-3);
 }
 
-// metastable steps --legs 0.1519 --friction 0.3,0.03 --method integrated: 1.5e7 steps. Rarer still, the study keeps
+// metastable steps --legs 0.1519 --friction 0.3,0.03 --method integrated says 1.5e7 steps. Rarer still, the study keeps
 // converging.
 TEST(KnownAnswers, RareFailuresAreSeen) {
   Setting setting = paper_setting(7.02, true);

@@ -45,7 +45,7 @@ Sample sample(const std::vector<double>& values) {
   return s;
 }
 
-// The chain against whole trials that share nothing with it but the map: uneven legs, defaults of the program.
+// The chain agrees with whole trials that share nothing with it but the map: uneven legs, defaults of the program.
 TEST(Metastability, AgreesWithMonteCarloTrials) {
   Setting setting = paper_setting(9.59, false);
   setting.ramp_length = std::numeric_limits<double>::infinity();  // trials go on to rest
@@ -108,7 +108,7 @@ TEST(Metastability, AgreesWithMonteCarloTrials) {
   EXPECT_NEAR(chain.violations[0].until_rest, lifted / collisions, 0.01);
 }
 
-// Uneven legs: the one-revolution product against elimination on the full (leg, omega^2) chain.
+// With uneven legs it holds the one-revolution product against elimination on the full (leg, omega^2) chain.
 TEST(Metastability, RevolutionProductAgreesWithTheFullChain) {
   const Problem problem = paper_setting(7.02, false).problem();
   const markov::StateSpace space = markov::covering_space(problem.map, problem.launch, 48, 1);
@@ -119,7 +119,7 @@ TEST(Metastability, RevolutionProductAgreesWithTheFullChain) {
   const std::vector<double> ones(space.size(), 1.0);
   const std::vector<double> by_product = product.solve(ones), full = markov::Elimination(sampled.chain).solve(ones);
   for (std::size_t i = 0; i < full.size(); ++i) EXPECT_NEAR(by_product[i] / full[i], 1.0, 1e-12);
-  // Per-step rate: one step of the full chain from the per-leg quasi-stationary distributions, leg after leg.
+  // The rate per step is of one step of the full chain from the per-leg quasi-stationary distributions, leg by leg.
   const markov::QuasiStationary quasi = markov::quasi_stationary(product);
   double survives = 1;
   for (int p = 0; p < 8; ++p) {
@@ -254,17 +254,17 @@ TEST(Metastability, SettingsThatSoonRestAreAnswered) {
     return study(setting).steps.from_start.value;
   };
   using dynamics::Law;
-  // Without noise: the launch's distribution decides. By trials: 3.852.
+  // Without noise the launch's distribution decides. By trials it is 3.852.
   EXPECT_NEAR(steps(Law::coulomb, 2, {4.5, 0.2}, {0.4, 0}, {0.4, 0}), 3.852, 0.01);
-  // Hardly any noise; by trials 3.274.
+  // There is hardly any noise; by trials it is 3.274.
   EXPECT_NEAR(steps(Law::published, 6, {5, 0.2}, {0.4, 0.002}, {0.4, 0.002}), 3.274, 0.01);
-  // Too slow to survive even once, or nearly so.
+  // These are too slow to survive even once, or nearly so.
   EXPECT_NEAR(steps(Law::published, 0.5, {3, 0.1}, {0.4, 0.1}, {0.4, 0.1}), 1.0, 1e-6);
   EXPECT_NEAR(steps(Law::published, 0.5, {5, 0.1}, {0.4, 0.1}, {0.4, 0.1}), 1.391, 0.01);
   EXPECT_DOUBLE_EQ(steps(Law::published, 7.02, {0, 0}, {0.4, 0.1}, {0.4, 0.1}), 1.0);
 }
 
-// Uneven legs, from a launch of which all trials rest at once: survival once rose again after the first step.
+// These are uneven legs, from a launch of which all trials rest at once: survival once rose again after the first step.
 TEST(Metastability, LaunchesTooSlowToVaultRestAtOnce) {
   Setting setting = paper_setting(9.59, false);
   setting.friction = {0.3, 0.05};
@@ -285,7 +285,7 @@ TEST(Metastability, LaunchesTooSlowToVaultRestAtOnce) {
   }
 }
 
-// Each once stretched the cells over the launch. By a million trials: 6.4694 (s.e. 0.0034), 8.1936 (0.0043).
+// Each once stretched the cells over the launch. A million trials give 6.4694 (s.e. 0.0034), 8.1936 (0.0043).
 TEST(Metastability, FastLaunchesDoNotStretchTheCells) {
   Setting setting = paper_setting(7.02, false);
   const double regime = study(setting.problem(), {}).steps.from_quasi_stationary.value;
@@ -299,7 +299,7 @@ TEST(Metastability, FastLaunchesDoNotStretchTheCells) {
     EXPECT_NEAR(result.steps.from_start.value / trials, 1, 0.004);
     EXPECT_NEAR(result.steps.from_quasi_stationary.value / regime, 1, 2e-4);
   }
-  // The fastest that options take, by 20,000 trials: 9.194 (s.e. 0.035).
+  // The fastest that options take gives 9.194 (s.e. 0.035) by 20,000 trials.
   EXPECT_NEAR(study_of({1000, 0.1}).steps.from_start.value, 9.194, 0.1);
 }
 
@@ -316,7 +316,7 @@ TEST(Metastability, LengthsAndSpeedsScale) {
 }
 
 TEST(Metastability, FailuresRarerThanTheDrawsReachDeepenTheTail) {
-  // Rough terrain at a spread of 0.6 deg: 1.4e31 steps, beyond tails of 1e-30.
+  // Rough terrain at a spread of 0.6 deg takes 1.4e31 steps, beyond tails of 1e-30.
   constexpr double degree = M_PI / 180;
   const auto rough = [&](double sd_deg) {
     const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = 8 * degree, .sd_slope_rad = sd_deg * degree});
@@ -362,7 +362,7 @@ TEST(Metastability, RegimeDoesNotDependOnTheLaunch) {
   EXPECT_NEAR(slow.steps.from_quasi_stationary.value, 1.12363, 5e-4);  // --method integrated
   EXPECT_NEAR(fast.steps.from_quasi_stationary.value, 1.12363, 1e-3);
   EXPECT_LT(fast.steps.from_quasi_stationary.upper - fast.steps.from_quasi_stationary.lower, 0.01);
-  // Spectra sees eigenvalues there that are rounding. Said, not shown.
+  // Spectra sees eigenvalues there that are rounding. That is said, not shown.
   EXPECT_NEAR(fast.spectrum.moduli.front(), 0.11003, 5e-4);
   EXPECT_EQ(fast.spectrum.moduli.size(), 1u);
   EXPECT_NE(fast.message.find("eigenvalues beyond lambda_1: "), std::string::npos) << fast.message;
@@ -413,7 +413,7 @@ TEST(Metastability, LegsThatHardlyEverFailDoNotHoldTheOthersUp) {
   setting.law = dynamics::Law::coulomb;
   setting.initial_speed = {4, 0.3};
   const Metastability result = study(setting);
-  // metastable steps --law coulomb --slope 3.5 --initial-speed 4,0.3 --method integrated
+  // It is that of metastable steps --law coulomb --slope 3.5 --initial-speed 4,0.3 --method integrated.
   EXPECT_LE(result.steps.from_start.lower, 1.2837e5);
   EXPECT_GE(result.steps.from_start.upper, 1.2837e5);
 }

@@ -1,7 +1,7 @@
-// Random settings within range under every law and method: each gets an answer that holds together, and every fiftieth
-// is judged by direct simulation. The suite takes the first 40; METASTABLE_SETTINGS=10000 METASTABLE_FIRST_SETTING=0 is
-// the long run. One in twenty may be refused by a solver with its sentence; a contradiction or a wrong number may not
-// be.
+// Random settings within range go under every law and method: each gets an answer that holds together, and every
+// fiftieth is judged by direct simulation. The suite takes the first 40; METASTABLE_SETTINGS=10000
+// METASTABLE_FIRST_SETTING=0 is the long run. One in twenty may be refused by a solver with its sentence; a
+// contradiction or a wrong number may not be.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -31,8 +31,8 @@ struct Drawn {
   StudyOptions options;
 };
 
-// Every fiftieth, and those under `settled`: few, as their landings are followed one by one for half a minute a
-// setting.
+// Every fiftieth is judged, and those under `settled`: few, as their landings are followed one by one for half a minute
+// a setting.
 constexpr std::uint64_t settled_every = 200;
 bool settled(std::uint64_t index) { return index % settled_every == settled_every - 1; }
 bool judged(std::uint64_t index) { return index % 50 == 0 || settled(index); }
@@ -67,7 +67,7 @@ Drawn draw(std::uint64_t index) {
   drawn.options.tolerance = 0.05;
   drawn.options.brief = true;
   drawn.options.threads = 1;
-  // As coarse as an answer allows where what is asked is whether it holds together.
+  // It is as coarse as an answer allows where what is asked is whether it holds together.
   if (judged(index)) {
     drawn.options.largest_cells = 512;
     drawn.options.largest_samples = 1u << 14;
@@ -100,7 +100,7 @@ Follow simulation(const Setting& setting) {
   };
 }
 
-// Steps, no more than are shown of survival: a number that every law has, rolling for ever or not.
+// Compares steps, no more than are shown of survival: a number that every law has, rolling for ever or not.
 void judge(const Setting& setting, const Metastability& study, double tolerance) {
   const Follow follow = simulation(setting);
   const std::size_t most = std::min<std::size_t>(study.steps.survival.size(), 64);

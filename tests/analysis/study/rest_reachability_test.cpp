@@ -74,7 +74,7 @@ TEST(RestReachability, SlowLaunchesOfAnEndlessWheelRest) {
   const Metastability result = study(setting);
   EXPECT_TRUE(std::isinf(result.steps.from_start.value));
   EXPECT_NE(result.message.find("the others rest"), std::string::npos);
-  // Rest at once below the threshold speed of the barrier: P(omega_0 < 3.061) for N(3, 0.1^2).
+  // They rest at once below the threshold speed of the barrier: P(omega_0 < 3.061) for N(3, 0.1^2).
   const double threshold = std::sqrt(*result.steps.safe_state);
   EXPECT_NEAR(*result.steps.reach_end, 0.5 * std::erfc((threshold - 3) / 0.1 / std::sqrt(2.0)), 2e-3);
   EXPECT_EQ(result.steps.distribution.quantile(0.5), 1.0);

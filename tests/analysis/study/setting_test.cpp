@@ -48,7 +48,7 @@ TEST(Setting, ErrorsNameTheQuantityAndItsRange) {
   expect_message([](Setting& s) { s.first_landing_leg = 8; }, "first landing leg: 8 is outside 0..7");
   expect_message([](Setting& s) { s.rebound_lost = 2; }, "rebound");
   expect_message([](Setting& s) { s.correlation = 1; }, "correlation");
-  // What no wheel has, but the arithmetic would take.
+  // No wheel has these, but the arithmetic would take them.
   expect_message([](Setting& s) { s.wheel.hub_mass = 1e250; }, "hub_mass: 1e+250 kg is outside [1e-06, 1e+06]");
   expect_message([](Setting& s) { s.wheel.leg_length[3] = 1e9; },
                  "leg_length[3]: 1000000000 m is outside [0.001, 100]");

@@ -1,4 +1,4 @@
-// Expected steps under `settled`: the chain against wheels rolled event by event, and its methods against each other.
+// Checks steps under `settled`: the chain against wheels rolled event by event, and its methods against each other.
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@
 namespace metastable::analysis {
 namespace {
 
-// J = 0.0025 kg m^2.
+// Has J = 0.0025 kg m^2.
 Setting settled(double slope_deg, Spread restitution, Spread friction, bool equal_legs) {
   Setting setting = paper_setting(slope_deg, equal_legs);
   setting.law = dynamics::Law::settled;
@@ -32,7 +32,7 @@ struct Rolled {
   double mean = 0, standard_error = 0;
 };
 
-// Direct simulation, with whatever motion a foot still has when the next one lands.
+// Simulates directly, with whatever motion a foot still has when the next one lands.
 Rolled roll(const Setting& setting, std::size_t trials) {
   const dynamics::SettledMotion motion = setting.motion();
   const dynamics::ContactNoise noise = setting.noise();
@@ -97,9 +97,9 @@ TEST(SettledStudy, HasNoProvenBoundsAndNoSafeSlope) {
   EXPECT_FALSE(safe_slope_deg(setting));
 }
 
-// Twelve settings against the wheels rolled here, and where it is known against direct simulation of an independent
-// prototype (no end of the ramp, tips of no radius). The suite takes the first; METASTABLE_SETTINGS=12 takes all, in
-// some minutes.
+// Holds twelve settings against the wheels rolled here, and where it is known against direct simulation of an
+// independent prototype (no end of the ramp, tips of no radius). The suite takes the first; METASTABLE_SETTINGS=12
+// takes all, in some minutes.
 TEST(SettledStudy, TwelveSettingsAreTheRolledWheel) {
   struct Contact {
     Spread restitution, friction;

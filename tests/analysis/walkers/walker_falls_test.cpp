@@ -1,4 +1,4 @@
-// How a walker falls, against walks followed step by step.
+// Checks how a walker falls against walks followed step by step.
 
 #include "analysis/walkers/walker_falls.h"
 
@@ -34,7 +34,7 @@ TEST(WalkerFalls, AreThoseOfWalksFollowed) {
       slope.push_back(step.slope_deg);
     }
     const StepProfile& told = falls.moments.last[k];
-    // Within a tenth of the middle 90 % of all steps: what 1500 walks and this mesh leave open.
+    // Close is within a tenth of the middle 90 % of all steps: what 1500 walks and this mesh leave open.
     const auto close = [&](const Estimate& one, const Estimate& regime, const std::vector<double>& walked) {
       EXPECT_NEAR(one.value, median(walked), 0.1 * (regime.upper - regime.lower)) << k;
     };

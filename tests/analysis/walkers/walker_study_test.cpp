@@ -28,7 +28,7 @@ TEST(WalkerStudy, FourDimensionsOnTheCoarsestMeshes) {
     EXPECT_LT(passage.steps_upper / passage.steps_lower, 1.06);
     steps.push_back(passage.steps);
   }
-  // Low, and rising towards 68.87 (direct simulation by an independent program, standard error 0.30).
+  // They are low, and rise towards 68.87 (direct simulation by an independent program, standard error 0.30).
   EXPECT_LT(steps[0], steps[1]);
   EXPECT_LT(steps[1], 68.87);
   const auto simulated = markov::simulate_steps(batch, start, {.trials = 400, .seed = 5});
@@ -36,7 +36,7 @@ TEST(WalkerStudy, FourDimensionsOnTheCoarsestMeshes) {
   EXPECT_NEAR(simulated->mean, 68.87, 4 * std::hypot(simulated->standard_error, 0.30));
 }
 
-// Reference: 28.151 (0.059), by an independent simulation.
+// The reference is 28.151 (0.059), by an independent simulation.
 TEST(WalkerStudy, SimplestWalkerIsWhatSimulationsSay) {
   WalkerSetting setting{Walker::simplest, 0.009 * per_radian, 0.0015 * per_radian, dynamics::Terrain::fresh};
   const WalkerStudy study =

@@ -1,4 +1,4 @@
-// The walkers and the wheel on meshes across ranks, against the same meshes on one process.
+// Holds the walkers and the wheel on meshes across ranks, against the same meshes on one process.
 
 #include <numbers>
 

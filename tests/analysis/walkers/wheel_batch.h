@@ -1,5 +1,5 @@
 #pragma once
-// The wheel with its uneven legs as phases of a mesh.
+// Makes the wheel with its uneven legs as phases of a mesh.
 
 #include <numbers>
 
@@ -8,7 +8,7 @@
 
 namespace metastable::analysis {
 
-/// The paper's legs on 7.02 deg, eta ~ N(0.4, 0.1^2), mu ~ N(0.35, 0.1^2).
+/// Has the paper's legs on 7.02 deg, eta ~ N(0.4, 0.1^2), mu ~ N(0.35, 0.1^2).
 inline dynamics::WheelMap wheel_of_tests() {
   return {dynamics::Wheel{}, 7.02 * std::numbers::pi / 180, dynamics::Law::published,
           dynamics::ContactNoise::normal(0.4, 0.1, 0.35, 0.1)};

@@ -1,4 +1,4 @@
-// The wheel with its eight uneven legs as phases of a mesh, against exact rows of its own chain.
+// Holds the wheel with its eight uneven legs as phases of a mesh, against exact rows of its own chain.
 
 #include <gtest/gtest.h>
 

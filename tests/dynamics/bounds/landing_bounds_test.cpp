@@ -90,7 +90,7 @@ TEST(LandingBounds, FineOnesLieWithinCoarseOnes) {
     }
 }
 
-// Second differences of C, whose own bounds leave a little play.
+// These are second differences of C, whose own bounds leave a little play.
 TEST(LandingBounds, CurvatureHoldsSecondDifferences) {
   const WheelMap m = map(9.59, 0.3, 0.05);
   const double lowest = m.state_interval(0).first;

@@ -1,4 +1,4 @@
-// Masses and moments of the panels, against 120 digits.
+// Holds masses and moments of the panels against 120 digits.
 
 #include "dynamics/bounds/restitution_panels.h"
 

@@ -27,7 +27,7 @@ Impact impact_of(Law law, const Collision& c, const ContactModel& model, const C
           .contact_mass = model.contact_mass};
 }
 
-// Two ways to the same numbers: closed forms of the laws, and the march along the impulse.
+// There are two ways to the same numbers: closed forms of the laws, and the march along the impulse.
 RC_GTEST_PROP(ImpulseCollision, AgreesWithTheLawsOverTheWholeBox, ()) {
   Wheel wheel = even_wheel();
   wheel.radius_of_gyration = uniform(0.02, 0.2);
@@ -47,7 +47,7 @@ RC_GTEST_PROP(ImpulseCollision, AgreesWithTheLawsOverTheWholeBox, ()) {
   }
 }
 
-// Half a period of the damped oscillator, pi / sqrt(K/m (1 - xi^2)).
+// It is half a period of the damped oscillator, pi / sqrt(K/m (1 - xi^2)).
 TEST(ImpulseCollision, ClosedTimeOfTheKelvinVoigtRamp) {
   for (const double xi : {0.0, 0.1, 0.3, 0.7, 0.95}) {
     const double eta = std::exp(-xi * std::numbers::pi / std::sqrt(1 - xi * xi));

@@ -40,7 +40,7 @@ Effect effect(const std::string& text) {
                           {s.restitution_mean, s.restitution_sd, s.friction_mean, s.friction_sd, s.wheel.leg_length});
 }
 
-// Without effects, collision by collision: two ways that share no formula.
+// Compares, without effects and collision by collision, two ways that share no formula.
 void compare_with_return_map(const LaboratorySetup& setup) {
   int compared = 0, rests = 0;
   for (const LaboratoryTrial& trial : run_all(setup)) {
@@ -94,7 +94,7 @@ TEST(Laboratory, SlipReversalIsTheCoulombWheel) {
   }
 }
 
-// omega+^2 - omega-^2 of the next collision, plus what gravity gave: the work of the drag over the stance.
+// Takes omega+^2 - omega-^2 of the next collision, plus what gravity gave: the work of the drag over the stance.
 double drag_work(const std::string& text) {
   LaboratorySetup setup = paper_setup(Law::plastic);
   setup.wheel.leg_length.assign(8, 0.1519);
@@ -107,12 +107,12 @@ double drag_work(const std::string& text) {
   return gravity - inertia / 2 * (b.omega_minus * b.omega_minus - a.omega_plus * a.omega_plus);
 }
 
-// The inertia about a foot that the laboratory's motion shows: what the hub's fall gave, turned into rotation.
+// Returns the inertia about a foot that the laboratory's motion shows: what the hub's fall gave, turned into rotation.
 double shown_inertia(const LaboratorySetup& setup, const LaboratoryTrial& trial, std::size_t k) {
   const Wheel& wheel = setup.wheel;
   const auto leg = static_cast<std::size_t>(trial.collisions[k].leg);
   const double slope = setup.conditions[trial.condition].slope_rad, own = wheel.leg_length[leg];
-  // Height of the hub over the foot it stands on when another foot touches behind (1) or ahead (-1).
+  // Returns the height of the hub over the foot it stands on when another foot touches behind (1) or ahead (-1).
   const auto height = [&](double other, double side) {
     const double chord = std::sqrt(own * own + other * other - 2 * own * other * std::cos(std::numbers::pi / 4));
     const double to_ramp = std::acos((own * own + chord * chord - other * other) / (2 * own * chord));
@@ -135,7 +135,7 @@ double ring_inertia(double mass, double radius, double length) {
   return sum;
 }
 
-// Written twice, in the laboratory and for the contact laws: neither asks the other.
+// It is written twice, in the laboratory and for the contact laws: neither asks the other.
 TEST(Laboratory, ItsInertiaIsThatOfTheLaws) {
   for (const Law law : {Law::published, Law::coulomb})
     for (const bool stated : {false, true}) {
@@ -314,7 +314,7 @@ TEST(Laboratory, FeetHopFromTheirOnsetOn) {
   EXPECT_EQ(after(none.omega_minus + 0.01).omega_plus, none.omega_plus);
 }
 
-// The mean speed over a window before a collision: below the speed there while the wheel speeds up.
+// The mean speed over a window before a collision is below the speed there while the wheel speeds up.
 TEST(Laboratory, SmoothingReportsMeansOverTheWindow) {
   LaboratorySetup setup = paper_setup();
   setup.smoothing = 0.02;

@@ -11,7 +11,7 @@
 namespace metastable::dynamics::test {
 namespace {
 
-/// Integral of the density over all survivors, on `panels` equal panels.
+/// Returns the integral of the density over all survivors, on `panels` equal panels.
 double total(const WheelMap& map, double state, double upper, int panels) {
   const LandingDensity density(map, state, 0);
   const double lower = map.state_interval(0).first;
@@ -33,7 +33,7 @@ TEST(LandingDensity, SumsToTheSurvivors) {
 
 TEST(LandingDensity, SumsToTheSurvivorsWhereTheSpreadsReachTheirBounds) {
   const WheelMap map = wheel_map(Law::published, 7.02, ContactNoise::normal(0.4, 0.2, 0.4, 0.2));
-  // A singularity of the size of both bounds' densities: fixed nodes converge slowly here.
+  // There is a singularity of the size of both bounds' densities: fixed nodes converge slowly here.
   EXPECT_NEAR(total(map, 30, 45, 60), 1 - rest_probability(map, 30, 0), 3e-4);
 }
 

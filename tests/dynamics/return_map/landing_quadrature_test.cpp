@@ -76,7 +76,7 @@ TEST(LandingPoints, AgreeWithTheDensity) {
   };
   const auto smooth = [](double y) { return std::exp(0.1 * y); };
   EXPECT_NEAR(expectation(map, state, {}, smooth) / integral(smooth, lowest, 60), 1, 1e-9);
-  // A kink, and a jump, where a break says so.
+  // It has a kink, and a jump, where a break says so.
   const auto bent = [&](double y) { return std::max(0.0, y - kink); };
   EXPECT_NEAR(expectation(map, state, {kink}, bent) / integral(bent, kink, 60), 1, 1e-9);
   const auto step = [&](double y) { return y > kink ? 1.0 : 0.0; };

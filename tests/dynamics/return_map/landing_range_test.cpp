@@ -13,7 +13,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Slowest state a survivor can have: if rest is unreachable from there it is unreachable.
+// It starts from the slowest state a survivor can have: if rest is unreachable from there it is unreachable.
 bool rest_reachable(double slope) {
   const WheelMap map(even_wheel(), slope, Law::coulomb, paper_noise);
   return map.landing_range(map.state_interval(0).first, 0).first == -infinity;

@@ -18,7 +18,7 @@ bool rests(const WheelMap& map, double state, const Contact& contact) {
   return !(map.after_collision(state, 0, contact) >= map.stance(0).barrier);
 }
 
-// Fine quadrature in eta and, for each eta, in mu up to every sign change found on a fine grid of mu (bisection).
+// Takes fine quadrature in eta and, for each eta, in mu up to every sign change found on a fine grid of mu (bisection).
 double two_dimensional(const WheelMap& map, double state) {
   const TruncatedNormal &eta = map.noise().restitution(), &mu = map.noise().friction();
   using Gauss = boost::math::quadrature::gauss<double, 15>;
@@ -46,7 +46,7 @@ double two_dimensional(const WheelMap& map, double state) {
   double total = 0;
   constexpr int panels = 40;
   for (int i = 0; i < panels; ++i) {
-    // panels shrink towards eta = 0, where T_r has its logarithm
+    // Panels shrink towards eta = 0, where T_r has its logarithm.
     const double a = std::pow(i / double(panels), 3), b = std::pow((i + 1) / double(panels), 3);
     total += Gauss::integrate([&](double e) { return eta.density(e) * inner(e); }, a, b);
   }
@@ -62,9 +62,9 @@ TEST(RestProbability, AgreesWithTwoDimensionalQuadrature) {
     }
 }
 
-// All frictions above mu_c are one: the rest probability jumps as a function of eta. Reference: for each mu the set of
-// eta in closed form, over mu by a midpoint rule below mu_c (good to 1e-4 at its kinks) and by its distribution
-// function above.
+// All frictions above mu_c are one: the rest probability jumps as a function of eta. The reference takes for each mu
+// the set of eta in closed form, over mu by a midpoint rule below mu_c (good to 1e-4 at its kinks) and by its
+// distribution function above.
 TEST(RestProbability, AgreesWithTheOtherOrderOfIntegrationForCoulomb) {
   const WheelMap map(even_wheel(), 3 * degree, Law::coulomb, ContactNoise::normal(0.4, 0.1, 0.4, 0.1));
   const TruncatedNormal &eta = map.noise().restitution(), &mu = map.noise().friction();
@@ -97,7 +97,7 @@ TEST(RestProbability, AgreesWithTheOtherOrderOfIntegrationForCoulomb) {
   EXPECT_GE(reachable, 4);
 }
 
-// Far tails: on ln p the two ways must agree to the accuracy of the quadrature, at 1e-20 and far below.
+// In far tails, on ln p, the two ways must agree to the accuracy of the quadrature, at 1e-20 and far below.
 TEST(RestProbability, KeepsRelativeAccuracyInTheFarTail) {
   double smallest = 1;
   for (double mean : {0.3, 0.25})
@@ -106,7 +106,7 @@ TEST(RestProbability, KeepsRelativeAccuracyInTheFarTail) {
       const double state = 26;
       const double p = rest_probability(map, state, 0);
       smallest = std::min(smallest, p);
-      // Reference: composite Gauss over eta on 400 panels, mu's root by bisection (a single upper root here).
+      // The reference is composite Gauss over eta on 400 panels, mu's root by bisection (a single upper root here).
       double reference = 0;
       for (int i = 0; i < 400; ++i)
         reference += boost::math::quadrature::gauss<double, 15>::integrate(

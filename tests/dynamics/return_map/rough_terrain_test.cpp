@@ -32,7 +32,7 @@ TEST(RoughTerrain, FixedPointIsFixed) {
 RC_GTEST_PROP(RoughTerrain, RestIsWhereTheSlopeIsTooFlat, ()) {
   const RoughTerrainWheel w = wheel(uniform(0.5, 3));
   const double state = uniform(0, 3);
-  // Root of next(state, slope) by bisection; the upper tail (slopes beyond 45 deg) is out of reach here.
+  // This is the root of next(state, slope) by bisection; the upper tail (slopes beyond 45 deg) is out of reach here.
   double flat = -60 * degree, steep = 45 * degree;
   for (int k = 0; k < 80; ++k) (w.next(state, (flat + steep) / 2) <= 0 ? flat : steep) = (flat + steep) / 2;
   const double expected = normal_cdf((flat - 8 * degree) / w.options().sd_slope_rad);
@@ -49,7 +49,7 @@ RC_GTEST_PROP(RoughTerrain, LandingsStayInTheInterval, ()) {
   RC_ASSERT(least == -std::numeric_limits<double>::infinity());
 }
 
-// 1 - lambda_1 of the map to sixty digits (see tests/markov/rows/rough_terrain_test.cpp), here from a Nystrom
+// It checks 1 - lambda_1 of the map to sixty digits (see tests/markov/rows/rough_terrain_test.cpp), here from a Nystrom
 // discretisation on Gauss nodes and power iteration; the kill rate of the quasi-stationary distribution is
 // rest_probability averaged over it.
 TEST(RoughTerrain, BenchmarkKillRates) {
@@ -65,7 +65,7 @@ TEST(RoughTerrain, BenchmarkKillRates) {
         node.push_back(top / 2 * (1 + side * Rule::abscissa()[i]));
         weight.push_back(top / 2 * Rule::weights()[i]);
       }
-    // Density of landing at y from x: the slope that leads there, by bisection, and the map's derivative in it.
+    // The density of landing at y from x takes the slope that leads there, by bisection, and the map's derivative.
     const std::size_t n = node.size();
     std::vector<double> kernel(n * n);
     for (std::size_t i = 0; i < n; ++i)

@@ -14,7 +14,7 @@
 namespace metastable::dynamics {
 namespace {
 
-// Equal legs, J = 0.0025 kg m^2; a table that is enough for eta from 0.2 to 0.6.
+// Has equal legs, J = 0.0025 kg m^2; a table that is enough for eta from 0.2 to 0.6.
 SettledReturnMap engine_wheel(const ContactNoise& noise, bool direct = false) {
   Wheel wheel = test::even_wheel();
   wheel.radius_of_gyration = std::sqrt(0.0025 / wheel.hub_mass);
@@ -29,7 +29,7 @@ SettledReturnMap engine_wheel(const ContactNoise& noise, bool direct = false) {
   return {wheel, 7.02 * test::degree, noise, 6, options};
 }
 
-// mu ~ N(0.4, 0.03^2), eta ~ N(0.4, 0.05^2).
+// Is mu ~ N(0.4, 0.03^2), eta ~ N(0.4, 0.05^2).
 ContactNoise engine_noise() { return ContactNoise::normal(0.4, 0.05, 0.4, 0.03, 0, most_settled_restitution); }
 
 TEST(SettledReturnMap, RowsAreDistributions) {
@@ -46,7 +46,7 @@ TEST(SettledReturnMap, RowsAreDistributions) {
     }
     EXPECT_NEAR(sum, 1, 1e-8);
     EXPECT_NEAR(*map.rest_probability(omega * omega, phase) / rest, 1, 1e-10);
-    // The same by draws.
+    // This is the same by draws.
     std::mt19937_64 random(7);
     std::normal_distribution<double> score;
     constexpr int draws = 4000;

@@ -38,8 +38,8 @@ WheelMap published(double slope, double friction, double sd) {
   return {even_wheel(), slope * degree, Law::published, ContactNoise::normal(0.4, 0.1, friction, sd)};
 }
 
-// metastable steps --legs 0.1519 --method integrated, with --slope 9.59 or --friction 0.3,0.05: 4.26, 6.17 and 1.30e3
-// steps; half a unit of the third digit is allowed for.
+// metastable steps --legs 0.1519 --method integrated, with --slope 9.59 or --friction 0.3,0.05, gives 4.26, 6.17 and
+// 1.30e3 steps; half a unit of the third digit is allowed for.
 TEST(Trials, ExpectedStepsOfThePublishedLaw) {
   const Moments flat = steps(published(7.02, 0.4, 0.1), launch_7, 100000);
   EXPECT_NEAR(flat.mean(), 4.26, 4 * flat.error() + 0.005);
@@ -58,7 +58,7 @@ TEST(Trials, ExpectedStepsOfTheCoulombLaw) {
   EXPECT_NEAR(m.mean(), 24.68, 4 * std::hypot(m.error(), 0.03));
 }
 
-// The paper's Fig. 8 as tests/analysis/paper/energy_losses_test.cpp reads it, to rounding and four standard errors.
+// This is Fig. 8 as tests/analysis/paper/energy_losses_test.cpp reads it, to rounding and four standard errors.
 TEST(Trials, EnergyLossesOfFigure8) {
   struct Row {
     int k;
@@ -129,7 +129,7 @@ TEST(Trials, FeetAndClockAdvance) {
   EXPECT_EQ(trial.collisions.front().time, 0);
   EXPECT_NEAR(trial.collisions.back().position, 3.604, 1e-3);
   EXPECT_EQ(trial.collisions[9].leg, 1);
-  // 45 deg a step, at speeds between the slowest (over the foot) and the fastest (before a collision).
+  // It turns 45 deg a step, at speeds between the slowest (over the foot) and the fastest (before a collision).
   const double step = trial.collisions[20].time - trial.collisions[19].time;
   EXPECT_GT(step * 5.8, 45 * degree);
   EXPECT_LT(step * 3.8, 45 * degree);
@@ -170,7 +170,7 @@ TEST(Trials, IllegalInputIsNamed) {
   EXPECT_EQ(message_of([&] { steps_to_rest(map, launch_7, -1, 1, 0, 10); }), "first_landing_leg: -1 is outside [0, 7]");
 }
 
-// settled.md: 28.9 (27.7 to 30.1) % of the trials rest before 3.66 m, at steady speeds about 4.8 rad/s.
+// settled.md says: 28.9 (27.7 to 30.1) % of the trials rest before 3.66 m, at steady speeds about 4.8 rad/s.
 TEST(Trials, SettledRestsAsItsOwnDirectSimulationSays) {
   Wheel wheel;
   wheel.radius_of_gyration = std::sqrt(0.0025 / wheel.hub_mass);

@@ -84,7 +84,7 @@ RC_GTEST_PROP(WheelMap, TableLandsLikeTheMap, ()) {
 }
 
 double duration_by_quadrature(const Stance& s, double next_state) {
-  // Both halves in terms of the distance from the apex, where the wheel is slowest.
+  // Both halves are in terms of the distance from the apex, where the wheel is slowest.
   const double apex = next_state - s.pendulum * (1 - std::sin(s.end_angle_rad));
   boost::math::quadrature::tanh_sinh<double> rule;
   const auto half = [&](double width) {

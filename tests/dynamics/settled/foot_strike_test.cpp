@@ -58,7 +58,7 @@ RC_GTEST_PROP(FootStrike, TakesWhatTheSingleImpulseLawTakes, ()) {
 }
 
 TEST(FootStrike, FirstImpactOfALandingThatSlips) {
-  // omega+/omega- = 1 - (1 + eta) c (d - mu h) / (J/M + d^2 - mu d h), below the friction that sticks.
+  // It has omega+/omega- = 1 - (1 + eta) c (d - mu h) / (J/M + d^2 - mu d h), below the friction that sticks.
   const Triangle both = triangle(0.1524, 0.1528, std::numbers::pi / 4);
   const double d = both.contact_x, h = both.hub_height, k2 = 0.0025 / 1.39, omega = 4.8;
   const double behind = both.chord - d;
@@ -71,7 +71,7 @@ TEST(FootStrike, FirstImpactOfALandingThatSlips) {
 }
 
 TEST(FootStrike, SlipThatJamsEndsWithoutApproach) {
-  // Painleve: sliding down the plane without approach, mu above (J/M + d^2) / (d h).
+  // Painleve's case is sliding down the plane without approach, mu above (J/M + d^2) / (d h).
   const ContactLever at{-0.0583, 0.1408, 0.0018};
   const PlaneVelocity sliding{0.3 + 0.1408 * 4, 0.0583 * 4, 4};
   ASSERT_NEAR(at.lift(sliding), 0, 1e-15);

@@ -21,7 +21,7 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr double slope = 7.02 * degree;
 constexpr ContactSpread usual{0.4, 0.05, 0.38, 0.03};
 
-// Equal legs, whose grid is one leg's.
+// Has equal legs, whose grid is one leg's.
 Wheel equal_wheel() {
   Wheel wheel;
   wheel.leg_length.assign(8, 0.152);
@@ -54,7 +54,7 @@ class Draws {
   std::normal_distribution<double> normal_;
 };
 
-// Largest distance of the draws' distribution function from `below`, times the root of their number.
+// Returns the largest distance of the draws' distribution function from `below`, times the root of their number.
 double kolmogorov(std::vector<double> drawn, const std::function<double(double)>& below) {
   std::sort(drawn.begin(), drawn.end());
   const auto count = static_cast<double>(drawn.size());

@@ -45,13 +45,13 @@ TEST(SettledMap, AtomKinkAndThresholdAreKept) {
   for (int leg = 0; leg < 8; ++leg) {
     const double omega = 5.1, eta = 0.43, sticking = map->sticking_friction(leg);
     ASSERT_TRUE(map->slice(leg, eta)->holds(omega));
-    // Above mu_c one value, met from below.
+    // Above mu_c there is one value, met from below.
     const double atom = map->land(leg, omega, {eta, sticking}).carried_squared;
     EXPECT_EQ(map->land(leg, omega, {eta, sticking + 0.1}).carried_squared, atom);
     EXPECT_EQ(map->land(leg, omega, {eta, 5.0}).carried_squared, atom);
     EXPECT_NEAR(map->land(leg, omega, {eta, sticking - 1e-9}).carried_squared, atom, 1e-6);
     EXPECT_NEAR(map->motion().land(leg, omega, {eta, sticking + 0.03}).carried_squared, atom, 1e-4 * omega * omega);
-    // One threshold of rest.
+    // There is one threshold of rest.
     const double resting = map->resting_friction(leg, omega, eta);
     EXPECT_TRUE(map->land(leg, omega, {eta, resting - 1e-12}).rest);
     EXPECT_FALSE(map->land(leg, omega, {eta, resting + 1e-12}).rest);
@@ -76,7 +76,7 @@ TEST(SettledMap, WithoutATableLandingsAreFollowed) {
   EXPECT_FALSE(map->slice(1, 0.4));
   const Landing direct = map->motion().land(1, 4.8, {0.4, 0.36});
   EXPECT_EQ(map->land(1, 4.8, {0.4, 0.36}).carried_squared, direct.carried_squared);
-  // Four digits from the prototype (settled.md); too slow to pass the barrier at any friction.
+  // Four digits are from the prototype (settled.md); it is too slow to pass the barrier at any friction.
   EXPECT_NEAR(map->resting_friction(1, 5, 0.4), 0.3291, 1e-4);
   EXPECT_EQ(map->resting_friction(1, 2.5, 0.4), std::numeric_limits<double>::infinity());
 }

@@ -29,7 +29,7 @@ SettledWheel any_wheel() {
   return wheel;
 }
 
-// An independent prototype of the law, J = 0.0025 kg m^2, the paper's legs, r = 0, v_tol = 1e-8: good to 4e-9.
+// Is of an independent prototype of the law, J = 0.0025 kg m^2, the paper's legs, r = 0, v_tol = 1e-8: good to 4e-9.
 struct KnownAnswer {
   double slope_deg;
   int leg;
@@ -74,13 +74,13 @@ TEST(SettledMotion, KnownRest) {
 }
 
 TEST(SettledMotion, FrictionThatSticksByLeg) {
-  // Six digits from the prototype.
+  // Six digits are from the prototype.
   const double known[] = {.376447, .379760, .371046, .379342, .381095, .372423, .393164, .383246};
   for (int leg = 0; leg < 8; ++leg) EXPECT_NEAR(sticking_friction(paper(7.02), leg), known[leg], 5e-7);
 }
 
 TEST(SettledMotion, FrictionThatRests) {
-  // 7.02 deg, eta = 0.4; four digits from the prototype.
+  // At 7.02 deg, eta = 0.4, four digits are from the prototype.
   const double speeds[] = {4, 4.5, 5, 5.5, 6, 7};
   const double leg_1[] = {.3386, .3333, .3291, .3256, .3225, .3175};
   const double leg_6[] = {.3533, .3471, .3425, .3388, .3356, .3303};
@@ -128,7 +128,7 @@ RC_GTEST_PROP(SettledMotion, EveryStepEndsAndNeverGainsEnergy, ()) {
   RC_ASSERT(step.landing.friction_loss > -1e-12);
   RC_ASSERT(step.landing.impact_loss > -1e-12);
   if (step.touched) {
-    // On with another foothold, from whatever the feet did.
+    // It goes on with another foothold, from whatever the feet did.
     roll.set_contact(old);
     const double between = roll.energy();
     roll.step();
@@ -159,7 +159,8 @@ TEST(SettledMotion, HardlyEverGivenUp) {
 }
 
 TEST(SettledMotion, ToleranceAndRestSpeedChangeNothing) {
-  // At 1e-8 m/s and 1e-12, halved: 1e-8 up to eta = 0.4, 1e-6 beyond (settled.md). At the default 1e-5 m/s: 1e-6.
+  // At 1e-8 m/s and 1e-12, halved, it moves by 1e-8 up to eta = 0.4, 1e-6 beyond (settled.md). At the default 1e-5 m/s
+  // it is 1e-6.
   SettledWheel half = paper(7.02, 5e-9);
   half.tolerance /= 2;
   const SettledMotion fine(paper(7.02)), finer(half), usual(paper(7.02, 1e-5));
@@ -180,7 +181,7 @@ TEST(SettledMotion, ToleranceAndRestSpeedChangeNothing) {
 }
 
 TEST(SettledMotion, TheFootThatCarriesTheSameMomentumLandsTheSame) {
-  // A foot that slides backward at the next touch (row 4 of the known answers), and the landing after it.
+  // This is a foot that slides backward at the next touch (row 4 of the known answers), and the landing after it.
   const SettledMotion motion(paper(7.02));
   SettledRoll roll(motion, 1, 4.8, {.4, .34}, {.4, .34});
   const Step late = roll.step();
@@ -196,7 +197,7 @@ TEST(SettledMotion, TheFootThatCarriesTheSameMomentumLandsTheSame) {
 }
 
 TEST(SettledMotion, ATipRollsAsItStands) {
-  // A foot that sticks without rebound: from touch to touch the chord of the tips' centres and what the disc rolls; the
+  // A foot sticks without rebound: from touch to touch go the chord of the tips' centres and what the disc rolls; the
   // energy about the rolling foot is kept.
   SettledWheel wheel = paper(7.02);
   wheel.leg_length.assign(8, 0.1519);
@@ -215,8 +216,8 @@ TEST(SettledMotion, ATipRollsAsItStands) {
 }
 
 TEST(SettledMotion, DragSlowsInFlightAndOnTheFoot) {
-  // Work of a linear drag over a step that sticks: c times the integral of omega over the turn, here by the trapezoid
-  // of a fine series of steps without drag at first order in c.
+  // The work of a linear drag over a step that sticks is c times the integral of omega over the turn, here by the
+  // trapezoid of a fine series of steps without drag at first order in c.
   SettledWheel wheel = paper(7.02);
   const Step free = SettledMotion(wheel).step(1, 4.8, {.4, .45});
   wheel.linear_drag = 1e-6;

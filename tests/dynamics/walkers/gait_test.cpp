@@ -7,7 +7,7 @@
 namespace metastable::dynamics::test {
 namespace {
 
-// Reference values: an independent integration by Runge-Kutta-Fehlberg 7(8) with events.
+// The reference values are an independent integration by Runge-Kutta-Fehlberg 7(8) with events.
 TEST(Gait, OfTheSimplestWalker) {
   const Gait gait = find_gait(TwoLinkWalker::simplest(), 0.009);
   EXPECT_NEAR(gait.state[0], 0.200310900544, 1e-11);
@@ -27,7 +27,7 @@ TEST(Gait, OfTheCompass) {
   EXPECT_TRUE(gait.stable());
 }
 
-// Garcia et al. (1998): the long-period gait is stable up to 0.0151 rad, where it doubles its period.
+// By Garcia et al. (1998) the long-period gait is stable up to 0.0151 rad, where it doubles its period.
 TEST(Gait, OfTheSimplestWalkerLosesStabilityWherePublished) {
   EXPECT_TRUE(find_gait(TwoLinkWalker::simplest(), 0.0150).stable());
   const Gait steep = find_gait(TwoLinkWalker::simplest(), 0.0153);

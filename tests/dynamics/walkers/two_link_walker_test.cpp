@@ -17,7 +17,7 @@ const Stride compass_gait{0.271028680, -1.09238359, -0.37737395};
 struct Point {
   double mass, x, y, vx, vy;
 };
-/// Hip and the two legs' masses, from the stance foot, by plain geometry.
+/// Returns hip and the two legs' masses, from the stance foot, by plain geometry.
 std::array<Point, 3> points(double m, double hip, double a, double b, const LegMotion& s) {
   const double l = a + b, t = s.stance_angle, p = s.swing_angle;
   const double hx = -l * std::sin(t), hy = l * std::cos(t);
@@ -72,7 +72,7 @@ TEST(TwoLinkWalker, StrikesKeepAngularMomenta) {
 }
 
 TEST(TwoLinkWalker, SimplestStrikesAsGarciaPrints) {
-  // theta'+ = cos(2 theta) theta', phi'+ = cos(2 theta) (1 - cos(2 theta)) theta' with phi = theta - psi.
+  // This has theta'+ = cos(2 theta) theta', phi'+ = cos(2 theta) (1 - cos(2 theta)) theta' with phi = theta - psi.
   const LegMotion before{0, -0.2, 0.2, -0.21, 0.05};
   const Stride after = TwoLinkWalker::simplest().strike(before);
   EXPECT_NEAR(after.stance_rate, std::cos(0.4) * -0.21, 1e-15);
@@ -80,7 +80,7 @@ TEST(TwoLinkWalker, SimplestStrikesAsGarciaPrints) {
 }
 
 TEST(TwoLinkWalker, LightLegsApproachTheSimplest) {
-  // Point masses at the feet (a -> 0), ever lighter: the compass's equations become Garcia's, errors fall with the
+  // Point masses at the feet (a -> 0) get ever lighter: the compass's equations become Garcia's, errors fall with the
   // mass.
   const TwoLinkWalker simplest = TwoLinkWalker::simplest();
   const Stride stride = simplest.stride(std::array{0.2, -0.2});

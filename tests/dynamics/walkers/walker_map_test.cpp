@@ -16,7 +16,7 @@ namespace {
 struct Simulated {
   double mean, error;
 };
-/// Steps before failure of `trials` walkers that start in the gait.
+/// Counts the steps before failure of `trials` walkers that start in the gait.
 Simulated simulate(const WalkerMap& map, int trials) {
   std::vector<double> start = find_gait(map.walker(), map.options().slope_rad).state;
   if (map.options().terrain == Terrain::facets) start.push_back(map.options().slope_rad);
@@ -51,7 +51,7 @@ void expect_agreement(const Simulated& simulated, double mean, double error) {
   EXPECT_NEAR(simulated.mean, mean, 3 * std::hypot(simulated.error, error));
 }
 
-// References: direct simulation by an independent program (Runge-Kutta-Fehlberg with events), mean (standard error).
+// An independent program simulated the references (Runge-Kutta-Fehlberg with events), mean (standard error).
 TEST(WalkerMap, FallsAsOftenAsAnIndependentSimulation) {
   const auto simplest = [](double sd) { return WalkerMap(TwoLinkWalker::simplest(), {0.009, sd, Terrain::fresh}); };
   const auto compass = [](double sd, Terrain terrain) {

@@ -52,7 +52,7 @@ TEST(CollisionDensity, NarrowSpreadsLoseNoProbabilityAndWinNone) {
 
 class AgainstTheExactDensity : public ::testing::TestWithParam<std::tuple<Law, double, ContactSpread, double>> {};
 
-// Another route to the same numbers: adaptive quadrature of the landing, over the stance's energy.
+// Takes another route to the same numbers: adaptive quadrature of the landing, over the stance's energy.
 TEST_P(AgainstTheExactDensity, AgreesInTheBody) {
   const auto& [law, slope, contact, tolerance] = GetParam();
   const WheelMap map = uneven(law, slope, contact);
@@ -104,8 +104,8 @@ TEST(CollisionDensity, IsTheDerivativeOfItsDistribution) {
   }
 }
 
-// Drawn collisions with the change applied by hand.
-// Spreads that reach the fastest speeds possible, where the density of a single friction is singular.
+// Collisions are drawn with the change applied by hand.
+// These spreads reach the fastest speeds possible, where the density of a single friction is singular.
 TEST(CollisionDensity, HoldsAllProbabilityUpToTheFastestSpeed) {
   for (const ContactSpread& contact :
        {ContactSpread{0.466, 0.187, 0.44, 0.044}, ContactSpread{0.36, 0.079, 0.29, 0.069}}) {

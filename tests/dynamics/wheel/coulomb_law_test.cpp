@@ -16,7 +16,7 @@ struct Work {
   double normal = 0, friction = 0;
 };
 
-// Independent integration: small steps of normal impulse, friction from an implicit step (stick if the cone allows it).
+// Integrates otherwise: small steps of normal impulse, friction from an implicit step (stick if the cone allows it).
 Work stepped(const ContactModel& m, const Collision& c, const Contact& contact) {
   const double x = c.contact_x, y = c.contact_y, r2 = m.radius_of_gyration * m.radius_of_gyration,
                scale = 1 / (m.mass * r2);
@@ -55,7 +55,7 @@ void compare(const ContactModel& model, const Collision& c, const Contact& conta
       << "eta " << contact.restitution << " mu " << contact.friction << " u0 " << c.tangential_speed;
 }
 
-// v0 = 0.6 m/s. Uphill slip that stops in compression / restitution / never; downhill slip; jam until slip stops.
+// It has v0 = 0.6 m/s. Uphill slip stops in compression / restitution / never; downhill slip; jam until slip stops.
 TEST(CoulombLaw, AgreesWithSteppedImpulseInEveryPhase) {
   Wheel wheel = even_wheel();
   for (double gyration : {0.03, 0.05, 0.15}) {

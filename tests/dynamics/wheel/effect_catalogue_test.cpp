@@ -33,7 +33,7 @@ TEST(EffectCatalogue, HoldsTwentyThreeEffectsWithNeutralValuesInRange) {
       EXPECT_FALSE(p.meaning.empty()) << info.id;
     }
     EXPECT_EQ(neutral.values.size(), size) << info.id;
-    // Text and back.
+    // They go to text and back.
     EXPECT_EQ(effect_from_text(effect_text(neutral), nominal).values, neutral.values) << effect_text(neutral);
   }
   EXPECT_EQ(ids.size(), 23U);

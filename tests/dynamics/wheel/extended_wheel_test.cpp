@@ -35,7 +35,7 @@ TEST(ExtendedWheel, WithoutExtensionIsTheReturnMap) {
   }
 }
 
-// The stance with torques, step by step in time, against the energy balance of the extension.
+// Holds the stance with torques, step by step in time, against the energy balance of the extension.
 TEST(ExtendedWheel, TorquesTakeTheirWork) {
   Extension extension;
   extension.rolling = 0.008;
@@ -117,7 +117,7 @@ TEST(ExtendedWheel, FeetHopFromTheirOnsetOn) {
   EXPECT_GT(wheel.after_collision({.leg = 0}, 5, 3.4).below, plain.after_collision({.leg = 0}, 5, 3.4).below);
 }
 
-// A sag that is a stretch of another slope's mean: the energy over the whole stretch is that of the drop in height.
+// A sag is a stretch of another slope's mean: the energy over the whole stretch is that of the drop in height.
 TEST(ExtendedWheel, SagGivesBackWhatItTook) {
   for (const auto shape : {Extension::Shape::parabola, Extension::Shape::sine, Extension::Shape::step}) {
     Extension extension;

@@ -10,7 +10,7 @@
 namespace metastable::dynamics {
 namespace {
 
-// omega^2 after a collision and before the next one; everything a law does to a wheel is in these.
+// Returns omega^2 after a collision and before the next one; everything a law does to a wheel is in these.
 std::pair<double, double> step(const Wheel& wheel, Law law, const Contact& contact, double rebound_lost) {
   if (law == Law::settled) {
     const Step of = SettledMotion(settled_wheel(wheel, 7.02 * test::degree)).step(1, 5, contact);
@@ -21,7 +21,7 @@ std::pair<double, double> step(const Wheel& wheel, Law law, const Contact& conta
   return {after, after + map.stance(0).gain};
 }
 
-// The table against the laws themselves: a quantity matters where changing it changes a step.
+// Holds the table against the laws themselves: a quantity matters where changing it changes a step.
 TEST(LawQuantities, AreThoseThatChangeAStep) {
   struct Case {
     LawQuantity quantity;

@@ -13,7 +13,7 @@ namespace {
 
 ContactNoise still() { return ContactNoise::normal(0, 0, 1, 0); }
 
-// omega+^2 -> omega-^2 of the noise-free wheel, iterated to its fixed point.
+// Iterates omega+^2 -> omega-^2 of the noise-free wheel to its fixed point.
 double fixed_state(const WheelMap& map) {
   double state = 30;
   for (int i = 0; i < 400; ++i) state = map.landing(state, 0, std::vector{0.0, 0.0}).value();

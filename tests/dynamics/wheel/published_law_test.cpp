@@ -23,8 +23,8 @@ double integral(F f, double from, double to) {  // midpoint rule
   return sum * (to - from) / steps;
 }
 
-// Integrals (12), (14), (17), (20) over the impulse, its end from the definition of the energetic restitution, the
-// times from (28): everything but the closed forms under test. For mu > 0 and a slip that starts as j says.
+// Integrates (12), (14), (17), (20) over the impulse, its end from the definition of the energetic restitution, the
+// times from (28): everything but the closed forms under test. It takes mu > 0 and a slip that starts as j says.
 Loss integrated(const Collision& c, const Contact& contact, double j) {
   const double eta = contact.restitution, mu = contact.friction, v0 = c.normal_speed, u0 = std::abs(c.tangential_speed);
   const double r2 = c.landing_length * c.landing_length, x = c.contact_x, y = c.contact_y;
@@ -33,7 +33,7 @@ Loss integrated(const Collision& c, const Contact& contact, double j) {
   const double shift = n(j) > 0 ? u0 * n(j) / mu : std::numeric_limits<double>::infinity();  // impulse that stops slip
   const auto v = [&](double p) { return p < shift ? v0 - p / m(j) : v0 - shift / m(j) - (p - shift) / m(-j); };
   const auto u = [&](double p) { return p < shift ? u0 - mu * p / n(j) : mu * (p - shift) / n(-j); };
-  // End of compression and of restitution by small steps of the impulse.
+  // This finds the end of compression and of restitution by small steps of the impulse.
   const double step = 2e-5 * v0 * m(1);
   double end = 0, absorbed = 0, released = 0;
   while (v(end) > 0 || released < eta * eta * absorbed) {
@@ -59,7 +59,7 @@ Loss integrated(const Collision& c, const Contact& contact, double j) {
   return loss;
 }
 
-// zeta below 1, between 1 and 1 + eta, and beyond; uphill slip, rolling, and downhill slip (mirrored signs).
+// Has zeta below 1, between 1 and 1 + eta, and beyond; uphill slip, rolling, and downhill slip (mirrored signs).
 TEST(PublishedLaw, AgreesWithTheIntegralsOverTheImpulse) {
   int cases[3] = {0, 0, 0};
   for (double u0 : {-2.0, -0.6, -0.1, 0.0, 0.05, 0.2, 0.5, 0.62, 0.7, 2.0})

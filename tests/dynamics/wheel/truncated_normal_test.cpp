@@ -25,7 +25,7 @@ struct Case {
 const Case cases[] = {{0.4, 0.1, 0, 1},  {0.4, 0.2, 0, infinity}, {7.35, 0.19, 0, infinity},   {0.4, 0.05, 0, 1},
                       {-0.5, 0.1, 0, 1}, {1.6, 0.1, 0, 1},        {0, 1, -infinity, infinity}, {0, 1, -infinity, -2}};
 
-// The score is exact when the mixture of the tails of both bounds is met; solved here by a Newton step in 50 digits.
+// The score is exact when the mixture of the tails of both bounds is met; a Newton step in 50 digits solves it here.
 TEST(TruncatedNormal, AtScoreAgreesWithFiftyDigits) {
   for (const Case& c : cases) {
     const TruncatedNormal normal(c.mean, c.sd, c.lower, c.upper);
@@ -40,7 +40,7 @@ TEST(TruncatedNormal, AtScoreAgreesWithFiftyDigits) {
       const double x = normal.at_score(score);
       const Wide z = (Wide(x) - c.mean) / c.sd;
       const Wide density = exp(-z * z / 2) / sqrt(2 * boost::math::constants::pi<Wide>());
-      // Newton on the logarithm of the smaller tail.
+      // This is Newton on the logarithm of the smaller tail.
       const bool lower_tail = below < above;
       const Wide tail = lower_tail ? wide_cdf(z) : wide_cdf(-z), wanted = lower_tail ? below : above;
       const Wide error = abs((tail - wanted) / density) * c.sd;
@@ -102,7 +102,7 @@ RC_GTEST_PROP(TruncatedNormal, ScoresRiseAndInvertTheDistribution, ()) {
 }
 
 TEST(TruncatedNormal, MomentsAreThoseOfTheClosedForm) {
-  // Mean and variance by the textbook formulas with phi, Phi.
+  // These are mean and variance by the textbook formulas with phi, Phi.
   const double mean = 0.4, sd = 0.2, a = -2, b = 3;
   const double mass = normal_cdf(b) - normal_cdf(a);
   const double shift = (normal_density(a) - normal_density(b)) / mass;

@@ -1,4 +1,4 @@
-// Chains nobody thought of: random ones against exact rational answers, and the shapes that break solvers.
+// Tries chains nobody thought of: random ones against exact rational answers, and the shapes that break solvers.
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -20,7 +20,7 @@ namespace {
 
 using reference::Rational;
 
-// Random sparse rows over many orders of magnitude. `period` > 1: classes i % period lead to the next class only.
+// Makes random sparse rows over many orders of magnitude. `period` > 1: classes i % period lead to the next class only.
 // `groups` > 1: all between groups i % groups is multiplied by `coupling`. Every state of a class or group has a way
 // on.
 struct Shape {
@@ -52,7 +52,7 @@ Chain random_sparse(const Shape& shape, unsigned seed) {
   return Chain::from_dense(n, matrix, kill);
 }
 
-// Means and visits to every digit but the last few.
+// Checks means and visits to every digit but the last few.
 void expect_exact(const Chain& chain) {
   const ChainSolver solver(chain);
   const std::size_t n = chain.size();
@@ -97,7 +97,7 @@ RC_GTEST_PROP(ChainProperty, PeriodicChainsToRationalAnswers, ()) {
   expect_exact(chain);
 }
 
-// Rest out of reach from somewhere: refused by name, never a number.
+// Rest out of reach from somewhere is refused by name, never a number.
 RC_GTEST_PROP(ChainProperty, UnreachableRestIsRefused, ()) {
   const auto n = *rc::gen::inRange<std::size_t>(2, 12);
   const Chain whole = random_sparse({.states = n}, *rc::gen::arbitrary<unsigned>());
@@ -134,7 +134,7 @@ TEST(ChainShapes, OneCell) {
   EXPECT_DOUBLE_EQ(quasi_stationary(solver).failure_rate, sampled.chain.kill(0));
 }
 
-// Up by 0.15, down by 0.1, three cells each way, and everywhere the same hazard: all answers in closed form.
+// It goes up by 0.15, down by 0.1, three cells each way, everywhere with the same hazard: all answers in closed form.
 TEST(ChainShapes, AMillionCellsBanded) {
   constexpr std::size_t n = 1000000;
   constexpr double hazard = 1e-9;

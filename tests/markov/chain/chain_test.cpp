@@ -83,7 +83,7 @@ TEST(Chain, IncomingIsTheTransposedPattern) {
   EXPECT_EQ(into.row, (std::vector<std::uint32_t>{2, 2, 0, 1}));
 }
 
-// 0 -> rest; 1 -> 0 or 2; 2 <-> 3 for ever; 4 -> 0; 5 -> 4.
+// The chain is 0 -> rest; 1 -> 0 or 2; 2 <-> 3 for ever; 4 -> 0; 5 -> 4.
 TEST(Classify, TellsCanRestFromMustRest) {
   const Chain chain({0, 0, 2, 3, 4, 5, 6}, {0, 2, 3, 2, 0, 4}, {1e-300, 0.5, 1, 1, 1, 1}, {1e-300, 0, 0, 0, 0, 0});
   const Reachability reach = classify(chain);

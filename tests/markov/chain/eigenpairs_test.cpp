@@ -14,7 +14,7 @@ namespace {
 
 using testing::message_of;
 
-// Walk with rest at both ends: lambda_k = stay + 2 sqrt(up down) cos(k pi / (n + 1)).
+// Belongs to a walk with rest at both ends: lambda_k = stay + 2 sqrt(up down) cos(k pi / (n + 1)).
 double walk_eigenvalue(std::size_t n, double up, double down, int k) {
   return 1 - up - down + 2 * std::sqrt(up * down) * std::cos(k * std::numbers::pi / static_cast<double>(n + 1));
 }
@@ -53,7 +53,7 @@ TEST(LeadingEigenpairs, ConjugatePairsStayTogether) {
     EXPECT_NEAR(pairs.values[0].real(), 0.99, 1e-13);
     for (std::size_t k = 1; k + 1 < pairs.values.size(); k += 2) {
       EXPECT_NEAR(std::abs(pairs.values[k] - std::conj(pairs.values[k + 1])), 0, 1e-13);
-      // lambda_k = 0.49 + 0.5 exp(2 pi i k / n)
+      // It is lambda_k = 0.49 + 0.5 exp(2 pi i k / n).
       const auto angle = 2 * std::numbers::pi * static_cast<double>((k + 1) / 2) / n;
       EXPECT_NEAR(std::abs(pairs.values[k] - (0.49 + std::polar(0.5, angle))), 0, 1e-12);
     }

@@ -16,7 +16,7 @@ using testing::message_of;
 
 std::vector<double> ones(std::size_t n) { return std::vector<double>(n, 1.0); }
 
-/// Largest relative residual of (I - Q) x = rhs in 100 digits.
+/// Returns the largest relative residual of (I - Q) x = rhs in 100 digits.
 double residual(const Chain& chain, const std::vector<double>& x, const std::vector<double>& rhs) {
   double worst = 0;
   for (std::size_t i = 0; i < chain.size(); ++i) {
@@ -37,7 +37,7 @@ TEST(Elimination, OneState) {
   EXPECT_DOUBLE_EQ(elimination.solve_left(ones(1))[0], 1e300);
 }
 
-// Symmetric walk with rest at both ends: m_i = (i + 1) (n - i) / (2 p).
+// A symmetric walk with rest at both ends has m_i = (i + 1) (n - i) / (2 p).
 TEST(Elimination, SymmetricWalkInClosedForm) {
   for (const std::size_t n : {2, 7, 300}) {
     const Elimination elimination(reference::birth_death(n, 0.25, 0.25, true));
@@ -51,7 +51,7 @@ TEST(Elimination, SymmetricWalkInClosedForm) {
   }
 }
 
-// Drift away from rest: the expected time from i to i - 1 is a sum of positive terms.
+// The drift is away from rest: the expected time from i to i - 1 is a sum of positive terms.
 TEST(Elimination, KeepsAllDigitsWhenRestTakes1e60Steps) {
   constexpr std::size_t n = 600;
   const double up = 0.4, down = 0.2;
@@ -78,7 +78,7 @@ TEST(Elimination, RandomChainsToRationalAnswers) {
   }
 }
 
-// Sizes on both sides of the blocks of the blocked elimination, and not multiples of them.
+// The sizes lie on both sides of the blocks of the blocked elimination, and are not multiples of them.
 TEST(Elimination, BlockedAndRowByRowAgree) {
   for (const std::size_t n : {127, 128, 129, 192, 250, 256, 257, 321, 601}) {
     const Chain chain = reference::random_chain(n, static_cast<unsigned>(n), 1e-9);
@@ -103,7 +103,7 @@ TEST(Elimination, BitsDoNotDependOnThreads) {
   }
 }
 
-// A chain whose rare exits (1e-25) are all in one state, full and larger than a block: closed form by symmetry.
+// The rare exits (1e-25) of a full chain, larger than a block, are all in one state: symmetry gives a closed form.
 TEST(Elimination, BlockedKeepsAllDigitsWhenRestIsRare) {
   constexpr std::size_t n = 200;
   std::vector<double> matrix(n * n, 1.0 / n), kill(n, 0.0);
@@ -144,7 +144,7 @@ TEST(Elimination, MillionStatesOfBandwidthThree) {
 }
 
 TEST(Elimination, SolutionsArePositiveExactlyWhereTheyShouldBe) {
-  // 0 -> 1 -> 2 -> rest: visits of a start in 1.
+  // In 0 -> 1 -> 2 -> rest these are the visits of a start in 1.
   const Chain chain({0, 1, 2, 2}, {1, 2}, {1, 1}, {0, 0, 1});
   const Elimination elimination(chain);
   EXPECT_EQ(elimination.solve_left(std::vector<double>{0, 1, 0}), (std::vector<double>{0, 1, 1}));

@@ -44,7 +44,7 @@ TEST(FindPeriod, CyclicClassesOfSeveralStates) {
   EXPECT_EQ(period.classes[3].size(), 5u);
 }
 
-// Cycles of 4 and of 6 through state 0.
+// There are cycles of 4 and of 6 through state 0.
 TEST(FindPeriod, IsTheGreatestCommonDivisorOfTheCycles) {
   std::vector<double> matrix(64, 0.0);
   const auto link = [&matrix](int from, int to, double p) { matrix[static_cast<std::size_t>(8 * from + to)] = p; };
@@ -70,17 +70,17 @@ TEST(FindPeriod, RoundingOfRowSumsIsNoStaying) {
 }
 
 TEST(FindPeriod, PartsWithoutACycleDoNotLowerIt) {
-  // A ring of 3, and a path that ends at rest.
+  // It has a ring of 3, and a path that ends at rest.
   const Chain chain({0, 1, 2, 3, 4, 5, 5}, {1, 2, 0, 4, 5}, {1, 1, 1, 1, 1}, {0, 0, 0, 0, 0, 1});
   const Period period = find_period(chain);
   EXPECT_EQ(period.period, 3);
   expect_cyclic(chain, period);
-  // Only a path: no cycle at all.
+  // This is only a path: it has no cycle at all.
   EXPECT_EQ(find_period(Chain({0, 1, 1}, {1}, {1}, {0, 1})).period, 1);
 }
 
 TEST(FindPeriod, PartsShareTheirDivisor) {
-  // Rings of 4 and of 6.
+  // There are rings of 4 and of 6.
   std::vector<double> matrix(100, 0.0);
   for (std::size_t i = 0; i < 4; ++i) matrix[i * 10 + (i + 1) % 4] = 1;
   for (std::size_t i = 0; i < 6; ++i) matrix[(4 + i) * 10 + 4 + (i + 1) % 6] = 1;

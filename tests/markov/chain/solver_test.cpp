@@ -35,7 +35,7 @@ TEST(ChainSolver, CyclicChainsSolveAsTheWholeChainDoes) {
   }
 }
 
-// Sparse blocks: a walk without staying has period 2; the product of its halves has bandwidth 1.
+// Blocks are sparse: a walk without staying has period 2; the product of its halves has bandwidth 1.
 TEST(ChainSolver, LongWalkOfPeriodTwo) {
   constexpr std::size_t n = 20000;
   const ChainSolver solver(reference::birth_death(n, 0.5, 0.5, true));
@@ -51,7 +51,7 @@ TEST(ChainSolver, RevolutionConservesProbability) {
   const ChainSolver solver(reference::cyclic_chain(5, 6, 3, 0.2));
   const Chain& revolution = solver.revolution();
   EXPECT_EQ(find_period(revolution).period, 1);
-  // Rest within one revolution, from the chain itself.
+  // This is rest within one revolution, from the chain itself.
   std::vector<double> alive(solver.chain().size(), 1.0);
   for (int step = 0; step < 5; ++step) alive = markov::apply(solver.chain(), alive);
   for (std::size_t i = 0; i < revolution.size(); ++i) {
@@ -90,8 +90,8 @@ TEST(Apply, IncludesStaying) {
   EXPECT_EQ(apply_left(chain, std::vector<double>{1, 2, 4}), (std::vector<double>{1.25, 2.75, 2.5}));
 }
 
-/// A random sparse chain with a ring through all its states (so irreducible), aperiodic or not, and kill rates over
-/// many orders of magnitude.
+/// Makes a random sparse chain with a ring through all its states (so irreducible), aperiodic or not, and kill rates
+/// over many orders of magnitude.
 Chain arbitrary_chain(int size, unsigned seed, double rarest) {
   const auto n = static_cast<std::size_t>(size);
   std::mt19937_64 engine(seed);

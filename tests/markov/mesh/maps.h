@@ -1,5 +1,5 @@
 #pragma once
-// Maps in batches whose expected steps are known from elsewhere.
+// Makes maps in batches whose expected steps are known from elsewhere.
 
 #include <cmath>
 #include <numeric>
@@ -14,7 +14,7 @@
 
 namespace metastable::markov::testing {
 
-/// x' = x / 2 + 1 + sd z, failed where x' <= 0.
+/// Maps x' = x / 2 + 1 + sd z, failed where x' <= 0.
 inline BatchMap linear_batch(double sd) {
   BatchMap map;
   map.names = {"x"};
@@ -27,7 +27,7 @@ inline BatchMap linear_batch(double sd) {
   return map;
 }
 
-/// The same beside y' = 0.6 y + z_2, in the coordinates (x + y, y - x / 3): failures do not hang on y.
+/// Does the same beside y' = 0.6 y + z_2, in the coordinates (x + y, y - x / 3): failures do not hang on y.
 inline BatchMap skew_batch(double sd) {
   BatchMap map;
   map.dimension = map.scores = 2;
@@ -43,7 +43,7 @@ inline BatchMap skew_batch(double sd) {
   return map;
 }
 
-/// Two phases: thresholds 0 and -1, so that failures are rarer in every second step.
+/// Has two phases with thresholds 0 and -1, so that failures are rarer in every second step.
 inline BatchMap two_phase_batch(double sd) {
   BatchMap map = linear_batch(sd);
   map.phases = 2;
@@ -56,7 +56,7 @@ inline BatchMap two_phase_batch(double sd) {
   return map;
 }
 
-/// Expected steps of the linear map from x, by Gauss-Legendre quadrature of its density.
+/// Returns the expected steps of the linear map from x, by Gauss-Legendre quadrature of its density.
 inline double linear_steps(double sd, double x) {
   const LinearWithDensity map{{.sd = sd}};
   const NodeSpace space(node_ranges(map, linear_launch(), 1), 8);

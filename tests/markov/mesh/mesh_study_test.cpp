@@ -49,7 +49,7 @@ TEST(MeshStudy, PhasesAgreeWithSimulation) {
 }
 
 TEST(MeshStudy, SaysWhereTheWaysDisagree) {
-  // A map that shows lattices less noise than it shows simulations.
+  // This map shows lattices less noise than it shows simulations.
   BatchMap map = linear_batch(0.8);
   map.step = [](int, auto states, auto scores, auto next, auto failed) {
     const bool mesh = scores.size() > 1 && scores[0] < -8;  // only a lattice begins so far out

@@ -24,7 +24,7 @@ Mesh linear_mesh(double sd, double spacing, std::uint32_t shift = 0) {
 }
 
 TEST(NoiseFrame, IsTheStationaryCovariance) {
-  // x: sd^2 / (1 - 1/4); y: 1 / (1 - 0.36); the state is (x + y, y - x / 3).
+  // Variances are, of x, sd^2 / (1 - 1/4); of y, 1 / (1 - 0.36); the state is (x + y, y - x / 3).
   const BatchMap map = skew_batch(0.3);
   const std::vector<double> start{2.1, -0.6};
   const NoiseFrame frame = noise_frames(map, start).front();

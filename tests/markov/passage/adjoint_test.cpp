@@ -14,7 +14,7 @@ Launch even_launch(const Chain& chain) {
   return {std::vector<double>(chain.size(), 0.9 / static_cast<double>(chain.size())), 0.1};
 }
 
-// The chain with one off-diagonal entry and one kill rate multiplied; staying takes up the rest.
+// Returns the chain with one off-diagonal entry and one kill rate multiplied; staying takes up the rest.
 Chain changed(const Chain& chain, double factor) {
   const std::size_t n = chain.size();
   std::vector<double> matrix(n * n, 0.0), kill(chain.kill().begin(), chain.kill().end());
@@ -46,7 +46,7 @@ TEST(Adjoint, DerivativeOfRandomChainsToRationalAnswers) {
   }
 }
 
-// m_i - m_reference of a walk away from rest, in exact arithmetic: from 1e3 to 1e60 steps the digits stay.
+// It is m_i - m_reference of a walk away from rest, in exact arithmetic: from 1e3 to 1e60 steps the digits stay.
 TEST(Adjoint, DifferencesOfMeansKeepTheirDigits) {
   for (const std::size_t n : {10, 60, 200}) {
     const Chain chain = reference::birth_death(n, 0.4, 0.2, false);
@@ -57,7 +57,7 @@ TEST(Adjoint, DifferencesOfMeansKeepTheirDigits) {
                                        std::vector<reference::Rational>(n, reference::Rational(1)));
     for (std::size_t i = 0; i < n; ++i) {
       const double exact = reference::Rational(mean[i] - mean[at.reference]).convert_to<double>();
-      // Two parts of the size of the time to the reference.
+      // They are two parts of the size of the time to the reference.
       EXPECT_NEAR(at.excess[i], exact, 1e-11 * (std::abs(exact) + 5.0 * static_cast<double>(n))) << n << ' ' << i;
     }
   }

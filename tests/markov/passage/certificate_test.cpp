@@ -1,4 +1,4 @@
-// Bounds around expected steps known in closed form.
+// Checks bounds around expected steps known in closed form.
 
 #include "markov/passage/certificate.h"
 
@@ -9,7 +9,7 @@
 namespace metastable::markov {
 namespace {
 
-// From x in [0, 1]: rest with probability k(x) = c (1 - x)^2, otherwise a landing that is uniform in [0, 1]. With
+// From x in [0, 1] it rests with probability k(x) = c (1 - x)^2, otherwise the landing is uniform in [0, 1]. With
 // M = the integral of m, m(x) = 1 + (1 - k(x)) M and M = 1 / (integral of k) = 3/c.
 class Uniform : public LandingSource {
  public:
@@ -57,7 +57,7 @@ void expect_holds(const Uniform& source, const Certificate& c) {
       EXPECT_LE(c.lower[p][i], source.steps(c.nodes[p][i]));
       EXPECT_GE(c.upper[p][i], source.steps(c.nodes[p][i]));
     }
-  // Linear between nodes.
+  // The bounds are linear between nodes.
   for (std::size_t i = 0; i + 1 < c.nodes[0].size(); ++i) {
     const double m = source.steps(0.5 * (c.nodes[0][i] + c.nodes[0][i + 1]));
     EXPECT_LE(0.5 * (c.lower[0][i] + c.lower[0][i + 1]), m);

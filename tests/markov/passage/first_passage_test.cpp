@@ -18,7 +18,7 @@ using testing::message_of;
 
 Chain one_state(double kill) { return Chain::from_dense(1, std::vector<double>{0}, std::vector<double>{kill}); }
 
-/// Everything that is asked of one chain and one launch.
+/// Holds everything that is asked of one chain and one launch.
 struct Problem {
   explicit Problem(const Chain& chain, Launch from)
       : solver(chain), quasi(quasi_stationary(solver)), launch(std::move(from)) {}
@@ -43,7 +43,7 @@ Launch even_launch(std::size_t n, double rest) {
 TEST(FirstPassage, GeometricLawInClosedForm) {
   for (const double kill : {1.0, 0.25, 1e-3, 1e-14}) {
     const Problem problem(one_state(kill), {{0.75}, 0.25});
-    // T = 1 with probability 1/4, otherwise 1 + Geometric(kill).
+    // Here T = 1 with probability 1/4, otherwise 1 + Geometric(kill).
     const double second = (2 - kill) / (kill * kill);
     EXPECT_NEAR(problem.steps().mean / (1 + 0.75 / kill), 1, 1e-14);
     EXPECT_NEAR(problem.steps().sd / std::sqrt(0.75 * second - std::pow(0.75 / kill, 2)), 1, 1e-12);
@@ -82,7 +82,7 @@ TEST(RewardFromLaunch, UnitRewardCountsTheStepsAfterTheLaunch) {
   for (const auto& chain : {reference::random_chain(7, 1, 0.2), reference::cyclic_chain(3, 4, 2, 1e-4)}) {
     const Problem problem(chain, even_launch(chain.size(), 0.125));
     const Moments reward = reward_from_launch(problem.solver, problem.launch, std::vector<double>(chain.size(), 1.0));
-    // One reward for every step but the last.
+    // There is one reward for every step but the last.
     EXPECT_NEAR(reward.mean / (problem.steps().mean - 1), 1, 1e-12);
     EXPECT_NEAR(reward.sd / problem.steps().sd, 1, 1e-11);
   }
@@ -187,7 +187,7 @@ TEST(RewardQuantiles, UnitRewardFollowsTheSteps) {
   }
 }
 
-// Rare rest: the total is exponential with the exact mean.
+// With rare rest the total is exponential with the exact mean.
 TEST(RewardQuantiles, ExponentialWhenRestIsRare) {
   for (const auto& chain : {reference::random_chain(20, 8, 1e-12), reference::cyclic_chain(8, 5, 8, 1e-12)}) {
     const Problem problem(chain, even_launch(chain.size(), 0.0));
@@ -200,7 +200,7 @@ TEST(RewardQuantiles, ExponentialWhenRestIsRare) {
   }
 }
 
-// A launch ten steps away from any rest: steps without rest must not pass for a settled law.
+// The launch is ten steps away from any rest: steps without rest must not pass for a settled law.
 TEST(RewardQuantiles, CorridorBeforeTheHazard) {
   constexpr std::size_t n = 11;
   std::vector<double> matrix(n * n, 0.0), kill(n, 0.0);
@@ -209,7 +209,7 @@ TEST(RewardQuantiles, CorridorBeforeTheHazard) {
   Launch launch{std::vector<double>(n, 0.0), 0.0};
   launch.after[0] = 1;
   const Problem problem(Chain::from_dense(n, matrix, kill), launch);
-  // 11 rewards for certain, and then one for every step survived.
+  // There are 11 rewards for certain, and then one for every step survived.
   const std::vector<double> total = problem.quantiles(std::vector<double>(n, 2.0), {0.005, 0.5});
   EXPECT_NEAR(total[0], 22, 1e-9);
   EXPECT_NEAR(total[1], 22 + 2 * (std::ceil(std::log(0.5) / std::log(0.99)) - 1), 1e-9);
@@ -253,7 +253,7 @@ TEST(RewardQuantiles, AgreeWithTrials) {
   const std::vector<double> computed = problem.quantiles(seconds, p);
   EXPECT_EQ(computed[0], 0);
   for (std::size_t i = 1; i < p.size(); ++i) {
-    // Within sampling error of the probability, and the shape of one step's law (0.02 s here).
+    // It lies within sampling error of the probability, and the shape of one step's law (0.02 s here).
     const auto at = [&](double q) { return totals[static_cast<std::size_t>(q * kTrials)]; };
     const double se = std::sqrt(p[i] * (1 - p[i]) / kTrials);
     EXPECT_GE(computed[i], at(p[i] - 4 * se) - 0.02) << p[i];

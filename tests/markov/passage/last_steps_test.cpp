@@ -11,7 +11,7 @@
 namespace metastable::markov {
 namespace {
 
-/// Gambler's ruin: from i (0 is one above ruin), the chance of reaching `top` first, and of ruin first.
+/// Solves gambler's ruin: from i (0 is one above ruin), the chance of reaching `top` first, and of ruin first.
 double reaches(double i, double top, double ratio) {
   return std::expm1((i + 1) * std::log(ratio)) / std::expm1((top + 1) * std::log(ratio));
 }
@@ -39,7 +39,7 @@ TEST(PassageTo, IsTheGamblersRuinByElimination) { expect_ruin(60, 40, 0.5, 0.3);
 TEST(PassageTo, IsTheGamblersRuinByProducts) { expect_ruin(3600, 3200, 0.8, 0.1); }
 
 TEST(PassageTo, KeepsTheDigitsOfWhatIsRare) {
-  // Ruin 30 states away with odds of 0.01 a step: 1e-60, and reaching is one minus nothing.
+  // Ruin is 30 states away with odds of 0.01 a step: 1e-60, and reaching is one minus nothing.
   const Chain chain = reference::birth_death(40, 0.9, 0.009, false);
   std::vector<std::uint8_t> set(40, 0);
   set[31] = 1;
@@ -53,7 +53,7 @@ TEST(LastSteps, OfARandomChainAreWhatItsPathsSay) {
   const std::vector<double> visits = ChainSolver(chain).solve_left(start);
   const LastSteps last = last_steps(chain, visits, 3);
   ASSERT_EQ(last.share.size(), 3u);
-  // By hand: all walks of two steps and a failure.
+  // By hand it goes through all walks of two steps and a failure.
   double best = 0, all = 0;
   std::vector<std::uint32_t> path;
   std::vector<double> by_first(6, 0.0);

@@ -29,7 +29,7 @@ TEST(QuasiStationary, OneStateIsItsOwnDistribution) {
   }
 }
 
-// Walk with rest at both ends: 1 - lambda_1 = 4 p sin^2(pi / (2 (n + 1))), left and right vectors are sines.
+// A walk with rest at both ends has 1 - lambda_1 = 4 p sin^2(pi / (2 (n + 1))), left and right vectors are sines.
 TEST(QuasiStationary, SymmetricWalkInClosedForm) {
   constexpr std::size_t n = 50;
   const double step = std::numbers::pi / (n + 1);
@@ -76,7 +76,7 @@ TEST(QuasiStationary, ClassDistributionsFollowEachOther) {
       EXPECT_NEAR(next[j] / sum(next), quasi.distribution[j], 1e-13);
     }
   }
-  // lambda x = Q x for all classes at once.
+  // It holds lambda x = Q x for all classes at once.
   const std::vector<double> image = markov::apply(solver.chain(), quasi.survival_weight);
   for (std::size_t i = 0; i < image.size(); ++i) {
     EXPECT_NEAR(image[i], (1 - quasi.failure_rate) * quasi.survival_weight[i], 1e-13);
@@ -93,7 +93,7 @@ TEST(QuasiStationary, FrequentRestNeedsFewIterations) {
 }
 
 TEST(QuasiStationary, ChainThatNeverReturnsFailsForCertain) {
-  // 0 -> 1 or 3, 1 -> 2, 2 and 3 -> rest.
+  // The chain is 0 -> 1 or 3, 1 -> 2, 2 and 3 -> rest.
   const Chain chain({0, 2, 3, 3, 3}, {1, 3, 2}, {0.5, 0.5, 1}, {0, 0, 1, 1});
   const QuasiStationary quasi = quasi_stationary(ChainSolver(chain));
   EXPECT_EQ(quasi.failure_rate, 1);
@@ -102,7 +102,7 @@ TEST(QuasiStationary, ChainThatNeverReturnsFailsForCertain) {
 }
 
 TEST(QuasiStationary, EqualEigenvaluesInARow) {
-  // 0 -> 1 -> rest, both staying with the same probability: a Jordan block.
+  // In 0 -> 1 -> rest both stay with the same probability: a Jordan block.
   const Chain chain({0, 1, 1}, {1}, {0.5}, {0, 0.5});
   const QuasiStationary quasi = quasi_stationary(ChainSolver(chain));
   EXPECT_NEAR(quasi.failure_rate, 0.5, 1e-12);
@@ -111,7 +111,7 @@ TEST(QuasiStationary, EqualEigenvaluesInARow) {
 }
 
 // Fast launches fall through cells that hardly keep them, each about as likely as its neighbours: plain inverse
-// iteration would take a million turns. Stays a > b > ... down to the last state, all triangular.
+// iteration would take a million turns. Staying falls, a > b > ..., down to the last state, all triangular.
 TEST(QuasiStationary, EigenvaluesThatDifferInTheSixthDigit) {
   constexpr std::size_t n = 12;
   std::vector<double> matrix(n * n, 0.0), kill(n, 0.0), stay(n);
@@ -143,7 +143,7 @@ TEST(Stationary, TwoStatesAndARing) {
 }
 
 TEST(Stationary, TransientStatesGetNothing) {
-  // 0 -> 1 -> 2 <-> 3; state 4 rests, but is not reached.
+  // The chain is 0 -> 1 -> 2 <-> 3; state 4 rests, but is not reached.
   const Chain chain({0, 1, 2, 3, 4, 4}, {1, 2, 3, 2}, {0.5, 1, 0.25, 0.5}, {0, 0, 0, 0, 1});
   const std::vector<double> pi = stationary(chain, std::vector<double>{1, 0, 0, 0, 0});
   EXPECT_EQ(pi[0] + pi[1] + pi[4], 0);
@@ -180,12 +180,12 @@ TEST(StationaryWithRestart, IsInvariantUnderTheRestartedChain) {
             "stationary distribution with restart: the restart has no mass");
 }
 
-// Two states that swap with probability 1/4 and rest never: the difference halves every step.
+// Two states swap with probability 1/4 and never rest: the difference halves every step.
 TEST(Mixing, GeometricDecayInClosedForm) {
   const ChainSolver solver(Chain({0, 1, 2}, {1, 0}, {0.25, 0.25}, {1e-15, 1e-15}));
   const QuasiStationary quasi = quasi_stationary(solver);
   const std::vector<double> start{1, 0};
-  // distance after t steps: 2^-(t + 1)
+  // The distance after t steps is 2^-(t + 1).
   EXPECT_EQ(total_variation_mixing(solver, quasi, start, 0.51), 0);
   EXPECT_EQ(total_variation_mixing(solver, quasi, start, 0.26), 1);
   EXPECT_EQ(total_variation_mixing(solver, quasi, start, 0.24), 2);
@@ -193,7 +193,7 @@ TEST(Mixing, GeometricDecayInClosedForm) {
   EXPECT_EQ(total_variation_mixing(solver, quasi, start, 0.001, 5), std::nullopt);
 }
 
-// metastable steps --method integrated --restitution 0.4,0.2 --friction 0.5,0: nobody survives for long, and what
+// In metastable steps --method integrated --restitution 0.4,0.2 --friction 0.5,0 nobody survives for long, and what
 // interpolated rows leave is rounding of either sign, here a circulant's complex pair.
 TEST(QuasiStationary, EndsWhereInterpolatedRowsLeaveNobody) {
   const double on = 1e-17, back = -5e-18;

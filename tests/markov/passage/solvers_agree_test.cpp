@@ -1,4 +1,4 @@
-// The same problems through every solver, against exact answers.
+// Puts the same problems through every solver, against exact answers.
 
 #include <gtest/gtest.h>
 
@@ -18,10 +18,10 @@
 namespace metastable::markov {
 namespace {
 
-/// Per-step rate of a chain of which one revolution fails at `rate`.
+/// Returns the rate per step of a chain of which one revolution fails at `rate`.
 double per_step(double rate, int period) { return -std::expm1(std::log1p(-rate) / period); }
 
-/// Full relative accuracy however rare rest is.
+/// Has full relative accuracy however rare rest is.
 struct SubtractionFree {
   static double failure_rate(const Chain& chain) { return quasi_stationary(ChainSolver(chain)).failure_rate; }
   static std::optional<std::vector<double>> means(const Chain& chain) { return mean_first_passage(ChainSolver(chain)); }
@@ -49,7 +49,7 @@ struct Klu {
   static double tolerance(double rate) { return 1e-12 + 1e-14 / rate; }
 };
 
-/// lambda_1 to an absolute 1e-14; no first passage. Cyclic chains by the revolution.
+/// Finds lambda_1 to an absolute 1e-14; no first passage. Cyclic chains go by the revolution.
 struct Arnoldi {
   static double failure_rate(const Chain& chain) {
     const Period period = find_period(chain);
@@ -91,7 +91,7 @@ TYPED_TEST(SolversAgree, OneState) {
   }
 }
 
-// 1 - lambda_1 = 4 p sin^2(pi / (2 (n + 1))), m_i = (i + 1) (n - i) / (2 p)
+// It has 1 - lambda_1 = 4 p sin^2(pi / (2 (n + 1))), m_i = (i + 1) (n - i) / (2 p)
 TYPED_TEST(SolversAgree, GamblersRuinWithAndWithoutStaying) {
   for (const std::size_t n : {2, 10, 101}) {
     for (const double p : {0.5, 0.3}) {
@@ -117,7 +117,7 @@ TYPED_TEST(SolversAgree, CyclicChains) {
   this->check(reference::cyclic_chain(2, 4, 3, 1e-5));
 }
 
-// Two halves of three states that exchange 1e-9 and rest at 1e-3 and 1e-4.
+// There are two halves of three states that exchange 1e-9 and rest at 1e-3 and 1e-4.
 TYPED_TEST(SolversAgree, NearlyDecomposable) {
   std::vector<double> matrix(36, 0.0), kill(6);
   for (std::size_t i = 0; i < 6; ++i) {

@@ -1,4 +1,4 @@
-// Tests that run under mpirun: every rank runs all of them, in step.
+// These tests run under mpirun: every rank runs all of them, in step.
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 #pragma once
-// The ranks that tests run on, and what they find held against one process.
+// Gives the ranks that tests run on, and holds what they find against one process.
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace metastable::markov::testing {
 
 Ranks& ranks();
 
-/// The node of one process's mesh that is this node of the shared one.
+/// Returns the node of one process's mesh that is this node of the shared one.
 inline std::uint32_t same_node(const Mesh& mesh, const SharedMesh& shared, std::size_t node) {
   const Mesh::Corners corners = mesh.corners(shared.phase(node), shared.state(node));
   for (int c = 0; c < corners.count; ++c)
@@ -23,7 +23,7 @@ inline std::uint32_t same_node(const Mesh& mesh, const SharedMesh& shared, std::
   return 0;
 }
 
-/// Nodes, entries, expected steps from the start and failure rate: the same as by products on one process, to 1e-10.
+/// Wants nodes, entries, expected steps from the start, failure rate as by products on one process, to 1e-10.
 inline void expect_same_as_one_process(const BatchMap& map, const std::vector<double>& start,
                                        const MeshOptions& options) {
   const auto frames = noise_frames(map, start);

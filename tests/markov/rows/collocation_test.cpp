@@ -36,7 +36,7 @@ struct LinearWithPoints : testing::LinearWithDensity {
   }
 };
 
-/// x' = x / 2 + 2 with probability 3/4, else x / 2 - 1: rest where that is below 0.
+/// Maps x' = x / 2 + 2 with probability 3/4, else x / 2 - 1: rest where that is below 0.
 struct Coin {
   std::pair<double, double> state_interval(int) const { return {0, infinity}; }
   int phases() const { return 1; }
@@ -106,8 +106,8 @@ TEST(Collocate, KeepsThePeriodOfPhases) {
   EXPECT_NEAR(steps(b) / steps(a), 1, 1e-11);
 }
 
-// Two outcomes, no density: from x < 2 a quarter of the landings rest. The expected steps jump at 2 and wherever an
-// outcome leads there.
+// There are two outcomes, no density: from x < 2 a quarter of the landings rest. The expected steps jump at 2 and
+// wherever an outcome leads there.
 TEST(Collocate, TakesSingleOutcomes) {
   const Coin map;
   const std::vector<std::vector<double>> edges = collocation_edges(map, {{0, 4}}, 3);
@@ -132,7 +132,7 @@ TEST(Collocate, NamesTheSampledMethodWhereThereAreNoPoints) {
 TEST(InterpolatedChain, TakesNegativeEntriesButNoUndefinedOnes) {
   const Chain chain = Chain::interpolated({0, 1, 2}, {1, 0}, {-0.125, 0.5}, {0.25, 0.25});
   EXPECT_DOUBLE_EQ(chain.stay(0), 0.875);
-  // (I - Q) x = 1 by hand: x0 / 8 + x1 / 8 = 1, -x0 / 2 + 3 x1 / 4 = 1.
+  // By hand (I - Q) x = 1 is x0 / 8 + x1 / 8 = 1, -x0 / 2 + 3 x1 / 4 = 1.
   const std::vector<double> x = ChainSolver(chain).solve(std::vector<double>{1, 1});
   EXPECT_NEAR(x[0], 4, 1e-13);
   EXPECT_NEAR(x[1], 4, 1e-13);

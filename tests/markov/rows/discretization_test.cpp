@@ -15,7 +15,7 @@
 namespace metastable::markov {
 namespace {
 
-// A third party's map, made without touching markov/: x' = a x + b + s z, rest below zero.
+// Is a third party's map, made without touching markov/: x' = a x + b + s z, rest below zero.
 struct LinearMap {
   double a = 0.5, b = 2.0, s = 1.0;
   std::pair<double, double> state_interval(int) const { return {0.0, INFINITY}; }
@@ -28,7 +28,7 @@ struct LinearMap {
   }
 };
 
-// The same with its probability of rest and a faster table.
+// Is the same with its probability of rest and a faster table.
 struct InformedMap : LinearMap {
   struct Table {
     std::vector<double> shift;
@@ -51,7 +51,7 @@ struct InformedMap : LinearMap {
   }
 };
 
-// The same dynamics seen every other step under another name: period two.
+// Is the same dynamics seen every other step under another name: period two.
 struct TwoPhaseMap : LinearMap {
   int phases() const { return 2; }
 };
@@ -64,7 +64,7 @@ double steps_from_launch_of(const SampledChain& sampled) {
   return 1 + std::inner_product(mean.begin(), mean.end(), sampled.launch.after.begin(), 0.0);
 }
 
-// By trapezoid on a fine grid of starts and a closed-form kernel: independent of cells and draws.
+// Integrates by trapezoid on a fine grid of starts and a closed-form kernel: independent of cells and draws.
 double reference_steps(const LinearMap& map) {
   constexpr int n = 1500;
   const double top = 14.0, h = top / n;
@@ -219,7 +219,7 @@ TEST(ViolationRates, CountWhatTheMapReports) {
   EXPECT_NEAR(rates[1].back(), 1.0, 1e-12);  // the launch
 }
 
-// A map with a hole: what lands nowhere must not pass for rest.
+// Is a map with a hole: what lands nowhere must not pass for rest.
 struct MapWithAHole : LinearMap {
   std::optional<double> landing(double state, int phase, std::span<const double> noise) const {
     return state > 3 && state < 3.1 ? std::numeric_limits<double>::quiet_NaN()

@@ -56,7 +56,7 @@ TEST(Draws, MomentsAreThoseOfIndependentStandardNormals) {
 }
 
 TEST(Draws, SobolConvergesFasterThanRandom) {
-  // Root mean square error of E z^2 over 16 randomisations, at two sizes.
+  // Returns the root mean square error of E z^2 over 16 randomisations, at two sizes.
   const auto error = [](Sequence sequence, std::size_t count) {
     double square = 0;
     for (std::uint32_t r = 0; r < 16; ++r) {

@@ -29,7 +29,7 @@ RC_GTEST_PROP(Grid, CellAgreesWithBinarySearchOnAnyEdges, ()) {
       RC_ASSERT(grid.cell(state) == by_search(grid, state));
 }
 
-// Both ways of finding a cell, for even grids and for strongly graded ones, edges, rest and what has overflown
+// Both ways of finding a cell agree, for even grids and for strongly graded ones, edges, rest and what has overflown
 // included.
 RC_GTEST_PROP(Grid, TallyCountsWhereCellSays, ()) {
   const auto whole = *rc::gen::suchThat(rc::gen::container<std::set<int>>(rc::gen::inRange(0, 300)),

@@ -1,5 +1,5 @@
-// The rough-terrain rimless wheel of Byl and Tedrake ("Metastable walking machines", IJRR 28, 2009) as an end-to-end
-// test of the solvers: its integral equation on Gauss-Legendre nodes, against values computed to 60 digits.
+// Takes the rough-terrain rimless wheel of Byl and Tedrake ("Metastable walking machines", IJRR 28, 2009) as an
+// end-to-end test of the solvers: its integral equation on Gauss-Legendre nodes, against values computed to 60 digits.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ struct Rule {
   std::vector<double> node, weight;
 };
 
-/// Gauss-Legendre on [lower, upper], by Newton's method on the three-term recurrence.
+/// Returns Gauss-Legendre on [lower, upper], by Newton's method on the three-term recurrence.
 Rule gauss_legendre(int n, double lower, double upper) {
   Rule rule;
   for (int k = n; k-- > 0;) {
@@ -44,21 +44,21 @@ Rule gauss_legendre(int n, double lower, double upper) {
   return rule;
 }
 
-/// x' = c x - (1 - c) G + G R cos(slope - phi): the map of the benchmark with its cosines put together;
+/// Maps x' = c x - (1 - c) G + G R cos(slope - phi): the map of the benchmark with its cosines put together;
 /// c = cos^2(2 a), a = pi/8, R cos(phi) = (1 - c) cos a, R sin(phi) = (1 + c) sin a.
 class RoughTerrain {
  public:
   explicit RoughTerrain(double sd_degrees) : sd_(sd_degrees * pi / 180) {}
 
   double fixed_point() const { return (kReach * std::cos(kMean - kPhi) - (1 - kC) * kG) / (1 - kC); }
-  /// Density of the next state.
+  /// Returns the density of the next state.
   double density(double from, double to) const {
     const double cosine = level(from, to);
     if (std::abs(cosine) >= 1) return 0;
     const double z = (kPhi - std::acos(cosine) - kMean) / sd_;
     return std::exp(-0.5 * z * z) / (sd_ * std::sqrt(2 * pi) * kReach * std::sqrt(1 - cosine * cosine));
   }
-  /// Probability of x' <= 0, from the error function.
+  /// Returns the probability of x' <= 0, from the error function.
   double kill(double from) const {
     const double slope = kPhi - std::acos(level(from, 0));
     return 0.5 * std::erfc((kMean - slope) / (sd_ * std::numbers::sqrt2));
@@ -70,7 +70,7 @@ class RoughTerrain {
   static inline const double kReach = kG * std::hypot((1 - kC) * std::cos(kA), (1 + kC) * std::sin(kA));
   static inline const double kPhi = std::atan2((1 + kC) * std::sin(kA), (1 - kC) * std::cos(kA));
 
-  /// cos(slope - phi) of the slope that leads there.
+  /// Returns cos(slope - phi) of the slope that leads there.
   static double level(double from, double to) { return (to - kC * from + (1 - kC) * kG) / kReach; }
 
   double sd_;
@@ -81,11 +81,11 @@ struct Answer {
   double from_fixed_point = 0;
 };
 
-/// Everything in double precision on `nodes` points of (0, upper].
+/// Finds everything in double precision on `nodes` points of (0, upper].
 Answer solve(double sd_degrees, int nodes) {
   const RoughTerrain wheel(sd_degrees);
-  // Ten standard deviations above the fixed point: sd of x' is 0.17 per degree, of the stationary state 2 / sqrt(3) of
-  // it.
+  // It lies ten standard deviations above the fixed point: sd of x' is 0.17 per degree, of the stationary state 2 /
+  // sqrt(3) of it.
   const double upper = wheel.fixed_point() + 10 * 0.21 * sd_degrees;
   const Rule rule = gauss_legendre(nodes, 0, upper);
   const std::size_t n = rule.node.size();

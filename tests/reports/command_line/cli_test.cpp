@@ -1,4 +1,4 @@
-// The program as its users meet it: arguments in, exit code, streams and files out.
+// Runs the program as its users meet it: arguments in, exit code, streams and files out.
 
 #include "reports/command_line/cli.h"
 
@@ -64,7 +64,7 @@ TEST_F(CommandLine, CertifiedBoundsStandBesideTheEstimate) {
   EXPECT_NE(none.out.find("no certificate: bounds exist for the law published only"), std::string::npos) << none.out;
 }
 
-// A wrong option, key or value: exit code 2 and one line that names it and what is allowed.
+// A wrong option, key or value gives exit code 2 and one line that names it and what is allowed.
 TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
   struct Case {
     std::vector<std::string> words;
@@ -199,7 +199,7 @@ TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {
   ASSERT_EQ(metastable(with(words, {"--out", path("whole.csv")})).code, 0);
   const std::string whole = read(path("whole.csv"));
   EXPECT_TRUE(std::filesystem::exists(path("whole.svg")));
-  // Cut in the middle of the fourth row.
+  // It is cut in the middle of the fourth row.
   std::size_t at = 0;
   for (int line = 0; line < 9; ++line) at = whole.find('\n', at) + 1;
   std::ofstream(path("part.csv.partial")) << whole.substr(0, at + 5);
@@ -338,7 +338,7 @@ TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
             "metastable: ACTION: 'shut' is none of 'make', 'answer', 'open'\n");
 }
 
-// The whole report, twice, on one thread and on two: the same bytes in every file.
+// The whole report, made on one thread and on two, has the same bytes in every file.
 TEST_F(CommandLine, ReportIsTheSameBytesOnAnyNumberOfThreads) {
   const auto report = [&](const std::string& name, const std::string& threads) {
     return metastable(with({"report", "--out", path(name), "--threads", threads, "--energy-trials", "20"}, quick));
@@ -422,7 +422,7 @@ TEST_F(CommandLine, DiagnoseNamesTheKnownEffects) {
     EXPECT_NE(ran.err.find(part), std::string::npos) << part << "\n" << ran.err;
 }
 
-// A small experiment with a leg that grips more: the same bytes on any number of threads, in every form.
+// A small experiment with a leg that grips more gives the same bytes on any number of threads, in every form.
 TEST_F(CommandLine, DiagnoseFindsWhatTheLaboratoryPutIn) {
   ASSERT_EQ(metastable({"simulate", "--reality", "--slope", "9.59", "--friction", "0.352,0.043", "--restitution",
                         "0.54,0.045", "--trials", "40", "--effect", "leg_contact:leg=3,friction_ratio=0.8",
@@ -450,7 +450,7 @@ TEST_F(CommandLine, DiagnoseFindsWhatTheLaboratoryPutIn) {
   EXPECT_EQ(again, first);
 }
 
-// The second system: a drum that loses a tenth more than stated.
+// The second system is a drum that loses a tenth more than stated.
 TEST_F(CommandLine, DiagnoseTakesACoastDown) {
   std::string rows = "trial,collision,time_s,omega_minus_rad_s\n";
   double x = 10000, time = 0, noise = 0.5;

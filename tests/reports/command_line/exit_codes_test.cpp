@@ -1,4 +1,4 @@
-// How the program ends where it cannot do its work: with the codes it documents, and never by waiting.
+// Checks how the program ends where it cannot do its work: with the codes it documents, and never by waiting.
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ class ExitCodes : public test::InFolder {
   }
 };
 
-// In a process of its own: the stream stays broken.
+// It runs in a process of its own: the stream stays broken.
 void run_into_full_device(const std::vector<std::string>& words) {
   ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO);
   ::_exit(test::run(words));
@@ -48,7 +48,7 @@ TEST_F(ExitCodes, FullDeviceIsTwoAndALine) {
   EXPECT_EXIT(run_into_full_device(quick({"compare"})), testing::ExitedWithCode(2), full);
   EXPECT_EXIT(run_into_full_device({"simulate", "--trials", "3", "--out", path("made")}), testing::ExitedWithCode(2),
               full);
-  // A file likewise.
+  // A file does likewise.
   const Ran ran = metastable({"effects", "--json", "/dev/full"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_EQ(ran.err, "metastable: cannot write /dev/full: No space left on device\n");
@@ -61,7 +61,7 @@ TEST_F(ExitCodes, FullDeviceIsNoPlaceForASweep) {
             "metastable: cannot write /dev/full: is no regular file, from which a sweep could be taken up again\n");
 }
 
-// Ctrl-C or its like a while after the program has begun to wait; without it the program would wait for ever.
+// Sends Ctrl-C or its like a while after the program has begun to wait; without it the program would wait for ever.
 void run_and_signal(const std::vector<std::string>& words, int signal) {
   ::alarm(20);
   std::thread([signal] {

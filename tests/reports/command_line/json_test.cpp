@@ -1,4 +1,4 @@
-// --json - of every command: standard output holds one JSON and nothing else.
+// With --json - of every command standard output holds one JSON and nothing else.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using Json = nlohmann::json;
 
 class JsonOfEveryCommand : public test::InFolder {
  protected:
-  // What a command answers; null where it is no JSON alone.
+  // Returns what a command answers; null where it is no JSON alone.
   Json answer(std::vector<std::string> words) const {
     words.insert(words.end(), {"--json", "-"});
     const Ran ran = metastable(words);

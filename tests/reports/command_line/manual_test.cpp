@@ -23,7 +23,7 @@ const std::vector<ManualCommand> manual{
       {"--direct", "", "", "-follow every landing", false}}},
     {"describe", "What the trials say", {{"DIR", "", "", "Folder", true}, {"--out", "DIR", "", "Folder", false}}}};
 
-// What bash itself makes of the script, for the words of a command line of which the last is to be completed.
+// Returns what bash itself makes of the script, for the words of a command line of which the last is to be completed.
 std::string completed(const std::string& words, int last) {
   const std::filesystem::path script = std::filesystem::path(testing::TempDir()) / "metastable_completion.bash";
   std::ofstream(script) << completion_script(manual, "bash") << "COMP_WORDS=(" << words << ")\nCOMP_CWORD=" << last

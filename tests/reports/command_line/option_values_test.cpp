@@ -9,7 +9,7 @@
 namespace metastable::reports {
 namespace {
 
-// Longer than a file's name may be: asking the file system about it once ended the program.
+// It is longer than a file's name may be: asking the file system about it once ended the program.
 TEST(OptionValues, ACatalogueOfAllEffectsIsAList) {
   std::string all;
   for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) all += (all.empty() ? "" : ",") + info.id;

@@ -1,4 +1,4 @@
-// What no wheel can have, and options that would do nothing: exit code 2 and one line that says why.
+// What no wheel can have, and options that would do nothing, give exit code 2 and one line that says why.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -107,7 +107,7 @@ TEST_F(Refusals, OfWhatNoWheelCanHave) {
       {{"sweep", "--slope", "5,6", "--initial-speed", "1e5", "--out", path("s.csv")},
        "--initial-speed: mean 100000 is outside [0, 1000]"},
       {{"steps", "--config", file("c.toml", "mass = 1e250\n")}, "--mass: 1e+250 is outside [1e-06, 1e+06]"},
-      // Inertia about the hub, where that about the foot is asked for.
+      // It is the inertia about the hub, where that about the foot is asked for.
       {{"steps", "--inertia", "0.0035"},
        "--inertia: 0.0035 kg m^2 is below M (mean L)^2 = 0.03207 kg m^2, the least about the stance foot; if it is the "
        "inertia about the hub, 0.03557 kg m^2 is meant"},

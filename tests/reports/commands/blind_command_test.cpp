@@ -30,7 +30,7 @@ std::string message_of(F f) {
   return "accepted";
 }
 
-// A run of three cases in a folder of its own, answered by a program that always says the same.
+// Makes a run of three cases in a folder of its own, answered by a program that always says the same.
 class BlindRun : public testing::Test {
  protected:
   void SetUp() override {
@@ -69,7 +69,7 @@ TEST_F(BlindRun, MakesAnswersAndOpens) {
     // Nothing of the truth is in the folder the diagnosis sees.
     EXPECT_EQ(read(cases / name / "experiment.toml").find("seed"), std::string::npos);
   }
-  // Cut short and taken up again: the same bytes.
+  // Cut short and taken up again, it has the same bytes.
   const std::string before = read(cases / "0002" / "collisions.csv");
   fs::remove_all(cases / "0002");
   run_blind_make(request_);
@@ -142,7 +142,7 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("the seal of case 3 is broken"), std::string::npos);
   write(truth, sealed);
 
-  // Two of three answered: opening the truths ends the run, so it has to be meant. The third then comes too late.
+  // Two of three are answered: opening the truths ends the run, so it has to be meant. The third then comes too late.
   const fs::path record = fs::path(request_.folder) / "answers" / "record.csv";
   const std::string all = read(record);
   write(record, all.substr(0, all.rfind('\n', all.size() - 2) + 1));

@@ -18,7 +18,7 @@ using test::read;
 
 class LessonsCommandTest : public test::InFolder {};
 
-// With few trials and few candidates: every section, with its tables and figures.
+// With few trials and few candidates it has every section, with its tables and figures.
 TEST_F(LessonsCommandTest, WritesEverySection) {
   SimulateRequest data;
   data.setting = analysis::stand_in_setting();

@@ -1,4 +1,4 @@
-// The files of a sweep: whole, its own, and taken up again.
+// The files of a sweep are whole, its own, and taken up again.
 
 #include "reports/commands/sweep_command.h"
 

@@ -1,4 +1,4 @@
-// Walkers on the command line: numbers with what stands beside them, files, and what is refused.
+// Tests walkers on the command line: numbers with what stands beside them, files, and what is refused.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -83,7 +83,7 @@ TEST_F(WalkerCommand, RefusesWhatHasNoMeaning) {
     EXPECT_EQ(ran.code, 2) << said;
     EXPECT_EQ(ran.err, "metastable: " + said + "\n");
   }
-  // No gait that is stable: a computation that failed, in one line that names the state.
+  // There is no gait that is stable: a computation that failed, in one line that names the state.
   const Ran unstable = metastable({"steps", "--walker", "compass", "--slope", "30", "--slope-sd", "0.5"});
   EXPECT_EQ(unstable.code, 3);
   EXPECT_EQ(std::count(unstable.err.begin(), unstable.err.end(), '\n'), 1);

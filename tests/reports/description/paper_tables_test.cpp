@@ -16,7 +16,8 @@ using test::expect_cell;
 
 constexpr double t_1 = 12.706204736432095;  // 97.5 % quantile of Student's t, 1 degree of freedom (R: qt(0.975, 1))
 
-// A profile whose numbers are all made of one: its mean steady speed is `mean`, with an sd between trials of 0.01.
+// Makes a profile whose numbers are all made of one: its mean steady speed is `mean`, with an sd between trials of
+// 0.01.
 analysis::StudiedProfile profile(double mean) {
   analysis::StudiedProfile p;
   p.label = "a line";

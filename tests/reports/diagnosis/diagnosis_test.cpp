@@ -1,4 +1,4 @@
-// A diagnosis as text, JSON and page, from one filled by hand.
+// Shows a diagnosis as text, JSON and page, from one filled by hand.
 
 #include <gtest/gtest.h>
 

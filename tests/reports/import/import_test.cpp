@@ -28,7 +28,7 @@ using test::metastable;
 using test::Ran;
 using Words = std::vector<std::string>;
 
-// Two conditions, one trial whose foot turned back, and speeds that are not known.
+// It has two conditions, one trial whose foot turned back, and speeds that are not known.
 constexpr const char* known_toml = R"(title = "Known"
 [wheel]
 hub_mass_kg = 1.39
@@ -83,7 +83,7 @@ class Import : public test::InFolder {
     return metastable(words);
   }
 
-  // The experiment that was imported is the known one; numbers to a relative `close`.
+  // The experiment that was imported is the known one, numbers to a relative `close`.
   void expect_same(const Ran& ran, double close = 0) const {
     ASSERT_EQ(ran.code, 0) << ran.err;
     const Experiment read = analysis::read_experiment(folder_ / "out");
@@ -114,7 +114,8 @@ class Import : public test::InFolder {
     EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
   }
 
-  // In degrees, from leg 1, with other names, an outcome by number, rows of the trials mixed, and a column of no use.
+  // Writes degrees, from leg 1, with other names, an outcome by number, rows of the trials mixed, and a column of
+  // no use.
   std::string long_csv() const {
     std::string rows[3];
     for (const MeasuredTrial& trial : known_.trials)
@@ -128,7 +129,7 @@ class Import : public test::InFolder {
     return file("long.csv", text + rows[0] + rows[1] + rows[2]);
   }
 
-  // As `known`, but for times and positions.
+  // Leaves it as `known`, but for times and positions.
   void forget_course() {
     for (MeasuredTrial& trial : known_.trials)
       for (MeasuredCollision& c : trial.collisions) c.time = c.position = std::nullopt;
@@ -286,7 +287,7 @@ class ImportMat : public Import {
  protected:
   using Pad = std::vector<std::vector<double>>;
 
-  // The speeds of each trial, in deg/s.
+  // Returns the speeds of each trial, in deg/s.
   static std::vector<double> speeds(const MeasuredTrial& trial) {
     std::vector<double> values;
     for (const MeasuredCollision& c : trial.collisions) values.push_back(c.omega_minus * 180 / std::numbers::pi);
@@ -309,7 +310,7 @@ class ImportMat : public Import {
     Mat_Close(mat);
     return path("lab.mat");
   }
-  // Each trial's condition, and its number.
+  // Returns each trial's condition, and its number.
   matvar_t* conditions() const {
     std::size_t dims[] = {known_.trials.size(), 1};
     std::vector<matvar_t*> cells;
@@ -317,7 +318,7 @@ class ImportMat : public Import {
       cells.push_back(text(nullptr, known_.conditions[trial.condition].id));
     return Mat_VarCreate("start", MAT_C_CELL, MAT_T_CELL, 2, dims, cells.data(), 0);
   }
-  // Known but for what these files do not tell.
+  // Leaves all known but for what these files do not tell.
   void forget() {
     forget_course();
     for (MeasuredTrial& trial : known_.trials) {

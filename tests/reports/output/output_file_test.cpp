@@ -142,7 +142,7 @@ TEST_F(OutputFileTest, FolderAppearsWholeOrNotAtAll) {
     EXPECT_EQ(files(), 1u);
     fs::remove_all(target);
   }
-  // Beside what somebody keeps there.
+  // They go beside what somebody keeps there.
   fs::create_directory(target);
   write_file(target / "notes.txt", "mine");
   {

@@ -8,7 +8,7 @@
 namespace metastable::reports::test {
 namespace {
 
-// FIPS 180-4's examples.
+// These are FIPS 180-4's examples.
 TEST(Seal, Sha256OfKnownTexts) {
   EXPECT_EQ(sha256(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   EXPECT_EQ(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
@@ -32,7 +32,7 @@ TEST(Seal, RecordShowsEveryChange) {
   EXPECT_EQ(record[1].number, 3);
   EXPECT_EQ(record[1].digest, sha256("second"));
   EXPECT_EQ(message(""), "accepted");
-  // Left out, swapped, renumbered, dated back, answered twice.
+  // Entries are left out, swapped, renumbered, dated back, answered twice.
   EXPECT_EQ(message(record_line(b)), "record.csv:1: the record was changed: its chain of digests is broken here");
   EXPECT_NE(message(record_line(b) + record_line(a)), "accepted");
   std::string renumbered = text;

@@ -1,4 +1,4 @@
-// Tables for the terminal: widths, wrapping, what is not shown.
+// Checks tables for the terminal: widths, wrapping, what is not shown.
 
 #include "reports/output/text_table.h"
 
@@ -71,7 +71,7 @@ std::string without_space(std::string text) {
   return text;
 }
 
-// Every width down to one where single words are the limit: no line is longer, and all characters are there.
+// At every width down to one where single words are the limit no line is longer, and all characters are there.
 TEST(TextTable, NoLineIsLongerThanTheWindow) {
   const Table table{.id = "t",
                     .title = "Which effect explains the gap that is left after recalibration",
@@ -88,7 +88,7 @@ TEST(TextTable, NoLineIsLongerThanTheWindow) {
   }
 }
 
-// Twelve columns in sixty characters: the ones that find no room stand below, beside the names again.
+// Of twelve columns in sixty characters the ones that find no room stand below, beside the names again.
 TEST(TextTable, MoreColumnsThanTheWindowHoldsGoOnBelow) {
   Table table{.id = "t", .title = "T", .columns = {{"conditions"}}, .rows = {{"fast-9.59, slow-9.59"}, {"all"}}};
   for (int i = 0; i < 11; ++i) {
