@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <span>
 #include <stdexcept>
@@ -14,6 +15,10 @@ namespace {
 
 constexpr double slowest_rate = 60, fastest_rate = 1000;  // [Hz]
 constexpr double default_span = 0.05;                     // of the filter's window [s]
+constexpr double flight_span = 0.04;                      // behind a collision in which a foot flies [s]
+constexpr std::size_t most_tries = 12;                    // of where it began to stand
+constexpr double noise_error = 1.7;                       // ratio by which the noise's square is known
+constexpr double noise_level = 0.99;                      // share of fits to noise alone that pass for it
 
 struct Peak {
   std::size_t at = 0;      // sample of the largest speed
@@ -43,6 +48,18 @@ std::vector<Peak> peaks(std::span<const double> speed, double rise) {
   return all;
 }
 
+// Estimates the white noise of the samples [rad], by the smaller ones of their third differences: most stretches are
+// smooth over four samples.
+double noise_of(const std::vector<double>& angle) {
+  constexpr double share = 0.25, normal_quantile = 0.3186, of_third_difference = 4.4721;  // sqrt(20)
+  std::vector<double> differences;
+  for (std::size_t i = 3; i < angle.size(); ++i)
+    differences.push_back(std::abs(angle[i] - 3 * angle[i - 1] + 3 * angle[i - 2] - angle[i - 3]));
+  const auto at = differences.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(differences.size()));
+  std::nth_element(differences.begin(), at, differences.end());
+  return *at / (normal_quantile * of_third_difference);
+}
+
 class Search {
  public:
   Search(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg,
@@ -56,6 +73,7 @@ class Search {
     const SavitzkyGolay smooth(smoothing_window(options, rate), 3, 0), slope(smooth.window(), 3, 1);
     angle_ = smooth.apply(recording.angle_rad, 1 / rate);
     speed_ = slope.apply(recording.angle_rad, 1 / rate);
+    noise_ = noise_of(recording.angle_rad);
   }
 
   FoundTrial run() {
@@ -128,15 +146,38 @@ class Search {
     double from = at - options_.fit_span, to = at + options_.fit_span;
     if (k > 0) from = std::max(from, (time[all[k - 1].trough] + time[all[k - 1].at]) / 2);
     if (k + 1 < all.size()) to = std::min(to, time[all[k + 1].at]);
-    const auto first = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), from) - time.begin());
-    const auto end = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), to) - time.begin());
     const StanceFit guess{.time = at,
                           .angle_rad = (recording_.angle_rad[fall] + recording_.angle_rad[fall + 1]) / 2,
                           .omega_minus = speed_[peak.at],
                           .omega_plus = speed_[std::min(peak.trough, fall + (fall - peak.at) + 1)],
                           .residual_sd_rad = 0};
-    return fit_collision(std::span(time).subspan(first, end - first),
-                         std::span(recording_.angle_rad).subspan(first, end - first), stance(n), stance(n + 1), guess);
+    const auto first = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), from) - time.begin());
+    const auto end_at = [&](double last) {
+      return static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), last) - time.begin());
+    };
+    const auto fitted = [&](std::size_t begin, std::size_t end, AfterCollision then) {
+      return fit_collision(std::span(time).subspan(begin, end - begin),
+                           std::span(recording_.angle_rad).subspan(begin, end - begin), stance(n), stance(n + 1), guess,
+                           then);
+    };
+    const std::optional<StanceFit> whole = fitted(first, end_at(to), AfterCollision::stands);
+    if (whole && noise_alone(*whole, end_at(to) - first)) return whole;
+    // Feet hop: the wheel stands for the last part of a step only, and flies at first.
+    const std::size_t end = end_at(std::min(to, at + flight_span)),
+                      stride = std::max<std::size_t>(1, (fall - first) / most_tries);
+    for (std::size_t begin = first; begin + 2 <= fall; begin += stride)
+      if (const std::optional<StanceFit> fit = fitted(begin, end, AfterCollision::flies);
+          fit && noise_alone(*fit, end - begin))
+        return fit;
+    return whole;
+  }
+
+  // Says whether what a fit leaves is no more than the samples' noise.
+  bool noise_alone(const StanceFit& fit, std::size_t samples) const {
+    const double freedom = static_cast<double>(samples) - 4;
+    if (freedom < 1) return false;
+    const double most = boost::math::quantile(boost::math::chi_squared(freedom), noise_level) / freedom;
+    return fit.residual_sd_rad <= std::sqrt(std::max(most, noise_error)) * noise_;
   }
 
   const AngleRecording& recording_;
@@ -144,6 +185,7 @@ class Search {
   int first_leg_;
   const FinderOptions& options_;
   std::vector<double> angle_, speed_;  // smoothed
+  double noise_ = 0;                   // of the samples, about [rad]
 };
 
 }  // namespace

@@ -16,8 +16,8 @@ using Parameters = Eigen::Vector4d;  // time, angle, omega_minus, omega_plus
 class Residuals {
  public:
   Residuals(std::span<const double> time, std::span<const double> angle, const dynamics::Stance& before,
-            const dynamics::Stance& after)
-      : time_(time), angle_(angle), before_(before), after_(after) {}
+            const dynamics::Stance& after, AfterCollision then)
+      : time_(time), angle_(angle), before_(before), after_(after), then_(then) {}
 
   Eigen::VectorXd operator()(const Parameters& p) const {
     Eigen::VectorXd residual(static_cast<Eigen::Index>(time_.size()));
@@ -29,6 +29,11 @@ class Residuals {
     for (std::size_t i = first_after; i-- > 0; now = time_[i]) {
       state = dynamics::stance_motion(before_.pendulum, state, time_[i] - now);
       residual(static_cast<Eigen::Index>(i)) = p(1) + state.angle - before_.end_angle_rad - angle_[i];
+    }
+    if (then_ == AfterCollision::flies) {
+      for (std::size_t i = first_after; i < time_.size(); ++i)
+        residual(static_cast<Eigen::Index>(i)) = p(1) + p(3) * (time_[i] - p(0)) - angle_[i];
+      return residual;
     }
     state = {after_.start_angle_rad, p(3)};
     now = p(0);
@@ -43,6 +48,7 @@ class Residuals {
  private:
   std::span<const double> time_, angle_;
   const dynamics::Stance &before_, &after_;
+  AfterCollision then_;
 };
 
 // Fits from one guess; the second number is the sum of squares.
@@ -89,15 +95,17 @@ std::optional<std::pair<StanceFit, double>> descend(const Residuals& residuals, 
 }  // namespace
 
 std::optional<StanceFit> fit_collision(std::span<const double> time, std::span<const double> angle,
-                                       const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess) {
+                                       const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess,
+                                       AfterCollision then) {
   constexpr std::size_t least = 3;
   if (time.size() < 2 * least) return std::nullopt;
   const double earliest = time[least - 1], latest = time[time.size() - least];
   if (!(guess.time >= earliest && guess.time <= latest)) return std::nullopt;
-  const Residuals residuals(time, angle, before, after);
+  const Residuals residuals(time, angle, before, after, then);
   // A wheel that falls back has minima of its own: one for stopping dead, one for a small hop.
   std::optional<std::pair<StanceFit, double>> best;
   for (const double omega_plus : {guess.omega_plus, 0.6, 0.1}) {
+    if (best && then == AfterCollision::flies) break;  // that wheel does not fall back
     guess.omega_plus = omega_plus;
     const auto fit = descend(residuals, guess, earliest, latest);
     if (fit && (!best || fit->second < best->second)) best = fit;

@@ -16,13 +16,20 @@ struct StanceFit {
   double residual_sd_rad = 0;  ///< of the samples
 };
 
+/// Says what the wheel does behind a collision, as far as its samples are taken.
+enum class AfterCollision {
+  stands,  ///< turns about the landed foot
+  flies    ///< the foot hops: nothing changes the spin
+};
+
 /// Fits by least squares time, angle, omega_minus and omega_plus: before the collision the stance motion of `before`
-/// backwards from its end, after it that of `after` onwards from its start; a wheel that falls back lies still on both
-/// feet (omega_plus is 0 where it never left them). Levenberg-Marquardt from `guess` and from small omega_plus, the
-/// best of them; nothing if fewer than three samples lie on either side, the time leaves the samples, or it does not
-/// settle within 50 steps.
+/// backwards from its end, after it that of `after` onwards from its start, or a flight; a wheel that falls back lies
+/// still on both feet (omega_plus is 0 where it never left them). Levenberg-Marquardt from `guess` and from small
+/// omega_plus, the best of them; nothing if fewer than three samples lie on either side, the time leaves the samples,
+/// or it does not settle within 50 steps.
 /// @param time, angle  samples around one collision and no other [s], [rad]
 std::optional<StanceFit> fit_collision(std::span<const double> time, std::span<const double> angle,
-                                       const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess);
+                                       const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess,
+                                       AfterCollision then = AfterCollision::stands);
 
 }  // namespace metastable::analysis

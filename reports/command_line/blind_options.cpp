@@ -9,7 +9,8 @@ namespace metastable::reports {
 std::vector<Command> blind_commands() {
   return {{"blind", "The diagnosis tested on cases whose truth is sealed until it has answered: make, answer, open",
            [](Options& o) {
-             o.add_place("ACTION", "make: draw cases and seal their truths; answer: diagnose the folders; open: grade");
+             o.add_place("ACTION", "make: draw cases and seal their truths; answer: diagnose the folders; open: grade",
+                         "make|answer|open");
              o.add_place("DIR", "Folder of the run");
              o.add("sealed", "DIR", "", "Folder of the truths (default: DIR-sealed, beside the run)");
              o.add("seed", "SEED", "", "make: of all cases (default: from the system's entropy)");

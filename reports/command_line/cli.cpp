@@ -22,6 +22,7 @@
 #include "reports/command_line/setting_options.h"
 #include "reports/command_line/suggestion.h"
 #include "reports/command_line/walker_options.h"
+#include "reports/command_line/written_paths.h"
 #include "reports/commands/compare_command.h"
 #include "reports/commands/doctor_command.h"
 #include "reports/commands/report_command.h"
@@ -133,7 +134,11 @@ Command sweep_command(const Sharing* sharing) {
         request.setting = common_setting(o);
         for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
           if (o.text(name).empty()) continue;
-          analysis::SweepAxis axis{analysis::parameter_from_name(name), range_value(name, o.text(name), o.range(name))};
+          const analysis::Parameter parameter = analysis::parameter_from_name(name);
+          const dynamics::Range allowed = parameter == analysis::Parameter::slope
+                                              ? dynamics::slope_range(request.setting.wheel.legs())
+                                              : o.range(name);
+          analysis::SweepAxis axis{parameter, range_value(name, o.text(name), allowed)};
           if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
             request.setting.slope_deg = axis.values.front();
           else
@@ -212,24 +217,22 @@ std::vector<ManualCommand> manual_of(const std::vector<CLI::App*>& subcommands) 
     for (const CLI::Option* option : sub->get_options()) {
       const bool place = option->get_positional();
       command.options.push_back({place ? option->get_single_name() : "--" + option->get_lnames().front(),
-                                 place || option->get_expected_max() == 0 ? "" : option->get_type_name(),
+                                 option->get_expected_max() == 0 ? "" : option->get_type_name(),
                                  option->get_default_str(), option->get_description(), place});
     }
   }
   return manual;
 }
 
-// Writes the options of one command, or of all, as a table.
-void write_options(const std::vector<ManualCommand>& manual, const Options& o, const std::string& line) {
+// Returns the options of one command, or of all, as a table.
+Table options_table(const std::vector<ManualCommand>& manual, const Options& o) {
   Table table{
       .id = "options", .title = "Options", .columns = {{"command"}, {"option"}, {"value"}, {"default"}, {"help"}}};
   for (const ManualCommand& command : manual)
     if (!o.given("COMMAND") || command.name == o.text("COMMAND"))
       for (const ManualOption& option : command.options)
         table.rows.push_back({command.name, option.name, option.value, option.fallback, option.help});
-  Answer answer(o.text("json"));
-  answer.table(table);
-  answer.finish({line, {}, 0, version()});
+  return table;
 }
 
 // @param manual  of all commands, known once they are declared
@@ -241,18 +244,20 @@ std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
            },
            [&manual](const Options& o, const std::string& line) {
              const std::string page = manual_page(manual, o.text("COMMAND"), version());
+             Answer answer(o.text("json"));
              if (o.text("json") != "-") fmt::print("{}", page);
-             if (o.given("json")) write_options(manual, o, line);
+             answer.table(options_table(manual, o));
+             answer.finish({line, {}, 0, version()});
            }},
           {"completion", "A script that completes commands and options: source <(metastable completion bash)",
            [](Options& o) {
-             o.add_place("SHELL", "bash, zsh or fish");
+             o.add_place("SHELL", "Whose completion it is", "bash|zsh|fish");
              o.add_json();
            },
            [&manual](const Options& o, const std::string& line) {
              const std::string script = completion_script(manual, o.text("SHELL"));
-             if (o.text("json") != "-") fmt::print("{}", script);
              Answer answer(o.text("json"));
+             if (o.text("json") != "-") fmt::print("{}", script);
              answer.fact("shell", o.text("SHELL"));
              answer.fact("script", script);
              answer.finish({line, {}, 0, version()});
@@ -349,6 +354,7 @@ int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, in
     if (!subcommands[i]->parsed()) continue;
     if (!config_files[i].empty()) options[i].read(config_files[i]);
     options[i].check_given();
+    check_written_paths(options[i], config_files[i]);
     all[i].run(options[i], command_line(argc, argv));
   }
   return 0;

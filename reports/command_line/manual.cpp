@@ -9,12 +9,10 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "reports/command_line/suggestion.h"
+
 namespace metastable::reports {
 namespace {
-
-bool is_file(const ManualOption& o) {
-  return o.value.starts_with("FILE") || o.value.starts_with("DIR") || (o.place && o.name != "SHELL");
-}
 
 std::string replaced(std::string text, std::string_view from, std::string_view to) {
   for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
@@ -22,10 +20,18 @@ std::string replaced(std::string text, std::string_view from, std::string_view t
   return text;
 }
 
-// Returns an option's words, with a space between them, if its value lists words (capitals stand for something else).
-std::string choices(const ManualOption& o) {
+// Returns the words an option or a place takes, with a space between them, if its value lists words (capitals stand for
+// something else); the place COMMAND takes the commands.
+std::string choices(const ManualOption& o, const std::vector<ManualCommand>& commands) {
+  if (o.place && o.name == "COMMAND")
+    return fmt::format("{}", fmt::join(commands | std::views::transform(&ManualCommand::name), " "));
   const bool words = std::ranges::none_of(o.value, [](char c) { return c >= 'A' && c <= 'Z'; });
   return words && o.value.find('|') != std::string::npos ? replaced(o.value, "|", " ") : "";
+}
+
+bool is_file(const ManualOption& o) {
+  const std::string& what = o.place ? o.name : o.value;
+  return what.starts_with("FILE") || what.starts_with("DIR") || what == "LOG";
 }
 
 std::string quoted(const std::string& text) { return "'" + replaced(text, "'", "'\\''") + "'"; }
@@ -47,13 +53,18 @@ std::string bash(const std::vector<ManualCommand>& commands) {
   for (const ManualCommand& command : commands) {
     fmt::format_to(std::back_inserter(text), "    {})\n      options='{}'\n", command.name,
                    fmt::join(names_of(command), " "));
-    text += "      case $before in\n";
     for (const ManualOption& o : command.options)
+      if (const std::string words = choices(o, commands); o.place && !words.empty())
+        text += "      [[ $COMP_CWORD == 2 && $word != -* ]] && values=" + quoted(words) + "\n";
+    text += "      case $before in\n";
+    for (const ManualOption& o : command.options) {
+      const std::string words = choices(o, commands);
       if (!o.place && !o.value.empty())
-        fmt::format_to(std::back_inserter(text), "        {}) values='{}' ;;\n", o.name,
-                       is_file(o)           ? "/"
-                       : choices(o).empty() ? "-"
-                                            : choices(o));
+        fmt::format_to(std::back_inserter(text), "        {}) values={} ;;\n", o.name,
+                       is_file(o)      ? "/"
+                       : words.empty() ? "-"
+                                       : quoted(words));
+    }
     text += "      esac ;;\n";
   }
   text +=
@@ -88,8 +99,9 @@ std::string zsh(const std::vector<ManualCommand>& commands) {
   for (const ManualCommand& command : commands) {
     fmt::format_to(std::back_inserter(text), "    {})\n      _arguments", command.name);
     for (const ManualOption& o : command.options) {
-      const std::string takes = is_file(o) ? "_files" : choices(o).empty() ? " " : "(" + choices(o) + ")";
-      const std::string what = o.place ? "*:" + escaped(o.name) + ":" + takes
+      const std::string words = choices(o, commands);
+      const std::string takes = is_file(o) ? "_files" : words.empty() ? " " : "(" + words + ")";
+      const std::string what = o.place ? (words.empty() ? "*:" : "1:") + escaped(o.name) + ":" + takes
                                : o.value.empty()
                                    ? fmt::format("{}[{}]", o.name, escaped(o.help))
                                    : fmt::format("*{}=[{}]:{}:{}", o.name, escaped(o.help), escaped(o.value), takes);
@@ -108,14 +120,18 @@ std::string fish(const std::vector<ManualCommand>& commands) {
   for (const ManualCommand& command : commands)
     for (const ManualOption& o : command.options) {
       const std::string of = fmt::format("complete -c metastable -n '__fish_seen_subcommand_from {}'", command.name);
-      if (o.place) {
-        if (is_file(o)) text += of + " -F\n";
-        continue;
-      }
-      const std::string takes = o.value.empty()      ? ""
-                                : is_file(o)         ? " -r -F"
-                                : choices(o).empty() ? " -x"
-                                                     : " -x -a '" + choices(o) + "'";
+      const std::string words = choices(o, commands);
+      if (o.place && !words.empty())
+        text += fmt::format(
+            "complete -c metastable -n 'test (count (commandline -opc)) -eq 2; and "
+            "__fish_seen_subcommand_from {}' -a {} -d {}\n",
+            command.name, quoted(words), quoted(o.help));
+      if (o.place && is_file(o)) text += of + " -F\n";
+      if (o.place) continue;
+      const std::string takes = o.value.empty() ? ""
+                                : is_file(o)    ? " -r -F"
+                                : words.empty() ? " -x"
+                                                : " -x -a " + quoted(words);
       text += fmt::format("{} -l {}{} -d {}\n", of, o.name.substr(2), takes, quoted(o.help));
     }
   return text;
@@ -157,9 +173,12 @@ std::string manual_page(const std::vector<ManualCommand>& commands, std::string_
     return page + std::string(exit_codes);
   }
   const auto found = std::ranges::find(commands, command, &ManualCommand::name);
-  if (found == commands.end())
-    throw std::invalid_argument(fmt::format("man: '{}' is none of the commands {}", command,
-                                            fmt::join(commands | std::views::transform(&ManualCommand::name), ", ")));
+  if (found == commands.end()) {
+    std::vector<std::string> names;
+    for (const ManualCommand& one : commands) names.push_back(one.name);
+    throw std::invalid_argument(fmt::format("man: '{}' is none of the commands {}{}", command, fmt::join(names, ", "),
+                                            did_you_mean(command, names)));
+  }
   std::string page = head("metastable-" + found->name, found->summary, version) + ".SH SYNOPSIS\n.B metastable " +
                      troff(found->name) + "\n[\\fIOPTIONS\\fR]";
   for (const ManualOption& o : found->options)

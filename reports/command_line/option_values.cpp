@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/sensitivity/sweep.h"
 #include "dynamics/wheel/effect_catalogue.h"
@@ -16,6 +17,8 @@
 
 namespace metastable::reports {
 namespace {
+
+std::string dashed(std::string_view name) { return fmt::format("--{}", name); }
 
 [[noreturn]] void refuse(std::string_view name, std::string_view text, std::string_view wanted) {
   throw std::invalid_argument(fmt::format("--{}: '{}' is not {}", name, text, wanted));
@@ -38,11 +41,6 @@ std::vector<std::string_view> split(std::string_view text, char mark) {
   }
 }
 
-void check(std::string_view name, std::string_view which, double value, const dynamics::Range& range) {
-  if (!range.holds(value))
-    throw std::invalid_argument(fmt::format("--{}: {}{} is outside {}", name, which, value, range.text()));
-}
-
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
   while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
@@ -51,10 +49,30 @@ std::string_view trimmed(std::string_view text) {
 
 }  // namespace
 
+void check_in_range(std::string_view called, double value, const dynamics::Range& range) {
+  if (!range.holds(value))
+    throw std::invalid_argument(fmt::format("{}: {} is outside {}", called, value, range.text()));
+}
+
+void check_in_range(std::string_view called, const analysis::Spread& value, const dynamics::Range& range) {
+  if (value.sd < 0) throw std::invalid_argument(fmt::format("{}: sd {} is below 0", called, value.sd));
+  for (const auto& [which, number] : {std::pair("mean", value.mean), std::pair("sd", value.sd)})
+    if (!range.holds(number))
+      throw std::invalid_argument(fmt::format("{}: {} {} is outside {}", called, which, number, range.text()));
+}
+
+void check_legs(std::string_view called, const std::vector<double>& lengths) {
+  for (const double length : lengths) check_in_range(called, length, dynamics::range::leg_length);
+  if (lengths.size() < 3)
+    throw std::invalid_argument(fmt::format("{}: {} legs are fewer than 3", called, lengths.size()));
+  if (lengths.size() > 1000)
+    throw std::invalid_argument(fmt::format("{}: {} legs are more than 1000", called, lengths.size()));
+}
+
 double number_value(std::string_view name, std::string_view text, const dynamics::Range& range) {
   double value = 0;
   if (!parse(trimmed(text), value)) refuse(name, text, "a number");
-  check(name, "", value, range);
+  check_in_range(dashed(name), value, range);
   return value;
 }
 
@@ -83,15 +101,13 @@ analysis::Spread spread_value(std::string_view name, std::string_view text, cons
   if (parts.size() > 2 || !parse(trimmed(parts[0]), spread.mean) ||
       (parts.size() == 2 && !parse(trimmed(parts[1]), spread.sd)))
     refuse(name, text, "'mean,sd' (or one number for a constant)");
-  if (spread.sd < 0) throw std::invalid_argument(fmt::format("--{}: sd {} is below 0", name, spread.sd));
   const bool coefficient = range.high <= dynamics::range::friction.high;
   if (coefficient && spread.mean == 0 && spread.sd > 1)
     throw std::invalid_argument(
         fmt::format("--{0}: '{1}' is mean 0 and sd {2}; decimals take a point, so that {3}.{2} is a constant and "
                     "{3}.{2},0.1 has sd 0.1",
                     name, text, trimmed(parts[1]), trimmed(parts[0])));
-  check(name, "mean ", spread.mean, range);
-  check(name, "sd ", spread.sd, range);
+  check_in_range(dashed(name), spread, range);
   return spread;
 }
 
@@ -102,8 +118,7 @@ std::vector<double> range_value(std::string_view name, std::string_view text, co
     double first = 0, last = 0, step = 0;
     if (!parse(trimmed(parts[0]), first) || !parse(trimmed(parts[1]), last) || !parse(trimmed(parts[2]), step))
       refuse(name, text, wanted);
-    check(name, "", first, range);
-    check(name, "", last, range);
+    for (const double end : {first, last}) check_in_range(dashed(name), end, range);
     try {
       return analysis::axis_values(first, last, step);
     } catch (const std::invalid_argument& error) {
@@ -114,7 +129,7 @@ std::vector<double> range_value(std::string_view name, std::string_view text, co
   const std::vector<double> values = list_value(name, text);
   for (std::size_t i = 1; i < values.size(); ++i)
     if (!(values[i - 1] < values[i])) refuse(name, text, wanted);
-  for (const double value : values) check(name, "", value, range);
+  for (const double value : values) check_in_range(dashed(name), value, range);
   return values;
 }
 
@@ -124,14 +139,10 @@ std::vector<double> legs_value(std::string_view name, std::string_view text, int
   for (const std::string_view part : split(text, ',')) {
     double length = 0;
     if (!parse(trimmed(part), length)) refuse(name, text, "'paper', one length or a comma list of lengths in m");
-    check(name, "", length, dynamics::range::leg_length);
     lengths.push_back(length);
   }
   if (lengths.size() == 1) lengths.assign(static_cast<std::size_t>(count), lengths.front());
-  if (lengths.size() < 3)
-    throw std::invalid_argument(fmt::format("--{}: {} legs are fewer than 3", name, lengths.size()));
-  if (lengths.size() > 1000)
-    throw std::invalid_argument(fmt::format("--{}: {} legs are more than 1000", name, lengths.size()));
+  check_legs(dashed(name), lengths);
   return lengths;
 }
 

@@ -12,6 +12,12 @@
 
 namespace metastable::reports {
 
+/// @throws std::invalid_argument "CALLED: NUMBER is outside RANGE"; of a spread it says whether mean or sd
+void check_in_range(std::string_view called, double value, const dynamics::Range& range);
+void check_in_range(std::string_view called, const analysis::Spread& value, const dynamics::Range& range);
+/// Likewise refuses any but 3 to 1000 legs whose lengths [m] are in their range.
+void check_legs(std::string_view called, const std::vector<double>& lengths);
+
 /// All throw std::invalid_argument: "--NAME: 'TEXT' is not ...", or "--NAME: NUMBER is outside RANGE".
 double number_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
 /// Reads a whole number in [least, most].

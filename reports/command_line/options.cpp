@@ -46,8 +46,8 @@ void Options::add_flag(const std::string& name, const std::string& help) {
   fallback_[name] = "false";
 }
 
-void Options::add_place(const std::string& name, const std::string& help) {
-  command_.add_option(name, texts_[name], help)->required()->expected(1)->allow_extra_args(false)->type_name("");
+void Options::add_place(const std::string& name, const std::string& help, const std::string& words) {
+  command_.add_option(name, texts_[name], help)->required()->expected(1)->allow_extra_args(false)->type_name(words);
 }
 
 void Options::add_optional_place(const std::string& name, const std::string& help) {
@@ -73,6 +73,11 @@ void Options::read(const std::string& file) {
     std::vector<std::string>& texts = texts_[entry.key];
     if (texts.empty()) texts = entry.values;
   }
+}
+
+std::string Options::value(const std::string& name) const {
+  const CLI::Option* option = command_.get_option_no_throw("--" + name);
+  return option != nullptr && option->get_expected_max() > 0 ? option->get_type_name() : "";
 }
 
 std::string Options::text(const std::string& name) const {

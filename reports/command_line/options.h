@@ -34,8 +34,9 @@ class Options {
   void add_json();
   /// Takes the default off an option that was added: what it says must be given, or is not said.
   void drop_default(const std::string& name);
-  /// Adds what the command is about, given by its place on the command line, which is required.
-  void add_place(const std::string& name, const std::string& help);
+  /// Adds what the command is about, given by its place on the command line, which is required. `words` are all it may
+  /// be, "a|b", or "" for anything.
+  void add_place(const std::string& name, const std::string& help, const std::string& words = "");
   /// Adds it likewise, and it may be left out.
   void add_optional_place(const std::string& name, const std::string& help);
   /// Adds one or more of those.
@@ -49,6 +50,8 @@ class Options {
   bool has(const std::string& name) const { return texts_.contains(name); }
   bool given(const std::string& name) const { return !texts_.at(name).empty(); }
   const std::vector<std::string>& all(const std::string& name) const { return texts_.at(name); }
+  /// Returns what stands for an option's value in the help ("FILE"); "" for places and flags.
+  std::string value(const std::string& name) const;
   /// Returns the one value of an option: given once, or its default ("" if it has none).
   std::string text(const std::string& name) const;
   bool flag(const std::string& name) const;

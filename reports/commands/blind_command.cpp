@@ -167,8 +167,7 @@ std::string trimmed(std::string text) {
 
 BlindMade make_blind(const BlindRequest& request, const CaseProgress& progress) {
   const Places places(request);
-  const fs::path inside = fs::weakly_canonical(places.sealed).lexically_relative(fs::weakly_canonical(places.run));
-  if (!inside.empty() && *inside.begin() != "..")
+  if (lies_in(places.sealed, places.run) || same_file(places.sealed, places.run))
     throw std::invalid_argument(
         fmt::format("--sealed: {} lies inside {}; truths must be kept apart", places.sealed.string(), request.folder));
   std::uint64_t seed = request.seed ? *request.seed : entropy();
@@ -355,9 +354,19 @@ CaseProgress shown_progress(const std::string& label, std::optional<Progress>& l
           check_interrupt, [&line] { line->advance(); }};
 }
 
+// Truths, cases and answers are not replaced by what a command says.
+void check_json(const BlindRequest& request) {
+  const Places places(request);
+  for (const fs::path& folder : {places.sealed, places.cases, places.answers})
+    if (lies_in(request.json, folder))
+      throw std::invalid_argument(
+          fmt::format("--json: {} lies in {}, which the blind check alone writes", request.json, folder.string()));
+}
+
 }  // namespace
 
 void run_blind_make(const BlindRequest& request) {
+  check_json(request);
   Answer answer(request.json);
   std::optional<Progress> line;
   const BlindMade made = make_blind(request, shown_progress("making cases", line));
@@ -369,6 +378,7 @@ void run_blind_make(const BlindRequest& request) {
 }
 
 void run_blind_answer(const BlindRequest& request) {
+  check_json(request);
   Answer answer(request.json);
   std::optional<Progress> line;
   const BlindAnswered told = answer_blind(request, shown_progress("answering", line));
@@ -382,6 +392,7 @@ void run_blind_answer(const BlindRequest& request) {
 }
 
 void run_blind_open(const BlindRequest& request, Unanswered unanswered) {
+  check_json(request);
   Answer answer(request.json);
   const BlindOpened opened = open_blind(request, unanswered);
   for (const Table& table : opened.tables)

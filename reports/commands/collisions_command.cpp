@@ -120,6 +120,9 @@ void run_collisions(const CollisionsRequest& request) {
   const bool to_terminal = out == "-";
   if (to_terminal && !request.json.empty())
     throw std::invalid_argument("--json: there is none with --out -, which prints the collisions themselves");
+  for (const char* read : {"experiment.toml", "angle.csv", "trials.csv"})
+    if (same_file(out, folder / read))
+      throw std::invalid_argument(fmt::format("--out: {} is what is read", out.string()));
   Answer answer(request.json);
   OutputFile collisions_file(out);
   std::optional<OutputFile> details_file;

@@ -20,27 +20,6 @@
 namespace metastable::reports {
 namespace {
 
-// Is a folder made before the work, so that a place that cannot be written to is refused at once; gone again if the
-// work fails before anything is in it.
-class FolderIfDone {
- public:
-  explicit FolderIfDone(const std::filesystem::path& folder) : folder_(folder) {
-    if (folder.empty()) return;
-    made_ = !std::filesystem::exists(folder);
-    make_folder(folder);
-  }
-  ~FolderIfDone() {
-    std::error_code ignored;
-    if (made_ && std::filesystem::is_empty(folder_, ignored)) std::filesystem::remove(folder_, ignored);
-  }
-  FolderIfDone(const FolderIfDone&) = delete;
-  FolderIfDone& operator=(const FolderIfDone&) = delete;
-
- private:
-  std::filesystem::path folder_;
-  bool made_ = false;
-};
-
 // Adds provenance, and leaves out what has nothing to show.
 class Sections {
  public:
@@ -101,10 +80,11 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
 }
 
 void run_diagnose(const DiagnoseRequest& request) {
+  const analysis::Experiment experiment = analysis::read_experiment(request.folder);
+  std::optional<FolderIfFilled> folder;
+  if (!request.out.empty()) folder.emplace(request.out);
   std::optional<OutputFile> json;
   if (!request.json.empty()) json.emplace(request.json);
-  const analysis::Experiment experiment = analysis::read_experiment(request.folder);
-  FolderIfDone folder(request.out);
   const analysis::Diagnosis diagnosis = [&] {
     Progress progress("diagnose", study_units);
     analysis::DiagnosisOptions options = request.options;

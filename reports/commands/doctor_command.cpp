@@ -39,28 +39,27 @@ void run_doctor(const std::string& json) {
                                  : "SSE2 (a machine with AVX2 takes some two thirds of the time, for the same bits)");
   answer.fact("vectors", avx2 ? "AVX2" : "SSE2");
 #endif
+  // A piece that may be missing: what is said where it is there, and where it is not.
+  const auto tell = [&](const char* name, const std::string& found, const std::string& there, const char* missing) {
+    answer.say("{}", found.empty() ? missing : there);
+    answer.fact(name, found);
+  };
   const std::string gnuplot = first_line("gnuplot --version 2>/dev/null");
-  if (gnuplot.empty())
-    answer.say(
-        "gnuplot: missing; figures (report, study, sweep, describe and diagnose --out) need it: install gnuplot-nox");
-  else
-    answer.say("gnuplot: {}, which draws the figures", gnuplot);
-  answer.fact("gnuplot", gnuplot);
+  tell("gnuplot", gnuplot, fmt::format("gnuplot: {}, which draws the figures", gnuplot),
+       "gnuplot: missing; figures (report, study, sweep, describe and diagnose --out) need it: install gnuplot-nox");
   const std::string matio = mat_library();
-  if (matio.empty())
-    answer.say("libmatio: not built in; `import` reads CSV only: install libmatio-dev and build again for MAT files");
-  else
-    answer.say("libmatio: {}, with which `import` reads MAT files", matio);
-  answer.fact("libmatio", matio);
+  tell("libmatio", matio, fmt::format("libmatio: {}, with which `import` reads MAT files", matio),
+       "libmatio: not built in; `import` reads CSV only: install libmatio-dev and build again for MAT files");
   const std::string module = first_line(
       "python3 -c 'import metastable, sys; print(metastable.__version__, \"for\", sys.executable)' 2>/dev/null");
-  if (module.empty())
-    answer.say(
-        "Python module: python3 does not find it; with it settings, trials, chains and simulators of your own are "
-        "asked from NumPy: ./run python (needs pybind11-dev, python3-dev and python3-numpy)");
-  else
-    answer.say("Python module: {}", module);
-  answer.fact("python_module", module);
+  tell("python_module", module, fmt::format("Python module: {}", module),
+       "Python module: python3 does not find it; with it settings, trials, chains and simulators of your own are asked "
+       "from NumPy: ./run python (needs pybind11-dev, python3-dev and python3-numpy)");
+  const std::string ranks = first_line("command -v metastable-mpi 2>/dev/null");
+  tell("metastable_mpi", ranks,
+       fmt::format("metastable-mpi: {}, which shares meshes and sweeps between machines", ranks),
+       "metastable-mpi: not on the PATH; it shares meshes and sweeps between machines: ./run test-mpi builds it (needs "
+       "libpetsc-real-dev, libslepc-real-dev and openmpi-bin)");
   answer.finish({"metastable doctor", {}, 0, version()});
 }
 

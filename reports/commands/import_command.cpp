@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 
 #include "analysis/experiment/csv_reader.h"
@@ -163,8 +164,13 @@ void run_import(const ImportRequest& request) {
   options.first_leg = request.legs_from;
   options.outcomes = request.outcomes;
   const Imported imported = imported_experiment(request.file, file.rows, options);
+  std::optional<OutputFile> json;
+  if (!request.json.empty()) json.emplace(request.json);
   folder.write(imported.source);
-  if (!request.json.empty()) write_file(request.json, import_json(request, file, imported, provenance));
+  if (json) {
+    json->stream() << import_json(request, file, imported, provenance);
+    json->commit();
+  }
   if (request.json != "-") print_import(request, file, imported);
 }
 

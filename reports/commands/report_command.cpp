@@ -208,8 +208,9 @@ class Report {
 }  // namespace
 
 void run_report(const ReportRequest& request) {
+  Report report(request);
   Answer answer(request.json);
-  Report(request).write(answer);
+  report.write(answer);
 }
 
 }  // namespace metastable::reports

@@ -46,17 +46,45 @@ std::vector<std::string> rows_of(const std::filesystem::path& file, const std::s
   return rows;
 }
 
-// Returns column `index` behind the coordinates: 0 expected steps, 1 and 2 its interval.
-double value_of(const std::string& row, std::size_t index) {
-  std::size_t at = 0;
-  for (std::size_t i = 0; i < index; ++i) at = row.find(',', at) + 1;
-  const std::string text = row.substr(at, row.find(',', at) - at);
-  if (text.empty()) return std::numeric_limits<double>::quiet_NaN();  // a point whose solver failed
-  return text == "infinite" ? std::numeric_limits<double>::infinity() : std::stod(text);
+// Returns a number of the table, which is text where it is none: "infinite", or empty for a point whose solver failed.
+double value_of(const Cell& cell) {
+  if (const double* number = std::get_if<double>(&cell.value())) return *number;
+  return std::get<std::string>(cell.value()).empty() ? std::numeric_limits<double>::quiet_NaN()
+                                                     : std::numeric_limits<double>::infinity();
+}
+
+std::vector<std::string> fields_of(std::string_view line) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (const char c : line)
+    if (c == '"')
+      quoted = !quoted;
+    else if (c == ',' && !quoted)
+      fields.emplace_back();
+    else if (c != '\n')
+      fields.back() += c;
+  return fields;
+}
+
+// Returns the rows as a table, those taken over from the file as those just computed: all are what the file holds. The
+// last line of the head names the columns.
+Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
+  Table table{.id = "sweep", .title = "Points of the sweep", .columns = {}};
+  const std::string_view head(sweep.head.data(), sweep.head.size() - 1);
+  for (const std::string& name : fields_of(head.substr(head.rfind('\n') + 1))) table.columns.push_back({name});
+  for (const std::string& row : rows) {
+    std::vector<Cell>& cells = table.rows.emplace_back();
+    for (const std::string& field : fields_of(row)) {
+      double number = 0;
+      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), number);
+      cells.push_back(error == std::errc() && end == field.data() + field.size() ? Cell(number) : Cell(field));
+    }
+  }
+  return table;
 }
 
 // Returns nothing if no point has a finite number of steps.
-std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
+std::optional<Figure> figure_of(const SweepFile& sweep, const Table& table) {
   const std::vector<SweepFileAxis>& axes = sweep.axes;
   Figure figure;
   figure.id = "sweep";
@@ -69,8 +97,9 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::s
   for (std::size_t a = 1; a < axes.size(); ++a) stride *= axes[a].values.size();
   for (std::size_t a = 2; a < axes.size(); ++a) stride_second *= axes[a].values.size();
   const std::size_t lines = second == 1 ? axes[1].values.size() : 1;
-  const auto row_at = [&](std::size_t i, std::size_t k) -> const std::string& {
-    return rows[i * stride + (second == 1 ? k * stride_second : 0)];
+  // Behind the coordinates: 0 expected steps, 1 and 2 their interval.
+  const auto number_at = [&](std::size_t i, std::size_t k, std::size_t column) {
+    return value_of(table.rows[i * stride + (second == 1 ? k * stride_second : 0)][axes.size() + column]);
   };
   figure.x = {across.label, across.unit};
   const bool mapped = second == 1 && lines > 4 && lines <= most_map_rows && across.values.size() <= most_map_columns;
@@ -79,8 +108,7 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::s
     HeatMap map{across.values, axes[1].values, {}, "expected steps", true};
     for (std::size_t k = 0; k < lines; ++k) {
       map.value.emplace_back();
-      for (std::size_t i = 0; i < across.values.size(); ++i)
-        map.value.back().push_back(value_of(row_at(i, k), axes.size()));
+      for (std::size_t i = 0; i < across.values.size(); ++i) map.value.back().push_back(number_at(i, k, 0));
     }
     const auto finite = [](const std::vector<double>& row) {
       return std::any_of(row.begin(), row.end(), [](double value) { return std::isfinite(value); });
@@ -98,9 +126,9 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const std::vector<std::s
     Series line{"", Style::line, across.values, {}, {}, {}, static_cast<int>(j)};
     if (second == 1) line.label = fmt::format("{} {}", axes[1].label, axes[1].values[k]);
     for (std::size_t i = 0; i < across.values.size(); ++i) {
-      line.y.push_back(value_of(row_at(i, k), axes.size()));
-      band.lower.push_back(value_of(row_at(i, k), axes.size() + 1));
-      band.upper.push_back(value_of(row_at(i, k), axes.size() + 2));
+      line.y.push_back(number_at(i, k, 0));
+      band.lower.push_back(number_at(i, k, 1));
+      band.upper.push_back(number_at(i, k, 2));
     }
     if (std::none_of(line.y.begin(), line.y.end(), [](double value) { return std::isfinite(value); })) continue;
     figure.series.push_back(std::move(band));
@@ -117,34 +145,6 @@ std::size_t size_of(const SweepFile& sweep) {
   return size;
 }
 
-// Returns the rows as a table; its columns are named by the last line of the head.
-Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
-  const auto split = [](std::string_view line) {
-    std::vector<std::string> fields(1);
-    bool quoted = false;
-    for (const char c : line)
-      if (c == '"')
-        quoted = !quoted;
-      else if (c == ',' && !quoted)
-        fields.emplace_back();
-      else if (c != '\n')
-        fields.back() += c;
-    return fields;
-  };
-  Table table{.id = "sweep", .title = "Points of the sweep", .columns = {}};
-  const std::string_view head(sweep.head.data(), sweep.head.size() - 1);
-  for (const std::string& name : split(head.substr(head.rfind('\n') + 1))) table.columns.push_back({name});
-  for (const std::string& row : rows) {
-    std::vector<Cell>& cells = table.rows.emplace_back();
-    for (const std::string& field : split(row)) {
-      double number = 0;
-      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), number);
-      cells.push_back(error == std::errc() && end == field.data() + field.size() ? Cell(number) : Cell(field));
-    }
-  }
-  return table;
-}
-
 }  // namespace
 
 void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
@@ -154,6 +154,9 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   picture.replace_extension(".svg");
   if (picture == out)
     throw OutputError(out, "the figure beside the numbers has that name; give the numbers another ending, .csv");
+  for (const std::filesystem::path& own : {picture, partial})
+    if (same_file(sweep.json, own))
+      throw std::invalid_argument(fmt::format("--json: {} is what --out {} writes too", sweep.json, sweep.out));
   Answer answer(sweep.json);
   std::vector<std::string> rows = rows_of(out, sweep.head, "holds another sweep");
   std::size_t had = rows.size();
@@ -188,11 +191,12 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
     std::filesystem::rename(partial, out, error);
     if (error) throw OutputError(out, error.message());
   }
-  const std::optional<Figure> drawn = figure_of(sweep, rows);
+  Table table = table_of(sweep, rows);
+  const std::optional<Figure> drawn = figure_of(sweep, table);
   if (drawn) write_file(picture, render_svg(*drawn));
   answer.say("{}: {} points ({} taken over); {}", out.string(), size, had,
              drawn ? picture.string() : "no figure: no point has a finite number of steps");
-  answer.table(table_of(sweep, rows));
+  answer.table(std::move(table));
   answer.file(out.string());
   if (drawn) answer.file(picture.string());
   answer.finish(sweep.provenance);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "analysis/study/verification.h"
@@ -157,8 +158,9 @@ void export_chain(const Checked& checked, const std::filesystem::path& folder) {
 }  // namespace
 
 void run_verify(const VerifyRequest& request) {
-  for (const std::string& folder : {request.out, request.export_to})  // before any long computation
-    if (!folder.empty()) make_folder(folder);
+  std::optional<FolderIfFilled> out, export_to;  // before any long computation
+  if (!request.out.empty()) out.emplace(request.out);
+  if (!request.export_to.empty()) export_to.emplace(request.export_to);
   Answer answer(request.json);
   const std::vector<analysis::Benchmark> terrain = analysis::rough_terrain_benchmarks(),
                                          wheels = analysis::wheel_benchmarks();

@@ -15,6 +15,8 @@
 #include <optional>
 
 #include "analysis/experiment/input_error.h"
+#include "reports/import/mat_whole.h"
+#include "reports/output/input_file.h"
 #endif
 
 namespace metastable::reports {
@@ -414,6 +416,7 @@ class MatTrials {
 
 MatRows mat_rows(const std::string& path, const std::vector<RequestedColumn>& requests, TrialsIn orientation,
                  int first_collision) {
+  check_mat_whole(path, read_file(path));
   const MatFile file(path);
   MatRows read{.rows = {}, .map = map_columns(requests, file.names(), path, first_collision), .names = file.names()};
   for (const MappedColumn& column : read.map)

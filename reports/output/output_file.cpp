@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -57,7 +58,29 @@ void wait_for_reader(const fs::path& pipe) {
   }
 }
 
+// Returns a path with links followed as far as they exist, without a slash at the end; empty if even that cannot be
+// looked up.
+fs::path resolved(const fs::path& path) {
+  std::error_code error;
+  const fs::path whole = fs::weakly_canonical(fs::absolute(path, error), error);
+  if (error) return {};
+  return whole.has_filename() ? whole : whole.parent_path();
+}
+
 }  // namespace
+
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  if (fs::equivalent(a, b, error)) return true;
+  const fs::path one = resolved(a);
+  return !one.empty() && one == resolved(b);
+}
+
+bool lies_in(const fs::path& file, const fs::path& folder) {
+  const fs::path one = resolved(file), other = resolved(folder);
+  const auto [end, rest] = std::mismatch(other.begin(), other.end(), one.begin(), one.end());
+  return !other.empty() && end == other.end() && rest != one.end();
+}
 
 OutputError::OutputError(const fs::path& path, const std::string& reason)
     : std::invalid_argument("cannot write " + (path.empty() ? std::string("''") : path.string()) + ": " + reason) {}
@@ -146,6 +169,18 @@ void OutputFolder::commit(const fs::path& last) {
   for (const fs::directory_entry& entry : fs::directory_iterator(temporary_))
     if (entry.path().filename() != last) move(entry.path().filename());
   move(last);
+}
+
+FolderIfFilled::FolderIfFilled(const fs::path& folder) : path_(folder) {
+  std::error_code error;
+  for (fs::path one = folder; !one.empty() && !fs::exists(one, error); one = one.parent_path()) made_.push_back(one);
+  make_folder(folder);
+}
+
+FolderIfFilled::~FolderIfFilled() {
+  std::error_code error;
+  for (const fs::path& one : made_)
+    if (!fs::remove(one, error)) return;  // it holds something
 }
 
 void write_file(const fs::path& path, std::string_view content) {

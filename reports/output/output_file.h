@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
+#include <vector>
 
 namespace metastable::reports {
 
@@ -58,8 +59,30 @@ class OutputFolder {
   std::filesystem::path target_, temporary_;
 };
 
+/// Is a folder made before the work, with its parents, so that a place that cannot be written to is refused at once;
+/// what was made of them is gone again where the work puts nothing into it.
+class FolderIfFilled {
+ public:
+  /// @throws OutputError
+  explicit FolderIfFilled(const std::filesystem::path& folder);
+  ~FolderIfFilled();
+  FolderIfFilled(const FolderIfFilled&) = delete;
+  FolderIfFilled& operator=(const FolderIfFilled&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  std::vector<std::filesystem::path> made_;  // the innermost first
+};
+
 /// Writes the whole of `content` into `path` ("-": standard output), or nothing. @throws OutputError
 void write_file(const std::filesystem::path& path, std::string_view content);
+
+/// Returns whether both name one file, which need not be there yet.
+bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
+/// Returns whether a file, there or not, lies below a folder.
+bool lies_in(const std::filesystem::path& file, const std::filesystem::path& folder);
 
 /// Creates a folder and its parents where they are missing. @throws OutputError
 void make_folder(const std::filesystem::path& path);

@@ -2,23 +2,20 @@
 
 #include <utility>
 
-#include "reports/output/output_file.h"
-
 namespace metastable::reports {
-
-PageFolder::PageFolder(const std::filesystem::path& folder) : folder_(folder) { make_folder(folder_ / "tables"); }
 
 void PageFolder::section(const std::string& id, const std::string& heading, const std::string& reading,
                          const std::vector<Figure>& figures, std::vector<Table> tables) {
   PageSection section{id, heading, reading, {}, {}};
-  if (!figures.empty()) make_folder(folder_ / "figures");
+  if (!figures.empty()) make_folder(folder_.path() / "figures");
   for (const Figure& figure : figures) {
     const std::string svg = render_svg(figure);
-    write_file(folder_ / "figures" / (figure.id + ".svg"), svg);
+    write_file(folder_.path() / "figures" / (figure.id + ".svg"), svg);
     section.figures.push_back({figure.id, svg, ""});
   }
+  if (!tables.empty()) make_folder(folder_.path() / "tables");
   for (Table& table : tables) {
-    const std::filesystem::path stem = folder_ / "tables" / table.id;
+    const std::filesystem::path stem = folder_.path() / "tables" / table.id;
     write_file(stem.string() + ".csv", to_csv(table));
     write_file(stem.string() + ".md", to_markdown(table));
     write_file(stem.string() + ".tex", to_latex(table));
@@ -29,15 +26,19 @@ void PageFolder::section(const std::string& id, const std::string& heading, cons
   page_.sections.push_back(std::move(section));
 }
 
-void PageFolder::write_index() const { write_file(folder_ / "index.html", render_page(page_)); }
+void PageFolder::write_index() const { write_file(folder_.path() / "index.html", render_page(page_)); }
 
 void PageFolder::finish(Answer& answer) const {
-  const std::string index = (folder_ / "index.html").string();
+  const std::string index = (folder_.path() / "index.html").string();
   answer.say("{}", index);
   answer.file(index);
   for (const PageSection& section : page_.sections) {
-    for (const PageFigure& figure : section.figures) answer.file((folder_ / "figures" / (figure.id + ".svg")).string());
-    for (const PageTable& table : section.tables) answer.table(table.table);
+    for (const PageFigure& figure : section.figures)
+      answer.file((folder_.path() / "figures" / (figure.id + ".svg")).string());
+    for (const PageTable& table : section.tables) {
+      for (const PageLink& link : table.files) answer.file((folder_.path() / link.href).string());
+      answer.table(table.table);
+    }
   }
   answer.finish(page_.provenance);
 }

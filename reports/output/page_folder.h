@@ -7,17 +7,18 @@
 
 #include "reports/output/answer.h"
 #include "reports/output/figure.h"
+#include "reports/output/output_file.h"
 #include "reports/output/page.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {
 
 /// Writes index.html, tables/<id>.csv, .md and .tex, figures/<id>.svg in one folder. Each file is whole or not there;
-/// the page comes last.
+/// the page comes last. A folder that gets none is gone again.
 class PageFolder {
  public:
-  /// Creates the folder and the one of tables (that of figures comes with the first of them). @throws OutputError
-  explicit PageFolder(const std::filesystem::path& folder);
+  /// Creates the folder (those of tables and figures come with the first of them). @throws OutputError
+  explicit PageFolder(const std::filesystem::path& folder) : folder_(folder) {}
 
   Page& page() { return page_; }  ///< for title, intro and provenance
   /// Adds a section, its tables and figures written at once. @throws as the renderings and write_file() do
@@ -28,7 +29,7 @@ class PageFolder {
   void finish(Answer& answer) const;
 
  private:
-  std::filesystem::path folder_;
+  FolderIfFilled folder_;
   Page page_;
 };
 

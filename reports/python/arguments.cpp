@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "dynamics/wheel/contact_law.h"
+#include "reports/command_line/option_values.h"
 #include "reports/command_line/setting_options.h"
 
 namespace metastable::reports::python {
@@ -123,26 +124,35 @@ Arguments Arguments::part(const char* name) const {
 
 analysis::Setting setting_of(const Arguments& fields) {
   analysis::Setting s;
-  const auto number = [&](const char* name, auto& into) {
-    if (fields.given(name)) into = fields.number(name);
+  namespace range = dynamics::range;
+  const auto number = [&](const char* name, auto& into, const dynamics::Range& allowed = {}) {
+    if (!fields.given(name)) return;
+    const double value = fields.number(name);
+    check_in_range(name, value, allowed);
+    into = value;
   };
-  const auto spread = [&](const char* name, analysis::Spread& into) {
-    if (fields.given(name)) into = fields.spread(name);
+  const auto spread = [&](const char* name, analysis::Spread& into, const dynamics::Range& allowed) {
+    if (!fields.given(name)) return;
+    into = fields.spread(name);
+    check_in_range(name, into, allowed);
   };
   number("slope_deg", s.slope_deg);
-  number("ramp_length", s.ramp_length);
-  if (fields.given("legs")) s.wheel.leg_length = fields.numbers("legs");
-  number("mass", s.wheel.hub_mass);
+  if (fields.given("ramp_length") && std::isinf(fields.number("ramp_length")))
+    s.ramp_length = fields.number("ramp_length");  // a ramp without end
+  else
+    number("ramp_length", s.ramp_length, range::ramp_length);
+  if (fields.given("legs")) check_legs("legs", s.wheel.leg_length = fields.numbers("legs"));
+  number("mass", s.wheel.hub_mass, range::mass);
   number("inertia", s.wheel.inertia);
-  number("radius_of_gyration", s.wheel.radius_of_gyration);
-  number("tip_radius", s.wheel.tip_radius);
-  number("contact_mass", s.wheel.contact_mass);
-  number("ramp_stiffness", s.wheel.ramp_stiffness);
-  number("gravity", s.wheel.gravity);
+  number("radius_of_gyration", s.wheel.radius_of_gyration, range::radius_of_gyration);
+  number("tip_radius", s.wheel.tip_radius, range::tip_radius);
+  number("contact_mass", s.wheel.contact_mass, range::mass);
+  number("ramp_stiffness", s.wheel.ramp_stiffness, range::ramp_stiffness);
+  number("gravity", s.wheel.gravity, range::gravity);
   if (fields.given("law")) s.law = dynamics::law_from_name(fields.text("law"));
   number("rebound_lost", s.rebound_lost);
-  spread("restitution", s.restitution);
-  spread("friction", s.friction);
+  spread("restitution", s.restitution, range::restitution);
+  spread("friction", s.friction, range::friction);
   number("correlation", s.correlation);
   refuse_what_law_lacks(s.law, [&](const std::string& option) {
     std::string name = option;
@@ -160,7 +170,7 @@ analysis::Setting setting_of(const Arguments& fields) {
         static_cast<int>(fields.whole("first_leg", 0, static_cast<std::uint64_t>(s.wheel.legs()) - 1));
   check_slope(s);
   if (fields.given("initial_speed"))
-    s.initial_speed = fields.spread("initial_speed");
+    spread("initial_speed", s.initial_speed, range::speed);
   else
     s.initial_speed = launch_for(s.slope_deg, std::nullopt);
   s.validate();

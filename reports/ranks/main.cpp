@@ -49,7 +49,7 @@ Command mesh_command(markov::Ranks& ranks) {
             o.add("margin", "ACTION", "12", "How far beyond the cheapest failure the mesh reaches", margins);
             o.add("memory", "GB", "3", "Most memory of a rank for its rows while they are landed", gigabytes);
             o.add_seed();
-            o.add("json", "FILE|-", "", "Write the results as JSON");
+            o.add_json();
           },
           [&ranks](const Options& o, const std::string& line) {
             if (!asks_for_walker(o)) throw std::invalid_argument("--walker: is needed");

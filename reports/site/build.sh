@@ -3,6 +3,10 @@
 # module is, if it is. `./run docs` calls this.
 set -euo pipefail
 source=$1 build=$2 python=${3:-}
+command -v doxygen >/dev/null || { echo 'the site needs doxygen' >&2; exit 1; }
+for module in sphinx myst_parser furo breathe ${python:+nbconvert ipykernel matplotlib}; do
+  /usr/bin/python3 -c "import $module" 2>/dev/null || { echo "the site needs $module for /usr/bin/python3" >&2; exit 1; }
+done
 pages=$build/source
 rm -rf "$pages"
 mkdir -p "$pages" "$build/xml"
@@ -15,6 +19,9 @@ rm "$pages/README.md"
   printf 'INPUT = %s %s %s\nFILE_PATTERNS = *.h\nRECURSIVE = YES\n' "$source"/{markov,dynamics,analysis}
   printf 'STRIP_FROM_PATH = %s\nOUTPUT_DIRECTORY = %s\n' "$source" "$build"
 } | doxygen - >"$build/doxygen.log" 2>&1 || { tail -20 "$build/doxygen.log" >&2; exit 1; }
+
+# Doxygen knows a header by its name alone; the pages say how it is included.
+sed -i '/<includes /d' "$build"/xml/{class,struct}*.xml
 
 if [[ -n $python ]]; then
   export PYTHONPATH=$python

@@ -59,3 +59,17 @@ def write_reference(folder):
 
 for folder in ("markov", "dynamics", "analysis"):
     write_reference(folder)
+
+
+def keep_layout(app, what, name, obj, options, lines):
+    """Docstrings are plain text: tables of arguments and programs in them keep their lines."""
+    told = []
+    for paragraph in re.split(r"\n\s*\n", "\n".join(lines)):
+        laid_out = re.search(r"^ |\S  +\S", paragraph, re.MULTILINE)
+        told += ["::", "", *("    " + line for line in paragraph.split("\n"))] if laid_out else paragraph.split("\n")
+        told.append("")
+    lines[:] = told
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", keep_layout)

@@ -12,6 +12,7 @@ computations a ComputationError (a RuntimeError).
 """
 
 import dataclasses
+import html
 import json
 import numbers
 import os
@@ -313,6 +314,14 @@ class Experiment:
         """As an experiment folder: experiment.toml, collisions.csv, trials.csv. Raises InputError if it holds one."""
         self._held.write(os.fspath(folder))
 
+    def to_dict(self):
+        """Title, ids of the conditions, notes, and the columns of collisions and trials, as plain data."""
+        return {"title": self.title, "conditions": list(self.conditions), "notes": list(self.notes),
+                "collisions": self.collisions.to_dict(), "trials": self.trials.to_dict()}
+
+    def _repr_html_(self):
+        return f"<p>{html.escape(self.title)}</p>{self.trials._repr_html_()}"
+
     def __repr__(self):
         trials = self._held.trials()
         return (f"<metastable.Experiment: {self.title}, {len(trials['trial'])} trials, "
@@ -473,11 +482,11 @@ def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1,
     return Walker(step, dimension, noise, start, names, noise_names, phases, name)
 
 
-class SimulatedSteps:
+class SimulatedSteps(Record):
     """Steps before failure by direct simulation: `mean`, its `standard_error`, and `steps` of each trial."""
 
     def __init__(self, mean, standard_error, steps):
-        self.mean, self.standard_error, self.steps = mean, standard_error, steps
+        super().__init__(dict(mean=mean, standard_error=standard_error, steps=steps))
 
     @property
     def interval_95(self):
@@ -491,35 +500,35 @@ class SimulatedSteps:
                 f"{len(self.steps)} trials>")
 
 
-class FirstPassage:
+class FirstPassage(Record):
     """Steps before failure from each state: `mean` and `sd`, and guaranteed bounds `lower` <= mean <= `upper`."""
 
     def __init__(self, mean, sd, lower, upper):
-        self.mean, self.sd, self.lower, self.upper = mean, sd, lower, upper
+        super().__init__(dict(mean=mean, sd=sd, lower=lower, upper=upper))
 
     def __repr__(self):
         return (f"<metastable.FirstPassage: {self.mean.min():.4g} to {self.mean.max():.4g} steps from "
                 f"{len(self.mean)} states>")
 
 
-class QuasiStationary:
+class QuasiStationary(Record):
     """What survivors look like once the start is forgotten: their `distribution`, the `survival_weight` of each state
     (largest 1), and the `failure_rate` per step; `residual` and `iterations` say how it was found."""
 
     def __init__(self, distribution, survival_weight, failure_rate, residual, iterations):
-        self.distribution, self.survival_weight, self.failure_rate = distribution, survival_weight, failure_rate
-        self.residual, self.iterations = residual, iterations
+        super().__init__(dict(distribution=distribution, survival_weight=survival_weight, failure_rate=failure_rate,
+                              residual=residual, iterations=iterations))
 
     def __repr__(self):
         return f"<metastable.QuasiStationary: failure rate {self.failure_rate:.6g} per step>"
 
 
-class Passage:
+class Passage(Record):
     """First passage to a set of states: the committor `reach` (probability of being there before failing), `fail`
     (neither is one minus the other), and the expected `steps` until either."""
 
     def __init__(self, reach, fail, steps):
-        self.reach, self.fail, self.steps = reach, fail, steps
+        super().__init__(dict(reach=reach, fail=fail, steps=steps))
 
     def __repr__(self):
         return f"<metastable.Passage: from {len(self.reach)} states>"

@@ -37,6 +37,7 @@ class Record:
     def __iter__(self) -> Iterator[str]: ...
     def __len__(self) -> int: ...
     def keys(self) -> List[str]: ...
+    def to_dict(self) -> Dict[str, Any]: ...
 
 
 class Result(Record):
@@ -63,7 +64,7 @@ class Provenance(Record):
     version: str
 
 
-class Regime:
+class Regime(Record):
     edges: Floats
     mass: Floats
     def __init__(self, edges: Floats, mass: Floats) -> None: ...
@@ -172,6 +173,7 @@ class Table:
     def __iter__(self) -> Iterator[Dict[str, Any]]: ...
     def __len__(self) -> int: ...
     def __getitem__(self, column: str) -> List[Any]: ...
+    def to_dict(self) -> Dict[str, Any]: ...
 
 
 class Description(Result):
@@ -268,7 +270,7 @@ class Walker:
     def simulate(self, **options: Any) -> SimulatedSteps: ...
 
 
-class SimulatedSteps:
+class SimulatedSteps(Record):
     mean: float
     standard_error: float
     steps: Integers
@@ -290,9 +292,10 @@ class Experiment:
     @property
     def trials(self) -> Columns: ...
     def write(self, folder: Path) -> None: ...
+    def to_dict(self) -> Dict[str, Any]: ...
 
 
-class FirstPassage:
+class FirstPassage(Record):
     mean: Floats
     sd: Floats
     lower: Floats
@@ -300,7 +303,7 @@ class FirstPassage:
     def __init__(self, mean: Floats, sd: Floats, lower: Floats, upper: Floats) -> None: ...
 
 
-class QuasiStationary:
+class QuasiStationary(Record):
     distribution: Floats
     survival_weight: Floats
     failure_rate: float
@@ -310,7 +313,7 @@ class QuasiStationary:
                  iterations: int) -> None: ...
 
 
-class Passage:
+class Passage(Record):
     reach: Floats
     fail: Floats
     steps: Floats

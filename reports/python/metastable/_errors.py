@@ -21,3 +21,8 @@ class Contradiction(ComputationError):
 class MapError(ComputationError):
     """A simulator broke its promises; the sentence names the state: a landing that is not finite, a noise-free orbit
     that fails, does not settle or is unstable, failures out of reach."""
+
+
+for kind in (InputError, ComputationError, Contradiction, MapError):
+    kind.__module__ = "metastable"  # where people find them
+del kind

@@ -34,12 +34,30 @@ class Record:
         """The names of the fields."""
         return [key for key in self.__dict__ if not key.startswith("_")]
 
+    def to_dict(self):
+        """Names and values as plain data: dicts, lists, numbers and texts."""
+        return {key: _plain(self[key]) for key in self.keys()}
+
     def __repr__(self):
         return "{" + ", ".join(f"{key}: {self[key]!r}" for key in self.keys()) + "}"
 
     def _repr_html_(self):
         rows = "".join(f"<tr><th>{html.escape(key)}</th><td>{_cell(self[key])}</td></tr>" for key in self.keys())
         return f"<table>{rows}</table>"
+
+
+def _plain(value):
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if isinstance(value, (tuple, list)):
+        return [_plain(each) for each in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _html_table(names, rows):
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
+    return f"<table><tr>{head}</tr>" + "".join(
+        "<tr>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>" for row in rows) + "</table>"
 
 
 def _cell(value):
@@ -107,12 +125,12 @@ class Study(Result):
         return f"{_steps(e.from_start, e.interval_95)}, {self.status}"
 
 
-class Regime:
+class Regime(Record):
     """What survivors look like at one landing leg: `edges` of the cells, squared speeds [rad^2/s^2] just before the
     collision, and the probability `mass` in each."""
 
     def __init__(self, edges, mass):
-        self.edges, self.mass = edges, mass
+        super().__init__(dict(edges=edges, mass=mass))
 
     @property
     def speed_edges(self):
@@ -171,6 +189,13 @@ class Table:
     def __getitem__(self, column):
         return [row[column] for row in self.rows]
 
+    def to_dict(self):
+        """Title, notes, units by column, and rows as dicts."""
+        return {"title": self.title, "notes": list(self.notes), "units": dict(self.units), "rows": list(self.rows)}
+
+    def _repr_html_(self):
+        return f"<p>{html.escape(self.title)}</p>" + _html_table(self.units, (row.values() for row in self.rows))
+
     def __repr__(self):
         return f"<metastable.Table: {self.title}, {len(self.rows)} rows of {', '.join(self.units)}>"
 
@@ -218,13 +243,9 @@ class Columns:
         return f"<metastable.{type(self).__name__}: {self._title}, {len(self)} rows of {', '.join(self._columns)}>"
 
     def _repr_html_(self, most=20):
-        head = "".join(f"<th>{html.escape(name)}</th>" for name in self._columns)
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{_cell(values[i])}</td>" for values in self._columns.values()) + "</tr>"
-            for i in range(min(most, len(self)))
-        )
+        rows = zip(*(values[:most] for values in self._columns.values()))
         more = f"<p>{len(self) - most} more rows</p>" if len(self) > most else ""
-        return f"<table><tr>{head}</tr>{rows}</table>{more}"
+        return _html_table(self._columns, rows) + more
 
 
 class Sweep(Columns):

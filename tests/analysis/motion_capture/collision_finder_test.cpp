@@ -3,9 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <stdexcept>
+#include <vector>
 
 #include "analysis/experiment/experiment_folder.h"
+#include "analysis/statistics/random.h"
+#include "dynamics/wheel/stance_motion.h"
+#include "dynamics/wheel/truncated_normal.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {
@@ -122,6 +127,52 @@ TEST(CollisionFinder, CountsPeaksBetweenCollisionsAsBounces) {
   ASSERT_EQ(found.collisions.size(), 5u);
   EXPECT_EQ(found.collisions[1].bounces, 1);
   EXPECT_EQ(found.collisions[2].bounces, 1);
+}
+
+// A wheel whose feet hop: in every step it flies twice, at a spin of its own each time, and stands for the last 50 ms.
+// Fitted as a stance from the drop on, omega_minus came out 0.05 rad/s low and omega_plus 0.4 rad/s high.
+TEST(CollisionFinder, FitsTheStandingPartOfAStepWhoseFootHops) {
+  const dynamics::WheelMap map = paper_setting(9.59, true).map();
+  const dynamics::Stance& stance = map.stance(0);
+  constexpr double rate = 120, stood = 0.05, flown = 0.105, hopped = 0.035, second_spin = 4.2;
+  constexpr int steps = 12;
+  AngleRecording recording;
+  std::vector<double> before, after;
+  double touch = 0, angle = 0;  // that the step begins with
+  for (int n = 0; n < steps; ++n) {
+    const double omega = 5.6 + 0.05 * (n % 4);
+    const auto standing = [&](double until) {  // the angle that is left that long before the next touch
+      return stance.end_angle_rad -
+             dynamics::stance_motion(stance.pendulum, {stance.end_angle_rad, omega}, -until).angle;
+    };
+    const double turn = map.wheel().leg_angle(), next = touch + flown + hopped + stood;
+    const double first_spin = (turn - standing(stood) - second_spin * hopped) / flown;
+    while (static_cast<double>(recording.time.size()) / rate < next) {
+      const auto frame = recording.time.size();
+      const double time = static_cast<double>(frame) / rate, since = time - touch;
+      const double at = since < flown            ? first_spin * since
+                        : since < flown + hopped ? first_spin * flown + second_spin * (since - flown)
+                                                 : turn - standing(next - time);
+      recording.time.push_back(time);
+      recording.angle_rad.push_back(angle + at + 2e-4 * dynamics::normal_quantile(uniform_at(5, frame, 0, 0)));
+    }
+    before.push_back(omega);
+    after.push_back(first_spin);
+    touch = next;
+    angle += turn;
+  }
+  const FoundTrial found = find_collisions(recording, map, 0, {});
+  ASSERT_EQ(found.collisions.size(), static_cast<std::size_t>(steps) - 1);
+  double minus_off = 0, plus_off = 0;
+  for (std::size_t n = 0; n + 1 < steps; ++n) {
+    const std::optional<StanceFit>& fit = found.collisions[n].fit;
+    ASSERT_TRUE(fit);
+    EXPECT_NEAR(fit->omega_minus, before[n], 0.04);
+    minus_off += (fit->omega_minus - before[n]) / (steps - 1);
+    plus_off += (fit->omega_plus - after[n + 1]) / (steps - 1);
+  }
+  EXPECT_NEAR(minus_off, 0, 0.01);
+  EXPECT_NEAR(plus_off, 0, 0.01);
 }
 
 TEST(CollisionFinder, RefusesWhatItCannotRead) {

@@ -20,8 +20,11 @@ const std::vector<ManualCommand> manual{
      {{"--law", "published|coulomb", "published", "Contact law", false},
       {"--slope", "DEG", "7.02", "Ramp's slope [deg]: any", false},
       {"--json", "FILE|-", "", "Write JSON", false},
+      {"--separator", "','|';'|tab", ",", "Between fields", false},
       {"--direct", "", "", "-follow every landing", false}}},
-    {"describe", "What the trials say", {{"DIR", "", "", "Folder", true}, {"--out", "DIR", "", "Folder", false}}}};
+    {"describe", "What the trials say", {{"DIR", "", "", "Folder", true}, {"--out", "DIR", "", "Folder", false}}},
+    {"blind", "The check", {{"ACTION", "make|open", "", "What to do", true}, {"DIR", "", "", "Folder", true}}},
+    {"man", "The manual", {{"COMMAND", "", "", "One of them", true}}}};
 
 // Returns what bash itself makes of the script, for the words of a command line of which the last is to be completed.
 std::string completed(const std::string& words, int last) {
@@ -34,9 +37,13 @@ std::string completed(const std::string& words, int last) {
 }
 
 TEST(Manual, BashCompletesCommandsOptionsAndValues) {
-  EXPECT_EQ(completed("metastable ''", 1), "steps describe --help --version\n");
+  EXPECT_EQ(completed("metastable ''", 1), "steps describe blind man --help --version\n");
   EXPECT_EQ(completed("metastable st", 1), "steps\n");
-  EXPECT_EQ(completed("metastable steps --s", 2), "--slope\n");
+  EXPECT_EQ(completed("metastable steps --s", 2), "--slope --separator\n");
+  EXPECT_EQ(completed("metastable steps --separator ''", 3), ", ; tab\n");  // said with quotes
+  EXPECT_EQ(completed("metastable blind ''", 2), "make open\n");
+  EXPECT_EQ(completed("metastable blind make /bi", 3), "/bin\n");
+  EXPECT_EQ(completed("metastable man st", 2), "steps\n");
   EXPECT_EQ(completed("metastable steps --law ''", 3), "published coulomb\n");
   EXPECT_EQ(completed("metastable steps --law c", 3), "coulomb\n");
   EXPECT_EQ(completed("metastable steps --slope ''", 3), "\n");
@@ -50,6 +57,10 @@ TEST(Manual, OtherShellsAndPagesEscapeWhatTheyWouldTakeForSyntax) {
   EXPECT_NE(zsh.find("'*--law=[Contact law]:published|coulomb:(published coulomb)'"), std::string::npos) << zsh;
   EXPECT_NE(fish.find(R"(-l slope -x -d 'Ramp'\''s slope [deg]: any')"), std::string::npos) << fish;
   EXPECT_NE(fish.find("from describe' -l out -r -F"), std::string::npos) << fish;
+  EXPECT_NE(fish.find(R"(-l separator -x -a ''\'','\'' '\'';'\'' tab')"), std::string::npos) << fish;
+  EXPECT_NE(fish.find("from blind' -a 'make open'"), std::string::npos) << fish;
+  EXPECT_NE(zsh.find("'1:ACTION:(make open)'"), std::string::npos) << zsh;
+  EXPECT_NE(zsh.find("'1:COMMAND:(steps describe blind man)'"), std::string::npos) << zsh;
   const std::string page = manual_page(manual, "steps", "1.0");
   EXPECT_NE(page.find("\\fB\\-\\-slope\\fR \\fIDEG\\fR\nRamp's slope [deg]: any (default: 7.02).\n"), std::string::npos)
       << page;

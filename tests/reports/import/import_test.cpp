@@ -304,12 +304,13 @@ class ImportMat : public Import {
   std::string save(const std::vector<matvar_t*>& variables) const {
     mat_t* const mat = Mat_CreateVer(path("lab.mat").c_str(), nullptr, MAT_FT_MAT5);
     for (matvar_t* const v : variables) {
-      Mat_VarWrite(mat, v, MAT_COMPRESSION_NONE);
+      Mat_VarWrite(mat, v, compression_);
       Mat_VarFree(v);
     }
     Mat_Close(mat);
     return path("lab.mat");
   }
+  matio_compression compression_ = MAT_COMPRESSION_NONE;
   // Returns each trial's condition, and its number.
   matvar_t* conditions() const {
     std::size_t dims[] = {known_.trials.size(), 1};
@@ -400,8 +401,26 @@ TEST_F(ImportMat, VectorsAndWhatIsWrongWithThem) {
                  mat +
                      ": w_deg_s: is 6 x 1: say --trials-in columns or --trials-in rows, or map trial to a vector of as "
                      "many");
-  file("broken.mat", "MATLAB 5.0 MAT-file, not really");
-  EXPECT_EQ(import({path("broken.mat"), "--columns", "omega_minus=w[rad/s]"}).code, 2);
+}
+
+// What libmatio itself would read as other numbers.
+TEST_F(ImportMat, CutShortOrDamagedIsRefused) {
+  const auto refusal_of = [&](const std::string& text) {
+    const std::string mat = file("broken.mat", text);
+    const Ran ran = import({mat, "--columns", "omega_minus=w[deg/s]", "--trials-in", "columns"});
+    EXPECT_EQ(ran.code, 2);
+    return ran.err.substr(0, ran.err.find(" at byte"));
+  };
+  const std::string whole = test::read(save({matrix(true)}));
+  const std::string begin = "metastable: " + path("broken.mat");
+  EXPECT_EQ(refusal_of("MATLAB 5.0 MAT-file, not really"), begin + ": is cut short: what begins");
+  for (const std::size_t size : {whole.size() - 1, whole.size() - 40, std::size_t{140}, std::size_t{131}})
+    EXPECT_EQ(refusal_of(whole.substr(0, size)), begin + ": is cut short: what begins") << size;
+  compression_ = MAT_COMPRESSION_ZLIB;
+  std::string compressed = test::read(save({matrix(true)}));
+  EXPECT_EQ(refusal_of(compressed.substr(0, compressed.size() - 1)), begin + ": is cut short: what begins");
+  compressed[compressed.size() - 12] ^= 1;
+  EXPECT_EQ(refusal_of(compressed), begin + ": is damaged: its variable");
 }
 
 #else

@@ -29,6 +29,8 @@ class Chains(unittest.TestCase):
         passage = chain.first_passage()
         np.testing.assert_allclose(passage.mean, mean, rtol=1e-11)
         np.testing.assert_allclose(passage.sd, np.sqrt(2 * inverse @ mean - mean - mean**2), rtol=1e-9)
+        self.assertEqual(passage.to_dict()["sd"], passage.sd.tolist())
+        self.assertIn("<th>lower</th>", passage._repr_html_())
         self.assertTrue(np.all(passage.lower <= passage.mean) and np.all(passage.mean <= passage.upper))
         self.assertLess((passage.upper / passage.lower).max() - 1, 1e-11)
         lists = metastable.chain(matrix.tolist(), kill.tolist())

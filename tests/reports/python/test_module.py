@@ -49,6 +49,21 @@ class Settings(unittest.TestCase):
             with self.assertRaises(ValueError) as raised:
                 metastable.Setting(**{"initial_speed": (7.35, 0.19), **fields})
             self.assertEqual(str(raised.exception), refusal("steps", *words).replace("--", ""))
+        for name, value, text, more in (
+            ("mass", 1e250, "1e250", {}), ("legs", [0.15, 0.15], "0.15,0.15", {}), ("legs", [1000], "1000", {}),
+            ("gravity", 1e5, "1e5", {}), ("ramp_length", 1e9, "1e9", {}), ("ramp_stiffness", 0, "0", {}),
+            ("contact_mass", -1, "-1", {}), ("friction", (0.4, -1), "0.4,-1", {}), ("friction", 20, "20", {}),
+            ("restitution", (1.2, 0.1), "1.2,0.1", {}), ("initial_speed", (1e200, 1), "1e200,1", {}),
+            ("inertia", 0.0035, "0.0035", {}), ("inertia", 1e6, "1e6", {}), ("tip_radius", -1, "-1", dict(law="settled")),
+            ("radius_of_gyration", 2, "2", dict(law="coulomb")), ("rebound_lost", 2, "2", dict(law="coulomb")),
+        ):
+            option = name.replace("_", "-")
+            words = [f"--{option}", text] + [f"--law={law}" for law in more.values()]
+            with self.subTest(name), self.assertRaises(metastable.InputError) as raised:
+                metastable.Setting(**{name: value, **more})
+            said = str(raised.exception)
+            self.assertIn(said.replace(name, option, 1), (refusal("steps", *words).replace("--", ""),
+                                                         refusal("steps", *words).replace("--", "").replace(name, option)))
         for fields, sentence in ((dict(mass="heavy"), "mass: a number expected, not str"),
                                  (dict(friction=(1, 2, 3)), r"friction: \(mean, sd\) expected, 3 numbers given"),
                                  (dict(contact_list=[1, 2]), "contact_list: an array of n rows and two columns"),
@@ -205,6 +220,8 @@ class Experiments(unittest.TestCase):
             self.assertEqual(other.collisions.to_dict(), columns.to_dict())
             self.assertEqual(other.trials.to_dict(), simulated.trials.to_dict())
         self.assertFalse(columns.omega_minus_rad_s.flags.owndata)
+        self.assertEqual(read.to_dict()["collisions"], columns.to_dict())
+        self.assertEqual(read._repr_html_().count("<tr>"), 21)  # a head and the trials
 
     def test_defects_have_their_places(self):
         wrong = dict(trial=[1, 1, 1], collision=[1, 2, 4], omega_minus_rad_s=[5.0, -1, 5])
@@ -223,6 +240,7 @@ class Experiments(unittest.TestCase):
         conditions = description.tables["conditions"]
         self.assertEqual([row["trials"] for row in conditions], [12])
         self.assertEqual(description.to_dict()["tables"]["conditions"]["title"], conditions.title)
+        self.assertIn("<td>12</td>", conditions._repr_html_())
         self.assertIn("<table", description._repr_html_())
 
     def test_effects_are_the_catalogue(self):

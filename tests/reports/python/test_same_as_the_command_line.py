@@ -1,5 +1,7 @@
 """The same seed gives the same numbers as the command line, to the bit."""
 
+import pathlib
+import tempfile
 import unittest
 
 import metastable
@@ -34,6 +36,28 @@ class SameAsTheCommandLine(unittest.TestCase):
         self.assertEqual(told(study.to_dict()),
                          command_line("steps", "--walker", "simplest", "--slope-sd", "0.5", "--spacing", "1.2",
                                       "--simulated-steps", "20000", "--how-it-fails"))
+
+    def test_simulate_and_describe(self):
+        setting = metastable.Setting(slope_deg=9.59, law="coulomb", friction=(0.35, 0.04))
+        words = ("--slope", "9.59", "--law", "coulomb", "--friction", "0.35,0.04", "--trials", "8", "--seed", "6")
+        for options, more in ((dict(), ()), (dict(reality=True, sensor_noise=0.01), ("--reality", "--sensor-noise", "0.01"))):
+            with self.subTest(**options), tempfile.TemporaryDirectory() as folder:
+                ours, theirs = pathlib.Path(folder) / "ours", pathlib.Path(folder) / "theirs"
+                metastable.simulate(setting, trials=8, seed=6, **options).write(ours)
+                command_line("simulate", *words, *more, "--out", str(theirs))
+                for name in ("collisions.csv", "trials.csv"):
+                    self.assertEqual((ours / name).read_bytes(), (theirs / name).read_bytes())
+        with tempfile.TemporaryDirectory() as folder:
+            plain = pathlib.Path(folder) / "plain"
+            metastable.simulate(metastable.Setting(law="plastic"), trials=12).write(plain)  # no contact to fit
+            self.assertEqual(metastable.describe(plain).to_dict()["tables"], command_line("describe", str(plain))["tables"])
+
+    def test_sweep(self):
+        with tempfile.TemporaryDirectory() as folder:
+            theirs = command_line("sweep", "--slope", "9.59", "--friction-mean", "0.35,0.45", "--cells", "24", "--samples",
+                                  "256", "--out", f"{folder}/sweep.csv")["tables"]["sweep"]["rows"]
+        ours = metastable.sweep(metastable.Setting(slope_deg=9.59), friction_mean=[0.35, 0.45], cells=24, samples=256)
+        self.assertEqual(ours.expected_steps.tolist(), [row[1] for row in theirs])
 
     def test_diagnose(self):
         catalogue = ["slope_offset"]
