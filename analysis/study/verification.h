@@ -41,11 +41,11 @@ struct Verified {
 /// @param most_nodes per phase, where doubling stops whatever the change
 Verified verify(const Benchmark& benchmark, int threads, std::size_t most_nodes = 512);
 
-/// Holds the table that `settled` is read from against landings that are followed (SettledMapError).
+/// Holds the table that `settled` is read from against landings that are followed (SettledMapErrors).
 struct VerifiedTable {
   std::string wheel;
   double slope_deg = 0;
-  dynamics::SettledMapError error;
+  dynamics::SettledMapErrors error;
 };
 /// Verifies the tables of the paper's wheel with J = 0.0025 kg m^2 at 7.02 deg, and of one with equal legs, an eighth
 /// of the work, at 9.59.

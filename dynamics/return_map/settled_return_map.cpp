@@ -324,11 +324,14 @@ std::optional<double> SettledReturnMap::landing_defect(double state, int phase, 
   };
   if (noise().is_empirical() || noise().correlation() != 0 || noise().friction().constant()) return difference();
   // Between the two thresholds of rest the landing is known; few draws meet that.
+  const TruncatedNormal& friction = noise().friction();
   const double read = resting_friction(phase, omega, contact.restitution);
+  // Where hardly any friction lets the wheel pass, the threshold is not worth finding: feet chatter for long there.
+  constexpr double reach = 0.05, negligible = 1e-9;
+  if (friction.complement(read - reach) * f(state_interval(phase + 1).first) < negligible) return difference();
   const double followed = landings_->followed_resting_friction(phase, omega, contact.restitution, read);
   const auto [low, high] = std::minmax(read, followed);
   if (!std::isfinite(high)) return difference();
-  const TruncatedNormal& friction = noise().friction();
   const double between = (friction.cdf(read) - friction.cdf(followed)) * f(state_interval(phase + 1).first);
   return contact.friction >= low && contact.friction < high ? between : between + difference();
 }
@@ -396,7 +399,11 @@ bool SettledReturnMap::violates(int which, double state, int phase, std::span<co
   if (which == 0) return omega > lift_speed(geometry_, phase);
   const Contact contact = noise().draw(score);
   const std::optional<SettledSlice> slice = landings_->slice(phase, contact.restitution);
-  if (slice && omega >= slice->lowest_speed() && !slice->at(omega).rough(contact.friction)) return false;
+  if (slice) {
+    if (omega < slice->lowest_speed()) return false;  // at rest, as below mu_r
+    const SettledSlice::Place place = slice->at(omega);
+    if (contact.friction < place.resting_friction() || !place.rough(contact.friction)) return false;
+  }
   return landings_->motion().land(phase, omega, contact).end == LandingEnd::unsettled;
 }
 

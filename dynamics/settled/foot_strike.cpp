@@ -65,4 +65,14 @@ PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const Pl
   return {before.along + rubbed, before.out + pressed, before.spin + (d * pressed - h * rubbed) / k2};
 }
 
+SlipLeft slip_left(const ContactLever& lever, const Contact& contact, const PlaneVelocity& before) {
+  const double slip = lever.slip(before), d = lever.behind, h = lever.height, k2 = lever.gyration_sq;
+  if (slip <= 0) return {slip, slip};
+  const double rise = 1 + d * d / k2 + contact.friction * d * h / k2;
+  const double drive = -contact.friction * (1 + h * h / k2) - d * h / k2;
+  if (rise <= 0) return {-slip, -slip};  // it jams
+  const double compression = -lever.lift(before) / rise;
+  return {slip + drive * compression, slip + drive * compression * (1 + contact.restitution)};
+}
+
 }  // namespace metastable::dynamics

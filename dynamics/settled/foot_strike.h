@@ -34,4 +34,12 @@ struct ContactLever {
 PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const PlaneVelocity& before,
                      double* rubbed_off = nullptr);
 
+/// Is the slip down the plane that a foot would have left at the end of its compression and of the whole impact if
+/// friction held against it without an end [m/s]: below 0 it stops before. Smooth in mu and eta.
+struct SlipLeft {
+  double compressed = 0, struck = 0;
+};
+/// @param before of a foot that approaches; if it does not slip down the plane, both are the slip that it has
+SlipLeft slip_left(const ContactLever& lever, const Contact& contact, const PlaneVelocity& before);
+
 }  // namespace metastable::dynamics

@@ -16,8 +16,6 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
-// Is far enough above mu_c that the foot sticks under its weight, too, on every slope with a barrier.
-constexpr double sticks_by = 0.02;
 constexpr double smooth_restitution = 0.6;  // above it feet hop on to the next touch
 constexpr double rough_step = 0.05;         // between rows there
 constexpr std::size_t most_kept = 32;       // maps, of some 8 MB
@@ -53,6 +51,66 @@ double rising_root(const F& value, double low, double at_low, double high, doubl
   return high;
 }
 
+// Says what a value will be at the next of evenly spread places, from those before.
+class Trend {
+ public:
+  void add(double value) {
+    last_ = {value, last_[0], last_[1], last_[2]};
+    count_ = std::min(count_ + 1, 4);
+  }
+  double next() const { return through(count_); }  // 0: not known
+  double off() const { return count_ < 3 ? 1e-3 : std::abs(next() - through(count_ - 1)) / 4 + 1e-8; }
+
+ private:
+  // Continues the polynomial through so many values.
+  double through(int count) const {
+    const auto [a, b, c, d] = last_;
+    return count == 1   ? a
+           : count == 2 ? 2 * a - b
+           : count == 3 ? 3 * (a - b) + c
+           : count == 4 ? 4 * (a + c) - 6 * b - d
+                        : 0;
+  }
+  std::array<double, 4> last_{};
+  int count_ = 0;
+};
+
+// Finds the friction up to `high` from which slip stops in an impact, or before its compression ends; `high` if it does
+// not stop there either.
+double stopping_friction(const SettledMotion& motion, int leg, double omega, double eta, int strike,
+                         double SlipLeft::*when, double high, const Trend& trend) {
+  const auto value = [&](double mu) {
+    const std::optional<SlipLeft> left = motion.slip_left(leg, omega, {eta, mu}, strike);
+    return left ? -((*left).*when) : -1;  // without an impact it slides on
+  };
+  double low = high, top = high - 1e-9, at_low = 0, at_top = 0;
+  const double guess = trend.next();
+  for (double off = trend.off(); guess > 0 && guess - off < top && off < 1e-2; off *= 16) {
+    const double below = std::max(0.0, guess - off), above = std::min(guess + off, top);
+    at_low = value(below), at_top = value(above);
+    if (at_top < 0 && above == top) return high;
+    if (!(at_low < 0 && at_top >= 0)) continue;
+    low = below, top = above;
+    break;
+  }
+  if (!(low < top)) {
+    low = top = high - 1e-9;
+    at_top = value(top);
+    if (at_top < 0) return high;
+    for (double step = 1e-3; (at_low = value(low = std::max(0.0, low - step))) >= 0; step *= 2) {
+      if (low == 0) return 0;
+      top = low, at_top = at_low;
+    }
+  }
+  return rising_root(value, low, at_low, top, at_top, 1e-9);
+}
+
+// Names the impact in which slip stops at the n-th edge of a table, and when.
+std::pair<int, double SlipLeft::*> stop_of(int n) {
+  if (n < 4) return {2 + n / 2, n % 2 == 0 ? &SlipLeft::compressed : &SlipLeft::struck};
+  return {n, &SlipLeft::struck};
+}
+
 // Returns evenly spread points in the unit cube (Roberts' sequence).
 double spread(std::size_t index, int dimension) {
   constexpr double g = 1.22074408460575947536;  // g^4 = g + 1
@@ -60,6 +118,26 @@ double spread(std::size_t index, int dimension) {
   double whole = 0;
   return std::modf(0.5 + static_cast<double>(index + 1) * step, &whole);
 }
+
+// Collects what was found at the points of one region.
+struct Found {
+  std::size_t landings = 0, misjudged_rests = 0;
+  double displacement = 0;
+  std::vector<double> off, resting_off;
+  SettledMapError summary() {
+    SettledMapError error{.landings = landings, .misjudged_rests = misjudged_rests, .displacement = displacement};
+    for (std::vector<double>* list : {&off, &resting_off}) std::sort(list->begin(), list->end());
+    if (!off.empty()) {
+      double sum = 0;
+      for (const double one : off) sum += one * one;
+      error.rms = std::sqrt(sum / static_cast<double>(off.size()));
+      error.median = off[off.size() / 2], error.largest = off.back();
+    }
+    if (!resting_off.empty())
+      error.resting_friction = resting_off.back(), error.resting_friction_median = resting_off[resting_off.size() / 2];
+    return error;
+  }
+};
 
 void in_order(std::size_t count, const std::function<void(std::size_t)>& work) {
   for (std::size_t i = 0; i < count; ++i) work(i);
@@ -138,7 +216,7 @@ double SettledMap::standstill(int leg, double eta) const {
   // These are speeds so low that a sticking foot is carried back; there are none for a slope without barrier.
   const double barrier = motion_.foot(leg).barrier_squared();
   if (!(barrier > 0)) return 0;
-  const double mu = sticking_[static_cast<std::size_t>(leg)] + sticks_by;
+  const double mu = sticking_[static_cast<std::size_t>(leg)] + clear_of_sticking;
   const auto value = [&](double omega) { return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier); };
   double low = 0.5 * std::sqrt(barrier), high = 1.5 * std::sqrt(barrier);
   double at_low = value(low), at_high = value(high);
@@ -153,7 +231,7 @@ double SettledMap::standstill(int leg, double eta) const {
 double SettledMap::solve_resting(int leg, double omega, double eta, double guess, double off) const {
   const double barrier = motion_.foot(leg).barrier_squared();
   const auto value = [&](double mu) { return beyond_barrier(motion_.land(leg, omega, {eta, mu}), barrier); };
-  double high = sticking_[static_cast<std::size_t>(leg)] + sticks_by, at_high = value(high);
+  double high = sticking_[static_cast<std::size_t>(leg)] + clear_of_sticking, at_high = value(high);
   if (at_high < 0) return never;
   // Around the guess it searches, or step by step from above: at high omega and eta there are gaps in rest below.
   double low = high, at_low = at_high;
@@ -168,34 +246,14 @@ double SettledMap::solve_resting(int leg, double omega, double eta, double guess
     low = below, at_low = at_below, high = above, at_high = at_above;
     break;
   }
-  for (double step = 2e-3; at_low >= 0 && low > 0;) {
+  const bool smooth = eta <= smooth_restitution;  // elsewhere landings are rough, and may take a millisecond
+  for (const double step = smooth ? 2e-3 : 1e-2; at_low >= 0 && low > 0;) {
     high = low, at_high = at_low;
     low = std::max(0.0, low - step);
     at_low = value(low);
   }
   if (at_low >= 0) return 0;
-  return rising_root(value, low, at_low, high, at_high, 1e-10);
-}
-
-double SettledMap::stopping_friction(int leg, double omega, double eta, int strikes, double low, double high) const {
-  // The slip falls about straight to 0 and stays there: where the line through the last two meets 0 or a little above.
-  double before = low, before_slip = 0, slip = motion_.slip_after(leg, omega, {eta, low}, strikes);
-  if (slip <= 0) return low;
-  for (int i = 0; high - low > 1e-10; ++i) {
-    double at = (low + high) / 2;
-    if (before_slip > slip && i % 3 != 0) {
-      const double ahead = (low - before) * slip / (before_slip - slip);
-      at = std::clamp(low + ahead * (i % 3 == 1 ? 1 : 1.01) + 5e-11, low, at);
-    }
-    const double slip_at = motion_.slip_after(leg, omega, {eta, at}, strikes);
-    if (slip_at > 0) {
-      before = low, before_slip = slip;
-      low = at, slip = slip_at;
-    } else {
-      high = at;
-    }
-  }
-  return high;
+  return rising_root(value, low, at_low, high, at_high, smooth ? 1e-10 : 1e-6);
 }
 
 // Finds the bend at two speeds and three restitutions: where the landing has risen by a quarter of its rise over [mu_r,
@@ -227,7 +285,7 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
         const double middle = (low + high) / 2, bend = std::exp(middle);
         (std::log1p(part / bend) > std::log1p(1 / bend) / 4 ? low : high) = middle;
       }
-      found[s] = low;
+      found[s] = low + std::log(sticking - resting);
     }
     rate[j] = (found[1] - found[0]) / (omega[1] - omega[0]);
     at_0[j] = found[0] - rate[j] * omega[0];
@@ -248,34 +306,51 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
   parabola(rate, &table.bend[3]);
 }
 
+// Finds the frictions where the landing has kinks, and mu_r, at all speeds of one restitution.
+void SettledMap::find_edges(SettledTable& table, int leg, int row) const {
+  constexpr int stops = SettledTable::stops;
+  const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
+  std::array<Trend, stops + 1> trend;
+  for (int i = 0; i < table.speeds; ++i) {
+    const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
+    double* edge = &table.edges[static_cast<std::size_t>((row * table.speeds + i) * (stops + 1))];
+    double resting = solve_resting(leg, omega, eta, trend[stops].next(), trend[stops].off());
+    if (!(resting < table.sticking)) resting = table.sticking - 1e-9;
+    trend[stops].add(edge[stops] = resting);
+    for (int n = 0; n < stops; ++n) {
+      edge[n] = table.sticking;
+      if (row >= table.smooth_rows) continue;
+      const auto [strike, when] = stop_of(n);
+      edge[n] = stopping_friction(motion_, leg, omega, eta, strike, when, n == 0 ? table.sticking : edge[n - 1],
+                                  trend[static_cast<std::size_t>(n)]);
+      trend[static_cast<std::size_t>(n)].add(edge[n]);
+    }
+  }
+}
+
 // Tabulates one row of a leg's table: all speeds and frictions at one restitution.
 void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
   constexpr int stops = SettledTable::stops, piece = SettledTable::piece;
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
   const bool smooth = row < table.smooth_rows;
-  std::array<double, 4> before{};  // mu_r at the speeds before, the last one first
+  find_edges(table, leg, row);
+  int* known = &table.known[static_cast<std::size_t>(row) * (stops + 1)];
   for (int i = 0; i < table.speeds; ++i) {
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     const auto at = static_cast<std::size_t>(row * table.speeds + i);
-    // The parabola, and the cubic, through the speeds before give a guess: these stand evenly on the table's axis.
-    const auto [one, two, three, four] = before;
-    const double parabola = 3 * (one - two) + three, cubic = 4 * (one + three) - 6 * two - four;
-    double resting = i < 4 ? solve_resting(leg, omega, eta, one - (i > 0 ? 1e-3 : 0), 1e-3)
-                           : solve_resting(leg, omega, eta, cubic, std::abs(cubic - parabola) / 4 + 1e-8);
-    if (!(resting < table.sticking)) resting = table.sticking - 1e-9;
-    before = {resting, one, two, three};
-    double* edge = &table.edges[at * (stops + 1)];
-    edge[stops] = resting;
-    for (int n = 0; n < stops; ++n)
-      edge[n] = smooth ? stopping_friction(leg, omega, eta, n + 2, resting, n == 0 ? table.sticking : edge[n - 1])
-                       : table.sticking;
+    const double* edge = &table.edges[at * (stops + 1)];
+    const double resting = edge[stops];
     double* kept = &table.kept[at * static_cast<std::size_t>(table.places())];
     double* displacement = &table.displacement[at * static_cast<std::size_t>(table.places())];
+    unsigned unknown = 0;
     const auto note = [&](int n, double mu) {
       const Landing landing = motion_.land(leg, omega, {eta, mu});
-      *kept++ = landing.carried_squared / (omega * omega);
+      const bool rests = landing.end == LandingEnd::rest || landing.end == LandingEnd::given_up;
+      *kept++ = (rests ? landing.settled_squared : landing.carried_squared) / (omega * omega);
       *displacement++ = landing.displacement;
-      if (landing.end != LandingEnd::settled || !smooth) table.unsettled[at] |= static_cast<std::uint16_t>(1 << n);
+      if (rests && !(landing.settled_squared > 0)) unknown |= 1U << n;
+      if (landing.end == LandingEnd::unsettled || landing.end == LandingEnd::given_up || !smooth)
+        table.unsettled[at] |= static_cast<std::uint16_t>(1 << n);
     };
     // A piece begins where the one above ended.
     const auto repeat = [&](int n, int times) {
@@ -283,23 +358,31 @@ void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
         *kept = *(kept - 1), ++kept;
         *displacement = *(displacement - 1), ++displacement;
       }
+      if (unknown >> (n - 1) & 1) unknown |= 1U << n;
       table.unsettled[at] |= static_cast<std::uint16_t>((table.unsettled[at] >> (n - 1) & 1) << n);
     };
     for (int n = 0; n < stops; ++n) {
       const double high = n == 0 ? table.sticking : edge[n - 1];
-      if (n == 0) note(n, table.sticking + sticks_by);
+      if (n == 0) note(n, table.sticking + clear_of_sticking);
       if (n > 0) repeat(n, edge[n] < high ? 1 : piece);
       if (n == 0 || edge[n] < high)
         for (int k = 1; k < piece; ++k) note(n, high + (edge[n] - high) * k / (piece - 1));
     }
-    const double bend = table.bend_at(omega, eta), whole = std::log1p(1 / bend);
+    const double bend = table.bend_at(omega, eta), width = edge[stops - 1] - resting;
     const double end_kept = *(kept - 1), end_displacement = *(displacement - 1);
     for (int k = 0; k < table.frictions - 1; ++k) {
-      const double part = k == 0 ? 1e-9 : bend * std::expm1(whole * k / (table.frictions - 1));
-      note(stops, resting + part * (edge[stops - 1] - resting));
+      if (!(width > 0)) {
+        unknown |= 1U << stops;
+        *kept++ = end_kept, *displacement++ = end_displacement;
+        continue;
+      }
+      const double place = static_cast<double>(k) / (table.frictions - 1);
+      note(stops, resting + (k == 0 ? 1e-9 * width : table.above_resting(place, width, bend)));
     }
     *kept = end_kept, *displacement = end_displacement;
     table.unsettled[at] |= static_cast<std::uint16_t>((table.unsettled[at] >> (stops - 1) & 1) << stops);
+    for (int n = 0; n <= stops; ++n)
+      if (smooth && 2 * i < table.speeds && (unknown >> n & 1) != 0) known[n] = i + 1;
   }
 }
 
@@ -366,12 +449,11 @@ MappedLanding SettledMap::land(int leg, double omega, const Contact& contact) co
 }
 
 void SettledMap::check() {
+  constexpr double barely = 0.5;  // [rad/s]
   const SettledRange& range = options_.range;
   const auto per_leg = static_cast<std::size_t>(options_.checks);
   std::mutex mutex;
-  double settled_sum = 0, rough_sum = 0;
-  std::size_t settled = 0, rough = 0;
-  std::vector<double> resting_off;
+  Found sliding, sticking, slow, rough;
   options_.executor(table_.size() * per_leg, [&](std::size_t index) {
     const int leg = static_cast<int>(index / per_leg);
     const SettledTable& table = table_[static_cast<std::size_t>(leg)];
@@ -386,30 +468,21 @@ void SettledMap::check() {
     const Landing direct = motion_.land(leg, omega, {eta, mu});
     const bool rests = direct.end == LandingEnd::rest || direct.end == LandingEnd::given_up;
     const bool is_rough = place.rough(std::max(mu, resting)) || direct.end == LandingEnd::unsettled;
+    Found& found = is_rough                                                             ? rough
+                   : omega < read.lowest_speed() - SettledTable::clear_of_rest + barely ? slow
+                   : mu < table.sticking                                                ? sliding
+                                                                                        : sticking;
     const bool solves = index % 8 == 0 && !is_rough;
     const double off_resting = solves ? std::abs(followed_resting_friction(leg, omega, eta, resting) - resting) : 0;
-    const double off = (by_table.carried_squared - direct.carried_squared) / (omega * omega);
     const std::lock_guard lock(mutex);
-    ++error_.landings;
-    if (solves) resting_off.push_back(off_resting);
-    if (is_rough) ++error_.rough;
-    if (rests != by_table.rest) {
-      ++(is_rough ? error_.rough_misjudged_rests : error_.misjudged_rests);
-    } else if (!rests && is_rough) {
-      ++rough, rough_sum += off * off;
-    } else if (!rests) {
-      ++settled, settled_sum += off * off;
-      error_.settled_max = std::max(error_.settled_max, std::abs(off));
-      error_.displacement_max =
-          std::max(error_.displacement_max, std::abs(by_table.displacement - direct.displacement));
-    }
+    ++found.landings;
+    if (solves) found.resting_off.push_back(off_resting);
+    if (rests != by_table.rest) ++found.misjudged_rests;
+    if (rests || by_table.rest) return;
+    found.off.push_back(std::abs(by_table.carried_squared - direct.carried_squared) / (omega * omega));
+    found.displacement = std::max(found.displacement, std::abs(by_table.displacement - direct.displacement));
   });
-  if (settled > 0) error_.settled_rms = std::sqrt(settled_sum / static_cast<double>(settled));
-  if (rough > 0) error_.rough_rms = std::sqrt(rough_sum / static_cast<double>(rough));
-  std::sort(resting_off.begin(), resting_off.end());
-  if (resting_off.empty()) return;
-  error_.resting_friction_max = resting_off.back();
-  error_.resting_friction_median = resting_off[resting_off.size() / 2];
+  error_ = {sliding.summary(), sticking.summary(), slow.summary(), rough.summary()};
 }
 
 }  // namespace metastable::dynamics

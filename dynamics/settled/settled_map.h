@@ -22,23 +22,29 @@ struct SettledRange {
 struct SettledMapOptions {
   SettledRange range;
   bool direct = false;                                 ///< no table: every landing followed
-  int speeds = 26, restitutions = 13, frictions = 20;  ///< nodes of the table per leg; restitutions up to 0.6
+  int speeds = 28, restitutions = 15, frictions = 20;  ///< nodes of the table per leg; restitutions up to 0.6
   int checks = 400;                                    ///< landings per leg that the table is held against
   /// Calls the work for every index in [0, count), in any order, from any threads; by default one after the other.
   std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)> executor;
   std::function<void(double share)> progress;  ///< called now and then, from any thread, one at a time
 };
 
-/// Holds the table against direct landings at random points of its range. Feet settle, or are rough: eta above 0.6, or
-/// the next leg touches an unsettled foot at some node around.
+/// Holds a table against landings that are followed, in one region.
 struct SettledMapError {
-  std::size_t landings = 0, rough = 0;
-  std::size_t misjudged_rests = 0, rough_misjudged_rests = 0;
-  double settled_rms = 0, settled_max = 0;  ///< of carried_squared / omega-^2
-  double rough_rms = 0;                     ///< the same of rough feet
-  double displacement_max = 0;              ///< [m], settled feet
-  /// Are those of mu_r, settled feet: the largest, and the median.
-  double resting_friction_max = 0, resting_friction_median = 0;
+  std::size_t landings = 0, misjudged_rests = 0;
+  double rms = 0, median = 0, largest = 0;  ///< of carried_squared / omega-^2, where both roll on
+  double displacement = 0;                  ///< the largest [m]
+  /// Are those of mu_r, the largest and the median.
+  double resting_friction = 0, resting_friction_median = 0;
+};
+
+/// Holds a table against landings that are followed at points spread over its range.
+struct SettledMapErrors {
+  SettledMapError sliding;   ///< mu < mu_c, 0.5 rad/s and more above the speed at which a sticking foot rests
+  SettledMapError sticking;  ///< mu > mu_c, likewise: the atom
+  SettledMapError slow;      ///< less than 0.5 rad/s above it: the wheel barely passes
+  /// eta above 0.6, or the next leg touches an unsettled foot at some node around.
+  SettledMapError rough;
 };
 
 /// Reads landings by table. Const members may be called from any thread.
@@ -72,24 +78,24 @@ class SettledMap {
   std::optional<SettledSlice> slice(int leg, double eta) const;
   /// Returns omega-^2 at the next touch [rad^2/s^2], for a landing that does not rest.
   double next_squared(int leg, double carried_squared) const { return motion_.foot(leg).next_squared(carried_squared); }
-  const SettledMapError& error() const { return error_; }
+  const SettledMapErrors& error() const { return error_; }
   double seconds() const { return seconds_; }  ///< that it took to build
 
  private:
   SettledMap(SettledMotion motion, SettledMapOptions options);
   void build();
+  void find_edges(SettledTable& table, int leg, int row) const;
   void tabulate(SettledTable& table, int leg, int row) const;
   void find_bend(SettledTable& table, int leg) const;
   void check();
   double standstill(int leg, double eta) const;
   double solve_resting(int leg, double omega, double eta, double guess, double off) const;
-  double stopping_friction(int leg, double omega, double eta, int strikes, double low, double high) const;
 
   SettledMotion motion_;
   SettledMapOptions options_;
   std::vector<double> sticking_;
   std::vector<SettledTable> table_;  // one a leg; one in all if they are alike
-  SettledMapError error_;
+  SettledMapErrors error_;
   double seconds_ = 0;
 };
 

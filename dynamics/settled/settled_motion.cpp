@@ -53,8 +53,9 @@ Landing SettledMotion::land(int leg, double omega_minus, const Contact& landed, 
   return SettledRoll(*this, leg, omega_minus, landed, old).land();
 }
 
-double SettledMotion::slip_after(int leg, double omega_minus, const Contact& contact, int strikes) const {
-  return SettledRoll(*this, leg, omega_minus, contact, contact).slip_after(strikes);
+std::optional<SlipLeft> SettledMotion::slip_left(int leg, double omega_minus, const Contact& contact,
+                                                 int strike) const {
+  return SettledRoll(*this, leg, omega_minus, contact, contact).slip_left(strike);
 }
 
 Step SettledMotion::step(int leg, double omega_minus, const Contact& landed, const Contact& old) const {
@@ -201,19 +202,15 @@ Landing SettledRoll::land() {
   return landing_;
 }
 
-double SettledRoll::slip_after(int strikes) {
+std::optional<SlipLeft> SettledRoll::slip_left(int strike) {
   landing_ = {};
   events_ = 0;
-  double slip = 0;
-  for (Event event = Event::strikes; landing_.strikes < strikes; event = fly()) {
-    if (event != Event::strikes || foot_ != leg_) return slip;
+  for (Event event = Event::strikes; event == Event::strikes && foot_ == leg_;) {
+    if (landing_.strikes + 1 == strike) return dynamics::slip_left(lever(leg_), contact_of(leg_), velocity_);
     event = resolve();
-    slip = lever(leg_).slip(velocity_);
-    if (slip < 1e-12) return 0;
-    if (landing_.strikes == strikes) break;
-    if (event != Event::flies) return slip;
+    if (event == Event::flies) event = fly();
   }
-  return slip;
+  return std::nullopt;
 }
 
 Step SettledRoll::step() {
@@ -451,8 +448,10 @@ SettledRoll::Event SettledRoll::fly() {
     // While the wheel turns by one leg no others may touch than those looked at, and none before a hub that is higher
     // than legs are long is down again.
     double slowing = 0, first = turn / std::max(1e-3, std::abs(spin));
-    if (height_ > longest * (1 + 1e-9))
-      first = (out + std::sqrt(out * out + 2 * cosine_ * (height_ - longest))) / cosine_;
+    if (height_ > longest * (1 + 1e-9)) {
+      const double above = height_ - longest, root = std::sqrt(out * out + 2 * cosine_ * above);
+      first = out > 0 ? (out + root) / cosine_ : 2 * above / (root - out);
+    }
     if (wheel.drags()) {
       first = std::min(first, 1e-3);
       slowing = -wheel.drag(spin - wheel.drag(spin) / wheel.gyration_sq() * first / 2) / wheel.gyration_sq();

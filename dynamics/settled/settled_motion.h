@@ -2,6 +2,7 @@
 // Follows the law `settled`: landings, steps and trials of a planar rigid wheel, event by event.
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "dynamics/settled/foot_strike.h"
@@ -71,10 +72,10 @@ class SettledMotion {
   Landing land(int leg, double omega_minus, const Contact& contact) const {
     return land(leg, omega_minus, contact, contact);
   }
-  /// Returns the speed at which the landed foot slips down the plane after its first `strikes` impacts [m/s]; 0 once it
-  /// has stuck, and if fewer follow. The landing is not smooth in mu where this becomes 0.
-  double slip_after(int leg, double omega_minus, const Contact& contact, int strikes) const;
-  /// Does the same and goes on to the next touch, the stance integrated in time.
+  /// Returns what the landed foot has left of its slip in the impact with the number `strike`; nothing if fewer follow.
+  /// The landing is not smooth in mu where either part of it becomes 0.
+  std::optional<SlipLeft> slip_left(int leg, double omega_minus, const Contact& contact, int strike) const;
+  /// Follows a landing as land() does and goes on to the next touch, the stance integrated in time.
   Step step(int leg, double omega_minus, const Contact& landed, const Contact& old) const;
   Step step(int leg, double omega_minus, const Contact& contact) const {
     return step(leg, omega_minus, contact, contact);
@@ -96,8 +97,8 @@ class SettledRoll {
   Step step();
   /// Follows the landing alone, until its foot has settled. Ends the roll unless it is `settled`.
   Landing land();
-  /// Does as SettledMotion::slip_after. Ends the roll.
-  double slip_after(int strikes);
+  /// Does as SettledMotion::slip_left. Ends the roll.
+  std::optional<SlipLeft> slip_left(int strike);
 
   int leg() const { return leg_; }                ///< that touches, counted on without end
   double position() const;                        ///< of its tip, down the plane from the first touch [m]

@@ -6,7 +6,8 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr double crowding = 1.5;  // of nodes in speed, towards the slowest
+constexpr double crowding = 1.5;        // of nodes in speed, towards the slowest
+constexpr double straight_share = 0.5;  // of the straight line in the places on the last piece
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
@@ -24,6 +25,7 @@ void SettledTable::resize() {
   standstill.resize(index(rows));
   edges.resize(count * (stops + 1));
   unsettled.resize(count);
+  known.resize(index(rows) * (stops + 1));
   kept.resize(count * index(places()));
   displacement.resize(kept.size());
 }
@@ -34,17 +36,30 @@ double SettledTable::eta(int row) const {
 }
 
 double SettledTable::speed(double still, double share) const {
-  const double from = still + clear_of_rest;
-  return from + (omega_high - from) * std::expm1(crowding * share) / std::expm1(crowding);
+  const double from = std::sqrt(clear_of_rest), root = from + share * (std::sqrt(omega_high - still) - from);
+  return still + root * root;
 }
 
 double SettledTable::share(double still, double omega) const {
-  const double from = still + clear_of_rest;
-  return std::log1p((omega - from) / (omega_high - from) * std::expm1(crowding)) / crowding;
+  const double from = std::sqrt(clear_of_rest);
+  return (std::sqrt(omega - still) - from) / (std::sqrt(omega_high - still) - from);
 }
 
 double SettledTable::bend_at(double omega, double eta) const {
   return std::exp(bend[0] + eta * (bend[1] + eta * bend[2]) + omega * (bend[3] + eta * (bend[4] + eta * bend[5])));
+}
+
+double SettledTable::place(double above, double width, double bend) {
+  return (std::log1p(above / bend) / std::log1p(width / bend) + straight_share * above / width) / (1 + straight_share);
+}
+
+double SettledTable::above_resting(double place, double width, double bend) {
+  double low = 0, high = width;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (SettledTable::place(middle, width, bend) < place ? low : high) = middle;
+  }
+  return high;
 }
 
 SettledSlice SettledTable::slice(double eta) const { return {*this, eta}; }
@@ -99,13 +114,13 @@ SettledSlice::Place SettledSlice::at(double omega) const {
   Place place;
   place.slice_ = this;
   place.omega_ = omega;
-  const Stencil speed = place.speed_ = stencil(place_of(omega), table_->speeds, smooth);
+  place.place_ = place_of(omega);
+  const Stencil speed = place.speed_ = stencil(place.place_, table_->speeds, smooth);
   for (std::size_t i = 0; i < speed.size; ++i) place.rough_ |= rough_[speed.first + i];
   for (std::size_t i = 0; i < speed.size; ++i)
     for (std::size_t n = 0; n <= stops; ++n)
       place.edge_[n] += speed.weight[i] * edges_[(speed.first + i) * (stops + 1) + n];
   place.bend_ = table_->bend_at(std::min(omega, table_->omega_high), eta_);
-  place.scale_ = (table_->frictions - 1) / std::log1p(1 / place.bend_);
   return place;
 }
 
@@ -138,14 +153,21 @@ MappedLanding SettledSlice::Place::land(double friction) const {
   if (friction < resting_friction() && friction < table.sticking) return {0, 0, true};
   const std::size_t n = piece_of(friction);
   const Stencil& row = slice_->row_;
-  const Stencil& speed = speed_;
-  const double high = n == 0 ? table.sticking : edge_[n - 1], low = edge_[n];
-  const double part = high > low ? std::clamp((friction - low) / (high - low), 0.0, 1.0) : 1;
+  const double high = n == 0 ? table.sticking : edge_[n - 1], low = n < stops ? edge_[n] : resting_friction();
+  const double above = std::clamp(friction - low, 0.0, std::max(0.0, high - low));
+  const double part = high > low ? (n < stops ? above / (high - low) : table.place(above, high - low, bend_)) : 1;
   const Stencil mu = n < stops ? stencil((1 - part) * (piece - 1), piece, smooth)
-                               : stencil(scale_ * std::log1p(part / bend_), table.frictions, smooth);
+                               : stencil(part * (table.frictions - 1), table.frictions, smooth);
   const std::size_t stride = index(table.places()), first = n * piece + mu.first;
   double kept = 0, displacement = 0;
-  for (std::size_t j = 0; j < row.size; ++j)
+  for (std::size_t j = 0; j < row.size; ++j) {
+    // Where the wheel barely passes a row's piece may begin at a higher speed.
+    const int known = table.known[(row.first + j) * (stops + 1) + n];
+    Stencil speed = speed_;
+    if (index(known) > speed.first) {
+      speed = stencil(place_ - known, table.speeds - known, place_ < known ? beyond : smooth);
+      speed.first += index(known);
+    }
     for (std::size_t i = 0; i < speed.size; ++i) {
       const std::size_t at = ((row.first + j) * index(table.speeds) + speed.first + i) * stride + first;
       double kept_here = 0, displacement_here = 0;
@@ -156,6 +178,7 @@ MappedLanding SettledSlice::Place::land(double friction) const {
       kept += row.weight[j] * speed.weight[i] * kept_here;
       displacement += row.weight[j] * speed.weight[i] * displacement_here;
     }
+  }
   return {std::max(0.0, kept * omega_ * omega_), displacement, false};
 }
 

@@ -21,14 +21,15 @@ struct MappedLanding {
 };
 
 /// Is one leg's table. It holds by restitution the speed at which even a sticking foot rests; from there on, spread in
-/// speed, mu_r and the frictions mu_2, mu_3, ... from which slip stops in the second, third, ... impact: there the
-/// landing has a kink, between them it is smooth. Landings are kept on every piece [mu_c, mu_2], ... at a few even
-/// places, on the last one, down to mu_r, spread evenly in log(1 + part / bend), part = (mu - mu_r) / (its width), bend
-/// falling exponentially with omega: steep above mu_r, nearly straight in that scale.
-/// Between the nodes polynomials of degree 5 are read, straight lines in eta above smooth_eta. What is read is
-/// continuous, so that chains made of it converge; where feet are still unsettled the landings themselves jump.
+/// speed, mu_r and the frictions at which the landing has a kink: mu_2', from which slip stops before the second
+/// compression ends, and mu_2, mu_3, ..., from which it stops in the second, third, ... impact; between them it is
+/// smooth. Landings are kept on every piece [mu_c, mu_2'], [mu_2', mu_2], ... at a few even places, on the last one,
+/// down to mu_r, spread so as to follow the landing, which is steep within some `bend` of mu_r. Where the wheel barely
+/// passes, mu_r lies above kinks: there the pieces go on below it, with the omega_eq^2 of feet that stood and were
+/// turned back. Between the nodes polynomials of degree 5 are read, straight lines in eta above smooth_eta. What is
+/// read is continuous, so that chains made of it converge; where feet are still unsettled the landings themselves jump.
 struct SettledTable {
-  static constexpr int stops = 8;                // mu_2 to mu_9
+  static constexpr int stops = 9;                // mu_2', mu_2, mu_3', mu_3 to mu_8
   static constexpr int piece = 4;                // places on a piece but the last
   static constexpr double clear_of_rest = 0.02;  // the first speed, over the one at which a sticking foot rests [rad/s]
 
@@ -38,11 +39,12 @@ struct SettledTable {
   double omega_high = 9;                                  // [rad/s]
   double sticking = 0;                                    // mu_c
   bool usable = false;
-  std::array<double, 6> bend{};            // of log(bend): 1, omega times 1, eta, eta^2
+  std::array<double, 6> bend{};            // of log(bend), a friction: 1, omega times 1, eta, eta^2
   std::vector<double> standstill;          // by row [rad/s]
-  std::vector<double> edges;               // by row, speed: mu_2, mu_3, ..., mu_r
+  std::vector<double> edges;               // by row, speed: mu_2', mu_2, mu_3, ..., mu_r
   std::vector<double> kept, displacement;  // by row, speed, place: carried_squared / omega-^2, [m]
   std::vector<std::uint16_t> unsettled;    // by row, speed: a bit for each piece with an unsettled landing
+  std::vector<int> known;                  // by row, piece: the first speed at which its landings are known
 
   void resize();
   double eta(int row) const;
@@ -51,6 +53,10 @@ struct SettledTable {
   double speed(double still, double share) const;
   double share(double still, double omega) const;
   double bend_at(double omega, double eta) const;
+  /// Says where a friction above mu_r stands on the last piece, in [0, 1]; and back. Even in log(1 + above / bend),
+  /// with some of a straight line. @param width of the piece
+  static double place(double above, double width, double bend);
+  static double above_resting(double place, double width, double bend);
   bool holds(double eta) const { return usable && eta >= eta_low && eta <= eta_high; }
   SettledSlice slice(double eta) const;  ///< @param eta that holds()
 };
@@ -58,7 +64,7 @@ struct SettledTable {
 /// Is the table at one restitution. It refers to the table.
 class SettledSlice {
   // Holds neighbouring nodes around a place on an axis and their weights: Lagrange's polynomial through them.
-  static constexpr std::size_t smooth = 6, straight = 2;  // nodes
+  static constexpr std::size_t smooth = 6, straight = 2, beyond = 3;  // nodes: between them, and outside
   struct Stencil {
     std::size_t first = 0, size = 0;
     std::array<double, smooth> weight{};
@@ -73,7 +79,7 @@ class SettledSlice {
   class Place {
    public:
     double resting_friction() const { return edge_[SettledTable::stops]; }
-    /// Returns mu_2, mu_3, ..., mu_r: where the landing has a kink.
+    /// Returns mu_2', mu_2, mu_3, ..., mu_r: where the landing has a kink.
     std::span<const double> edges() const { return edge_; }
     MappedLanding land(double friction) const;  ///< friction above mu_c is read as mu_c
     /// Says whether feet are unsettled at some of the nodes around.
@@ -83,10 +89,9 @@ class SettledSlice {
     friend class SettledSlice;
     std::size_t piece_of(double friction) const;
     const SettledSlice* slice_ = nullptr;
-    double omega_ = 0;
+    double omega_ = 0, place_ = 0, bend_ = 0;
     Stencil speed_;
     std::array<double, SettledTable::stops + 1> edge_{};
-    double bend_ = 0, scale_ = 0;
     std::uint16_t rough_ = 0;  // of any node around: a bit for each piece
   };
   /// @param omega at least lowest_speed(); above the table's speeds the last one's share of omega^2 is kept

@@ -76,5 +76,7 @@ inline constexpr double most_settled_restitution = 0.95;
 
 /// Returns the friction from which a rolling wheel's landing on `leg` does not slip, mu_c = d h / (J/M + h^2).
 double sticking_friction(const SettledWheel& wheel, int leg);
+/// Is far enough above mu_c that the foot sticks under its weight, too, on every slope with a barrier.
+inline constexpr double clear_of_sticking = 0.02;
 
 }  // namespace metastable::dynamics

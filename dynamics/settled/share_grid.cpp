@@ -11,7 +11,6 @@ namespace {
 constexpr int speeds = 15, restitutions = 13, places = 20;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
 constexpr double just_above = 1e-7;           // mu_r, of the first place
-constexpr double clear_of_sticking = 0.02;    // as in settled_map: here the foot sticks under its weight, too
 
 // Fills all places of one leg at one restitution.
 void fill(LandingShares& grid, const SettledMap& map, int leg, int row) {
@@ -94,9 +93,7 @@ std::shared_ptr<const LandingShares> share_grid(
     one.sticking = map->sticking_friction(leg);
     const Triangle both = triangle(wheel.length(leg - 1), wheel.length(leg), wheel.leg_angle());
     const double height = both.hub_height + wheel.tip_radius;
-    const double lost =
-        both.chord * both.contact_x / (wheel.gyration_sq() + both.contact_x * both.contact_x + height * height);
-    one.plastic = (1 - lost) * (1 - lost);
+    one.plastic = plastic_share(both.chord, both.contact_x, height, wheel.gyration_sq());
     one.barrier_squared = foot.barrier_squared();
     one.next_gain = foot.next_squared(0);
     one.next_rate = foot.next_squared(1) - one.next_gain;

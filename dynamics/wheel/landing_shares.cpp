@@ -28,6 +28,11 @@ struct LandingShares::Place::Corners {
   }
 };
 
+double plastic_share(double chord, double ahead, double height, double gyration_sq) {
+  const double kept = 1 - chord * ahead / (gyration_sq + ahead * ahead + height * height);
+  return kept * kept;
+}
+
 void LandingShares::resize() {
   resting.resize(legs.size() * static_cast<std::size_t>(speed.count * restitution.count));
   kept.resize(resting.size() * static_cast<std::size_t>(parts));

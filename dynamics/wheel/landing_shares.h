@@ -67,4 +67,8 @@ struct LandingShares {
   Place place(int leg, double omega) const { return {*this, leg, omega}; }
 };
 
+/// Returns the share of omega^2 that a foot keeps which sticks and does not spring. @param chord between the feet [m]
+/// @param ahead, height of the landing foot: ahead of the centre of mass, below it [m]; @param gyration_sq J / M [m^2]
+double plastic_share(double chord, double ahead, double height, double gyration_sq);
+
 }  // namespace metastable::dynamics

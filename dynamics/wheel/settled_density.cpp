@@ -257,8 +257,7 @@ double SettledLanding::first_impact(const Contact& contact) const {
 LandingShares::Kept SettledLanding::carried(const Contact& contact) const {
   const double critical = sticking(), own = place.leg().sticking;
   LandingShares::Kept kept = place.at(contact.restitution, contact.friction - critical + own);
-  const double plastic = 1 - chord * ahead / (gyration_sq + ahead * ahead + height * height);
-  kept.share += plastic * plastic - place.leg().plastic;
+  kept.share += plastic_share(chord, ahead, height, gyration_sq) - place.leg().plastic;
   kept.share = (1 - loss_ratio * (1 - kept.share)) * omega * omega;
   return kept;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "analysis/study/verification.h"
@@ -90,25 +91,28 @@ Table settled_table(const std::vector<analysis::VerifiedTable>& rows) {
       .title = "The table of landings under settled, against landings followed event by event",
       .notes =
           {"At points spread over restitutions to 0.95, speeds to 9 rad/s, and frictions from a little below rest to "
-           "beyond sticking. Landings: error of the ω² that a standing foot would have, over ω² before the landing; "
-           "where feet settle, and rough ones, where some do not before the next leg lands. Threshold: error of the "
-           "friction below which the wheel rests."},
+           "beyond sticking. Errors of the ω² that a standing foot would have, over ω² before the landing. Feet slide, "
+           "or stick, or the wheel barely passes: less than 0.5 rad/s above the speed at which even a sticking foot "
+           "rests; rough: above a restitution of 0.6, or some feet do not settle before the next leg lands. Threshold: "
+           "error of the friction below which the wheel rests."},
       .columns = {{"wheel"},
                   {"slope", "deg"},
                   {"landings"},
+                  {"number"},
                   {"rms error", "", NumberFormat::significant, 2},
+                  {"median", "", NumberFormat::significant, 2},
                   {"largest", "", NumberFormat::significant, 2},
+                  {"slide, largest", "m", NumberFormat::significant, 2},
                   {"rests misjudged"},
                   {"threshold, median", "", NumberFormat::significant, 2},
-                  {"largest threshold", "", NumberFormat::significant, 2},
-                  {"slide, largest", "m", NumberFormat::significant, 2},
-                  {"rough landings"},
-                  {"rms error, rough", "", NumberFormat::significant, 2},
-                  {"rests misjudged, rough"}}};
-  for (const auto& [wheel, slope, e] : rows)
-    table.rows.push_back({wheel, slope, e.landings, e.settled_rms, e.settled_max, e.misjudged_rests,
-                          e.resting_friction_median, e.resting_friction_max, e.displacement_max, e.rough, e.rough_rms,
-                          e.rough_misjudged_rests});
+                  {"largest threshold", "", NumberFormat::significant, 2}}};
+  for (const auto& [wheel, slope, errors] : rows)
+    for (const auto& [landings, e] : {std::pair{"feet slide", errors.sliding},
+                                      {"feet stick", errors.sticking},
+                                      {"barely passes", errors.slow},
+                                      {"rough", errors.rough}})
+      table.rows.push_back({wheel, slope, landings, e.landings, e.rms, e.median, e.largest, e.displacement,
+                            e.misjudged_rests, e.resting_friction_median, e.resting_friction});
   return table;
 }
 

@@ -31,13 +31,15 @@ SettledMapOptions narrow() {
 
 TEST(SettledMap, ReadsWhatDirectLandingsGive) {
   const auto map = SettledMap::of(paper_wheel(7.02), narrow());
-  const SettledMapError& error = map->error();
-  EXPECT_EQ(error.landings, 800U);
-  EXPECT_LE(error.misjudged_rests, 2U);
-  EXPECT_LT(error.settled_rms, 2e-4);
-  EXPECT_LT(error.settled_max, 2e-3);
-  EXPECT_LT(error.resting_friction_max, 1e-3);  // where the wheel barely passes at all
-  EXPECT_LT(error.displacement_max, 3e-4);
+  const SettledMapErrors& error = map->error();
+  EXPECT_EQ(error.sliding.landings + error.sticking.landings + error.slow.landings + error.rough.landings, 800U);
+  EXPECT_EQ(error.sliding.misjudged_rests, 0U);
+  EXPECT_LT(error.sliding.rms, 3e-5);
+  EXPECT_LT(error.sliding.resting_friction, 3e-6);
+  EXPECT_LT(error.sticking.rms, 3e-5);
+  EXPECT_LT(error.slow.rms, 1e-4);
+  EXPECT_LT(error.slow.resting_friction, 1e-3);
+  EXPECT_LT(error.sliding.displacement, 3e-5);
 }
 
 TEST(SettledMap, AtomKinkAndThresholdAreKept) {
