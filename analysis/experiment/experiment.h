@@ -21,6 +21,8 @@ enum class System { rimless_wheel, coast_down };
 struct NominalContact {
   dynamics::Law law = dynamics::Law::published;
   Spread restitution, friction;  ///< eta, mu; zero under `plastic`, which has neither
+  /// By how much the mean of mu differs from day to day: an sd, as a share of it, in [0, 0.5].
+  std::optional<double> day_to_day = {};
 };
 
 /// Nominal coast-downs lose omega^2 [rad^2/s^2] a revolution: constant + linear omega + quadratic omega^2 + noise.
@@ -37,7 +39,7 @@ struct RevolutionLoss {
   /// Returns the mean loss at a speed [rad^2/s^2]. @param omega [rad/s]
   double at(double omega) const { return constant + linear * omega + quadratic * omega * omega; }
 };
-/// Is RevolutionLoss::run_to_run of a drum of which one run is known.
+/// Is RevolutionLoss::run_to_run of a drum of which one run is known, and NominalContact::day_to_day where it is not.
 inline constexpr double usual_run_to_run = 0.03;
 
 struct Condition {
@@ -46,6 +48,7 @@ struct Condition {
   double ramp_length = 0;               ///< [m]; 0 for a coast-down
   std::optional<Spread> initial_speed;  ///< just before collision 1 [rad/s]
   int first_landing_leg = 0;
+  int day = 1;  ///< on which it was measured, from 1
 };
 
 struct Sensor {

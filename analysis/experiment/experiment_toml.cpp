@@ -178,6 +178,7 @@ void read_contact(Keys& root, NominalContact& contact) {
   const bool required = contact.law != dynamics::Law::plastic;
   contact.restitution = keys->spread("restitution", required, range::restitution).value_or(Spread{});
   contact.friction = keys->spread("friction", required, range::friction).value_or(Spread{});
+  contact.day_to_day = keys->number("day_to_day", false, range::run_to_run);
   keys->finish();
 }
 
@@ -223,6 +224,7 @@ void read_conditions(const std::string& file, Keys& root, Experiment& experiment
       condition.ramp_length = keys.number("ramp_length_m", true, range::ramp_length).value_or(0);
       condition.first_landing_leg =
           static_cast<int>(keys.whole("first_landing_leg", false, 0, experiment.wheel.legs() - 1).value_or(0));
+      condition.day = static_cast<int>(keys.whole("day", false, 1, 1000).value_or(1));
     }
     condition.initial_speed = keys.spread("initial_speed_rad_s", false, wheel ? range::speed : range::rotor_speed);
     keys.finish();

@@ -29,6 +29,7 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
     : measured_(measured),
       run_(run),
       wheel_(wheel),
+      day_shift_(hypothesis.shift_of(run.condition)),
       friction_sd_(hypothesis.extension.trial_friction_sd),
       nodes_(friction_sd_ > 0 ? five_nodes.size() : 1),
       filters_(nodes_, SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
@@ -46,7 +47,7 @@ void TrialFollower::come_to(const Event& event) {
 }
 
 double TrialFollower::friction_shift(std::size_t node) const {
-  return nodes_ == 1 ? 0 : five_nodes[node].score * friction_sd_;
+  return day_shift_ + (nodes_ == 1 ? 0 : five_nodes[node].score * friction_sd_);
 }
 
 double TrialFollower::largest_log_weight() const {
@@ -100,7 +101,7 @@ SpeedFilter::Out TrialFollower::see(const Event& event) {
   if (event.kind == EventKind::launch) next_ = 0;
   if (event.kind == EventKind::collision) next_ = collision_of(event);  // whether it rested may follow
   if (event.kind == EventKind::stance || event.kind == EventKind::step) next_ = collision_of(event) + 1;
-  if (nodes_ == 1) return seen_by(filters_[0], event, 0);
+  if (nodes_ == 1) return seen_by(filters_[0], event, day_shift_);
   // The density is averaged over the nodes, which are weighed anew by it.
   const double largest = largest_log_weight();
   double before = 0, now = 0, below = 0, unit = 0;

@@ -39,6 +39,7 @@ class TrialFollower {
   const WheelRuns& measured_;
   const WheelRun& run_;
   const dynamics::ExtendedWheel& wheel_;
+  double day_shift_;    // of mu
   double friction_sd_;  // of the trial's own; 0: one node, without a shift
   std::size_t nodes_;
   std::vector<SpeedFilter> filters_;             // by node

@@ -1,7 +1,9 @@
 #pragma once
 // Holds what is supposed of a wheel whose trials were measured: its contact and the effects added to it.
 
+#include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "analysis/likelihood/score_tilt.h"
 #include "dynamics/wheel/collision_density.h"
@@ -13,7 +15,10 @@ struct WheelHypothesis {
   dynamics::ContactSpread contact;
   ScoreTilt tilt;  ///< change of shape of what a collision's spread gives
   dynamics::Extension extension;
-  std::optional<double> noise = {};  ///< sd of reported speeds [rad/s]; none: what the runs say
+  std::optional<double> noise = {};         ///< sd of reported speeds [rad/s]; none: what the runs say
+  std::vector<double> friction_shift = {};  ///< by condition: what its day adds to the mean of mu; empty: one day
+
+  double shift_of(std::size_t condition) const { return friction_shift.empty() ? 0 : friction_shift[condition]; }
 };
 
 }  // namespace metastable::analysis

@@ -40,7 +40,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
   const auto first = uniforms(seed, index, 0);
   WheelRun run = design;
   run.collisions.clear();
-  const double shift = e.trial_friction_sd * score(first[0]);
+  const double shift = hypothesis.shift_of(design.condition) + e.trial_friction_sd * score(first[0]);
   double omega = design.collisions.front().before;
   if (const auto& launch = all.conditions[design.condition].initial_speed)
     omega =

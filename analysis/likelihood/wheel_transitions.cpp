@@ -38,6 +38,8 @@ WheelRuns runs_with_legs(const Experiment& experiment) {
   return stated;
 }
 
+constexpr double least_shift = 1e-4;  // of mu from day to day: no two days are more alike
+
 class WheelTransitions : public TransitionModel {
  public:
   explicit WheelTransitions(const Experiment& experiment);
@@ -68,11 +70,14 @@ class WheelTransitions : public TransitionModel {
  private:
   WheelHypothesis hypothesis(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
   void set_up_parameters();
+  void set_up_days();
 
   Experiment experiment_;  // as it was read
   WheelRuns measured_;
   std::vector<Event> events_;
   std::vector<Nuisance> nuisances_;
+  std::size_t days_from_ = 0;  // in nuisances_: shifts of mu on the days behind the first
+  std::vector<int> days_;      // rising
   std::vector<WheelCandidate> effects_;
   std::vector<Candidate> candidates_;
 };
@@ -94,6 +99,7 @@ void WheelTransitions::set_up_parameters() {
   const bool refits_noise = !settled && !measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances;
   nuisances_ =
       wheel_nuisances(experiment_.contact, refits_noise ? std::optional<double>(measured_.noise) : std::nullopt);
+  set_up_days();
   WheelDesign design;
   design.legs = measured_.wheel.legs();
   design.legs_known = measured_.legs_known;
@@ -129,9 +135,33 @@ void WheelTransitions::set_up_parameters() {
   for (const WheelCandidate& effect : effects_) candidates_.push_back(effect.candidate);
 }
 
+// Wheel and ramp are not quite the same from day to day: mu may shift, as far as days are said to differ.
+void WheelTransitions::set_up_days() {
+  days_from_ = nuisances_.size();
+  for (const Condition& condition : measured_.conditions) days_.push_back(condition.day);
+  std::sort(days_.begin(), days_.end());
+  days_.erase(std::unique(days_.begin(), days_.end()), days_.end());
+  if (days_.size() < 2) return;
+  const double mean = experiment_.contact.friction.mean,
+               share = experiment_.contact.day_to_day.value_or(usual_run_to_run);
+  const double sd = std::max(least_shift, std::numbers::sqrt2 * share * mean);  // of a difference
+  for (std::size_t d = 1; d < days_.size(); ++d)
+    nuisances_.push_back({fmt::format("friction_shift_day_{}", days_[d]), 0, sd, 1e-4, -0.5 * mean, 0.5 * mean});
+  if (!experiment_.contact.day_to_day)
+    measured_.notes.push_back(
+        fmt::format("contact.day_to_day is missing: the mean friction is taken to differ by {:.0f} % from day to day",
+                    100 * usual_run_to_run));
+}
+
 WheelHypothesis WheelTransitions::hypothesis(std::span<const double> nuisance,
                                              std::span<const EffectTerm> terms) const {
-  WheelHypothesis h = hypothesis_at(nuisance);
+  WheelHypothesis h = hypothesis_at(nuisance.first(days_from_));
+  if (days_.size() > 1)
+    for (const Condition& condition : measured_.conditions) {
+      const auto d =
+          static_cast<std::size_t>(std::lower_bound(days_.begin(), days_.end(), condition.day) - days_.begin());
+      h.friction_shift.push_back(d == 0 ? 0 : nuisance[days_from_ + d - 1]);
+    }
   for (const EffectTerm& term : terms)
     for (const WheelCandidate& effect : effects_)
       if (effect.candidate.id == term.candidate->id) effect.apply(h.extension, term.variant, term.values);
@@ -221,7 +251,7 @@ double WheelTransitions::expected_steps(std::span<const double> nuisance, std::s
 }
 
 std::vector<NamedValue> WheelTransitions::report_nuisances(std::span<const double> nuisance) const {
-  const WheelHypothesis at = hypothesis_at(nuisance);
+  const WheelHypothesis at = hypothesis_at(nuisance.first(days_from_));
   const dynamics::ContactSpread& contact = at.contact;
   std::vector<NamedValue> named{{"restitution_mean", contact.restitution_mean},
                                 {"restitution_sd", contact.restitution_sd},
@@ -232,6 +262,7 @@ std::vector<NamedValue> WheelTransitions::report_nuisances(std::span<const doubl
     named.emplace_back("hub_inertia_kg_m2", model.mass * model.radius_of_gyration * model.radius_of_gyration *
                                                 at.extension.hub_inertia_ratio);
   }
+  for (std::size_t k = days_from_; k < nuisances_.size(); ++k) named.emplace_back(nuisances_[k].name, nuisance[k]);
   return named;
 }
 

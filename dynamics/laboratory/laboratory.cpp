@@ -16,10 +16,12 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr double reference_speed = 5;  // [rad/s] of the catalogue's power laws
-constexpr double plank = 0.31;         // [m]
-constexpr double slosh_time = 0.15;    // [s]
-constexpr double lead = 0.3;           // [s] of motion kept before collision 1
+constexpr double reference_speed = 5;   // [rad/s] of the catalogue's power laws
+constexpr double plank = 0.31;          // [m]
+constexpr double slosh_time = 0.15;     // [s]
+constexpr double warming_time = 1;      // [s]
+constexpr double sway_frequency = 0.8;  // [Hz]
+constexpr double lead = 0.3;            // [s] of motion kept before collision 1
 
 enum class Stream : std::uint64_t { trial = 100, contact = 101, sensor = 102 };
 
@@ -147,6 +149,9 @@ class Laboratory::Roll {
     launch_ = lab.launch_[condition_].at_score(own.score[0]);
     added_friction_ = c_.trial_sd * own.score[1];
     drift_ = trials > 1 ? 1 + c_.drift * static_cast<double>(index) / (trials - 1) : 1;
+    body_.constant_drag += c_.wind * own.score[2];
+    phase_ = 2 * std::numbers::pi * own.uniform;
+    progress_ = static_cast<double>(index) / trials;
   }
 
   LaboratoryTrial run() {
@@ -187,22 +192,54 @@ class Laboratory::Roll {
     return std::move(trial_);
   }
 
+  // Makes the scores of the collision that comes from fresh ones and those before.
+  void remember(const std::array<double, 3>& fresh) {
+    const std::size_t before = trial_.collisions.size();
+    const double last = before > 0 ? c_.memory : 0, second = before > 1 ? c_.second_memory : 0;
+    const double renewed = std::sqrt(std::max(0.0, 1 - last * last - second * second));
+    const auto next = [&](std::array<double, 2>& scores, double drawn) {
+      scores = {last * scores[0] + second * scores[1] + renewed * drawn, scores[0]};
+    };
+    next(restitution_score_, fresh[0]);
+    next(friction_score_, fresh[1]);
+  }
+
+  // Says what effects outside the catalogue make of the deviation of mu from its mean, and of mu.
+  double outside_scatter(int leg, double position, double speed) const {
+    double factor = std::pow(speed / reference_speed, 8 * c_.spread);
+    if (leg == 2 || leg == 5) factor *= 1 + c_.loose;
+    if (position > 0.5 && position < 1) factor *= 1 + c_.rough;
+    return factor;
+  }
+  double outside_friction(int leg, double position, double speed, double time) const {
+    constexpr double turn = 2 * std::numbers::pi;
+    const std::size_t conditions = lab_.setup_.conditions.size();
+    double factor = 1 + c_.planks * std::cos(turn * position / plank);
+    factor *= 1 + (leg % 2 == 1 ? c_.plates : -c_.plates);
+    factor *= 1 - c_.warming * -std::expm1(-time / warming_time);
+    factor *= 1 + (index_ % 2 == 0 ? c_.crews : -c_.crews);
+    if (conditions > 1 && condition_ + 1 == conditions) factor *= 1 + c_.wet;
+    factor *= 1 + c_.cycle * std::sin(2 * turn * progress_);
+    if (!trial_.collisions.empty()) factor *= 1 + c_.hysteresis * (trial_.collisions.back().omega_minus - speed);
+    if (leg == 3) factor *= 1 + c_.wear * (1 - 2 * progress_);
+    if (trial_.collisions.empty()) factor *= 1 + c_.sticky;
+    factor *= 1 + c_.sway * std::cos(turn * sway_frequency * time + phase_);
+    return std::max(0.0, factor);
+  }
+
   // Draws eta and mu of the collision that comes, effects included.
-  Contact draw(int leg, double position, double speed) {
+  Contact draw(int leg, double position, double speed, double time) {
     const Draws d = draws(lab_.setup_.seed, index_, trial_.collisions.size() + 1, Stream::contact);
-    const double fresh = trial_.collisions.empty() ? 1 : std::sqrt(1 - c_.memory * c_.memory);
-    const double kept = trial_.collisions.empty() ? 0 : c_.memory;
-    restitution_score_ = kept * restitution_score_ + fresh * d.score[0];
-    friction_score_ = kept * friction_score_ + fresh * d.score[1];
-    Contact contact{0, lab_.friction_.at_score(friction_score_)};
+    remember(d.score);
+    Contact contact{0, lab_.friction_.at_score(friction_score_[0])};
     if (lab_.setup_.restitution_skewness == 0)
-      contact.restitution = lab_.restitution_.at_score(restitution_score_);
+      contact.restitution = lab_.restitution_.at_score(restitution_score_[0]);
     else
       contact.restitution = lab_.restitution_.mean() +
-                            lab_.restitution_.sd() * skewed(lab_.setup_.restitution_skewness, restitution_score_);
-    if (c_.spread > 0)
-      contact.friction = lab_.friction_.mean() +
-                         (contact.friction - lab_.friction_.mean()) * std::pow(speed / reference_speed, 8 * c_.spread);
+                            lab_.restitution_.sd() * skewed(lab_.setup_.restitution_skewness, restitution_score_[0]);
+    const double mean = lab_.friction_.mean();
+    if (const double scatter = outside_scatter(leg, position, speed); scatter != 1)
+      contact.friction = mean + (contact.friction - mean) * scatter;
     contact.friction = std::max(0.0, contact.friction + added_friction_) * drift_;
     for (const LegChange& change : c_.legs)
       if (change.leg == leg) {
@@ -214,8 +251,7 @@ class Laboratory::Roll {
       if (position >= patch.from && position <= (patch.to > 0 ? patch.to : ramp))
         contact.friction *= patch.friction_ratio;
     contact.friction *= 1 + c_.stribeck_amplitude * std::exp(-speed / c_.stribeck_speed);
-    contact.friction *= 1 + c_.planks * std::cos(2 * std::numbers::pi * position / plank);
-    contact.friction *= 1 + (leg % 2 == 1 ? c_.plates : -c_.plates);
+    contact.friction *= outside_friction(leg, position, speed, time);
     if (d.uniform < c_.outlier_share) contact.friction *= c_.outlier_ratio;
     contact.friction = std::max(0.0, contact.friction);
     contact.restitution *= std::pow(speed / reference_speed, -c_.restitution_exponent);
@@ -291,7 +327,7 @@ class Laboratory::Roll {
     collision.position = tip(body_, touch.before, touch.leg).x;
     collision.omega_minus = touch.before.speed;
     collision.flew = touch.flew;
-    collision.contact = contact_ = draw(touch.leg, collision.position, touch.before.speed);
+    collision.contact = contact_ = draw(touch.leg, collision.position, touch.before.speed, time);
     const double since = trial_.collisions.empty() ? 0 : time - trial_.collisions.back().time;
     const double factor =
         trial_.collisions.empty() ? 1 : 1 + c_.vibration * std::cos(2 * std::numbers::pi * c_.vibration_hz * since);
@@ -330,12 +366,13 @@ class Laboratory::Roll {
   const Laboratory& lab_;
   const LaboratoryChanges& c_;
   std::size_t condition_, index_;
-  const RollingBody& body_;
+  RollingBody body_;
   const RampSurface& surface_;
   LaboratoryTrial trial_;
   Contact contact_;
   double launch_ = 0, added_friction_ = 0, drift_ = 1;
-  double restitution_score_ = 0, friction_score_ = 0;
+  double phase_ = 0, progress_ = 0;  // of the trial: of its swing, and its share of all trials
+  std::array<double, 2> restitution_score_{}, friction_score_{};  // of the last collision and of the one before
   double loss_sum_ = 0, last_loss_ = 0;
   int losses_ = 0;
 };

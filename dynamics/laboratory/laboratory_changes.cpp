@@ -94,10 +94,14 @@ LaboratoryChanges laboratory_changes(const NominalValues& stated, const std::vec
       throw std::invalid_argument(fmt::format("effect {}: given twice", effect.id));
     found->second.make(c, effect.values);
   }
-  const std::map<std::string, double LaboratoryChanges::*, std::less<>> sizes{
-      {"sloshing_fluid", &LaboratoryChanges::slosh},      {"planks", &LaboratoryChanges::planks},
-      {"frame_resonance", &LaboratoryChanges::resonance}, {"stored_energy", &LaboratoryChanges::stored},
-      {"speed_spread", &LaboratoryChanges::spread},       {"double_plate", &LaboratoryChanges::plates},
+  using C = LaboratoryChanges;
+  const std::map<std::string, double C::*, std::less<>> sizes{
+      {"sloshing_fluid", &C::slosh},        {"planks", &C::planks},         {"frame_resonance", &C::resonance},
+      {"stored_energy", &C::stored},        {"speed_spread", &C::spread},   {"double_plate", &C::plates},
+      {"warming_feet", &C::warming},        {"two_crews", &C::crews},       {"loose_feet", &C::loose},
+      {"second_memory", &C::second_memory}, {"crosswind", &C::wind},        {"wet_day", &C::wet},
+      {"daily_cycle", &C::cycle},           {"hysteresis", &C::hysteresis}, {"wearing_leg", &C::wear},
+      {"rough_stretch", &C::rough},         {"sticky_start", &C::sticky},   {"swaying_floor", &C::sway},
   };
   for (const OutsideEffect& effect : outside) {
     const OutsideInfo& info = outside_info(effect.id);

@@ -22,6 +22,20 @@ struct OutsideInfo {
 /// stored_energy    a share `size` of what a collision lost beyond the trial's mean loss comes back at the next one
 /// speed_spread     contact noise grows with speed: the deviation of mu from its mean times (omega / 5 rad/s)^(8 size)
 /// double_plate     legs sit on two plates in turn: mu of odd legs times 1 + size, of even legs times 1 - size
+/// warming_feet     mu (1 - size (1 - exp(-t / 1 s))), t since collision 1
+/// two_crews        mu of odd trials times 1 + size, of even trials times 1 - size
+/// loose_feet       the deviation of mu from its mean times 1 + size on legs 2 and 5
+/// second_memory    scores of eta and mu correlate with those of the last collision but one, by `size`
+/// crosswind        a torque on the stance, drawn for each trial: N(0, (size N m)^2)
+/// wet_day          mu times 1 + size in the last condition; nothing where there is one
+/// daily_cycle      mu (1 + size sin(2 pi 2 k / n)), trial k of n
+/// hysteresis       mu (1 + size (omega at the last collision - omega) / (1 rad/s))
+/// wearing_leg      mu of leg 3 times 1 + size (1 - 2 k / n), trial k of n
+/// rough_stretch    the deviation of mu from its mean times 1 + size from 0.5 to 1 m
+/// sticky_start     mu times 1 + size at collision 1
+/// swaying_floor    mu (1 + size cos(2 pi 0.8 Hz t + phase)), t since collision 1, phase uniform by trial
+///
+/// Of the last twelve, the diagnosis was set up on the first six; the others are kept for reports.
 const std::vector<OutsideInfo>& outside_effects();
 /// @throws std::invalid_argument naming the id and all known ones
 const OutsideInfo& outside_info(std::string_view id);

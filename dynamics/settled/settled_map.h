@@ -52,7 +52,7 @@ class SettledMap {
  public:
   /// Returns the map of this wheel on its slope: built at the first call and kept for the life of the process (the last
   /// 32 of them; a map with other options is another map, executor and progress do not count). The table of the paper's
-  /// wheel takes some 5 s on two cores.
+  /// wheel takes some 4 s on two cores.
   /// @throws std::invalid_argument as SettledWheel::validate(), and for a range that is empty or out of bounds
   static std::shared_ptr<const SettledMap> of(const SettledWheel& wheel, const SettledMapOptions& options = {});
 

@@ -106,13 +106,14 @@ Table settled_table(const std::vector<analysis::VerifiedTable>& rows) {
                   {"rests misjudged"},
                   {"threshold, median", "", NumberFormat::significant, 2},
                   {"largest threshold", "", NumberFormat::significant, 2}}};
+  const auto if_any = [](double error) { return error > 0 ? Cell(error) : Cell(""); };  // of rough ones none is sought
   for (const auto& [wheel, slope, errors] : rows)
     for (const auto& [landings, e] : {std::pair{"feet slide", errors.sliding},
                                       {"feet stick", errors.sticking},
                                       {"barely passes", errors.slow},
                                       {"rough", errors.rough}})
       table.rows.push_back({wheel, slope, landings, e.landings, e.rms, e.median, e.largest, e.displacement,
-                            e.misjudged_rests, e.resting_friction_median, e.resting_friction});
+                            e.misjudged_rests, if_any(e.resting_friction_median), if_any(e.resting_friction)});
   return table;
 }
 

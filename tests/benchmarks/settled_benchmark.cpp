@@ -7,6 +7,7 @@
 
 #include "analysis/study/metastability.h"
 #include "analysis/study/setting.h"
+#include "dynamics/return_map/settled_return_map.h"
 #include "dynamics/settled/settled_map.h"
 #include "markov/parallel.h"
 
@@ -78,6 +79,30 @@ void study(benchmark::State& state, dynamics::Law law) {
   for (auto _ : state) benchmark::DoNotOptimize(analysis::study(problem, options));
 }
 
+// Says by how much a table of twice the nodes moves the expected steps: equal legs, eta ~ N(0.3, 0.05^2), sd of mu
+// 0.03.
+void twice_the_nodes(benchmark::State& state) {
+  analysis::Setting setting = engine_wheel();
+  setting.wheel.leg_length.assign(8, 0.1519);
+  setting.restitution = {0.3, 0.05};
+  setting.friction = {0.01 * static_cast<double>(state.range(0)), 0.03};
+  const dynamics::TruncatedNormal speed = setting.launch();
+  const auto steps = [&](int times) {
+    dynamics::SettledMapOptions options = on_threads(0);
+    options.speeds *= times, options.restitutions *= times, options.frictions *= times;
+    const dynamics::SettledReturnMap map(setting.wheel, setting.slope_deg * std::numbers::pi / 180, setting.noise(),
+                                         speed.at_score(6), options);
+    const auto launch = [&](double score) { return std::pow(speed.at_score(score), 2); };
+    const analysis::Problem problem{map, {launch, 0}, [](double square) { return std::sqrt(square); }, {}};
+    return analysis::study(problem, {.method = analysis::Method::integrated, .tolerance = 1e-6}).steps.from_start.value;
+  };
+  for (auto _ : state) {
+    const double single = steps(1);
+    state.counters["steps"] = single;
+    state.counters["moved"] = steps(2) / single - 1;
+  }
+}
+
 // Runs each once: these take seconds.
 void once(benchmark::internal::Benchmark* of) {
   of->UseRealTime()->MeasureProcessCPUTime()->Unit(benchmark::kSecond)->Iterations(1);
@@ -85,6 +110,7 @@ void once(benchmark::internal::Benchmark* of) {
 
 BENCHMARK(landings_followed);
 BENCHMARK(landings_read);
+BENCHMARK(twice_the_nodes)->ArgName("mu*100")->Arg(33)->Arg(44)->Arg(48)->Arg(51)->Arg(54)->Arg(57)->Apply(once);
 BENCHMARK(table)->ArgName("threads")->Arg(1)->Arg(2)->Apply(once);
 BENCHMARK_CAPTURE(study, settled, dynamics::Law::settled)->ArgName("integrated")->Arg(0)->Arg(1)->Apply(once);
 BENCHMARK_CAPTURE(study, published, dynamics::Law::published)->ArgName("integrated")->Arg(0)->Arg(1)->Apply(once);

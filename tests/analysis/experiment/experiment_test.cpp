@@ -36,6 +36,7 @@ slope_deg = 12
 ramp_length_m = 3
 initial_speed_rad_s = { mean = 5.83, sd = 0.28 }
 first_landing_leg = 1
+day = 2
 )";
 const std::string header = "condition,trial,collision,leg,omega_minus_rad_s\n";
 
@@ -76,6 +77,8 @@ TEST(Experiment, ReadsEverythingThatTheFilesSay) {
   EXPECT_EQ(e.conditions[0].initial_speed, std::nullopt);
   EXPECT_EQ(e.conditions[1].initial_speed->mean, 5.83);
   EXPECT_EQ(e.conditions[1].first_landing_leg, 1);
+  EXPECT_EQ(e.conditions[0].day, 1);
+  EXPECT_EQ(e.conditions[1].day, 2);
   EXPECT_EQ(e.sensor.rate, 120);
   ASSERT_EQ(e.trials.size(), 2u);
   EXPECT_EQ(e.trials[0].number, 3);

@@ -109,6 +109,28 @@ TEST(WheelTransitions, OfSettledTakeAnErrorOfItsFormForNoGap) {
   EXPECT_LT(left, chance_999);
 }
 
+// Two conditions of two days: a recalibration takes up a difference of mu as large as days differ, and no larger one.
+TEST(WheelTransitions, MayDifferFromDayToDay) {
+  constexpr double shift = 0.012;
+  Experiment design = test::wheel_design(80, 12);
+  design.conditions[1].day = 2;
+  const auto drawn = wheel_transitions(design);
+  ASSERT_EQ(drawn->nuisances().back().name, "friction_shift_day_2");
+  std::vector<double> truth = nominal_values(*drawn);
+  truth.back() = shift;
+  const auto data = drawn->simulate(truth, {}, 3);
+  const Fit taken_up = fit(*data, nominal_values(*data), {});
+  const auto last = static_cast<Eigen::Index>(truth.size()) - 1;
+  EXPECT_NEAR(taken_up.nuisance.back(), shift, 3 / std::sqrt(taken_up.information(last, last)) + 0.004);
+  EXPECT_GT(2 * (taken_up.penalised - data->evaluate(nominal_values(*data), {}).total()), 10);
+  EXPECT_EQ(data->notes().back(),
+            "contact.day_to_day is missing: the mean friction is taken to differ by 3 % from day to day");
+
+  design.contact.day_to_day = 0.001;
+  const auto strict = wheel_transitions(design)->simulate(truth, {}, 3);
+  EXPECT_LT(std::abs(fit(*strict, nominal_values(*strict), {}).nuisance.back()), 0.003);
+}
+
 TEST(WheelTransitions, NeedATransition) {
   EXPECT_THROW(wheel_transitions(test::wheel_design(3, 1, false)), std::invalid_argument);
 }
