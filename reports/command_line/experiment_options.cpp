@@ -40,7 +40,8 @@ void add_reality(Options& o) {
         "With --reality, repeatable: an effect the model lacks, e.g. leg_contact:leg=3,friction_ratio=1.4");
   o.add("outside", "ID:SIZE", "",
         "With --reality, repeatable: an effect outside the catalogue (sloshing_fluid, planks, frame_resonance, "
-        "stored_energy, speed_spread, double_plate)");
+        "stored_energy, speed_spread, double_plate, warming_feet, two_crews, loose_feet, second_memory, crosswind, "
+        "wet_day, daily_cycle, hysteresis, wearing_leg, rough_stretch, sticky_start, swaying_floor)");
   o.add("skewness", "G", "0", "With --reality: skewness of restitution, (-2, 2)");
   o.add("sensor-noise", "SD", "0", "With --reality: white noise of every reported speed [rad/s]",
         dynamics::range::speed);
