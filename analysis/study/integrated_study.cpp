@@ -27,6 +27,7 @@ struct Level {
   markov::NodeSpace space;
   markov::SampledChain chain;
   SolvedChain solved;
+  double launch_error = 0;  // relative, of from_start()
   double worst_start = 0;
 
   double from_start() const { return solved.from_start; }
@@ -41,7 +42,7 @@ double inner(const std::vector<double>& a, const std::vector<double>& b) {
 // interpolation makes nonsense of it.
 std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::size_t panels) {
   const markov::NodeSpace space = rows.space(panels);
-  markov::SampledChain chain = rows.chain(problem, space).chain;
+  auto [chain, row_error, launch_error] = rows.chain(problem, space);
   const markov::Launch& launch = chain.launch;
   if (std::accumulate(launch.after.begin(), launch.after.end(), launch.rest) < 1 - most_unseen) return std::nullopt;
   const markov::Reachability reach = markov::classify(chain.chain);
@@ -55,8 +56,9 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
   } catch (const std::domain_error&) {  // from some node no entry leads to rest
     return std::nullopt;
   }
-  Level level{space, std::move(chain), *std::move(solved)};
+  Level level{space, std::move(chain), *std::move(solved), launch_error};
   const std::vector<double>& mean = level.solved.mean;
+  level.launch_error *= *std::max_element(mean.begin(), mean.end()) / level.from_start();
   int worst = 0;
   for (int p = 1; p < space.phases(); ++p)
     if (mean[static_cast<std::size_t>(p) * space.nodes()] < mean[static_cast<std::size_t>(worst) * space.nodes()])
@@ -126,7 +128,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
       steps_error.refine(fine->from_start(), coarse->from_start());
       rate_error.refine(fine->failure_rate(), coarse->failure_rate());
       worst_error.refine(fine->worst_start, coarse->worst_start);
-      error = std::max(steps_error.error(), rate_error.error());
+      error = std::max(steps_error.error() + fine->launch_error, rate_error.error());
       met = error <= options.tolerance;
     }
     const bool last = free ? met || more(panels) > std::max<std::size_t>(most, 4)
@@ -143,7 +145,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   Metastability result;
   result.method = Method::integrated;
   result.cells = fine->space.nodes();
-  result.steps.from_start = estimate(fine->from_start(), steps_error.error());
+  result.steps.from_start = estimate(fine->from_start(), steps_error.error() + fine->launch_error);
   result.spectrum.failure_rate = estimate(fine->failure_rate(), rate_error.error());
   result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate(), rate_error.error());
   result.steps.worst_start = estimate(fine->worst_start, worst_error.error());
