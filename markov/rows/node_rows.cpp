@@ -16,7 +16,7 @@ namespace {
 constexpr double score_step = 0.5;       // of the coarsest trapezoidal rule
 constexpr int score_steps = 13;          // on each side: 8e-11 of the launches are beyond
 constexpr int most_halvings = 6;         // of its steps
-constexpr double launch_settles = 1e-8;  // change of the launch's probabilities at a halving
+constexpr double launch_settles = 1e-4;  // change of the launch's probabilities at a halving, which squares the error
 
 }  // namespace
 
@@ -90,8 +90,9 @@ Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const
   std::vector<LaunchPoint> rule = launch_points(launch, kinks);
   Launch result = by_rule(rule);
   double change = 0;
-  // A launch that spreads wider than its landings meets rows that differ more than a coarse rule sees.
-  for (int halvings = 1; rule.size() > 1 && halvings <= most_halvings; ++halvings) {
+  // A launch that spreads wider than its landings meets rows that differ more than a coarse rule sees. Weights of
+  // interpolation tell nothing of that one by one; there the kinks cut the rule.
+  for (int halvings = 1; error && rule.size() > 1 && halvings <= most_halvings; ++halvings) {
     rule = launch_points(launch, kinks, halvings);
     Launch finer = by_rule(rule);
     change = std::abs(finer.rest - result.rest);
@@ -99,7 +100,7 @@ Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const
     result = std::move(finer);
     if (change <= launch_settles) break;
   }
-  if (error) *error = change;
+  if (error) *error = change <= launch_settles ? change * change : change;
   return result;
 }
 
@@ -129,7 +130,8 @@ IntegratedChain chain_of_rows(const AnyReturnMap& map, const NodeSpace& space, c
   result.chain.chain =
       interpolated ? Chain::interpolated(std::move(row_start), std::move(column), std::move(value), std::move(kill))
                    : Chain(std::move(row_start), std::move(column), std::move(value), std::move(kill), 1.0);
-  result.chain.launch = launch_of_rows(make_row, space, launch, kinks, threads, &result.launch_error);
+  result.chain.launch =
+      launch_of_rows(make_row, space, launch, kinks, threads, interpolated ? nullptr : &result.launch_error);
   result.chain.launch.interpolated = interpolated;
   const auto before = [&](std::size_t i) { return (space.phase(i) + space.phases() - 1) % space.phases(); };
   if (map.duration(space.node(0), before(0)))

@@ -22,10 +22,9 @@ using MakeNodeRow = std::function<NodeRow(double state, int phase)>;
 
 /// Holds a chain of exact rows and says how well the nodes resolve them.
 struct IntegratedChain {
-  SampledChain chain;    ///< `chain.launch` by quadrature over the launch state
-  double row_error = 0;  ///< largest |sum of a row - probability of surviving| before it was removed
-  double launch_error =
-      0;  ///< of the launch's probabilities together, by what the quadrature's last refinement changed
+  SampledChain chain;       ///< `chain.launch` by quadrature over the launch state
+  double row_error = 0;     ///< largest |sum of a row - probability of surviving| before it was removed
+  double launch_error = 0;  ///< of the launch's probabilities together, by the change at the quadrature's last halving
 };
 
 /// @param interpolated  entries may have any sign (Chain::interpolated)
@@ -51,8 +50,9 @@ inline constexpr double most_growth = 1e6;
 /// most).
 std::vector<double> survivors_or_visits(const Chain& chain, std::span<const double> after);
 
-/// Finds where the launch leads, by launch_points() refined until the probabilities settle.
-/// @param error  if given, becomes IntegratedChain::launch_error
+/// Finds where the launch leads, by launch_points().
+/// @param error  if given, they are refined until the probabilities settle, and it becomes
+/// IntegratedChain::launch_error
 Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,
                       std::span<const double> kinks, int threads, double* error = nullptr);
 
