@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/statistics/interval_95.h"
+
 namespace metastable::analysis {
 namespace {
 
 constexpr int longest_profile = 40;  // collisions
 constexpr std::uint64_t rounds = 4;  // simulated experiments
 constexpr double least_trials = 3;
-constexpr double score_95 = 1.96;  // half-width of the band of means, in standard errors
 
 // Sums up the speeds before one collision.
 struct Sum {
@@ -65,7 +66,7 @@ std::vector<ProfilePoint> collision_profile(const TransitionModel& model, const 
       if (k < given[c].size()) p.baseline = given[c][k].mean();
       if (k < with[c].size()) {
         p.with_effect = with[c][k].mean();
-        p.band = score_95 * with[c][k].sd() / std::sqrt(m.count);
+        p.band = normal_95 * with[c][k].sd() / std::sqrt(m.count);
       }
       points.push_back(p);
     }

@@ -59,7 +59,9 @@ std::string sweep_description(const Setting& base, const std::vector<SweepAxis>&
   // A number that varies is none: it is described as "nan".
   constexpr std::string_view none = "nan", slope = "nan deg";
   Setting setting = base;
-  for (const SweepAxis& axis : axes) set_parameter(setting, axis.parameter, std::numeric_limits<double>::quiet_NaN());
+  for (const SweepAxis& axis : axes)
+    set_parameter(setting, axis.parameter,
+                  axis.values.size() == 1 ? axis.values[0] : std::numeric_limits<double>::quiet_NaN());
   std::string text = setting.describe();
   if (text.starts_with(slope)) text.replace(0, slope.size(), "slope varies");
   for (std::size_t at = text.find(none); at != std::string::npos; at = text.find(none, at))

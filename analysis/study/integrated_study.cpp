@@ -20,12 +20,14 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t first_panels = 1;
-constexpr double safety = 2;  // of the error over the changes it is told from
+constexpr double most_unseen = 1e-9;  // launches that land between the nodes
+constexpr double safety = 2;          // of the error over the changes it is told from
 
 struct Level {
   markov::NodeSpace space;
   markov::SampledChain chain;
   SolvedChain solved;
+  double launch_error = 0;  // relative, of from_start()
   double worst_start = 0;
 
   double from_start() const { return solved.from_start; }
@@ -36,10 +38,13 @@ double inner(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-// Returns nothing if the nodes are too few to lead to rest, or so few that interpolation makes nonsense of it.
+// Returns nothing if the nodes are too few to see where the launch lands or to lead to rest, or so few that
+// interpolation makes nonsense of it.
 std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::size_t panels) {
   const markov::NodeSpace space = rows.space(panels);
-  markov::SampledChain chain = rows.chain(problem, space).chain;
+  auto [chain, row_error, launch_error] = rows.chain(problem, space);
+  const markov::Launch& launch = chain.launch;
+  if (std::accumulate(launch.after.begin(), launch.after.end(), launch.rest) < 1 - most_unseen) return std::nullopt;
   const markov::Reachability reach = markov::classify(chain.chain);
   if (std::find(reach.must_rest.begin(), reach.must_rest.end(), 0) != reach.must_rest.end()) return std::nullopt;
   std::optional<SolvedChain> solved;
@@ -51,8 +56,9 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
   } catch (const std::domain_error&) {  // from some node no entry leads to rest
     return std::nullopt;
   }
-  Level level{space, std::move(chain), *std::move(solved)};
+  Level level{space, std::move(chain), *std::move(solved), launch_error};
   const std::vector<double>& mean = level.solved.mean;
+  level.launch_error *= *std::max_element(mean.begin(), mean.end()) / level.from_start();
   int worst = 0;
   for (int p = 1; p < space.phases(); ++p)
     if (mean[static_cast<std::size_t>(p) * space.nodes()] < mean[static_cast<std::size_t>(worst) * space.nodes()])
@@ -122,7 +128,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
       steps_error.refine(fine->from_start(), coarse->from_start());
       rate_error.refine(fine->failure_rate(), coarse->failure_rate());
       worst_error.refine(fine->worst_start, coarse->worst_start);
-      error = std::max(steps_error.error(), rate_error.error());
+      error = std::max(steps_error.error() + fine->launch_error, rate_error.error());
       met = error <= options.tolerance;
     }
     const bool last = free ? met || more(panels) > std::max<std::size_t>(most, 4)
@@ -133,12 +139,13 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   if (!fine || !coarse)
     throw markov::ConvergenceError(
         "integrated rows", 1,
-        fmt::format("{} nodes are too few to lead to rest; method sampled may tell", panels * rows.coarsest()));
+        fmt::format("{} nodes are too few to follow the launch and lead to rest; method sampled may tell",
+                    panels * rows.coarsest()));
 
   Metastability result;
   result.method = Method::integrated;
   result.cells = fine->space.nodes();
-  result.steps.from_start = estimate(fine->from_start(), steps_error.error());
+  result.steps.from_start = estimate(fine->from_start(), steps_error.error() + fine->launch_error);
   result.spectrum.failure_rate = estimate(fine->failure_rate(), rate_error.error());
   result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate(), rate_error.error());
   result.steps.worst_start = estimate(fine->worst_start, worst_error.error());

@@ -137,7 +137,8 @@ LandingError landing_error(const Problem& problem, int phases, std::span<const d
                               [&](double state, int phase, std::span<const double> score) {
                                 return *map.landing_defect(state, phase, score, events.worth(phase + 1));
                               }));
-    error.table = std::abs(change.mean) + change.half_width;
+    const double first_order = std::abs(change.mean) + change.half_width;
+    error.table = first_order + 2 * first_order * first_order;
   }
   if (map.memory_defect(states[0], 0, no_noise, nothing)) {
     const TInterval change =

@@ -16,7 +16,8 @@ struct LandingError {
 /// It is, to first order, the visits to every state times the mean difference in expected steps: between the true
 /// landing and the one read (AnyReturnMap::landing_defect), and between the landing after it with and without what the
 /// state leaves out (AnyReturnMap::memory_defect). Draws come in eight randomisations: Student's 95 % half-width is
-/// part of `table`, and of the interval of `memory`, which is wider by its square for the second order.
+/// part of `table`, and of the interval of `memory`. For the second order `table` is larger by twice its square (true
+/// visits differ from the chain's as its steps do), the interval of `memory` wider by its square.
 /// Cost: some thousand landings followed.
 /// @param states as in summarize()
 LandingError landing_error(const Problem& problem, int phases, std::span<const double> states,

@@ -78,6 +78,9 @@ void Setting::validate() const {
   require_spread("initial speed", initial_speed, "rad/s", range::speed);
   if (law == dynamics::Law::settled) {
     motion();
+    if (initial_speed.mean == 0 && initial_speed.sd == 0)
+      throw std::invalid_argument(
+          "initial speed: 0 without spread is outside (0, 1000] rad/s, the range of law settled");
     if (pairs.empty() && restitution.mean > dynamics::most_settled_restitution)
       throw std::invalid_argument(fmt::format("restitution: mean {} is outside [0, {}], the range of law settled",
                                               restitution.mean, dynamics::most_settled_restitution));

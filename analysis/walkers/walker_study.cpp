@@ -12,7 +12,7 @@ const char* terrain_name(dynamics::Terrain terrain) { return terrain == dynamics
 
 const char* walker_name(Walker walker) { return walker == Walker::simplest ? "simplest" : "compass"; }
 
-double walker_slope_deg(Walker walker) { 
+double walker_slope_deg(Walker walker) {
   constexpr double garcia_slope_deg = 0.5156620156177409;  // 0.009 rad
   return walker == Walker::simplest ? garcia_slope_deg : 3;
 }

@@ -448,7 +448,8 @@ SettledRoll::Event SettledRoll::fly() {
     // While the wheel turns by one leg no others may touch than those looked at, and none before a hub that is higher
     // than legs are long is down again.
     double slowing = 0, first = turn / std::max(1e-3, std::abs(spin));
-    if (height_ > longest * (1 + 1e-9)) {
+    const bool high = height_ > longest * (1 + 1e-9);
+    if (high) {
       const double above = height_ - longest, root = std::sqrt(out * out + 2 * cosine_ * above);
       first = out > 0 ? (out + root) / cosine_ : 2 * above / (root - out);
     }
@@ -493,7 +494,7 @@ SettledRoll::Event SettledRoll::fly() {
       if (has_other_) look(other_, true);
     }
     const int lowest = leg_ + static_cast<int>(std::lround(angle_ / turn));
-    for (int leg = lowest - reach; leg <= lowest + reach; ++leg)
+    for (int leg = lowest - reach; leg <= lowest + reach && !high; ++leg)
       if (!(leaves && (leg == foot_ || (has_other_ && leg == other_)))) look(leg, false);
     const double by = first * (spin + slowing * first / 2);
     along_ += first * (velocity_.along + sine_ * first / 2);

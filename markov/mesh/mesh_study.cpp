@@ -45,8 +45,8 @@ struct Extrapolated {
   double log_value = 0, shift_error = 0, discretization_error = 0;
 };
 
-/// Extrapolates `logs[shift][size]`.
-Extrapolated extrapolate(const std::vector<std::vector<double>>& logs) {
+/// Extrapolates `logs[shift][size]`; takes `safety` times the discretization error that the sizes show.
+Extrapolated extrapolate(const std::vector<std::vector<double>>& logs, double safety) {
   const auto n = static_cast<double>(logs.size());
   const std::size_t sizes = logs.front().size();
   std::vector<double> values, mean(sizes, 0.0);
@@ -65,6 +65,7 @@ Extrapolated extrapolate(const std::vector<std::vector<double>>& logs) {
   if (sizes > 3)
     e.discretization_error = std::max(e.discretization_error,
                                       std::abs(at_zero(mean, sizes - 3, sizes) - at_zero(mean, sizes - 4, sizes - 1)));
+  e.discretization_error *= safety;
   return e;
 }
 
@@ -179,7 +180,10 @@ class Run {
         study_.sizes[size].steps.push_back(std::exp(steps_[shift][size]));
         study_.bracket = std::max(study_.bracket, brackets_[shift][size]);
       }
-    const Extrapolated by_steps = extrapolate(steps_), by_rate = extrapolate(rates_);
+    // What an extrapolation says of its own error grows with what it left out: as the square of the spacing.
+    const double coarser = std::max(1.0, study_.sizes.front().spacing / coarsest(map_.dimension));
+    const Extrapolated by_steps = extrapolate(steps_, coarser * coarser),
+                       by_rate = extrapolate(rates_, coarser * coarser);
     study_.shift_error = by_steps.shift_error;
     study_.discretization_error = by_steps.discretization_error;
     study_.steps = around(std::exp(by_steps.log_value),

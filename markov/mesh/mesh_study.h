@@ -63,7 +63,8 @@ double study_score_spacing(const BatchMap& map);
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
 /// discretization error; the bracket of what leaves the mesh is added. The discretization error is the difference from
-/// the extrapolation without the coarsest size; with four sizes, at least that between the two triples'.
+/// the extrapolation without the coarsest size; with four sizes, at least that between the two triples'. Meshes coarser
+/// than the default count it by the square of the ratio of their spacings: the sizes show less and less of it.
 ///
 /// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
 /// windows of it, and direct simulation where 100 trials or more fit into `simulated_steps`. Two ways disagree when

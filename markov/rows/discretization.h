@@ -45,8 +45,8 @@ Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const Launch
                   int threads = 1);
 
 /// Says how often events violate each of the map's assumptions: [assumption][state], and for the launch [assumption] at
-/// the back (one extra entry: index size()). `draws.count` plain draws a state, another randomisation for each; states
-/// with mask[i] == 0 are left at 0.
+/// the back (one extra entry: index size()). `draws.count` plain draws a state (64 times as many at the launch),
+/// another randomisation for each; states with mask[i] == 0 are left at 0.
 std::vector<std::vector<double>> violation_rates(const AnyReturnMap& map, const StateSpace& space,
                                                  const LaunchState& launch, std::span<const double> mask,
                                                  DrawOptions draws);

@@ -13,18 +13,21 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double score_step = 0.5;  // of the trapezoidal rule
-constexpr int score_steps = 13;     // on each side: 8e-11 of the launches are beyond
+constexpr double score_step = 0.5;       // of the coarsest trapezoidal rule
+constexpr int score_steps = 13;          // on each side: 8e-11 of the launches are beyond
+constexpr int most_halvings = 6;         // of its steps
+constexpr double launch_settles = 1e-4;  // change of the launch's probabilities at a halving, which squares the error
 
 }  // namespace
 
-std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<const double> states) {
+std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<const double> states, int halvings) {
   if (launch.state(-1) == launch.state(1)) return {{0, 1}};
   std::vector<LaunchPoint> rule;
   constexpr double furthest = score_step * score_steps;
   const auto inside = [&](double kink) { return launch.state(-furthest) < kink && kink < launch.state(furthest); };
   if (std::none_of(states.begin(), states.end(), inside)) {
-    for (int k = -score_steps; k <= score_steps; ++k) rule.push_back({k * score_step, 1});
+    const int steps = score_steps << halvings;
+    for (int k = -steps; k <= steps; ++k) rule.push_back({k * furthest / steps, 1});
   } else {
     std::vector<double> cuts{-furthest};
     for (const double kink : states) {
@@ -35,7 +38,7 @@ std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<cons
     }
     cuts.push_back(furthest);
     for (std::size_t i = 1; i < cuts.size(); ++i) {
-      const int panels = 1 + static_cast<int>((cuts[i] - cuts[i - 1]) / 4);
+      const int panels = (1 + static_cast<int>((cuts[i] - cuts[i - 1]) / 4)) << halvings;
       for (int p = 0; p < panels; ++p)
         for (std::size_t k = 0; k < NodeSpace::order; ++k) {
           const double share = (p + 0.5 + 0.5 * gauss_abscissa(k)) / panels;
@@ -67,21 +70,37 @@ std::vector<double> survivors_or_visits(const Chain& chain, std::span<const doub
 }
 
 Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,
-                      std::span<const double> kinks, int threads) {
-  const std::vector<LaunchPoint> rule = launch_points(launch, kinks);
-  std::vector<NodeRow> rows(rule.size());
-  parallel_for(rule.size(), threads,
-               [&](std::size_t k) { rows[k] = make_row(launch.state(rule[k].score), launch.phase); });
-  Launch result;
-  result.after.assign(space.size(), 0.0);
+                      std::span<const double> kinks, int threads, double* error) {
   const std::size_t base = static_cast<std::size_t>((launch.phase + 1) % space.phases()) * space.nodes();
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    result.rest += rule[k].weight * rows[k].rest;
-    for (std::size_t j = 0; j < space.nodes(); ++j) result.after[base + j] += rule[k].weight * rows[k].landing[j];
+  const auto by_rule = [&](const std::vector<LaunchPoint>& rule) {
+    std::vector<NodeRow> rows(rule.size());
+    parallel_for(rule.size(), threads,
+                 [&](std::size_t k) { rows[k] = make_row(launch.state(rule[k].score), launch.phase); });
+    Launch result;
+    result.after.assign(space.size(), 0.0);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      result.rest += rule[k].weight * rows[k].rest;
+      for (std::size_t j = 0; j < space.nodes(); ++j) result.after[base + j] += rule[k].weight * rows[k].landing[j];
+    }
+    const double after = std::accumulate(result.after.begin(), result.after.end(), 0.0);
+    if (after > 0)
+      for (double& p : result.after) p *= (1 - result.rest) / after;
+    return result;
+  };
+  std::vector<LaunchPoint> rule = launch_points(launch, kinks);
+  Launch result = by_rule(rule);
+  double change = 0;
+  // A launch that spreads wider than its landings meets rows that differ more than a coarse rule sees. Weights of
+  // interpolation tell nothing of that one by one; there the kinks cut the rule.
+  for (int halvings = 1; error && rule.size() > 1 && halvings <= most_halvings; ++halvings) {
+    rule = launch_points(launch, kinks, halvings);
+    Launch finer = by_rule(rule);
+    change = std::abs(finer.rest - result.rest);
+    for (std::size_t j = 0; j < space.nodes(); ++j) change += std::abs(finer.after[base + j] - result.after[base + j]);
+    result = std::move(finer);
+    if (change <= launch_settles) break;
   }
-  const double after = std::accumulate(result.after.begin(), result.after.end(), 0.0);
-  if (after > 0)
-    for (double& p : result.after) p *= (1 - result.rest) / after;
+  if (error) *error = change <= launch_settles ? change * change : change;
   return result;
 }
 
@@ -111,7 +130,8 @@ IntegratedChain chain_of_rows(const AnyReturnMap& map, const NodeSpace& space, c
   result.chain.chain =
       interpolated ? Chain::interpolated(std::move(row_start), std::move(column), std::move(value), std::move(kill))
                    : Chain(std::move(row_start), std::move(column), std::move(value), std::move(kill), 1.0);
-  result.chain.launch = launch_of_rows(make_row, space, launch, kinks, threads);
+  result.chain.launch =
+      launch_of_rows(make_row, space, launch, kinks, threads, interpolated ? nullptr : &result.launch_error);
   result.chain.launch.interpolated = interpolated;
   const auto before = [&](std::size_t i) { return (space.phase(i) + space.phases() - 1) % space.phases(); };
   if (map.duration(space.node(0), before(0)))

@@ -102,11 +102,14 @@ analysis::Spread spread_value(std::string_view name, std::string_view text, cons
       (parts.size() == 2 && !parse(trimmed(parts[1]), spread.sd)))
     refuse(name, text, "'mean,sd' (or one number for a constant)");
   const bool coefficient = range.high <= dynamics::range::friction.high;
-  if (coefficient && spread.mean == 0 && spread.sd > 1)
-    throw std::invalid_argument(
-        fmt::format("--{0}: '{1}' is mean 0 and sd {2}; decimals take a point, so that {3}.{2} is a constant and "
-                    "{3}.{2},0.1 has sd 0.1",
-                    name, text, trimmed(parts[1]), trimmed(parts[0])));
+  if (coefficient && spread.mean == 0 && spread.sd > 1) {
+    const std::string_view sd = trimmed(parts[1]);
+    const bool whole = sd.find_first_not_of("0123456789") == std::string_view::npos;
+    throw std::invalid_argument(fmt::format(
+        "--{}: '{}' is mean 0 and sd {}; decimals take a point, {}", name, text, sd,
+        whole ? fmt::format("so that {0}.{1} is a constant and {0}.{1},0.1 has sd 0.1", trimmed(parts[0]), sd)
+              : std::string("as in 0.4,0.1")));
+  }
   check_in_range(dashed(name), spread, range);
   return spread;
 }

@@ -97,9 +97,7 @@ Table data_table(const Diagnosis& d) {
 }
 
 // Tests put together are factors above the 1e-12 at which each of them stops, and say no more than it does.
-Cell together(double p) {
-  return p < 1e-11 ? Cell(NotShown{{p, p, p}, "< 10⁻¹¹"}) : Cell(p);
-}
+Cell together(double p) { return p < 1e-11 ? Cell(NotShown{{p, p, p}, "< 10⁻¹¹"}) : Cell(p); }
 
 Table gap_table(const Diagnosis& d) {
   return {.id = "gap",

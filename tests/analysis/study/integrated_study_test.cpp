@@ -135,6 +135,15 @@ TEST(IntegratedStudy, TakesLaunchesSlowerThanAnySurvivor) {
   }
 }
 
+// The bounds are those of `metastable steps --initial-speed 1,3 --certify`: a launch wider than its landings.
+TEST(IntegratedStudy, TakesLaunchesWiderThanTheirLandings) {
+  Setting setting;  // the paper's legs at 7.02 deg
+  setting.initial_speed = {1, 3};
+  const double steps = integrated(setting, 0.01).steps.from_start.value;
+  EXPECT_GE(steps, 1.800719);
+  EXPECT_LE(steps, 1.80545);
+}
+
 TEST(IntegratedStudy, TakesCoulomb) {
   Setting setting = equal_legs(3.0, {0.4, 0.1});
   setting.law = dynamics::Law::coulomb;

@@ -28,6 +28,21 @@ TEST(MeshStudy, HoldsWhatQuadratureSays) {
   EXPECT_GE(inside, 18);  // of 20 intervals of 95 %
 }
 
+TEST(MeshStudy, MeshesCoarserThanTheDefaultSayHowLittleTheyKnow) {
+  const std::vector<double> start{2};
+  int inside = 0;
+  for (const double sd : {1.2, 0.6, 0.35}) {
+    const double exact = linear_steps(sd, 2);
+    for (const double spacing : {1.2, 1.6, 2.0})
+      for (const std::uint64_t seed : {1, 2, 3}) {
+        const MeshStudy study = mesh_study(
+            linear_batch(sd), start, {.spacing = spacing, .seed = seed, .guided_samples = 0, .simulated_steps = 0});
+        if (study.steps.lower <= exact && exact <= study.steps.upper) ++inside;
+      }
+  }
+  EXPECT_GE(inside, 25);  // of 27 intervals of 95 %
+}
+
 TEST(MeshStudy, TwoDimensionsOfWhichOneMatters) {
   const std::vector<double> start{2, -2.0 / 3};
   const double exact = linear_steps(1.0, 2);

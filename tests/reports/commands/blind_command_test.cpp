@@ -162,7 +162,8 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
 TEST_F(BlindRun, CountsWhatTheToolFailedOn) {
   run_blind_make(request_);
   const fs::path failing = folder_ / "failing.sh", answers = fs::path(request_.folder) / "answers";
-  write(failing, "#!/bin/sh\ncase $2 in *0002) echo no >&2; exit 3;; esac\nexec " + request_.tool.front() + " \"$@\"\n");
+  write(failing,
+        "#!/bin/sh\ncase $2 in *0002) echo no >&2; exit 3;; esac\nexec " + request_.tool.front() + " \"$@\"\n");
   fs::permissions(failing, fs::perms::owner_all);
   request_.tool = {failing.string()};
   run_blind_answer(request_);

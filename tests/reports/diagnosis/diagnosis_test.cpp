@@ -227,7 +227,8 @@ TEST(DiagnosisText, SaysLessWhereLessIsKnown) {
   const std::string text = diagnosis_text(d, 400);
   for (const char* absurd : {"10⁻²³", "10⁻⁷²", "732427", "7.32×10⁵", "137 %"})
     EXPECT_EQ(text.find(absurd), std::string::npos) << absurd << text;
-  for (const char* said : {"< 10⁻¹²", "< 10⁻¹¹", "< −100", "not known: 90 % interval −140 to 140 %, wider than the gap"})
+  for (const char* said :
+       {"< 10⁻¹²", "< 10⁻¹¹", "< −100", "not known: 90 % interval −140 to 140 %, wider than the gap"})
     EXPECT_NE(text.find(said), std::string::npos) << said << text;
   EXPECT_NE(to_csv(shrinkage_table(d)).find(",1.37,-1.41,1.42"), std::string::npos) << to_csv(shrinkage_table(d));
   EXPECT_NE(to_csv(causes_table(d)).find(",-732427.8,"), std::string::npos) << to_csv(causes_table(d));
