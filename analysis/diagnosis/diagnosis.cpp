@@ -40,8 +40,7 @@ constexpr double least_left_over = 0.05;   // held-out gap that counts as one [n
 constexpr double least_left_in_all = 6;    //   or that no draw of the trials takes away [nats, all collisions]
 constexpr double left_over_errors = 6;     // squared model errors of the gap as given that count as none, held out
 constexpr double largest_log_odds = 300;   // of none: their exponential stays finite
-// Odds of something without a name: to one effect of the catalogue, as many of which share the odds of all; beside a
-// hypothesis to the hypothesis alone.
+// Prior odds of something without a name: to one effect of the catalogue; beside a hypothesis to the hypothesis alone.
 constexpr double unnamed_alone = 4, unnamed_beside = 0.03;
 constexpr std::size_t most_beside = 3;  // hypotheses beside which it is supposed, the recalibrated model not counted,
 constexpr double beside_margin = 12;    //   whose evidence is no further behind the best
@@ -343,11 +342,14 @@ struct Chosen {
   double bent = 1;           // share of its gain that an error of form may bend
 };
 
-// Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds to the likeliest.
+// Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds to all hypotheses.
 double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
                        const std::vector<const RankedCause*>& ordered, const Fit& recalibrated) {
+  const double top = ordered.front()->evidence;
+  double all = 0, joined = 0, beside = 0;  // hypotheses, those of them that are joined, and those joined
   for (const RankedCause* cause : ordered) {
-    if (d.causes.unnamed.size() > most_beside || cause->evidence < ordered.front()->evidence - beside_margin) break;
+    all += std::exp(cause->evidence - top);
+    if (d.causes.unnamed.size() > most_beside || cause->evidence < top - beside_margin) continue;
     if (cause->fit.nuisance.empty()) continue;
     const PhaseGain gained = phase_gain(model, cause->fit, exact_part(ranking.singles, cause->terms, recalibrated));
     Unnamed one{{},
@@ -355,14 +357,15 @@ double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRa
                 left_by_facet(model, cause->fit, model_error * model_error * gained.collisions,
                               model_error * model_error * gained.stances)};
     for (const EffectTerm& term : cause->terms) one.beside.push_back(term.candidate->id);
+    one.evidence += evidence_of_more(one.facets);
+    joined += std::exp(cause->evidence - top);
+    beside += std::exp(std::min(largest_log_odds, one.evidence - top));
     d.causes.unnamed.push_back(std::move(one));
   }
-  double most = -largest_log_odds;
-  for (Unnamed& one : d.causes.unnamed) {
-    one.evidence += evidence_of_more(one.facets);
-    most = std::max(most, one.evidence + std::log(one.beside.empty() ? unnamed_alone : unnamed_beside));
-  }
-  return std::exp(std::min(largest_log_odds, most - ordered.front()->evidence));
+  Unnamed& alone = d.causes.unnamed.front();
+  alone.evidence = evidence_of_more(alone.facets);
+  return unnamed_alone * std::exp(std::min(largest_log_odds, alone.evidence - top)) / all +
+         (joined > 0 ? unnamed_beside * beside / joined : 0);
 }
 
 // What the best hypothesis leaves on the map is judged beyond its own model error.

@@ -10,6 +10,8 @@
 
 #include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/map_columns.h"
+#include "analysis/diagnosis/model_fit.h"
+#include "analysis/diagnosis/transition_model.h"
 #include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
@@ -18,6 +20,7 @@ namespace {
 constexpr int most_waves = 3;             // of a smooth change along a trial
 constexpr int most_cycles = 4;            // of a slow swing over the trials
 constexpr std::size_t least_events = 40;  // of a column that the map lacks
+constexpr double most_promised = 1;       // rise of the log likelihood that a fit may still promise, to be judged
 constexpr double least_own = 0.1;         // share of a facet's direction that the fitted parameters leave, to be judged
 
 // Holds columns by facet, aspect and phase.
@@ -121,6 +124,8 @@ LeftInFacet judge(const Key& key, const Eigen::MatrixXd& dense, const Eigen::Vec
 
 std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, double collisions,
                                        double stances) {
+  // Where the fit did not settle, what is left is mostly the fit's own.
+  if (!fit.converged && fit.promised > most_promised) return {};
   Facets facets;
   MapColumns mapped = map_columns(model, fit);
   for (std::size_t c = 0; c < mapped.cells.size(); ++c)

@@ -4,9 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "analysis/diagnosis/model_fit.h"
-
 namespace metastable::analysis {
+
+class TransitionModel;
+struct Fit;
 
 /// Holds what is left in one facet and aspect of it, all its cells together.
 struct LeftInFacet {
@@ -20,7 +21,7 @@ struct LeftInFacet {
 
 /// Judges the facets of the map; and what no effect of a catalogue does: every other trial, slow swings over the
 /// trials, smooth changes along them, trends of single legs, memory beyond the last collision, the change of speed
-/// since then. What the fit's parameters could take up is projected out.
+/// since then. What the fit's parameters could take up is projected out. Empty of a fit that did not settle.
 /// @param collisions, stances  2 Delta log likelihood that an error of form may leave in a facet, see PhaseGain
 std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, double collisions, double stances);
 
