@@ -285,6 +285,26 @@ Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
   return given;
 }
 
+void describe_data(Diagnosis& d, const TransitionModel& model) {
+  d.data.trials = model.trials();
+  d.data.events = model.events().size();
+  for (const Event& e : model.events())
+    d.data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
+  for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
+  d.data.notes = model.notes();
+  d.data.accepted_defects = model.accepted_defects();
+  d.gap.refitted = model.recalibrated();
+}
+
+// What the data hold no information on is not decided, whatever its evidence.
+void leave_undecided(Diagnosis& d, CauseRanking& ranking, const std::vector<const Candidate*>& candidates) {
+  d.limits.visible = visibility(ranking.scan, candidates);
+  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
+    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() &&
+        d.limits.visible[i].smallest == 0)
+      ranking.singles[i].not_decided = d.limits.visible[i].undecidable;
+}
+
 // Puts the tests for a gap together.
 void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated) {
   d.gap.p_effects = std::max(least_p_value, ranking.p_value);
@@ -493,14 +513,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   };
 
   Diagnosis d;
-  d.data.trials = model.trials();
-  d.data.events = model.events().size();
-  for (const Event& e : model.events())
-    d.data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
-  for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
-  d.data.notes = model.notes();
-  d.data.accepted_defects = model.accepted_defects();
-  d.gap.refitted = model.recalibrated();
+  describe_data(d, model);
 
   progress(0, "the model as given");
   const std::vector<double> nominal = nominal_values(model);
@@ -524,12 +537,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   d.causes.unnamed.push_back({{}, 0, left_by_facet(model, recalibrated, 0, 0)});
   test_for_gap(d, ranking, candidates.size(), recalibrated);
   note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
-  // What the data hold no information on is not decided, whatever its evidence.
-  d.limits.visible = visibility(ranking.scan, candidates);
-  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
-    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() &&
-        d.limits.visible[i].smallest == 0)
-      ranking.singles[i].not_decided = d.limits.visible[i].undecidable;
+  leave_undecided(d, ranking, candidates);
   const std::vector<const RankedCause*> ordered = hypotheses(d, model, ranking);
   const bool gap = d.gap.p_value < options.level;
 
