@@ -362,9 +362,11 @@ struct Chosen {
   double bent = 1;           // share of its gain that an error of form may bend
 };
 
-// Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds to all hypotheses.
+// Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds to all hypotheses; few
+// trials cannot show that events scatter as they would by themselves, and facets are then not judged.
 double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
                        const std::vector<const RankedCause*>& ordered, const Fit& recalibrated) {
+  if (!ranking.scan.trials_suffice) return 0;
   const double top = ordered.front()->evidence;
   double all = 0, joined = 0, beside = 0;  // hypotheses, those of them that are joined, and those joined
   for (const RankedCause* cause : ordered) {
@@ -415,11 +417,12 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
 }
 
 // Says whether trials that the cause was not fitted to still show a gap, beyond what its form may be off.
-bool leaves_gap_held_out(const Shrinkage& log_score, double bent, std::size_t collisions) {
+bool leaves_gap_held_out(const Diagnosis& d, double bent) {
+  const Shrinkage& log_score = d.shrinkage.measures.front();
   const double tolerated = model_error * model_error * left_over_errors * bent * log_score.baseline;
   if (log_score.with_effect > least_left_over + tolerated) return true;
-  return log_score.with_effect_least > tolerated &&
-         log_score.with_effect * static_cast<double>(collisions) > least_left_in_all;
+  return d.data.trials >= enough_trials && log_score.with_effect_least > tolerated &&
+         log_score.with_effect * static_cast<double>(d.data.collisions) > least_left_in_all;
 }
 
 // Lists those that compete on the trials held out.
@@ -557,8 +560,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
         gap_shrinkage(model, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
                       options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
   // Even a cause that closes nearly all of a huge gap may leave a large one.
-  if (named && !d.shrinkage.measures.empty() &&
-      leaves_gap_held_out(d.shrinkage.measures[0], chosen.bent, d.data.collisions))
+  if (named && !d.shrinkage.measures.empty() && leaves_gap_held_out(d, chosen.bent))
     chosen.none = std::max(chosen.none, certain);
   const double share_of_effects = share_probabilities(d, model, ordered, candidates.size(), gap, chosen.none);
   give_verdict(d, gap, chosen.none, share_of_effects);
