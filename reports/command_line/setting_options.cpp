@@ -225,6 +225,8 @@ analysis::StudyOptions study_options(const Options& options) {
     throw std::invalid_argument(fmt::format("--sequence: '{}' is neither 'sobol' nor 'random'", sequence));
   if (draws != "weighted" && draws != "plain")
     throw std::invalid_argument(fmt::format("--draws: '{}' is neither 'weighted' nor 'plain'", draws));
+  if (draws == "plain" && options.given("tail"))
+    throw std::invalid_argument("--tail: plain draws have none; --draws weighted reaches it");
   study.sequence = sequence == "sobol" ? markov::Sequence::sobol : markov::Sequence::random;
   study.weighting = draws == "weighted" ? markov::Weighting::weighted : markov::Weighting::plain;
   study.tail = options.number("tail");
