@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# `./run` refuses wrong arguments with exit code 2 and a line that names them, before it builds anything.
+# `./run` refuses wrong arguments with exit code 2 and a line that names them, before it builds anything. The site's
+# script says what it misses.
 set -u
 run=$1/run
 failed=0
@@ -27,4 +28,12 @@ refused 'is no folder' install --prefix "$run"
 
 help=$("$run" help) || failed=1
 [[ $help == *'install [--prefix P]'* ]] || { echo './run help does not name install'; failed=1; }
+
+# What the site needs and is not there is said in one line, with its package.
+hidden=$(mktemp -d)
+echo 'raise ImportError' | tee "$hidden/furo.py" >"$hidden/breathe.py"
+said=$(PYTHONPATH=$hidden bash "$1/reports/site/build.sh" --needs 2>&1) && { echo 'build.sh needs no furo'; failed=1; }
+rm -r "$hidden"
+[[ $said == 'the site needs what is not there:'*' furo (furo of '*' python3-breathe ('* && $said != *$'\n'* ]] ||
+  { printf 'build.sh --needs says "%s"\n' "$said"; failed=1; }
 exit $failed

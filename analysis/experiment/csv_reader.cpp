@@ -8,6 +8,7 @@
 #include <ranges>
 
 #include "analysis/experiment/csv_field.h"
+#include "analysis/experiment/suggestion.h"
 
 namespace metastable::analysis {
 namespace {
@@ -42,8 +43,10 @@ CsvReader::CsvReader(std::string file, std::string_view text, std::span<const Cs
   for (std::size_t i = 0; i < fields_.size(); ++i) {
     const auto known = std::ranges::find(columns_, fields_[i].text, &CsvColumn::name);
     if (known == columns_.end()) {
-      report(fields_[i].offset, fmt::format("unknown column {} (known: {})", shown_text(fields_[i].text),
-                                            fmt::join(columns_ | std::views::transform(&CsvColumn::name), ", ")));
+      std::vector<std::string> names;
+      for (const CsvColumn& column : columns_) names.emplace_back(column.name);
+      report(fields_[i].offset, fmt::format("unknown column {} (known: {}){}", shown_text(fields_[i].text),
+                                            fmt::join(names, ", "), did_you_mean(fields_[i].text, names)));
       continue;
     }
     std::optional<std::size_t>& position = position_[static_cast<std::size_t>(known - columns_.begin())];

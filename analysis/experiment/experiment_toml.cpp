@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "analysis/experiment/suggestion.h"
 #include "dynamics/wheel/ranges.h"
 
 // toml++ 3.3 takes some things for granted that a text can break ("[!" or "[1,}"), and asserts them. Here they are
@@ -110,8 +111,9 @@ class Keys {
     for (const auto& [key, node] : table_) {
       if (known_.contains(key.str())) continue;
       defects_.add(file_, place(key.source()),
-                   fmt::format("unknown key {}{} (known: {})", shown_text(key.str()),
-                               name_.empty() ? "" : fmt::format(" in {}", name_), fmt::join(known_, ", ")));
+                   fmt::format("unknown key {}{} (known: {}){}", shown_text(key.str()),
+                               name_.empty() ? "" : fmt::format(" in {}", name_), fmt::join(known_, ", "),
+                               did_you_mean(key.str(), {known_.begin(), known_.end()})));
     }
   }
 
@@ -172,7 +174,9 @@ void read_contact(Keys& root, NominalContact& contact) {
       if (name == nullptr) throw std::invalid_argument("a text in quotes is expected");
       contact.law = dynamics::law_from_name(name->get());
     } catch (const std::invalid_argument&) {
-      keys->report(*node, fmt::format("contact.law: one of {} is expected", fmt::join(dynamics::law_names(), ", ")));
+      const std::vector<std::string> laws = dynamics::law_names();
+      keys->report(*node, fmt::format("contact.law: one of {} is expected{}", fmt::join(laws, ", "),
+                                      name == nullptr ? "" : did_you_mean(name->get(), laws)));
     }
   }
   const bool required = contact.law != dynamics::Law::plastic;

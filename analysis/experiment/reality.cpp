@@ -11,6 +11,7 @@
 #include "analysis/experiment/angle_recording.h"
 #include "analysis/experiment/csv_field.h"
 #include "analysis/experiment/experiment_notes.h"
+#include "analysis/experiment/suggestion.h"
 #include "analysis/statistics/random.h"
 #include "markov/parallel.h"
 
@@ -129,12 +130,7 @@ const std::vector<std::string>& droppable() {
 Experiment experiment_of(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
                          const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
   if (conditions.empty()) throw std::invalid_argument("laboratory: no condition");
-  for (const std::string& name : options.dropped)
-    if (std::find(droppable().begin(), droppable().end(), name) == droppable().end()) {
-      std::string known;
-      for (const std::string& one : droppable()) known += (known.empty() ? "" : ", ") + one;
-      throw std::invalid_argument(fmt::format("drop: \"{}\" is none of {}", name, known));
-    }
+  for (const std::string& name : options.dropped) require_word("drop", name, droppable());
   const auto told = [&](std::string_view name) {
     return std::find(options.dropped.begin(), options.dropped.end(), name) == options.dropped.end();
   };

@@ -16,11 +16,11 @@
 #include <vector>
 
 #include "analysis/experiment/input_error.h"
+#include "analysis/experiment/suggestion.h"
 #include "reports/command_line/command.h"
 #include "reports/command_line/manual.h"
-#include "reports/command_line/option_values.h"
+#include "reports/command_line/requests.h"
 #include "reports/command_line/setting_options.h"
-#include "reports/command_line/suggestion.h"
 #include "reports/command_line/walker_options.h"
 #include "reports/command_line/written_paths.h"
 #include "reports/commands/compare_command.h"
@@ -40,53 +40,19 @@ namespace metastable::reports {
 namespace {
 
 Command steps() {
-  return {"steps", "Expected steps before failure of one setting, with their interval",
-          [](Options& o) {
-            add_slope(o);
-            o.add("initial-speed", "MEAN,SD", "",
-                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)", dynamics::range::speed);
-            add_wheel(o), add_contact(o), add_course(o), add_study(o);
-            o.add_flag("direct", "Follow every landing instead of reading a table, hundreds of times slower (settled)");
-            o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
-            o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
-            add_standard_errors(o);
-            o.add_json();
-            o.add_flag("explain", "What stands behind the words of the answer");
-            o.add_flag("how-it-fails", "The last steps before failure: which leg, which noise, from where");
-            add_walker(o, "DEG");
-          },
+  return {"steps", "Expected steps before failure of one setting, with their interval", declare_steps,
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) {
               WalkerRequest walker = walker_request(o, line, {"how-it-fails"});
               walker.how_it_fails = o.flag("how-it-fails");
               return run_walker_steps(walker);
             }
-            StepsRequest request{one_setting(o), study_options(o), o.text("json"), line, o.flag("certify")};
-            request.sensitivities = o.flag("sensitivities");
-            request.explain = o.flag("explain");
-            request.how_it_fails = o.flag("how-it-fails");
-            request.study.direct = o.flag("direct");
-            if (request.study.direct && request.setting.law != dynamics::Law::settled)
-              throw std::invalid_argument("--direct: has a meaning under --law settled only");
-            request.standard_errors = standard_errors(o, request.setting);
-            run_steps(request);
+            run_steps(steps_request(o, one_setting(o), line));
           }};
 }
 
 Command compare() {
-  return {"compare", "Expected steps of two or more slopes on common random numbers",
-          [](Options& o) {
-            o.add("slopes", "DEG,DEG,...", "7.02,9.59",
-                  "Ramp slopes [deg], each from 0.001 to below half the angle between legs; later ones are compared "
-                  "with the first");
-            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
-                  dynamics::range::speed);
-            add_wheel(o), add_contact(o), add_course(o), add_study(o);
-            o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
-            add_standard_errors(o);
-            o.add_json();
-            add_walker(o, "DEG,DEG,...");
-          },
+  return {"compare", "Expected steps of two or more slopes on common random numbers", declare_compare,
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) {
               const WalkerRequest walker = walker_request(o, line);
@@ -94,79 +60,48 @@ Command compare() {
                 throw std::invalid_argument("--slopes, --slope-sd: two slopes or two sds at least");
               return run_walker_compare(walker);
             }
-            CompareRequest request{several_settings(o, 2), study_options(o), o.count("collisions", 1, 63),
-                                   o.text("json"), line};
-            request.standard_errors = standard_errors(o, request.settings.front());
-            run_compare(request);
+            run_compare(compare_request(o, several_settings(o, 2), line));
           }};
 }
 
 }  // namespace
 
 Command sweep_command(const Sharing* sharing) {
-  return {
-      "sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
-      [](Options& o) {
-        o.add("slope", "RANGE", "7.02",
-              "[deg] first:last:step, a comma list or one value, each from 0.001 to below half the angle between legs; "
-              "likewise the other axes");
-        o.add("restitution-mean", "RANGE", "", "Mean of eta", dynamics::range::restitution);
-        o.add("restitution-sd", "RANGE", "", "Sd of eta", dynamics::range::restitution);
-        o.add("friction-mean", "RANGE", "", "Mean of mu", dynamics::range::friction);
-        o.add("friction-sd", "RANGE", "", "Sd of mu", dynamics::range::friction);
-        o.add("initial-speed", "MEAN,SD", "", "Of all points (default: the paper's if the one slope is 7.02 or 9.59)",
-              dynamics::range::speed);
-        add_wheel(o), add_contact(o), add_course(o), add_study(o);
-        o.add("out", "FILE", "sweep.csv",
-              "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
-        o.add_json();
-        add_walker(o, "RANGE");
-      },
-      [sharing](const Options& o, const std::string& line) {
-        if (asks_for_walker(o)) {
-          WalkerRequest walker = walker_sweep_request(o, line);
-          walker.sharing = sharing;
-          if (sharing) walker.study.threads = 1;
-          return run_walker_sweep(walker);
-        }
-        SweepRequest request;
-        request.sharing = sharing;
-        request.setting = common_setting(o);
-        for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
-          if (o.text(name).empty()) continue;
-          const analysis::Parameter parameter = analysis::parameter_from_name(name);
-          const dynamics::Range allowed = parameter == analysis::Parameter::slope
-                                              ? dynamics::slope_range(request.setting.wheel.legs())
-                                              : o.range(name);
-          analysis::SweepAxis axis{parameter, range_value(name, o.text(name), allowed)};
-          if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
-            request.setting.slope_deg = axis.values.front();
-          else
-            request.axes.push_back(std::move(axis));
-        }
-        if (request.axes.empty())
-          throw std::invalid_argument(
-              "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
-              "--friction-mean or --friction-sd as first:last:step)");
-        for (const analysis::SweepAxis& axis : request.axes)
-          if (!request.setting.pairs.empty() && axis.parameter != analysis::Parameter::slope)
-            throw std::invalid_argument(
-                fmt::format("--{}: cannot vary with --contact-list", analysis::parameter_name(axis.parameter)));
-        for (const analysis::SweepAxis& axis : request.axes)
-          if (request.setting.law == dynamics::Law::plastic && axis.parameter != analysis::Parameter::slope)
-            throw std::invalid_argument(
-                fmt::format("--{}: has no meaning under --law plastic", analysis::parameter_name(axis.parameter)));
-        const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
-        std::optional<std::string> launch;
-        if (o.given("initial-speed")) launch = o.text("initial-speed");
-        if (!launch && !one_slope) throw std::invalid_argument("--initial-speed: must be given when the slope varies");
-        request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
-        request.study = study_options(o);
-        request.out = o.text("out");
-        request.json = o.text("json");
-        request.command = line;
-        run_sweep(request);
-      }};
+  return {"sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable", declare_sweep,
+          [sharing](const Options& o, const std::string& line) {
+            if (asks_for_walker(o)) {
+              WalkerRequest walker = walker_sweep_request(o, line);
+              walker.sharing = sharing;
+              if (sharing) walker.study.threads = 1;
+              return run_walker_sweep(walker);
+            }
+            SweepRequest request;
+            request.sharing = sharing;
+            request.setting = common_setting(o);
+            for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
+              if (o.text(name).empty()) continue;
+              analysis::SweepAxis axis = sweep_axis(o, name, request.setting);
+              if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
+                request.setting.slope_deg = axis.values.front();
+              else
+                request.axes.push_back(std::move(axis));
+            }
+            if (request.axes.empty())
+              throw std::invalid_argument(
+                  "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
+                  "--friction-mean or --friction-sd as first:last:step)");
+            const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
+            std::optional<std::string> launch;
+            if (o.given("initial-speed")) launch = o.text("initial-speed");
+            if (!launch && !one_slope)
+              throw std::invalid_argument("--initial-speed: must be given when the slope varies");
+            request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
+            request.study = study_options(o);
+            request.out = o.text("out");
+            request.json = o.text("json");
+            request.command = line;
+            run_sweep(request);
+          }};
 }
 
 namespace {
@@ -326,7 +261,7 @@ int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, in
     for (const Command& command : all) names.push_back(command.name);
     throw std::invalid_argument(argc < 2 ? fmt::format("a subcommand is needed: {}", fmt::join(names, ", "))
                                          : fmt::format("'{}' is none of the subcommands {}{}", argv[1],
-                                                       fmt::join(names, ", "), did_you_mean(argv[1], names)));
+                                                       fmt::join(names, ", "), analysis::did_you_mean(argv[1], names)));
   }
   try {
     app.parse(argc, argv);
@@ -343,7 +278,7 @@ int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, in
           for (const ManualOption& option : manual[i].options)
             if (!option.place) names.push_back(option.name);
           throw std::invalid_argument(fmt::format("{}: is no option of '{}'{}", word, all[i].name,
-                                                  did_you_mean(word.substr(0, word.find('=')), names)));
+                                                  analysis::did_you_mean(word.substr(0, word.find('=')), names)));
         }
     if (argv[1][0] == '-')
       throw std::invalid_argument(

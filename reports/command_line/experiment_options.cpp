@@ -6,9 +6,11 @@
 #include <vector>
 
 #include "analysis/experiment/stand_in.h"
+#include "analysis/experiment/suggestion.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/command_line/command.h"
 #include "reports/command_line/option_values.h"
+#include "reports/command_line/requests.h"
 #include "reports/command_line/setting_options.h"
 #include "reports/command_line/walker_options.h"
 #include "reports/commands/coast_down_command.h"
@@ -24,10 +26,10 @@ namespace metastable::reports {
 namespace {
 
 // Its conditions come with slope, launch and number of trials; the rest can be chosen.
-analysis::Setting stand_in_base(const Options& o) {
+analysis::Setting stand_in_base(const Options& o, const Pairs& pairs) {
   for (const char* name : {"slope", "initial-speed", "trials", "collisions"})
     if (o.given(name)) throw std::invalid_argument(fmt::format("--{}: is fixed by --stand-in", name));
-  analysis::Setting setting = common_setting(o);
+  analysis::Setting setting = common_setting(o, pairs);
   const analysis::Setting chosen = analysis::stand_in_setting();
   if (!o.given("restitution")) setting.restitution = chosen.restitution;
   if (!o.given("friction")) setting.friction = chosen.friction;
@@ -60,94 +62,14 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
-void simulate_reality(const Options& o, const SimulateRequest& plain) {
-  RealityRequest request;
-  request.conditions = plain.stand_in ? analysis::stand_in_conditions(plain.setting)
-                                      : std::vector<analysis::RealityCondition>{
-                                            {fmt::format("{}", plain.setting.slope_deg), plain.setting, plain.trials}};
-  analysis::RealityOptions& reality = request.reality;
-  const analysis::Setting& s = plain.setting;
-  const dynamics::NominalValues stated = analysis::stated_values(s.restitution, s.friction, s.wheel.leg_length);
-  for (const std::string& text : o.all("effect")) reality.effects.push_back(dynamics::effect_from_text(text, stated));
-  for (const std::string& text : o.all("outside")) {
-    const std::vector<std::string> parts = split(text, ':');
-    if (parts.size() != 2) throw std::invalid_argument(fmt::format("--outside: '{}' is not of the form ID:SIZE", text));
-    reality.outside.push_back({parts[0], number_value("outside", parts[1])});
-  }
-  reality.restitution_skewness = o.number("skewness");
-  reality.sensor_noise = o.number("sensor-noise");
-  reality.smoothing = o.number("smoothing");
-  reality.flight = !o.flag("no-flight");
-  reality.shuffled = o.flag("shuffle");
-  reality.collisions = plain.collisions;
-  reality.seed = plain.seed;
-  reality.threads = plain.threads;
-  if (o.given("drop")) request.dropped = split(o.text("drop"), ',');
-  request.camera = plain.camera;
-  request.out = plain.out;
-  request.json = plain.json;
-  request.command = plain.command;
-  run_reality(request);
-}
-
 Command simulate() {
-  return {"simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)",
-          [](Options& o) {
-            add_slope(o);
-            o.add("initial-speed", "MEAN,SD", "",
-                  "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)", dynamics::range::speed);
-            add_wheel(o), add_contact(o), add_course(o);
-            o.add_flag(
-                "stand-in",
-                "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
-                "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
-            o.add("trials", "N", "50", "Trials, 1..1000000");
-            o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000 (walker: strikes, default 1000)");
-            o.add("angle-rate", "HZ", "",
-                  "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
-            o.add("angle-noise", "RAD", "", "White noise of the angle, >= 0 (default 0.0002; needs --angle-rate)");
-            add_reality(o);
-            add_walker(o, "DEG", false);
-            o.add_seed();
-            o.add_threads();
-            o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
-            o.add_json();
-          },
+  return {"simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)", declare_simulate,
           [](const Options& o, const std::string& line) {
             if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
-            if (asks_for_walker(o)) {
-              WalkerRequest walker = walker_request(o, line, {"trials", "collisions"});
-              walker.walks.trials = o.whole("trials", 1, 1000000);
-              if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 1, 1000000);
-              return run_walker_simulate(walker);
-            }
-            const bool stand_in = o.flag("stand-in");
-            SimulateRequest request{stand_in ? stand_in_base(o) : one_setting(o),
-                                    o.count("trials", 1, 1000000),
-                                    o.count("collisions", 1, 100000),
-                                    o.seed(),
-                                    o.threads(),
-                                    o.text("out"),
-                                    line};
-            if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
-              throw std::invalid_argument("--angle-noise: needs --angle-rate");
-            request.stand_in = stand_in;
-            request.json = o.text("json");
-            const bool reality = o.flag("reality");
-            for (const char* name :
-                 {"effect", "outside", "skewness", "sensor-noise", "smoothing", "drop", "no-flight", "shuffle"})
-              if (o.given(name) && !reality) throw std::invalid_argument(fmt::format("--{}: needs --reality", name));
-            if (o.given("angle-rate") || (stand_in && !reality)) {
-              analysis::CameraOptions& camera = request.camera.emplace();
-              if (o.given("angle-rate")) camera.rate = o.number("angle-rate");
-              if (stand_in) camera.decimals = 5;  // a twentieth of the noise; keeps the folder small
-              if (o.given("angle-noise")) camera.noise_sd_rad = o.number("angle-noise");
-              camera.seed = request.seed;
-              camera.threads = request.threads;
-              camera.validate();
-            }
-            if (reality)
-              simulate_reality(o, request);
+            if (asks_for_walker(o)) return run_walker_simulate(walker_simulate_request(o, line));
+            const SimulateRequest request = simulate_request(o, line);
+            if (o.flag("reality"))
+              run_reality(reality_request(o, request));
             else
               run_simulate(request);
           }};
@@ -183,8 +105,6 @@ Command coast_down() {
         request.options.block = o.count("block", 10, 100000);
         request.options.validate();
         request.blocks = o.text("blocks");
-        if (request.blocks != "all" && request.blocks != "odd" && request.blocks != "even")
-          throw std::invalid_argument(fmt::format("--blocks: '{}' is none of 'all', 'odd', 'even'", request.blocks));
         request.nominal = o.text("nominal");
         request.linear = o.flag("linear");
         if (request.linear && !request.nominal.empty())
@@ -222,10 +142,7 @@ Command collisions() {
         request.finder.rise = o.number("rise");
         request.finder.fit_span = o.number("fit-span");
         request.finder.validate();
-        const std::string speed = o.text("omega-minus");
-        if (speed != "fit" && speed != "peak")
-          throw std::invalid_argument(fmt::format("--omega-minus: '{}' is neither 'fit' nor 'peak'", speed));
-        request.peak = speed == "peak";
+        request.peak = o.text("omega-minus") == "peak";
         request.threads = o.threads();
         request.out = o.text("out");
         run_collisions(request);
@@ -234,39 +151,7 @@ Command collisions() {
 
 Command describe() {
   return {"describe", "What the trials of an experiment folder show: speeds, tests, survival, restitution and friction",
-          [](Options& o) {
-            o.add_place("DIR", "Experiment folder");
-            o.add("transition", "auto|collision|step", "auto",
-                  "Restitution and friction from omega_minus to omega_plus, or to the next omega_minus");
-            o.add("against", "LAW,LAW,...", "",
-                  "Compare with simulated trials under published, coulomb, plastic, settled");
-            o.add("trials", "N", "2000", "Simulated trials of that comparison, 2..1000000");
-            o.add_seed();
-            o.add_threads();
-            o.add("out", "DIR", "", "Folder for tables, figures and index.html (default: tables on the terminal)");
-            o.add_json();
-          },
-          [](const Options& o, const std::string& line) {
-            DescribeRequest request;
-            request.folder = o.text("DIR");
-            request.out = o.text("out");
-            request.json = o.text("json");
-            const std::string transition = o.text("transition");
-            if (transition == "collision" || transition == "step")
-              request.options.transition =
-                  transition == "step" ? analysis::Transition::step : analysis::Transition::collision;
-            else if (transition != "auto")
-              throw std::invalid_argument(
-                  fmt::format("--transition: '{}' is none of 'auto', 'collision' and 'step'", transition));
-            std::istringstream laws(o.text("against"));
-            for (std::string law; std::getline(laws, law, ',');)
-              request.against.push_back(dynamics::law_from_name(law));
-            request.trials = o.count("trials", 2, 1000000);
-            request.options.seed = o.seed();
-            request.options.threads = o.threads();
-            request.command = line;
-            run_describe(request);
-          }};
+          declare_describe, [](const Options& o, const std::string& line) { run_describe(describe_request(o, line)); }};
 }
 
 Command study() {
@@ -295,30 +180,9 @@ Command study() {
 }
 
 Command diagnose() {
-  return {
-      "diagnose", "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
-      [](Options& o) {
-        o.add_place("DIR", "Experiment folder; the law of its [contact] is published, coulomb or settled");
-        o.add(
-            "catalogue", "FILE|ID,ID,...", "",
-            "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects'); a pair, "
-            "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");
-        o.add_seed();
-        o.add_threads();
-        o.add_json();
-        o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
-      },
-      [](const Options& o, const std::string& line) {
-        DiagnoseRequest request;
-        request.folder = o.text("DIR");
-        if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
-        request.options.seed = o.seed();
-        request.options.threads = o.threads();
-        request.json = o.text("json");
-        request.out = o.text("out");
-        request.command = line;
-        run_diagnose(request);
-      }};
+  return {"diagnose",
+          "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
+          declare_diagnose, [](const Options& o, const std::string& line) { run_diagnose(diagnose_request(o, line)); }};
 }
 
 Command lessons() {
@@ -350,6 +214,150 @@ Command effects() {
 }
 
 }  // namespace
+
+void declare_simulate(Options& o) {
+  add_slope(o);
+  o.add("initial-speed", "MEAN,SD", "", "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)",
+        dynamics::range::speed);
+  add_wheel(o), add_contact(o), add_course(o);
+  o.add_flag("stand-in",
+             "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
+             "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
+  o.add("trials", "N", "50", "Trials, 1..1000000");
+  o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000 (walker: strikes, default 1000)");
+  o.add("angle-rate", "HZ", "", "Write angle.csv too, as a camera of this rate sees the trials, 10..100000 (120)");
+  o.add("angle-noise", "RAD", "", "White noise of the angle, >= 0 (default 0.0002; needs --angle-rate)");
+  add_reality(o);
+  add_walker(o, "DEG", false);
+  o.add_seed();
+  o.add_threads();
+  o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
+  o.add_json();
+}
+
+SimulateRequest simulate_request(const Options& o, const std::string& line, const Pairs& pairs) {
+  const bool stand_in = o.flag("stand-in");
+  SimulateRequest request{stand_in ? stand_in_base(o, pairs) : one_setting(o, pairs),
+                          o.count("trials", 1, 1000000),
+                          o.count("collisions", 1, 100000),
+                          o.seed(),
+                          o.threads(),
+                          o.text("out"),
+                          line};
+  if (o.given("angle-noise") && !o.given("angle-rate") && !stand_in)
+    throw std::invalid_argument("--angle-noise: needs --angle-rate");
+  request.stand_in = stand_in;
+  request.json = o.text("json");
+  const bool reality = o.flag("reality");
+  for (const char* name :
+       {"effect", "outside", "skewness", "sensor-noise", "smoothing", "drop", "no-flight", "shuffle"})
+    if (o.given(name) && !reality) throw std::invalid_argument(fmt::format("--{}: needs --reality", name));
+  if (o.given("angle-rate") || (stand_in && !reality)) {
+    analysis::CameraOptions& camera = request.camera.emplace();
+    if (o.given("angle-rate")) camera.rate = o.number("angle-rate");
+    if (stand_in) camera.decimals = 5;  // a twentieth of the noise; keeps the folder small
+    if (o.given("angle-noise")) camera.noise_sd_rad = o.number("angle-noise");
+    camera.seed = request.seed;
+    camera.threads = request.threads;
+    camera.validate();
+  }
+  return request;
+}
+
+WalkerRequest walker_simulate_request(const Options& o, const std::string& line) {
+  WalkerRequest walker = walker_request(o, line, {"trials", "collisions"});
+  walker.walks.trials = o.whole("trials", 1, 1000000);
+  if (o.given("collisions")) walker.walks.longest = o.whole("collisions", 1, 1000000);
+  return walker;
+}
+
+RealityRequest reality_request(const Options& o, const SimulateRequest& plain) {
+  RealityRequest request;
+  request.conditions = plain.stand_in ? analysis::stand_in_conditions(plain.setting)
+                                      : std::vector<analysis::RealityCondition>{
+                                            {fmt::format("{}", plain.setting.slope_deg), plain.setting, plain.trials}};
+  analysis::RealityOptions& reality = request.reality;
+  const analysis::Setting& s = plain.setting;
+  const dynamics::NominalValues stated = analysis::stated_values(s.restitution, s.friction, s.wheel.leg_length);
+  for (const std::string& text : o.all("effect")) {
+    analysis::require_word("--effect", text.substr(0, text.find(':')), effect_ids());
+    reality.effects.push_back(dynamics::effect_from_text(text, stated));
+  }
+  for (const std::string& text : o.all("outside")) {
+    const std::vector<std::string> parts = split(text, ':');
+    if (parts.size() != 2) throw std::invalid_argument(fmt::format("--outside: '{}' is not of the form ID:SIZE", text));
+    reality.outside.push_back({parts[0], number_value("outside", parts[1])});
+  }
+  reality.restitution_skewness = o.number("skewness");
+  reality.sensor_noise = o.number("sensor-noise");
+  reality.smoothing = o.number("smoothing");
+  reality.flight = !o.flag("no-flight");
+  reality.shuffled = o.flag("shuffle");
+  reality.collisions = plain.collisions;
+  reality.seed = plain.seed;
+  reality.threads = plain.threads;
+  if (o.given("drop")) request.dropped = split(o.text("drop"), ',');
+  request.camera = plain.camera;
+  request.out = plain.out;
+  request.json = plain.json;
+  request.command = plain.command;
+  return request;
+}
+
+void declare_describe(Options& o) {
+  o.add_place("DIR", "Experiment folder");
+  o.add("transition", "auto|collision|step", "auto",
+        "Restitution and friction from omega_minus to omega_plus, or to the next omega_minus");
+  o.add("against", "LAW,LAW,...", "", "Compare with simulated trials under published, coulomb, plastic, settled");
+  o.add("trials", "N", "2000", "Simulated trials of that comparison, 2..1000000");
+  o.add_seed();
+  o.add_threads();
+  o.add("out", "DIR", "", "Folder for tables, figures and index.html (default: tables on the terminal)");
+  o.add_json();
+}
+
+DescribeRequest describe_request(const Options& o, const std::string& line) {
+  DescribeRequest request;
+  request.folder = o.text("DIR");
+  request.out = o.text("out");
+  request.json = o.text("json");
+  const std::string transition = o.text("transition");
+  if (transition != "auto")
+    request.options.transition = transition == "step" ? analysis::Transition::step : analysis::Transition::collision;
+  std::istringstream laws(o.text("against"));
+  for (std::string law; std::getline(laws, law, ',');) {
+    analysis::require_word("--against", law, dynamics::law_names());
+    request.against.push_back(dynamics::law_from_name(law));
+  }
+  request.trials = o.count("trials", 2, 1000000);
+  request.options.seed = o.seed();
+  request.options.threads = o.threads();
+  request.command = line;
+  return request;
+}
+
+void declare_diagnose(Options& o) {
+  o.add_place("DIR", "Experiment folder; the law of its [contact] is published, coulomb or settled");
+  o.add("catalogue", "FILE|ID,ID,...", "",
+        "Effects to consider, in a list or a file with one a line (default: all of 'metastable effects'); a pair, "
+        "trial_drift+bounce, is tried in any case, and a list of pairs alone extends the whole catalogue");
+  o.add_seed();
+  o.add_threads();
+  o.add_json();
+  o.add("out", "DIR", "", "Folder for index.html with figures and tables (CSV, Markdown, LaTeX)");
+}
+
+DiagnoseRequest diagnose_request(const Options& o, const std::string& line) {
+  DiagnoseRequest request;
+  request.folder = o.text("DIR");
+  if (o.given("catalogue")) request.options.catalogue = catalogue_value("catalogue", o.text("catalogue"));
+  request.options.seed = o.seed();
+  request.options.threads = o.threads();
+  request.json = o.text("json");
+  request.out = o.text("out");
+  request.command = line;
+  return request;
+}
 
 std::vector<Command> experiment_commands() {
   return {simulate(), import_command(), coast_down(), collisions(), describe(),

@@ -4,6 +4,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "analysis/experiment/suggestion.h"
 #include "dynamics/wheel/contact_law.h"
 #include "dynamics/wheel/law_quantities.h"
 #include "dynamics/wheel/ranges.h"
@@ -125,16 +126,12 @@ void import_as_asked(const Options& o, const std::string& line) {
   request.columns = column_requests(o.text("columns"));
   request.separator = separator_value(o.text("separator"));
   const std::string lie = o.text("trials-in");
-  if (!lie.empty() && lie != "columns" && lie != "rows")
-    throw std::invalid_argument(fmt::format("--trials-in: '{}' is neither 'columns' nor 'rows'", lie));
   request.orientation = lie.empty() ? TrialsIn::not_told : lie == "columns" ? TrialsIn::columns : TrialsIn::rows;
   request.number_trials = o.flag("number-trials");
   request.collisions_from = o.count("collisions-from", 0, 1);
   request.legs_from = o.count("legs-from", 0, 1);
   for (const auto& [outcome, word] : pairs_value("outcomes", o.text("outcomes"))) {
-    if (outcome != "rest" && outcome != "end_of_ramp" && outcome != "max_collisions")
-      throw std::invalid_argument(
-          fmt::format("--outcomes: '{}' is none of rest, end_of_ramp, max_collisions", outcome));
+    analysis::require_word("--outcomes", outcome, {"rest", "end_of_ramp", "max_collisions"});
     if (!request.outcomes.emplace(word, outcome).second)
       throw std::invalid_argument(fmt::format("--outcomes: '{}' stands for two outcomes", word));
   }

@@ -9,7 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "reports/command_line/suggestion.h"
+#include "analysis/experiment/suggestion.h"
 
 namespace metastable::reports {
 namespace {
@@ -177,7 +177,7 @@ std::string manual_page(const std::vector<ManualCommand>& commands, std::string_
     std::vector<std::string> names;
     for (const ManualCommand& one : commands) names.push_back(one.name);
     throw std::invalid_argument(fmt::format("man: '{}' is none of the commands {}{}", command, fmt::join(names, ", "),
-                                            did_you_mean(command, names)));
+                                            analysis::did_you_mean(command, names)));
   }
   std::string page = head("metastable-" + found->name, found->summary, version) + ".SH SYNOPSIS\n.B metastable " +
                      troff(found->name) + "\n[\\fIOPTIONS\\fR]";

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/experiment/suggestion.h"
 #include "analysis/sensitivity/sweep.h"
 #include "dynamics/wheel/effect_catalogue.h"
 #include "dynamics/wheel/wheel.h"
@@ -181,15 +182,17 @@ std::vector<dynamics::Contact> contact_list(const std::string& file) {
   return pairs;
 }
 
+std::vector<std::string> effect_ids() {
+  std::vector<std::string> ids;
+  for (const dynamics::EffectInfo& effect : dynamics::effect_catalogue()) ids.push_back(effect.id);
+  return ids;
+}
+
 std::vector<std::string> catalogue_value(std::string_view name, const std::string& text) {
   std::vector<std::string> ids;
   const auto take = [&ids](std::string_view word, const std::string& where) {
     const std::string id(trimmed(word));
-    try {
-      for (const std::string_view one : split(id, '+')) dynamics::effect_info(one);
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(fmt::format("{}: {}", where, error.what()));
-    }
+    for (const std::string_view one : split(id, '+')) analysis::require_word(where, one, effect_ids());
     if (std::ranges::count(id, '+') > 1)
       throw std::invalid_argument(fmt::format("{}: \"{}\" has more than two effects", where, id));
     if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);

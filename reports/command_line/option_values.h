@@ -36,6 +36,8 @@ bool is_one_length(std::string_view text);
 /// Reads pairs from a CSV file with the header "restitution,friction"; errors name file, line and column.
 std::vector<dynamics::Contact> contact_list(const std::string& file);
 
+/// Returns the ids of the catalogue.
+std::vector<std::string> effect_ids();
 /// Reads ids of effects from a comma list, or from a file with one a line (# starts a comment); each once, in that
 /// order. Errors name the id and the known ones, in a file the line too.
 std::vector<std::string> catalogue_value(std::string_view name, const std::string& text);

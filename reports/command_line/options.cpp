@@ -5,13 +5,42 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
+#include <sstream>
 #include <stdexcept>
 
+#include "analysis/experiment/suggestion.h"
 #include "reports/command_line/config_file.h"
 #include "reports/command_line/option_values.h"
-#include "reports/command_line/suggestion.h"
 
 namespace metastable::reports {
+namespace {
+
+// Returns it as people write it: places are in capitals.
+std::string named(const std::string& name) {
+  return std::isupper(static_cast<unsigned char>(name.front())) ? name : "--" + name;
+}
+
+// Returns a and b of "a|b"; nothing of what is not words alone.
+std::vector<std::string> words_of(const std::string& value) {
+  if (value.find('|') == std::string::npos ||
+      value.find_first_not_of("abcdefghijklmnopqrstuvwxyz|") != std::string::npos)
+    return {};
+  std::vector<std::string> words;
+  std::istringstream stream(value);
+  for (std::string word; std::getline(stream, word, '|');) words.push_back(word);
+  return words;
+}
+
+}  // namespace
+
+LooseOptions::LooseOptions(const std::function<void(Options&)>& declare)
+    : holder_(std::make_unique<CLI::App>()), options_(*holder_) {
+  declare(options_);
+}
+
+LooseOptions::LooseOptions(LooseOptions&&) noexcept = default;
+
+LooseOptions::~LooseOptions() = default;
 
 void Options::add(const std::string& name, const std::string& value, const std::string& fallback,
                   const std::string& help) {
@@ -69,14 +98,14 @@ void Options::read(const std::string& file) {
     if (entry.key == "config" || !texts_.contains(entry.key))
       throw std::invalid_argument(
           fmt::format("{}:{}: unknown key '{}' (keys are the long options of 'metastable {}'){}", file, entry.line,
-                      entry.key, command_.get_name(), did_you_mean(entry.key, names())));
+                      entry.key, command_.get_name(), analysis::did_you_mean(entry.key, names())));
     std::vector<std::string>& texts = texts_[entry.key];
     if (texts.empty()) texts = entry.values;
   }
 }
 
 std::string Options::value(const std::string& name) const {
-  const CLI::Option* option = command_.get_option_no_throw("--" + name);
+  const CLI::Option* option = command_.get_option_no_throw(named(name));
   return option != nullptr && option->get_expected_max() > 0 ? option->get_type_name() : "";
 }
 
@@ -96,10 +125,14 @@ bool Options::flag(const std::string& name) const {
 }
 
 void Options::check_given() const {
-  for (const auto& [name, texts] : texts_)
+  for (const auto& [name, texts] : texts_) {
     if (std::ranges::find(texts, "") != texts.end())
-      throw std::invalid_argument(fmt::format(
-          "{}{}: what is given is empty", std::isupper(static_cast<unsigned char>(name.front())) ? "" : "--", name));
+      throw std::invalid_argument(fmt::format("{}: what is given is empty", named(name)));
+    if (texts.empty()) continue;
+    const std::vector<std::string> words = words_of(value(name));
+    for (const std::string& text : texts)
+      if (!words.empty()) analysis::require_word(named(name), text, words);
+  }
 }
 
 const dynamics::Range& Options::range(const std::string& name) const {

@@ -2,8 +2,11 @@
 // Holds the options of one command, as texts; CLI11 stays in the .cpp.
 
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/study/setting.h"
@@ -43,14 +46,17 @@ class Options {
   void add_places(const std::string& name, const std::string& help);
   /// Reads the keys of the file that the command line did not give.
   void read(const std::string& file);
-  /// Nothing that was given may be empty. @throws std::invalid_argument
+  /// Says of an option what a command line would say, once for each time it would be given; nothing forgets.
+  void give(const std::string& name, std::vector<std::string> values) { texts_.at(name) = std::move(values); }
+  /// Nothing that was given may be empty; where the value is one of some words ("fresh|facets"), it is one of these.
+  /// @throws std::invalid_argument with the nearest word
   void check_given() const;
 
   std::vector<std::string> names() const;  ///< all of them, without dashes
   bool has(const std::string& name) const { return texts_.contains(name); }
   bool given(const std::string& name) const { return !texts_.at(name).empty(); }
   const std::vector<std::string>& all(const std::string& name) const { return texts_.at(name); }
-  /// Returns what stands for an option's value in the help ("FILE"); "" for places and flags.
+  /// Returns what stands for an option's or a place's value in the help ("FILE"); "" for flags.
   std::string value(const std::string& name) const;
   /// Returns the one value of an option: given once, or its default ("" if it has none).
   std::string text(const std::string& name) const;
@@ -70,6 +76,21 @@ class Options {
   std::map<std::string, std::vector<std::string>> texts_;
   std::map<std::string, std::string> fallback_;
   std::map<std::string, dynamics::Range> ranges_;
+};
+
+/// Are options that no command line gives, but give().
+class LooseOptions {
+ public:
+  explicit LooseOptions(const std::function<void(Options&)>& declare);
+  LooseOptions(LooseOptions&&) noexcept;
+  ~LooseOptions();
+  Options& operator*() { return options_; }
+  Options* operator->() { return &options_; }
+  const Options& operator*() const { return options_; }
+
+ private:
+  std::unique_ptr<CLI::App> holder_;
+  Options options_;
 };
 
 }  // namespace metastable::reports

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <ranges>
 #include <stdexcept>
 #include <utility>
@@ -52,11 +53,28 @@ constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
     {"contact-mass", dynamics::LawQuantity::contact_mass}};
 
 void check_law(const Options& options, dynamics::Law law) {
-  refuse_what_law_lacks(law, [&](const std::string& name) {
+  for (const auto& [name, quantity] : of_some_laws) {
+    if (!options.has(name) || !options.given(name) || dynamics::uses(law, quantity)) continue;
     // A folder states the wheel's r_g under any law: the effect slip_reversal takes it.
-    return options.has(name) && options.given(name) && !(name == "radius-of-gyration" && options.has("reality"));
-  });
+    if (quantity == dynamics::LawQuantity::radius_of_gyration && options.has("reality")) continue;
+    throw std::invalid_argument(
+        fmt::format("--{}: has a meaning under --law {} only", name,
+                    fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
+  }
 }
+
+// Checks before the launch is asked for: a slope that no launch can save is named so.
+void check_slope(const char* option, const analysis::Setting& setting) {
+  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
+  if (!range.holds(setting.slope_deg))
+    throw std::invalid_argument(fmt::format("--{}: {:.6g} deg is outside {} deg (below half the angle between legs)",
+                                            option, setting.slope_deg, range.text()));
+}
+
+constexpr dynamics::Range between_zero_and_one{.low = 0, .high = 1, .low_open = true, .high_open = true};
+constexpr dynamics::Range shares{.low = 0, .high = 1};
+constexpr dynamics::Range correlations{.low = -1, .high = 1, .low_open = true, .high_open = true};
+constexpr dynamics::Range tails{.low = 1e-300, .high = 1e-3};
 
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
 analysis::Setting checked(analysis::Setting setting) {
@@ -104,13 +122,13 @@ void add_stated_contact(Options& options) {
 
 void add_contact(Options& options) {
   add_stated_contact(options);
-  options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops, 0..1 (coulomb)");
-  options.add("correlation", "RHO", "0", "Of the normal scores of eta and mu, (-1, 1)");
+  options.add("rebound-lost", "SHARE", "0", "Share of the rebound's energy lost in hops (coulomb)", shares);
+  options.add("correlation", "RHO", "0", "Of the normal scores of eta and mu", correlations);
   options.add("contact-list", "FILE", "", "CSV 'restitution,friction': draw pairs from a list instead");
 }
 
 void add_course(Options& options) {
-  options.add("ramp-length", "M", "3.66", "Ramp length [m]", range::ramp_length);
+  options.add("ramp-length", "M", "3.66", "Ramp length [m], inf: without end", range::ramp_length);
   options.add("first-leg", "I", "0", "Leg that lands at collision 1, from 0 to the number of legs less one");
 }
 
@@ -120,34 +138,20 @@ void add_study(Options& options) {
   options.add("cells", "N", "", "Cells per landing leg, 8..4096 (default: refined until the tolerance is met)");
   options.add("samples", "S", "",
               "Draws per cell and replicate, 16..16777216 (default: raised until the tolerance is met)");
-  options.add("tolerance", "REL", "0.01", "Half-width of the 95 % interval of the expected steps, relative, (0, 1)");
+  options.add("tolerance", "REL", "0.01", "Half-width of the 95 % interval of the expected steps, relative",
+              between_zero_and_one);
   options.add("sequence", "sobol|random", "sobol", "Where the draws come from");
   options.add("draws", "weighted|plain", "weighted", "Weighted draws cover the tails; plain ones see what is frequent");
-  options.add("tail", "P", "1e-30", "Tail probability the weighted draws reach, 1e-300..1e-3");
+  options.add("tail", "P", "1e-30", "Tail probability the weighted draws reach", tails);
   options.add("replicates", "R", "8", "Independent randomisations behind the interval, 2..64");
-  options.add("mixing-distance", "D", "0.05", "Total variation distance that counts as mixed, (0, 1)");
+  options.add("mixing-distance", "D", "0.05", "Total variation distance that counts as mixed", between_zero_and_one);
   options.add("eigenvalues", "K", "6", "How many eigenvalue moduli to report, 1..64");
   options.add_seed();
   options.add_threads();
 }
 
-void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std::string&)>& given) {
-  for (const auto& [name, quantity] : of_some_laws)
-    if (given(name) && !dynamics::uses(law, quantity))
-      throw std::invalid_argument(
-          fmt::format("--{}: has a meaning under --law {} only", name,
-                      fmt::join(dynamics::laws_with(quantity) | std::views::transform(dynamics::law_name), ", ")));
-}
-
-void check_slope(const analysis::Setting& setting) {
-  const dynamics::Range range = dynamics::slope_range(setting.wheel.legs());
-  if (!range.holds(setting.slope_deg))
-    throw std::invalid_argument(fmt::format("slope: {:.6g} deg is outside {} deg (below half the angle between legs)",
-                                            setting.slope_deg, range.text()));
-}
-
 // Reads all but slope and launch speed.
-analysis::Setting common_setting(const Options& options) {
+analysis::Setting common_setting(const Options& options, const Pairs& pairs) {
   analysis::Setting setting;
   setting.wheel = wheel(options);
   setting.law = dynamics::law_from_name(options.text("law"));
@@ -162,9 +166,10 @@ analysis::Setting common_setting(const Options& options) {
   if (options.has("contact-list") && options.given("contact-list")) {
     if (options.given("restitution") || options.given("friction") || options.given("correlation"))
       throw std::invalid_argument("--contact-list: excludes --restitution, --friction and --correlation");
-    setting.pairs = contact_list(options.text("contact-list"));
+    setting.pairs = pairs ? *pairs : contact_list(options.text("contact-list"));
   }
-  setting.ramp_length = options.number("ramp-length");
+  setting.ramp_length =
+      options.text("ramp-length") == "inf" ? std::numeric_limits<double>::infinity() : options.number("ramp-length");
   setting.first_landing_leg = options.count("first-leg", 0, setting.wheel.legs() - 1);
   return setting;
 }
@@ -179,10 +184,10 @@ analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& 
   return *paper;
 }
 
-analysis::Setting one_setting(const Options& options) {
-  analysis::Setting setting = common_setting(options);
+analysis::Setting one_setting(const Options& options, const Pairs& pairs) {
+  analysis::Setting setting = common_setting(options, pairs);
   setting.slope_deg = options.number("slope");
-  check_slope(setting);
+  check_slope("slope", setting);
   std::optional<std::string> launch;
   if (options.given("initial-speed")) launch = options.text("initial-speed");
   setting.initial_speed = launch_for(setting.slope_deg, launch);
@@ -201,7 +206,7 @@ std::vector<analysis::Setting> several_settings(const Options& options, std::siz
   for (std::size_t i = 0; i < slopes.size(); ++i) {
     analysis::Setting setting = common_setting(options);
     setting.slope_deg = slopes[i];
-    check_slope(setting);
+    check_slope("slopes", setting);
     setting.initial_speed = launch_for(slopes[i], launches.empty() ? std::nullopt : std::optional(launches[i]));
     settings.push_back(checked(std::move(setting)));
   }
@@ -210,9 +215,6 @@ std::vector<analysis::Setting> several_settings(const Options& options, std::siz
 
 analysis::StudyOptions study_options(const Options& options) {
   analysis::StudyOptions study;
-  if (options.text("method") != "sampled" && options.text("method") != "integrated")
-    throw std::invalid_argument(
-        fmt::format("--method: '{}' is neither 'sampled' nor 'integrated'", options.text("method")));
   study.method = analysis::method_from_name(options.text("method"));
   for (const char* name : {"samples", "sequence", "draws", "tail", "replicates"})
     if (options.given(name) && study.method != analysis::Method::sampled)
@@ -220,15 +222,10 @@ analysis::StudyOptions study_options(const Options& options) {
   if (options.given("cells")) study.cells = options.whole("cells", 8, 4096);
   if (options.given("samples")) study.samples = options.whole("samples", 16, 1u << 24);
   study.tolerance = options.number("tolerance");
-  const std::string sequence = options.text("sequence"), draws = options.text("draws");
-  if (sequence != "sobol" && sequence != "random")
-    throw std::invalid_argument(fmt::format("--sequence: '{}' is neither 'sobol' nor 'random'", sequence));
-  if (draws != "weighted" && draws != "plain")
-    throw std::invalid_argument(fmt::format("--draws: '{}' is neither 'weighted' nor 'plain'", draws));
-  if (draws == "plain" && options.given("tail"))
+  study.sequence = options.text("sequence") == "sobol" ? markov::Sequence::sobol : markov::Sequence::random;
+  study.weighting = options.text("draws") == "weighted" ? markov::Weighting::weighted : markov::Weighting::plain;
+  if (study.weighting == markov::Weighting::plain && options.given("tail"))
     throw std::invalid_argument("--tail: plain draws have none; --draws weighted reaches it");
-  study.sequence = sequence == "sobol" ? markov::Sequence::sobol : markov::Sequence::random;
-  study.weighting = draws == "weighted" ? markov::Weighting::weighted : markov::Weighting::plain;
   study.tail = options.number("tail");
   study.replicates = options.count("replicates", 2, 64);
   study.mixing_distance = options.number("mixing-distance");

@@ -2,7 +2,6 @@
 // Reads options that several commands share: wheel, contact, course, study.
 
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,7 +9,7 @@
 #include "analysis/sensitivity/propagation.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/setting.h"
-#include "dynamics/wheel/contact_law.h"
+#include "dynamics/wheel/contact_noise.h"
 #include "reports/command_line/options.h"
 
 namespace metastable::reports {
@@ -25,17 +24,15 @@ void add_course(Options& options);
 void add_study(Options& options);
 void add_standard_errors(Options& options);
 
-/// @param given  by the name of the option
-/// @throws std::invalid_argument for the first one given that has no meaning under the law
-void refuse_what_law_lacks(dynamics::Law law, const std::function<bool(const std::string&)>& given);
-/// Checks before the launch is asked for: a slope that no launch can save is named so. @throws std::invalid_argument
-void check_slope(const analysis::Setting& setting);
+/// Are contacts in the place of those in the file of --contact-list, which only has to be given then.
+using Pairs = std::optional<std::vector<dynamics::Contact>>;
+
 /// Reads what the options above say, as far as the command has them: all but slope and launch speed.
-analysis::Setting common_setting(const Options& options);
+analysis::Setting common_setting(const Options& options, const Pairs& pairs = {});
 /// Reads `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
 analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);
 /// Reads --slope and --initial-speed too, and checks them.
-analysis::Setting one_setting(const Options& options);
+analysis::Setting one_setting(const Options& options, const Pairs& pairs = {});
 /// Makes one setting a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
 std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least);
 analysis::StudyOptions study_options(const Options& options);

@@ -14,12 +14,15 @@ constexpr dynamics::Range walker_slopes{.low = 0, .high = 45, .low_open = true, 
 constexpr dynamics::Range spacings{.low = 0.05, .high = 2};
 constexpr dynamics::Range gigabytes{.low = 0.001, .high = 1e6};
 
-analysis::WalkerSetting base_setting(const Options& o, const std::vector<std::string>& own) {
+void refuse_what_walkers_lack(const Options& o, const std::vector<std::string>& own) {
   static const std::vector<std::string> all{"walker",          "slope",   "slopes", "slope-sd", "terrain", "memory",
                                             "simulated-steps", "spacing", "seed",   "threads",  "json",    "out"};
   for (const std::string& name : o.names())
     if (o.given(name) && std::ranges::find(all, name) == all.end() && std::ranges::find(own, name) == own.end())
       throw std::invalid_argument(fmt::format("--{}: has no meaning with --walker", name));
+}
+
+analysis::WalkerSetting base_setting(const Options& o) {
   if (!o.given("slope-sd")) throw std::invalid_argument("--slope-sd: is needed with --walker");
   analysis::WalkerSetting setting;
   setting.walker = analysis::walker_from_name(o.text("walker"));
@@ -28,15 +31,11 @@ analysis::WalkerSetting base_setting(const Options& o, const std::vector<std::st
   return setting;
 }
 
-WalkerRequest base_request(const Options& o, const std::string& command_line) {
+WalkerRequest base_request(const Options& o, const std::string& command_line, const std::vector<std::string>& own) {
   WalkerRequest request;
-  request.study.seed = request.walks.seed = o.seed();
-  if (o.has("threads")) request.study.threads = request.walks.threads = o.threads();
-  if (o.has("memory") && o.given("memory"))
-    request.study.most_bytes = static_cast<std::size_t>(o.number("memory") * 0x1p30);
-  if (o.has("spacing") && o.given("spacing")) request.study.spacing = o.number("spacing");
-  if (o.has("simulated-steps") && o.given("simulated-steps"))
-    request.study.simulated_steps = o.whole("simulated-steps", 0, 1000000000000);
+  request.study = mesh_options(o, own);
+  request.walks.seed = request.study.seed;
+  request.walks.threads = request.study.threads;
   if (o.has("json")) request.json = o.text("json");
   if (o.has("out")) request.out = o.text("out");
   request.command = command_line;
@@ -82,9 +81,21 @@ bool asks_for_walker(const Options& o) {
   return false;
 }
 
+markov::MeshStudyOptions mesh_options(const Options& o, const std::vector<std::string>& own) {
+  refuse_what_walkers_lack(o, own);
+  markov::MeshStudyOptions study;
+  study.seed = o.seed();
+  if (o.has("threads")) study.threads = o.threads();
+  if (o.has("memory") && o.given("memory")) study.most_bytes = static_cast<std::size_t>(o.number("memory") * 0x1p30);
+  if (o.has("spacing") && o.given("spacing")) study.spacing = o.number("spacing");
+  if (o.has("simulated-steps") && o.given("simulated-steps"))
+    study.simulated_steps = o.whole("simulated-steps", 0, 1000000000000);
+  return study;
+}
+
 WalkerRequest walker_request(const Options& o, const std::string& command_line, std::vector<std::string> own) {
-  const analysis::WalkerSetting base = base_setting(o, own);
-  WalkerRequest request = base_request(o, command_line);
+  WalkerRequest request = base_request(o, command_line, own);
+  const analysis::WalkerSetting base = base_setting(o);
   const std::string slope = o.has("slopes") ? "slopes" : "slope";
   std::vector<double> slopes = o.given(slope) ? slopes_in(o, slope) : std::vector<double>{base.slope_deg};
   std::vector<double> sds = slopes_in(o, "slope-sd");
@@ -103,8 +114,8 @@ WalkerRequest walker_request(const Options& o, const std::string& command_line, 
 }
 
 WalkerRequest walker_sweep_request(const Options& o, const std::string& command_line) {
-  const analysis::WalkerSetting base = base_setting(o, {});
-  WalkerRequest request = base_request(o, command_line);
+  WalkerRequest request = base_request(o, command_line, {});
+  const analysis::WalkerSetting base = base_setting(o);
   request.slopes =
       o.given("slope") ? range_value("slope", o.text("slope"), walker_slopes) : std::vector<double>{base.slope_deg};
   request.slope_sds = range_value("slope-sd", o.text("slope-sd"), walker_slopes);

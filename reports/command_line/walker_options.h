@@ -22,6 +22,8 @@ bool asks_for_walker(const Options& options);
 /// @throws std::invalid_argument for values out of range, and for options of the wheel
 WalkerRequest walker_request(const Options& options, const std::string& command_line,
                              std::vector<std::string> own = {});
+/// Likewise what meshes are told, of walkers and of simulators of one's own; `own` as above.
+markov::MeshStudyOptions mesh_options(const Options& options, const std::vector<std::string>& own);
 WalkerRequest walker_sweep_request(const Options& options, const std::string& command_line);
 
 }  // namespace metastable::reports

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "analysis/experiment/input_error.h"
+#include "analysis/experiment/suggestion.h"
 
 namespace metastable::reports {
 namespace {
@@ -106,7 +107,7 @@ std::vector<std::size_t> numbered_columns(std::string_view pattern, std::span<co
   for (const auto& [number, index] : found) {
     if (const int due = first_collision + static_cast<int>(columns.size()); number != due)
       throw std::invalid_argument(fmt::format("--columns: {}: number {} is not there, but {} is{}", pattern, due,
-                                              number, number == 0 ? " (--first-collision 0)" : ""));
+                                              number, number == 0 ? " (--collisions-from 0)" : ""));
     columns.push_back(index);
   }
   return columns;
@@ -167,13 +168,14 @@ std::vector<RequestedColumn> column_requests(const std::string& text) {
   std::istringstream stream(text);
   for (std::string entry; std::getline(stream, entry, ',');) {
     const std::size_t equals = entry.find('=');
-    std::vector<std::string_view> names;
-    for (const RoleInfo& role : roles) names.push_back(role.name);
-    const auto role = std::ranges::find(names, std::string_view(entry).substr(0, equals));
+    const std::string what = entry.substr(0, equals);
+    std::vector<std::string> names;
+    for (const RoleInfo& role : roles) names.emplace_back(role.name);
+    const auto role = std::ranges::find(names, what);
     if (equals == std::string::npos || equals + 1 == entry.size() || role == names.end())
       throw std::invalid_argument(
-          fmt::format("--columns: {} is not WHAT=NAME or WHAT=NAME[UNIT], where WHAT is one of {}",
-                      analysis::shown_text(entry), fmt::join(names, ", ")));
+          fmt::format("--columns: {} is not WHAT=NAME or WHAT=NAME[UNIT], where WHAT is one of {}{}",
+                      analysis::shown_text(entry), fmt::join(names, ", "), analysis::did_you_mean(what, names)));
     requests.push_back({roles[role - names.begin()].role, entry.substr(equals + 1)});
   }
   return requests;

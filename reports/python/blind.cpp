@@ -4,6 +4,7 @@
 
 #include <atomic>
 
+#include "reports/command_line/requests.h"
 #include "reports/commands/blind_command.h"
 #include "reports/output/table_json.h"
 #include "reports/output/text_table.h"
@@ -15,23 +16,14 @@ namespace {
 
 BlindRequest blind_request_of(const py::dict& options, const std::string& command) {
   const Arguments given(options);
-  BlindRequest request;
-  request.folder = given.text("folder");
-  while (request.folder.size() > 1 && request.folder.ends_with('/')) request.folder.pop_back();
-  if (given.given("sealed")) request.sealed = given.text("sealed");
-  if (given.given("seed")) request.seed = given.seed();
-  const auto count = [&](const char* name, int& into, std::uint64_t most) {
-    if (given.given(name)) into = static_cast<int>(given.whole(name, 0, most));
-  };
-  count("per_effect", request.size.per_effect_and_strength, 1000);
-  count("none", request.size.none, 5000);
-  count("pairs", request.size.pairs, 5000);
-  count("outside", request.size.outside, 5000);
-  count("left_out", request.size.left_out_per_effect, 1000);
+  LooseOptions asked(declare_blind);
+  asked->give("DIR", {given.text("folder")});
+  for (const char* name : {"sealed", "out"})
+    if (given.given(name)) asked->give(name, {given.text(name)});
+  given.without({"sealed", "out", "tool"}).give(*asked);
+  asked->check_given();
+  BlindRequest request = blind_request(*asked, command);
   request.tool = given.texts("tool");
-  if (given.given("threads")) request.threads = given.threads();
-  if (given.given("out")) request.out = given.text("out");
-  request.command = command;
   return request;
 }
 

@@ -1,6 +1,7 @@
 // Binds experiments: read, simulated, or made of arrays; described and diagnosed.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,9 +11,8 @@
 #include <stdexcept>
 
 #include "analysis/experiment/experiment.h"
-#include "analysis/experiment/stand_in.h"
 #include "analysis/likelihood/diagnose.h"
-#include "dynamics/wheel/contact_law.h"
+#include "reports/command_line/requests.h"
 #include "reports/commands/describe_command.h"
 #include "reports/commands/experiment_output.h"
 #include "reports/commands/simulate_command.h"
@@ -150,61 +150,18 @@ HeldExperiment from_arrays(const py::list& ids, const py::list& settings, const 
   return held(std::move(source));
 }
 
-RealityRequest reality_of(const SimulateRequest& plain, const Arguments& given) {
-  RealityRequest request;
-  const analysis::Setting& s = plain.setting;
-  request.conditions = plain.stand_in
-                           ? analysis::stand_in_conditions(s)
-                           : std::vector<analysis::RealityCondition>{{fmt::format("{}", s.slope_deg), s, plain.trials}};
-  analysis::RealityOptions& reality = request.reality;
-  const dynamics::NominalValues stated = analysis::stated_values(s.restitution, s.friction, s.wheel.leg_length);
-  for (const std::string& text : given.texts("effects"))
-    reality.effects.push_back(dynamics::effect_from_text(text, stated));
-  const Arguments outside = given.part("outside");
-  for (const auto& [key, size] : outside.all()) {
-    const auto name = py::str(key).cast<std::string>();
-    reality.outside.push_back({name, outside.number(name.c_str())});
-  }
-  reality.restitution_skewness = given.number("skewness");
-  reality.sensor_noise = given.number("sensor_noise");
-  reality.smoothing = given.number("smoothing");
-  reality.flight = given.flag("flight");
-  reality.shuffled = given.flag("shuffled");
-  reality.collisions = plain.collisions;
-  reality.seed = plain.seed;
-  reality.threads = plain.threads;
-  request.dropped = given.texts("drop");
-  request.camera = plain.camera;
-  request.out = plain.out;
-  request.command = plain.command;
-  return request;
-}
-
 HeldExperiment simulate(const py::dict& setting, const py::dict& options, const std::string& command,
                         const py::object& progress) {
   const Arguments given(options);
-  SimulateRequest request{setting_of(Arguments(setting)),
-                          static_cast<int>(given.whole("trials", 1, 1000000)),
-                          static_cast<int>(given.whole("collisions", 1, 100000)),
-                          given.seed(),
-                          given.threads(),
-                          "simulated",
-                          command};
-  request.stand_in = given.flag("stand_in");
-  if (given.given("angle_noise") && !given.given("angle_rate"))
-    throw std::invalid_argument("angle_noise: needs angle_rate");
-  if (given.given("angle_rate")) {
-    analysis::CameraOptions& camera = request.camera.emplace();
-    camera.rate = given.number("angle_rate");
-    if (request.stand_in) camera.decimals = 5;
-    if (given.given("angle_noise")) camera.noise_sd_rad = given.number("angle_noise");
-    camera.seed = request.seed;
-    camera.threads = request.threads;
-    camera.validate();
-  }
+  LooseOptions asked(declare_simulate);
+  const Pairs pairs = give_setting(Arguments(setting), *asked);
+  give_simulation(given, *asked);
+  asked->give("out", {"simulated"});
+  asked->check_given();
+  const SimulateRequest request = simulate_request(*asked, command, pairs);
   HeldExperiment experiment;
-  const bool reality = given.flag("reality");
-  const RealityRequest laboratory = reality ? reality_of(request, given) : RealityRequest{};
+  const bool reality = asked->flag("reality");
+  const RealityRequest laboratory = reality ? reality_request(*asked, request) : RealityRequest{};
   Call call(progress);
   call.run([&] {
     const BeginPart begin = parts_of(call);
@@ -217,10 +174,11 @@ HeldExperiment simulate(const py::dict& setting, const py::dict& options, const 
 py::dict diagnose(const HeldExperiment& held, const py::dict& options, const std::string& command,
                   const py::object& progress) {
   const Arguments given(options);
-  analysis::DiagnosisOptions study;
-  study.seed = given.seed();
-  study.threads = given.threads();
-  study.catalogue = given.texts("catalogue");
+  LooseOptions asked(declare_diagnose);
+  const std::vector<std::string> catalogue = given.texts("catalogue");
+  if (!catalogue.empty()) asked->give("catalogue", {fmt::format("{}", fmt::join(catalogue, ","))});
+  given.without({"catalogue"}).give(*asked);
+  analysis::DiagnosisOptions study = diagnose_request(*asked, command).options;
   analysis::Diagnosis found;
   Call call(progress);
   study.progress = [&](double share, const std::string& doing) { call.tell(share, doing); };
@@ -236,16 +194,12 @@ py::dict diagnose(const HeldExperiment& held, const py::dict& options, const std
 py::dict describe(const HeldExperiment& held, const py::dict& options, const std::string& command,
                   const py::object& progress) {
   const Arguments given(options);
-  DescribeRequest request;
-  const std::string transition = given.text("transition");
-  if (transition == "collision" || transition == "step")
-    request.options.transition = transition == "step" ? analysis::Transition::step : analysis::Transition::collision;
-  else if (transition != "auto")
-    throw std::invalid_argument(fmt::format("transition: '{}' is none of 'auto', 'collision' and 'step'", transition));
-  for (const std::string& law : given.texts("against")) request.against.push_back(dynamics::law_from_name(law));
-  request.trials = static_cast<int>(given.whole("trials", 2, 1000000));
-  request.options.seed = given.seed();
-  request.options.threads = given.threads();
+  LooseOptions asked(declare_describe);
+  const std::vector<std::string> against = given.texts("against");
+  if (!against.empty()) asked->give("against", {fmt::format("{}", fmt::join(against, ","))});
+  given.without({"against"}).give(*asked);
+  asked->check_given();
+  DescribeRequest request = describe_request(*asked, command);
   const Provenance provenance{command, "experiment: " + held->experiment.title, request.options.seed, version()};
   Call call(progress);
   // A fit takes some 500 to 1000 evaluations of its likelihood.

@@ -10,6 +10,8 @@
 #include "analysis/walkers/walker_study.h"
 #include "analysis/walkers/walker_trials.h"
 #include "markov/mesh/batch_simulation.h"
+#include "reports/command_line/requests.h"
+#include "reports/command_line/walker_options.h"
 #include "reports/commands/walker_command.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"
@@ -26,11 +28,22 @@ py::array survival_array(const markov::MeshStudy& study) {
   return array_of(std::move(survival));
 }
 
+// Reads what a walker of the library or of one's own is asked, as `steps` and `compare` do.
+markov::MeshStudyOptions mesh_options_of(const Arguments& given, void (*declare)(Options&) = declare_steps) {
+  if (given.given("standard_errors")) throw std::invalid_argument("--standard-errors: has no meaning with --walker");
+  LooseOptions options(declare);
+  given.give(*options);
+  options->check_given();
+  markov::MeshStudyOptions study = mesh_options(*options, {"how-it-fails"});
+  read_guided_samples(given, study);
+  return study;
+}
+
 WalkerRequest walker_request_of(const py::list& settings, const Arguments& given, const std::string& command) {
   WalkerRequest request;
   for (const py::handle& fields : settings)
     request.settings.push_back(walker_setting_of(Arguments(fields.cast<py::dict>())));
-  request.study = mesh_options_of(given);
+  request.study = mesh_options_of(given, settings.size() > 1 ? declare_compare : declare_steps);
   request.command = command;
   request.how_it_fails = given.flag("how_it_fails");
   return request;
@@ -178,10 +191,14 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
 py::dict simulate_map(const py::dict& fields, const py::dict& options, const py::object& progress) {
   const PythonMap python = map_of(fields);
   const Arguments given(options);
-  const markov::SimulationOptions simulation{.trials = given.whole("trials", 2, 100000000),
-                                             .seed = given.seed(),
-                                             .threads = given.threads(),
-                                             .most_steps = given.whole("most_steps", 1, 1ULL << 62)};
+  LooseOptions asked(declare_simulate);
+  give_simulation(given.without({"trials"}), *asked);
+  const markov::MeshStudyOptions study = mesh_options(*asked, {});
+  const markov::SimulationOptions simulation{
+      .trials = given.whole("trials", 2, 100000000),
+      .seed = study.seed,
+      .threads = study.threads,
+      .most_steps = given.given("most_steps") ? given.whole("most_steps", 1, 1ULL << 62) : 1ULL << 62};
   std::optional<markov::SimulatedSteps> found;
   Call call(progress);
   const markov::BatchMap map = batch_of(python, call);
@@ -197,12 +214,15 @@ py::dict simulate_map(const py::dict& fields, const py::dict& options, const py:
 }
 
 py::dict simulate_walks(const py::dict& fields, const py::dict& options, const py::object& progress) {
-  const analysis::WalkerSetting setting = walker_setting_of(Arguments(fields));
   const Arguments given(options);
-  analysis::WalkOptions walking{.trials = given.whole("trials", 1, 1000000),
-                                .longest = given.whole("most_steps", 1, 1000000),
-                                .seed = given.seed(),
-                                .threads = given.threads()};
+  LooseOptions asked(declare_simulate);
+  Arguments(fields).give(*asked);
+  give_simulation(given, *asked);
+  asked->check_given();
+  const WalkerRequest request = walker_simulate_request(*asked, "");
+  const analysis::WalkerSetting& setting = request.settings.front();
+  analysis::WalkOptions walking = request.walks;
+  if (given.given("most_steps")) walking.longest = given.whole("most_steps", 1, 1000000);
   std::vector<analysis::Walk> walks;
   Call call(progress);
   walking.progress = [&](double share) { call.tell(share, "simulate"); };

@@ -16,18 +16,20 @@
 #include "reports/output/interrupt.h"
 #include "reports/output/version.h"
 #include "reports/python/answer.h"
+#include "reports/python/arguments.h"
 
 namespace metastable::reports::python {
 namespace {
 
-// Sentences name options as the command line spells them, --first-leg; Python's arguments are first_leg.
+// Sentences name options as the command line spells them, --first-leg, or begin with the name of a parameter,
+// friction-mean; Python's arguments are first_leg and friction_mean, slope_deg for --slope.
 std::string in_python(const std::string& sentence) {
-  static const std::regex option("--([a-z]+(-[a-z]+)*)");
+  static const std::regex option("--([a-z]+(?:-[a-z]+)*)|^([a-z]+(?:-[a-z]+)*)(?=:)");
   std::string text;
   auto from = sentence.begin();
   for (std::sregex_iterator at(sentence.begin(), sentence.end(), option), end; at != end; ++at) {
     text.append(from, (*at)[0].first);
-    for (auto c = (*at)[1].first; c != (*at)[1].second; ++c) text += *c == '-' ? '_' : *c;
+    text += argument_of((*at)[1].matched ? (*at)[1].str() : (*at)[2].str());
     from = (*at)[0].second;
   }
   return text.append(from, sentence.end());

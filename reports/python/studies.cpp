@@ -1,13 +1,15 @@
 // Binds study, compare and sweep of settings.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <atomic>
 #include <limits>
 #include <optional>
 
 #include "analysis/sensitivity/sweep.h"
-#include "dynamics/wheel/contact_law.h"
+#include "reports/command_line/requests.h"
+#include "reports/command_line/walker_options.h"
 #include "reports/commands/compare_command.h"
 #include "reports/commands/steps_command.h"
 #include "reports/output/text_table.h"
@@ -21,14 +23,38 @@ namespace {
 
 using Command = std::string;
 
+// Gives the options of a command what they are in Python.
+LooseOptions options_of(void (*declare)(Options&), const Arguments& given) {
+  LooseOptions options(declare);
+  given.give(*options);
+  options->check_given();
+  asks_for_walker(*options);  // which a wheel does not
+  if (given.given("guided_samples")) throw std::invalid_argument("--guided-samples: has a meaning with --walker only");
+  return options;
+}
+
+// Takes an axis that the command line has too as it does.
+analysis::SweepAxis axis_of(const Options& declared, const std::string& name, const std::vector<double>& values,
+                            const analysis::Setting& base) {
+  const std::string option = option_of(name);
+  if (values.empty()) throw std::invalid_argument(fmt::format("{}: holds no value", name));
+  if (!declared.has(option) || declared.value(option) != "RANGE") {
+    for (std::size_t i = 1; i < values.size(); ++i)
+      if (!(values[i] > values[i - 1])) throw std::invalid_argument(fmt::format("{}: values must rise", name));
+    const analysis::SweepAxis axis{analysis::parameter_from_name(option), values};
+    if (!analysis::matters(base, axis.parameter))
+      throw std::invalid_argument(fmt::format("{}: has no meaning under this setting", name));
+    return axis;
+  }
+  LooseOptions given(declare_sweep);
+  given->give(option, {fmt::format("{}", fmt::join(values, ","))});
+  return sweep_axis(*given, option.c_str(), base);
+}
+
 py::dict study(const py::dict& setting, const py::dict& options, const Command& command, const py::object& progress) {
   const Arguments given(options);
-  StepsRequest request{setting_of(Arguments(setting)), study_options_of(given), "", command, given.flag("certify")};
-  request.study.direct = given.flag("direct");
-  if (request.study.direct && request.setting.law != dynamics::Law::settled)
-    throw std::invalid_argument("direct: has a meaning under law settled only");
-  request.sensitivities = given.flag("sensitivities");
-  request.how_it_fails = given.flag("how_it_fails");
+  const LooseOptions asked = options_of(declare_steps, given);
+  StepsRequest request = steps_request(*asked, setting_of(Arguments(setting)), command);
   request.standard_errors = standard_errors_of(given, request.setting);
   const auto found = std::make_shared<StepsAnswer>();
   Call call(progress);
@@ -54,10 +80,10 @@ py::dict study(const py::dict& setting, const py::dict& options, const Command& 
 py::dict compare(const py::list& settings, const py::dict& options, const Command& command,
                  const py::object& progress) {
   const Arguments given(options);
-  CompareRequest request{{}, study_options_of(given), static_cast<int>(given.whole("collisions", 1, 63)), "", command};
-  for (const py::handle& one : settings) request.settings.push_back(setting_of(Arguments(one.cast<py::dict>())));
-  if (request.settings.size() < 2)
-    throw std::invalid_argument(fmt::format("settings: {} given where at least 2 are needed", request.settings.size()));
+  std::vector<analysis::Setting> all;
+  for (const py::handle& one : settings) all.push_back(setting_of(Arguments(one.cast<py::dict>())));
+  const LooseOptions asked = options_of(declare_compare, given);
+  CompareRequest request = compare_request(*asked, all, command);
   request.standard_errors = standard_errors_of(given, request.settings.front());
   CompareAnswer found;
   Call call(progress);
@@ -82,20 +108,14 @@ struct Columns {
 };
 
 py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& options, const py::object& progress) {
-  const Arguments given(options), fields(setting), ranges(axes);
-  analysis::StudyOptions study = study_options_of(given);
-  analysis::Setting base = setting_of(fields);
+  const LooseOptions asked = options_of(declare_sweep, Arguments(options));
+  analysis::StudyOptions study = study_options(*asked);
+  const analysis::Setting base = setting_of(Arguments(setting));
   std::vector<analysis::SweepAxis> all;
   std::vector<std::string> names;
   for (const auto& [key, value] : axes) {
     names.push_back(py::str(key).cast<std::string>());
-    all.push_back({analysis::parameter_from_name(parameter_of(names.back())), ranges.numbers(names.back().c_str())});
-    const std::vector<double>& values = all.back().values;
-    if (values.empty()) throw std::invalid_argument(fmt::format("{}: holds no value", names.back()));
-    for (std::size_t i = 1; i < values.size(); ++i)
-      if (!(values[i] > values[i - 1])) throw std::invalid_argument(fmt::format("{}: values must rise", names.back()));
-    if (!analysis::matters(base, all.back().parameter))
-      throw std::invalid_argument(fmt::format("{}: has no meaning under this setting", names.back()));
+    all.push_back(axis_of(*asked, names.back(), Arguments(axes).numbers(names.back().c_str()), base));
   }
   if (all.empty()) throw std::invalid_argument("sweep: no range given");
   const std::size_t size = analysis::sweep_size(all);

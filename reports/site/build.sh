@@ -1,16 +1,27 @@
 #!/usr/bin/env bash
 # Builds the site: build.sh SOURCE BUILD [PYTHON]; SOURCE is the tree, BUILD a folder for it, PYTHON where the Python
-# module is, if it is. `./run docs` calls this.
+# module is, if it is. `build.sh --needs` only says what is missing, in one line. `./run docs` calls both.
 set -euo pipefail
+
+missing=$(/usr/bin/python3 - <<'CHECK' || echo ' python3'
+import importlib
+for module, package in (("sphinx", "python3-sphinx"), ("myst_parser", "python3-myst-parser"), ("furo", "furo"),
+                        ("breathe", "python3-breathe"), ("nbconvert", "jupyter-nbconvert"),
+                        ("ipykernel", "python3-ipykernel"), ("matplotlib", "python3-matplotlib")):
+    try:
+        importlib.import_module(module)
+    except ImportError:
+        print(f" {package} ({module} of /usr/bin/python3)", end="")
+CHECK
+)
+command -v doxygen >/dev/null || missing+=' doxygen'
+[[ -z $missing ]] || { echo "the site needs what is not there:$missing" >&2; exit 1; }
+[[ ${1:-} != --needs ]] || exit 0
 source=$1 build=$2 python=${3:-}
-command -v doxygen >/dev/null || { echo 'the site needs doxygen' >&2; exit 1; }
-for module in sphinx myst_parser furo breathe ${python:+nbconvert ipykernel matplotlib}; do
-  /usr/bin/python3 -c "import $module" 2>/dev/null || { echo "the site needs $module for /usr/bin/python3" >&2; exit 1; }
-done
 pages=$build/source
 rm -rf "$pages"
 mkdir -p "$pages" "$build/xml"
-cp -r "$source"/reports/site/{conf.py,static,*.md} "$pages"
+cp -r "$source"/reports/site/{conf.py,static,samples,*.md} "$pages"
 rm "$pages/README.md"
 
 # All headers with their folders, in which the reference looks its public ones up.

@@ -5,7 +5,8 @@
 
 A PAGE is a page of Markdown or a notebook, whose code is run (exit code 77 without Matplotlib). Blocks fenced as `console` hold commands behind "$ " (continued lines end with a backslash) and what they print, on
 either stream. Blocks fenced as `pycon` hold a Python session. The blocks of a page run in order, in one empty folder
-of their own; a line "..." stands for lines that are left out. Other blocks are not run.
+of their own, with the files of samples/ that the page offers; a line "..." stands for lines that are left out. Other
+blocks are not run.
 
 With METASTABLE_WRITE_PAGES=1 in the environment the pages are rewritten to say what came of it now; "..." stays where
 it stands.
@@ -22,6 +23,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -109,6 +111,8 @@ def check(page, programs, python_folder, write):
     """Returns what is wrong with a page, as text."""
     text, wrong = page.read_text(), []
     with tempfile.TemporaryDirectory() as folder:
+        for sample in re.findall(r"<samples/(.+?)>`", text):  # which readers download
+            shutil.copy(page.parent / "samples" / sample, folder)
         session = Session(folder, programs, python_folder)
 
         def run_block(match):

@@ -198,17 +198,14 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     seed             the same seed gives the same numbers, on any number of threads (0: all cores)
     progress         None: shown on a terminal and in a notebook; True, False, or a function of the share done (0 to 1)
     """
-    wheel = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
-                 tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
-                 direct=direct, certify=certify, sensitivities=sensitivities, standard_errors=standard_errors)
-    mesh = dict(spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples, memory_gb=memory_gb)
-    every = dict(how_it_fails=how_it_fails, seed=seed, threads=threads)
-    is_wheel = isinstance(setting, Setting)
-    _refuse(mesh if is_wheel else wheel, "a wheel" if is_wheel else "a walker")
-    options = {**(wheel if is_wheel else mesh), **every}
+    options = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
+                   tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
+                   direct=direct, certify=certify, sensitivities=sensitivities, standard_errors=standard_errors,
+                   spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples,
+                   memory_gb=memory_gb, how_it_fails=how_it_fails, seed=seed, threads=threads)
     command = _called("study", setting, **{key: value for key, value in options.items() if key != "threads"})
     with _progress.telling(progress, "study") as tell:
-        if is_wheel:
+        if isinstance(setting, Setting):
             return Study(_metastable.study(_fields(setting), options, command, tell))
         if isinstance(setting, WalkerSetting):
             return WalkerStudy(_metastable.study_walkers([_fields(setting)], options, command, tell))
@@ -217,15 +214,9 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     raise TypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
 
 
-def _refuse(options, who):
-    for name, value in options.items():
-        if value is not None and value is not False:
-            raise InputError(f"{name}: has no meaning for {who}")
-
-
 def compare(settings, *, collisions=16, method=None, cells=None, samples=None, tolerance=None, sequence=None,
-            draws=None, tail=None, replicates=None, standard_errors=None, spacing=None, simulated_steps=None,
-            guided_samples=None, memory_gb=None, seed=1, threads=0, progress=None):
+            draws=None, tail=None, replicates=None, mixing_distance=None, eigenvalues=None, standard_errors=None,
+            spacing=None, simulated_steps=None, guided_samples=None, memory_gb=None, seed=1, threads=0, progress=None):
     """Expected steps of two or more settings on common random numbers, each compared with the first: `metastable
     compare`. Settings of the wheel give a Comparison, WalkerSettings a WalkerComparison.
 
@@ -233,21 +224,18 @@ def compare(settings, *, collisions=16, method=None, cells=None, samples=None, t
     The other arguments are those of study().
     """
     settings = list(settings)
-    wheel = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
-                 tail=tail, replicates=replicates, standard_errors=standard_errors)
-    mesh = dict(spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples, memory_gb=memory_gb)
     kinds = {type(setting) for setting in settings}
     if len(settings) < 2 or len(kinds) > 1 or not kinds <= {Setting, WalkerSetting}:
         raise InputError("settings: two or more of one kind, Setting or WalkerSetting, expected")
-    is_wheel = kinds == {Setting}
-    _refuse(mesh if is_wheel else wheel, "wheels" if is_wheel else "walkers")
-    options = {**(wheel if is_wheel else mesh), "seed": seed, "threads": threads}
-    if is_wheel:
-        options["collisions"] = collisions
+    options = dict(collisions=None if collisions == 16 else collisions, method=method, cells=cells, samples=samples,
+                   tolerance=tolerance, sequence=sequence, draws=draws, tail=tail, replicates=replicates,
+                   mixing_distance=mixing_distance, eigenvalues=eigenvalues, standard_errors=standard_errors,
+                   spacing=spacing, simulated_steps=simulated_steps,
+                   guided_samples=guided_samples, memory_gb=memory_gb, seed=seed, threads=threads)
     command = _called("compare", settings, **{key: value for key, value in options.items() if key != "threads"})
     fields = [_fields(setting) for setting in settings]
     with _progress.telling(progress, "compare") as tell:
-        if is_wheel:
+        if kinds == {Setting}:
             return Comparison(_metastable.compare(fields, options, command, tell))
         return WalkerComparison(_metastable.study_walkers(fields, options, command, tell))
 
@@ -255,7 +243,7 @@ def compare(settings, *, collisions=16, method=None, cells=None, samples=None, t
 def sweep(setting, *, slope_deg=None, restitution_mean=None, restitution_sd=None, friction_mean=None, friction_sd=None,
           leg_length=None, inertia=None, ramp_stiffness=None, radius_of_gyration=None, contact_mass=None,
           tip_radius=None, method=None, cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None,
-          replicates=None, seed=1, threads=0, progress=None):
+          replicates=None, mixing_distance=None, eigenvalues=None, seed=1, threads=0, progress=None):
     """Expected steps over the product of ranges, rising values of what varies (units as in Setting): `metastable
     sweep`. A slope that varies keeps the setting's launch, which then must be given. Returns a Sweep.
 
@@ -267,7 +255,8 @@ def sweep(setting, *, slope_deg=None, restitution_mean=None, restitution_sd=None
                 tip_radius=tip_radius)
     axes = {name: values for name, values in axes.items() if values is not None}
     options = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
-                   tail=tail, replicates=replicates, seed=seed, threads=threads)
+                   tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
+                   seed=seed, threads=threads)
     if slope_deg is not None and setting.initial_speed is None:
         raise InputError("initial_speed: must be given when the slope varies")
     with _progress.telling(progress, "sweep") as tell:
@@ -360,7 +349,8 @@ def simulate(setting, *, trials=50, collisions=16, most_steps=None, stand_in=Fal
     """Trials, one by one: `metastable simulate`.
 
     A Setting gives an Experiment of `trials` trials of at most `collisions` collisions:
-    stand_in     the paper's three experiments, 51, 48 and 50 trials, instead
+    stand_in     the paper's three experiments, 51, 48 and 50 trials, instead; slope, launch and numbers are theirs, and
+                 contacts that are not given their estimates
     reality      in the virtual laboratory, which shares no formula with the model; with it
       effects      that the model lacks, texts "leg_contact:leg=3,friction_ratio=1.4" (see effects())
       outside      effects of no catalogue, {"planks": 2.0}
@@ -372,26 +362,32 @@ def simulate(setting, *, trials=50, collisions=16, most_steps=None, stand_in=Fal
     A WalkerSetting gives Walks, each of at most `most_steps` steps (None: 1000). A Walker gives SimulatedSteps: every
     trial is followed until it fails; more than `most_steps` steps of all together (None: no limit) are an error.
     """
-    common = dict(trials=trials, seed=seed, threads=threads)
+    if not isinstance(setting, (Setting, WalkerSetting, Walker)):
+        raise TypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
+    is_wheel = isinstance(setting, Setting)
+    if most_steps is not None and is_wheel:
+        raise InputError("most_steps: has a meaning with walker only")
+    if collisions != 16 and not is_wheel:
+        raise InputError("collisions: has no meaning with walker")
+    options = dict(trials=None if trials == 50 else trials, collisions=None if collisions == 16 else collisions,
+                   stand_in=stand_in, reality=reality, effects=[effects] if isinstance(effects, str) else list(effects),
+                   outside=outside, skewness=skewness or None, sensor_noise=sensor_noise or None,
+                   smoothing=smoothing or None, flight=not flight, shuffled=shuffled,
+                   drop=[drop] if isinstance(drop, str) else list(drop), angle_rate=angle_rate,
+                   angle_noise=angle_noise, seed=seed, threads=threads)
+    told = {key: value for key, value in options.items() if key not in ("flight", "threads") and value}
+    command = _called("simulate", setting, **told, **({} if flight else {"flight": 0}))
+    fields = _fields(setting)
+    if stand_in and fields.get("slope_deg") == Setting.slope_deg:
+        fields["slope_deg"] = None  # which conditions of its own have
     with _progress.telling(progress, "simulate") as tell:
-        if isinstance(setting, WalkerSetting):
-            told = _metastable.simulate_walks(_fields(setting), {**common, "most_steps": most_steps or 1000}, tell)
-            return Walks(told["walks"], told["steps"], told["fell"])
+        if is_wheel:
+            return Experiment(_metastable.simulate(fields, options, command, tell))
+        options["most_steps"] = most_steps
         if isinstance(setting, Walker):
-            told = _metastable.simulate_map(_fields(setting), {**common, "most_steps": most_steps or 2**62}, tell)
-            return SimulatedSteps(**told)
-        if not isinstance(setting, Setting):
-            raise TypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
-        laboratory = dict(effects=list(effects), outside=outside, skewness=skewness, sensor_noise=sensor_noise,
-                          smoothing=smoothing, shuffled=shuffled, drop=list(drop))
-        if not reality:
-            for name, value in {**laboratory, "flight": not flight}.items():
-                if value:
-                    raise InputError(f"{name}: needs reality")
-        options = dict(common, collisions=collisions, stand_in=stand_in, reality=reality, flight=flight,
-                       angle_rate=angle_rate, angle_noise=angle_noise, **laboratory)
-        command = _called("simulate", setting, **{k: v for k, v in options.items() if k != "threads" and v})
-        return Experiment(_metastable.simulate(_fields(setting), options, command, tell))
+            return SimulatedSteps(**_metastable.simulate_map(fields, {**options, "trials": trials}, tell))
+        walks = _metastable.simulate_walks(fields, options, tell)
+        return Walks(walks["walks"], walks["steps"], walks["fell"])
 
 
 def _experiment(what):

@@ -352,7 +352,8 @@ def study(setting: Union[WalkerSetting, Walker], *, spacing: Optional[float] = N
 def compare(settings: Iterable[Setting], *, collisions: int = 16, method: Optional[str] = None,
             cells: Optional[int] = None, samples: Optional[int] = None, tolerance: Optional[float] = None,
             sequence: Optional[str] = None, draws: Optional[str] = None, tail: Optional[float] = None,
-            replicates: Optional[int] = None, standard_errors: Optional[Mapping[str, float]] = None, seed: int = 1,
+            replicates: Optional[int] = None, mixing_distance: Optional[float] = None,
+            eigenvalues: Optional[int] = None, standard_errors: Optional[Mapping[str, float]] = None, seed: int = 1,
             threads: int = 0, progress: Progress = None) -> Comparison: ...
 @overload
 def compare(settings: Iterable[WalkerSetting], *, spacing: Optional[float] = None,
@@ -368,15 +369,16 @@ def sweep(setting: Setting, *, slope_deg: Optional[ArrayLike] = None, restitutio
           radius_of_gyration: Optional[ArrayLike] = None, contact_mass: Optional[ArrayLike] = None,
           tip_radius: Optional[ArrayLike] = None, method: Optional[str] = None, cells: Optional[int] = None,
           samples: Optional[int] = None, tolerance: Optional[float] = None, sequence: Optional[str] = None,
-          draws: Optional[str] = None, tail: Optional[float] = None, replicates: Optional[int] = None, seed: int = 1,
+          draws: Optional[str] = None, tail: Optional[float] = None, replicates: Optional[int] = None,
+          mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None, seed: int = 1,
           threads: int = 0, progress: Progress = None) -> Sweep: ...
 
 
 @overload
 def simulate(setting: Setting, *, trials: int = 50, collisions: int = 16, stand_in: bool = False,
-             reality: bool = False, effects: Sequence[str] = (), outside: Optional[Mapping[str, float]] = None,
+             reality: bool = False, effects: Union[str, Sequence[str]] = (), outside: Optional[Mapping[str, float]] = None,
              skewness: float = 0, sensor_noise: float = 0, smoothing: float = 0, flight: bool = True,
-             shuffled: bool = False, drop: Sequence[str] = (), angle_rate: Optional[float] = None,
+             shuffled: bool = False, drop: Union[str, Sequence[str]] = (), angle_rate: Optional[float] = None,
              angle_noise: Optional[float] = None, seed: int = 1, threads: int = 0,
              progress: Progress = None) -> Experiment: ...
 @overload

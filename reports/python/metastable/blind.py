@@ -1,29 +1,31 @@
 """The diagnosis tested on cases whose truth is sealed until it has answered: make, answer, open."""
 
-import dataclasses
 import os
 import pathlib
 import sys
 
 from metastable import _metastable, _progress
-from metastable._results import Description
+from metastable._results import Description, Record
 
 
-@dataclasses.dataclass(frozen=True)
-class Made:
+class Made(Record):
     """`cases` were drawn; their truths lie `sealed` in a folder of their own."""
 
-    cases: int
-    sealed: str
+    def __init__(self, cases, sealed):
+        super().__init__(dict(cases=cases, sealed=sealed))
+
+    def __repr__(self):
+        return f"<metastable.blind.Made: {self.cases} cases, truths in {self.sealed}>"
 
 
-@dataclasses.dataclass(frozen=True)
-class Answered:
+class Answered(Record):
     """Of `cases`, how many are `answered`, and on how many the tool `failed` now."""
 
-    cases: int
-    answered: int
-    failed: int
+    def __init__(self, cases, answered, failed):
+        super().__init__(dict(cases=cases, answered=answered, failed=failed))
+
+    def __repr__(self):
+        return f"<metastable.blind.Answered: {self.answered} of {self.cases} cases, {self.failed} failed>"
 
 
 class Grades(Description):

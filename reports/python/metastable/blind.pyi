@@ -1,19 +1,19 @@
 from os import PathLike
 from typing import Callable, Optional, Sequence, Union
 
-from metastable import Description
+from metastable import Description, Record
 
 Path = Union[str, PathLike[str]]
 Progress = Union[None, bool, Callable[[float], object]]
 
 
-class Made:
+class Made(Record):
     cases: int
     sealed: str
     def __init__(self, cases: int, sealed: str) -> None: ...
 
 
-class Answered:
+class Answered(Record):
     cases: int
     answered: int
     failed: int

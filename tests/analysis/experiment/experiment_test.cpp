@@ -150,9 +150,9 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
   EXPECT_EQ(of("leg = 1", "leg = 4"),
             "experiment.toml:17:21: condition[1].first_landing_leg: a whole number in 0..3 is expected");
   EXPECT_EQ(of("id = \"b\"", "id = \"a\""), "experiment.toml:13:6: id: a condition 'a' was there before");
-  EXPECT_EQ(of("[wheel]\n", "[wheel]\nhub_mas = 1\n"),
-            "experiment.toml:2:1: unknown key 'hub_mas' in wheel (known: hub_mass_kg, inertia_kg_m2, leg_lengths_m, "
-            "radius_of_gyration_m, tip_radius_m)");
+  EXPECT_EQ(of("[wheel]\n", "[wheel]\nhub_mas_kg = 1\n"),
+            "experiment.toml:2:1: unknown key 'hub_mas_kg' in wheel (known: hub_mass_kg, inertia_kg_m2, leg_lengths_m, "
+            "radius_of_gyration_m, tip_radius_m); did you mean 'hub_mass_kg'?");
   EXPECT_EQ(of("[wheel]\n", "[wheel\n").substr(0, 20), "experiment.toml:1:7:");
 }
 

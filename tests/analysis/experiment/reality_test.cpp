@@ -131,7 +131,7 @@ TEST(Reality, WhatIsDroppedIsNotTold) {
     make({}, {.dropped = {"legs"}});
     ADD_FAILURE();
   } catch (const std::invalid_argument& error) {
-    EXPECT_TRUE(std::string(error.what()).starts_with("drop: \"legs\" is none of leg, time_s")) << error.what();
+    EXPECT_TRUE(std::string(error.what()).starts_with("drop: 'legs' is none of leg, time_s")) << error.what();
   }
 }
 

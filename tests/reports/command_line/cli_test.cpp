@@ -336,7 +336,7 @@ TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
             "metastable: " + path("none.csv") + ": cannot be read: No such file or directory\n");
   EXPECT_FALSE(std::filesystem::exists(path("c")));
   EXPECT_EQ(metastable({"blind", "shut", path("run")}).err,
-            "metastable: ACTION: 'shut' is none of 'make', 'answer', 'open'\n");
+            "metastable: ACTION: 'shut' is none of make, answer, open\n");
 }
 
 // The whole report, made on one thread and on two, has the same bytes in every file.

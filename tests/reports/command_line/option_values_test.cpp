@@ -30,7 +30,7 @@ TEST(OptionValues, ACatalogueTakesPairsAndTellsAMissingFileFromAnUnknownEffect) 
   };
   EXPECT_EQ(message("list.txt"), "--catalogue: list.txt: no such file, nor a list of effects");
   EXPECT_EQ(message("bounce+air_drag+inertia"), "--catalogue: \"bounce+air_drag+inertia\" has more than two effects");
-  EXPECT_NE(message("bounce+wind").find("\"wind\" is none of"), std::string::npos);
+  EXPECT_NE(message("bounce+wind").find("'wind' is none of"), std::string::npos);
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ TEST_F(Refusals, OfOptionsThatDoNothing) {
       {{"sweep", "--law", "plastic", "--friction-sd", "0.1,0.2", "--out", path("s.csv")},
        "--friction-sd: has no meaning under --law plastic"},
       {{"steps", "--method", "integrated", "--samples", "256"}, "--samples: has a meaning under --method sampled only"},
+      {{"steps", "--draws", "plain", "--tail", "1e-9"}, "--tail: plain draws have none; --draws weighted reaches it"},
       {{"steps", "--json", ""}, "--json: what is given is empty"},
       {{"effects", "--json", ""}, "--json: what is given is empty"},
       {{"diagnose", ""}, "DIR: what is given is empty"},
@@ -101,7 +102,7 @@ TEST_F(Refusals, OfWhatNoWheelCanHave) {
       {{"steps", "--ramp-stiffness", "0"}, "--ramp-stiffness: 0 is outside [1, 1e+12]"},
       {{"steps", "--gravity", "1e5"}, "--gravity: 100000 is outside [0.001, 1000]"},
       {{"steps", "--slope", "1e-9", "--initial-speed", "5,1"},
-       "slope: 1e-09 deg is outside [0.001, 22.5) deg (below half the angle between legs)"},
+       "--slope: 1e-09 deg is outside [0.001, 22.5) deg (below half the angle between legs)"},
       {{"steps", "--restitution", "1.2,0.1"}, "--restitution: mean 1.2 is outside [0, 1]"},
       {{"sweep", "--friction-mean", "0:20:1", "--out", path("s.csv")}, "--friction-mean: 20 is outside [0, 10]"},
       {{"sweep", "--slope", "5,6", "--initial-speed", "1e5", "--out", path("s.csv")},
@@ -125,6 +126,36 @@ TEST_F(Refusals, OfADecimalCommaHintsAtThePoint) {
                   {{"steps", "--restitution", "0,4"}, "--restitution: '0,4' is mean 0 and sd 4; " + hint}});
 }
 
+TEST_F(Refusals, OfWrongWordsHintAtTheNearest) {
+  const std::string laws = "is none of published, coulomb, plastic, settled";
+  expect_refused({
+      {{"steps", "--law", "plastik"}, "--law: 'plastik' " + laws + "; did you mean 'plastic'?"},
+      {{"steps", "--law", "newton"}, "--law: 'newton' " + laws},
+      {{"steps", "--config", file("law.toml", "law = \"colomb\"\n")},
+       "--law: 'colomb' " + laws + "; did you mean 'coulomb'?"},
+      {{"steps", "--config", file("key.toml", "slope = 5\nfrictoin = 0.3\n")},
+       path("key.toml") + ":2: unknown key 'frictoin' (keys are the long options of 'metastable steps'); did you mean "
+                          "'friction'?"},
+      {{"steps", "--method", "integrate"},
+       "--method: 'integrate' is none of sampled, integrated; did you mean 'integrated'?"},
+      {{"steps", "--sequence", "sobel"}, "--sequence: 'sobel' is none of sobol, random; did you mean 'sobol'?"},
+      {{"steps", "--walker", "compas", "--slope-sd", "1"},
+       "--walker: 'compas' is none of simplest, compass; did you mean 'compass'?"},
+      {{"blind", "opne", "run"}, "ACTION: 'opne' is none of make, answer, open; did you mean 'open'?"},
+      {{"completion", "fihs"}, "SHELL: 'fihs' is none of bash, zsh, fish; did you mean 'fish'?"},
+      {{"describe", "trials", "--transition", "setp"},
+       "--transition: 'setp' is none of auto, collision, step; did you mean 'step'?"},
+      {{"describe", "trials", "--against", "coulomb,publisht"},
+       "--against: 'publisht' " + laws + "; did you mean 'published'?"},
+      {{"import", "a.csv", "--out", path("o"), "--columns", "omega_minsu=w[deg/s]"},
+       "--columns: 'omega_minsu=w[deg/s]' is not WHAT=NAME or WHAT=NAME[UNIT], where WHAT is one of condition, trial, "
+       "collision, leg, time, position, omega_minus, omega_plus, outcome, angle; did you mean 'omega_minus'?"},
+  });
+  const std::string effect =
+      metastable({"simulate", "--reality", "--effect", "leg_contct:leg=3", "--out", path("t")}).err;
+  EXPECT_TRUE(effect.ends_with("; did you mean 'leg_contact'?\n")) << effect;
+}
+
 // The help says what the messages say, from the same table.
 TEST_F(Refusals, AreAnnouncedInTheHelp) {
   std::string help = metastable({"steps", "--help"}).out;
@@ -137,9 +168,10 @@ TEST_F(Refusals, AreAnnouncedInTheHelp) {
   std::ranges::replace(help, '\n', ' ');
   for (const char* text :
        {"rad/s] (default: the paper's at 7.02 and 9.59); in [0, 1000]", "landing order; in [0.001, 100]",
-        "Hub mass M [kg]; in [1e-06, 1e+06]", "Ramp length [m]; in [0.001, 100000]", "g [m/s^2]; in [0.001, 1000]",
-        "K_r [N/m] (published); in [1, 1e+12]", "Ramp slope [deg], from 0.001 to below half the angle between legs",
-        "expected steps, relative, (0, 1)", "Draws per cell and replicate, 16..16777216"})
+        "Hub mass M [kg]; in [1e-06, 1e+06]", "Ramp length [m], inf: without end; in [0.001, 100000]",
+        "g [m/s^2]; in [0.001, 1000]", "K_r [N/m] (published); in [1, 1e+12]",
+        "Ramp slope [deg], from 0.001 to below half the angle between legs", "expected steps, relative; in (0, 1)",
+        "Draws per cell and replicate, 16..16777216"})
     EXPECT_NE(help.find(text), std::string::npos) << text << "\n" << help;
 }
 

@@ -68,11 +68,11 @@ TEST_F(WalkerCommand, SweepIsTakenUpAgain) {
 TEST_F(WalkerCommand, RefusesWhatHasNoMeaning) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"steps", "--walker", "simplest"}, "--slope-sd: is needed with --walker"},
-      {{"steps", "--walker", "biped", "--slope-sd", "1"}, "walker: 'biped' is none of simplest, compass"},
+      {{"steps", "--walker", "biped", "--slope-sd", "1"}, "--walker: 'biped' is none of simplest, compass"},
       {walker("steps", {"--slope", "50"}), "--slope: 50 is outside (0, 45)"},
       {walker("steps", {"--friction", "0.3"}), "--friction: has no meaning with --walker"},
       {walker("steps", {"--certify"}), "--certify: has no meaning with --walker"},
-      {walker("steps", {"--terrain", "sand"}), "terrain: 'sand' is none of fresh, facets"},
+      {walker("steps", {"--terrain", "sand"}), "--terrain: 'sand' is none of fresh, facets"},
       {walker("steps", {"--spacing", "3"}), "--spacing: 3 is outside [0.05, 2]"},
       {walker("compare", {}), "--slopes, --slope-sd: two slopes or two sds at least"},
       {walker("compare", {"--slopes", "0.5,0.6,0.7", "--slope-sd", "0.1,0.2"}), "--slope-sd: given 2 times"},

@@ -64,6 +64,41 @@ class SameAsTheCommandLine(unittest.TestCase):
         self.assertEqual(told(metastable.diagnose(data, catalogue=catalogue).to_dict()),
                          command_line("diagnose", str(data), "--catalogue", ",".join(catalogue)))
 
+    def test_blind(self):
+        size = dict(per_effect=0, none=1, pairs=0, outside=1, left_out=0)
+        with tempfile.TemporaryDirectory() as folder:
+            ours, theirs = pathlib.Path(folder) / "ours", pathlib.Path(folder) / "theirs"
+            made = metastable.blind.make(ours, seed=5, **size)
+            words = [f"--{name.replace('_', '-')}={number}" for name, number in size.items()]
+            command_line("blind", "make", str(theirs), "--seed=5", *words)
+            self.assertEqual(made.to_dict(), {"cases": 2, "sealed": f"{ours}-sealed"})
+            self.assertIn("<td>2</td>", made._repr_html_())
+            self.assertEqual(bytes_below(ours), bytes_below(theirs))
+            self.assertEqual(bytes_below(made.sealed), bytes_below(f"{theirs}-sealed"))
+            tool = pathlib.Path(folder) / "tool"  # answers at once, and each case with what it holds
+            tool.write_text(f'#!/bin/sh\ntest "$1" = diagnose || exit 9\ncat "$2/seal.txt" > "$4.seal"; cp "{folder}/answer.json" "$4"\n')
+            tool.chmod(0o755)
+            slope = metastable.diagnose(data, catalogue="slope_offset")
+            (pathlib.Path(folder) / "answer.json").write_text(slope._json)
+            answered = metastable.blind.answer(ours, tool=tool)
+            self.assertEqual(repr(answered), "<metastable.blind.Answered: 2 of 2 cases, 0 failed>")
+            command_line("blind", "answer", str(theirs), "--tool", str(tool))
+            mine, other = bytes_below(ours), bytes_below(theirs)
+            self.assertEqual(mine.keys(), other.keys())
+            self.assertEqual([name for name in mine if mine[name] != other[name]], ["answers/record.csv"])  # it has times
+            grades = metastable.blind.open(ours)
+            self.assertEqual(grades.to_dict()["tables"], command_line("blind", "open", str(theirs))["tables"])
+            self.assertIn("<table", grades._repr_html_())
+            self.assertTrue((ours / "report" / "index.html").is_file())
+            with self.assertRaisesRegex(metastable.InputError, "was opened"):
+                metastable.blind.answer(ours, tool=tool)
+
+
+def bytes_below(folder):
+    """The files in a folder, by their paths in it."""
+    root = pathlib.Path(folder)
+    return {str(file.relative_to(root)): file.read_bytes() for file in sorted(root.rglob("*")) if file.is_file()}
+
 
 if __name__ == "__main__":
     unittest.main()

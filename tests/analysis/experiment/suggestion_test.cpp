@@ -1,8 +1,8 @@
-#include "reports/command_line/suggestion.h"
+#include "analysis/experiment/suggestion.h"
 
 #include <gtest/gtest.h>
 
-namespace metastable::reports {
+namespace metastable::analysis {
 namespace {
 
 TEST(Suggestion, IsTheNameWithFewestTypingErrors) {
@@ -17,4 +17,4 @@ TEST(Suggestion, IsTheNameWithFewestTypingErrors) {
 }
 
 }  // namespace
-}  // namespace metastable::reports
+}  // namespace metastable::analysis

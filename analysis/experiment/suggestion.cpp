@@ -1,11 +1,13 @@
-#include "reports/command_line/suggestion.h"
+#include "analysis/experiment/suggestion.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstddef>
+#include <stdexcept>
 
-namespace metastable::reports {
+namespace metastable::analysis {
 namespace {
 
 // Counts typing errors: Damerau-Levenshtein distance by its dynamic programme (optimal string alignment).
@@ -28,6 +30,8 @@ std::size_t typing_errors(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest(std::string_view word, const std::vector<std::string>& names) {
+  constexpr std::size_t longest_name = 100;
+  if (word.size() > longest_name) return "";  // a file's text may be of any length
   std::string found;
   std::size_t least = std::max<std::size_t>(1, word.size() / 3) + 1;
   for (const std::string& name : names) {
@@ -45,4 +49,10 @@ std::string did_you_mean(std::string_view word, const std::vector<std::string>& 
   return name.empty() ? "" : fmt::format("; did you mean '{}'?", name);
 }
 
-}  // namespace metastable::reports
+void require_word(std::string_view called, std::string_view word, const std::vector<std::string>& known) {
+  if (std::ranges::find(known, word) == known.end())
+    throw std::invalid_argument(
+        fmt::format("{}: '{}' is none of {}{}", called, word, fmt::join(known, ", "), did_you_mean(word, known)));
+}
+
+}  // namespace metastable::analysis
