@@ -119,7 +119,9 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   }
   const auto& outside = dynamics::outside_effects();
   for (int o = 0; o < size.outside; ++o)
-    plan.push_back({BlindKind::outside, {outside[static_cast<std::size_t>(o) % outside.size()].id}, 0});
+    plan.push_back({BlindKind::outside,
+                    {outside[static_cast<std::size_t>(o) % outside.size()].id},
+                    static_cast<std::size_t>(o) / outside.size() % 2 == 0 ? 2 : 4});
   for (std::size_t i = plan.size(); i > 1; --i)
     std::swap(plan[i - 1], plan[static_cast<std::size_t>(dice.whole(0, static_cast<int>(i) - 1))]);
   return plan;
@@ -163,7 +165,8 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   if (!truth.effects.empty()) truth.power = power(design, truth.effects);
   if (plan.kind == BlindKind::outside) {
     const dynamics::OutsideInfo& info = dynamics::outside_info(plan.effects.front());
-    truth.outside = {info.id, info.upper * dice.uniform(0.35, 0.8)};
+    // Twice the size is four times the power: 0.4 of the range stands for 2x, 0.8 for 4x.
+    truth.outside = {info.id, info.upper * 0.2 * plan.strength * dice.uniform(0.85, 1.15)};
     design.reality.outside = {*truth.outside};
   }
 

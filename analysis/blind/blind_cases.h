@@ -39,7 +39,7 @@ struct BlindTruth {
   BlindKind kind = BlindKind::none;
   std::vector<dynamics::Effect> effects;
   std::optional<dynamics::OutsideEffect> outside;
-  int strength = 0;  ///< 1, 2, 4; 0 where it is not defined (none, outside)
+  int strength = 0;  ///< 1, 2, 4; of `outside` by its size alone; 0 where it is not defined (none)
   double power = 0;  ///< expected 2 Delta log likelihood, true contact known
   double left = 0;   ///< realised, after recalibration; 0 until complete_truth()
   /// Of a pair, by effect, it is what was realised after recalibration with the other effect in the model. Not sealed,

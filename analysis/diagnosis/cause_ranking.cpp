@@ -55,8 +55,7 @@ double log_evidence(const ScannedEffect& scanned, double gain) {
     const double share = v == scanned.best || !(best > 0) ? 1 : scanned.gain[v] / best;
     sum += std::exp(0.5 * shrink * gain * (std::min(1.0, share) - 1));
   }
-  return 0.5 * shrink * gain + std::log(sum / static_cast<double>(scanned.gain.size())) -
-         0.5 * parameters * std::log1p(g);
+  return evidence_of_gain(gain, parameters) + std::log(sum / static_cast<double>(scanned.gain.size()));
 }
 
 EffectTerm term_at(const ScannedEffect& scanned, std::size_t variant) {
@@ -448,6 +447,11 @@ void Ranker::fit_pairs() {
 }
 
 }  // namespace
+
+double evidence_of_gain(double gain, double parameters) {
+  const double g = expected_gain / std::max(1.0, parameters);
+  return 0.5 * g / (1 + g) * gain - 0.5 * parameters * std::log1p(g);
+}
 
 PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse) {
   PhaseGain gain;

@@ -62,6 +62,9 @@ struct RankingOptions {
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options);
 
+/// Returns that evidence of an effect without variants. @param parameters  >= 0
+double evidence_of_gain(double gain, double parameters);
+
 inline constexpr double model_error = 0.06;
 
 /// Is 2 Delta log likelihood of one fit over another, in stances and in everything else.

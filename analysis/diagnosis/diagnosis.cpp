@@ -15,6 +15,7 @@
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/diagnosis/gap_map.h"
 #include "analysis/diagnosis/gap_shrinkage.h"
+#include "analysis/diagnosis/left_over.h"
 #include "analysis/diagnosis/missing_columns.h"
 #include "analysis/diagnosis/too_few.h"
 #include "analysis/diagnosis/visibility.h"
@@ -26,7 +27,8 @@ namespace metastable::analysis {
 namespace {
 
 // These levels decide whether there is a gap.
-constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes
+constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes:
+constexpr double share_for_facets = 0.05;   //   in all cells of a facet together, the others in one cell
 constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide one another; hardly ever used up
 constexpr double recalibration_level = 0.02;
 constexpr double least_p_value = 1e-12;  // smaller ones are beyond what chance levels can say
@@ -35,9 +37,14 @@ constexpr double least_p_value = 1e-12;  // smaller ones are beyond what chance 
 constexpr double left_over_level = 0.003;  // of the map's p-value
 constexpr double left_over_square = 15;    // of a cell's statistic, beyond the model error
 constexpr double least_left_over = 0.05;   // held-out gap that counts as one [nats a collision]
+constexpr double least_left_in_all = 6;    //   or that no draw of the trials takes away [nats, all collisions]
 constexpr double left_over_errors = 6;     // squared model errors of the gap as given that count as none, held out
 constexpr double largest_log_odds = 300;   // of none: their exponential stays finite
-constexpr double certain = 1e6;            // odds of none where a test decides against all that were fitted
+// Prior odds of something without a name: to one effect of the catalogue; beside a hypothesis to the hypothesis alone.
+constexpr double unnamed_alone = 4, unnamed_beside = 0.03;
+constexpr std::size_t most_beside = 3;  // hypotheses beside which it is supposed, the recalibrated model not counted,
+constexpr double beside_margin = 12;    //   whose evidence is no further behind the best
+constexpr double certain = 1e6;         // odds of none where a test decides against all that were fitted
 
 // These numbers are of odds and sets.
 constexpr double none_prior = 0.01;      // odds of none to a gap where nothing is left over
@@ -89,6 +96,14 @@ double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit
         std::min(least, looks * boost::math::cdf(boost::math::complement(boost::math::chi_squared(parameters), gain)));
   }
   return least;
+}
+
+// Takes the facet with the least p-value, for as many facets.
+double facets_p_value(const CauseRanking& ranking, const std::vector<LeftInFacet>& facets) {
+  double least = 1;
+  if (!ranking.scan.trials_suffice) return least;
+  for (const LeftInFacet& facet : facets) least = std::min(least, facet.p_value);
+  return std::min(1.0, least * static_cast<double>(facets.size()));
 }
 
 std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::MatrixXd& covariance,
@@ -270,14 +285,36 @@ Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
   return given;
 }
 
+void describe_data(Diagnosis& d, const TransitionModel& model) {
+  d.data.trials = model.trials();
+  d.data.events = model.events().size();
+  for (const Event& e : model.events())
+    d.data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
+  for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
+  d.data.notes = model.notes();
+  d.data.accepted_defects = model.accepted_defects();
+  d.gap.refitted = model.recalibrated();
+}
+
+// What the data hold no information on is not decided, whatever its evidence.
+void leave_undecided(Diagnosis& d, CauseRanking& ranking, const std::vector<const Candidate*>& candidates) {
+  d.limits.visible = visibility(ranking.scan, candidates);
+  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
+    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() &&
+        d.limits.visible[i].smallest == 0)
+      ranking.singles[i].not_decided = d.limits.visible[i].undecidable;
+}
+
 // Puts the tests for a gap together.
 void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated) {
   d.gap.p_effects = std::max(least_p_value, ranking.p_value);
   d.gap.p_where = std::max(least_p_value, d.gap.recalibrated.p_value);
+  d.gap.p_facets = std::max(least_p_value, facets_p_value(ranking, d.causes.unnamed.front().facets));
   d.gap.p_recalibration = std::max(least_p_value, d.gap.p_recalibration);
   const double pairs = std::max(least_p_value, pairs_p_value(ranking, candidates, recalibrated));
-  d.gap.p_value = std::min(
-      {1.0, d.gap.p_effects / share_for_effects, d.gap.p_where / (1 - share_for_effects), pairs / share_for_pairs});
+  d.gap.p_value =
+      std::min({1.0, d.gap.p_effects / share_for_effects, d.gap.p_where / (1 - share_for_effects - share_for_facets),
+                d.gap.p_facets / share_for_facets, pairs / share_for_pairs});
   d.gap.p_as_given = std::min(1.0, 2 * std::min(d.gap.p_recalibration, d.gap.p_value));
 }
 
@@ -325,9 +362,37 @@ struct Chosen {
   double bent = 1;           // share of its gain that an error of form may bend
 };
 
+// Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds to all hypotheses.
+double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
+                       const std::vector<const RankedCause*>& ordered, const Fit& recalibrated) {
+  const double top = ordered.front()->evidence;
+  double all = 0, joined = 0, beside = 0;  // hypotheses, those of them that are joined, and those joined
+  for (const RankedCause* cause : ordered) {
+    all += std::exp(cause->evidence - top);
+    if (d.causes.unnamed.size() > most_beside || cause->evidence < top - beside_margin) continue;
+    if (cause->fit.nuisance.empty()) continue;
+    const PhaseGain gained = phase_gain(model, cause->fit, exact_part(ranking.singles, cause->terms, recalibrated));
+    Unnamed one{{},
+                cause->evidence,
+                left_by_facet(model, cause->fit, model_error * model_error * gained.collisions,
+                              model_error * model_error * gained.stances)};
+    for (const EffectTerm& term : cause->terms) one.beside.push_back(term.candidate->id);
+    one.evidence += evidence_of_more(one.facets);
+    joined += std::exp(cause->evidence - top);
+    beside += std::exp(std::min(largest_log_odds, one.evidence - top));
+    d.causes.unnamed.push_back(std::move(one));
+  }
+  Unnamed& alone = d.causes.unnamed.front();
+  alone.evidence = evidence_of_more(alone.facets);
+  return unnamed_alone * std::exp(std::min(largest_log_odds, alone.evidence - top)) / all +
+         (joined > 0 ? unnamed_beside * beside / joined : 0);
+}
+
 // What the best hypothesis leaves on the map is judged beyond its own model error.
-Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking, const RankedCause& best,
-              const Fit& recalibrated, const DiagnosisOptions& options) {
+Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
+              const std::vector<const RankedCause*>& ordered, const Fit& recalibrated,
+              const DiagnosisOptions& options) {
+  const RankedCause& best = *ordered.front();
   Chosen chosen{&best.fit};
   d.gap.left = gap_map(model, best.fit, options.draws, options.seed + 1);
   const Fit& exact = exact_part(ranking.singles, best.terms, recalibrated);
@@ -343,9 +408,18 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
   const double beyond = d.gap.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
   if (d.gap.left.p_value < left_over_level && beyond > left_over_square)
     chosen.none = std::exp(std::min(largest_log_odds, 0.5 * (beyond - left_over_square)));
+  chosen.none = std::max(chosen.none, odds_of_unnamed(d, model, ranking, ordered, recalibrated));
   d.causes.together = best.together;
   if (d.causes.together > most_together) chosen.none = std::max(chosen.none, certain);
   return chosen;
+}
+
+// Says whether trials that the cause was not fitted to still show a gap, beyond what its form may be off.
+bool leaves_gap_held_out(const Shrinkage& log_score, double bent, std::size_t collisions) {
+  const double tolerated = model_error * model_error * left_over_errors * bent * log_score.baseline;
+  if (log_score.with_effect > least_left_over + tolerated) return true;
+  return log_score.with_effect_least > tolerated &&
+         log_score.with_effect * static_cast<double>(collisions) > least_left_in_all;
 }
 
 // Lists those that compete on the trials held out.
@@ -369,10 +443,11 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const std
   for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
   // The tests decide whether there is a gap, because their levels are calibrated and the evidence's are not: where both
   // disagree, the odds of a gap go no further than even.
-  const double even = weight_null / (1 + none_prior + none);
+  none = std::max(none, none_prior);
+  const double even = weight_null / (1 + none);
   double share = 1;
   if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
-  const double weight_none = (none + none_prior) * (given_gap > 0 ? share * given_gap : even);
+  const double weight_none = none * (given_gap > 0 ? share * given_gap : even);
   const double sum = weight_null + share * given_gap + weight_none;
   d.causes.p_none = weight_none / sum;
   (d.gap.p_recalibration < recalibration_level ? d.causes.p_recalibrate : d.causes.p_no_gap) = weight_null / sum;
@@ -438,14 +513,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   };
 
   Diagnosis d;
-  d.data.trials = model.trials();
-  d.data.events = model.events().size();
-  for (const Event& e : model.events())
-    d.data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
-  for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
-  d.data.notes = model.notes();
-  d.data.accepted_defects = model.accepted_defects();
-  d.gap.refitted = model.recalibrated();
+  describe_data(d, model);
 
   progress(0, "the model as given");
   const std::vector<double> nominal = nominal_values(model);
@@ -466,21 +534,17 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
                                       .seed = options.seed,
                                       .pairs = wanted_pairs(candidates, options.catalogue),
                                       .progress = [&](double share) { progress(0.15 + 0.5 * share, "which effect"); }});
+  d.causes.unnamed.push_back({{}, 0, left_by_facet(model, recalibrated, 0, 0)});
   test_for_gap(d, ranking, candidates.size(), recalibrated);
   note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
-  // What the data hold no information on is not decided, whatever its evidence.
-  d.limits.visible = visibility(ranking.scan, candidates);
-  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
-    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() &&
-        d.limits.visible[i].smallest == 0)
-      ranking.singles[i].not_decided = d.limits.visible[i].undecidable;
+  leave_undecided(d, ranking, candidates);
   const std::vector<const RankedCause*> ordered = hypotheses(d, model, ranking);
   const bool gap = d.gap.p_value < options.level;
 
   Chosen chosen{&recalibrated};
   if (gap && !ordered.empty() && ordered.front()->evidence > 0 && !ordered.front()->fit.nuisance.empty()) {
     progress(0.68, "what is left");
-    chosen = choose(d, model, ranking, *ordered.front(), recalibrated, options);
+    chosen = choose(d, model, ranking, ordered, recalibrated, options);
   } else {
     d.gap.left = d.gap.recalibrated;
     if (gap) chosen.none = certain;  // cells of the map stand out, and no effect does
@@ -494,8 +558,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
                       options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
   // Even a cause that closes nearly all of a huge gap may leave a large one.
   if (named && !d.shrinkage.measures.empty() &&
-      d.shrinkage.measures[0].with_effect > least_left_over + model_error * model_error * left_over_errors *
-                                                                  chosen.bent * d.shrinkage.measures[0].baseline)
+      leaves_gap_held_out(d.shrinkage.measures[0], chosen.bent, d.data.collisions))
     chosen.none = std::max(chosen.none, certain);
   const double share_of_effects = share_probabilities(d, model, ordered, candidates.size(), gap, chosen.none);
   give_verdict(d, gap, chosen.none, share_of_effects);

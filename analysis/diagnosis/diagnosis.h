@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "analysis/diagnosis/gap_cell.h"
+#include "analysis/diagnosis/left_over.h"
 #include "analysis/diagnosis/transition_model.h"
 
 namespace metastable::analysis {
@@ -52,6 +53,13 @@ struct Cause {
   std::string name() const;  ///< "a" or "a+b"
 };
 
+/// Supposes something that has no name beside a hypothesis or alone.
+struct Unnamed {
+  std::vector<std::string> beside;  ///< ids; empty: the recalibrated model
+  double evidence = 0;              ///< log Bayes factor against the recalibrated model, without its prior odds
+  std::vector<LeftInFacet> facets;  ///< where it would act
+};
+
 /// Says what the data could have seen of one effect.
 struct Visibility {
   std::string effect;
@@ -90,6 +98,7 @@ struct Shrinkage {
   /// Is (baseline - with_effect) / (baseline - floor); nothing where the denominator's interval covers zero.
   std::optional<double> closed, closed_lower, closed_upper;  ///< 90 % interval over trials
   double baseline_lower = 0, baseline_upper = 0;             ///< 90 %
+  double with_effect_least = 0;  ///< of with_effect when trials are drawn anew, some hundred times
 };
 
 struct StepsBeforeFailure {
@@ -129,9 +138,10 @@ struct Diagnosis {
   struct Gap {
     double p_as_given = 1;       ///< of the model as given: twice the smaller of the next two
     double p_recalibration = 1;  ///< of as large a gain by recalibration
-    double p_value = 1;          ///< of a gap after it: the smallest of the next two and one of pairs, shared out
+    double p_value = 1;          ///< of a gap after it: the smallest of the next three and one of pairs, shared out
     double p_effects = 1;        ///< of the best single effect, with the look elsewhere
     double p_where = 1;          ///< of the largest cell of the map
+    double p_facets = 1;         ///< of the facet that has most left, its cells together, with the look elsewhere
     GapMap as_given, recalibrated, left;      ///< maps under the nominal, the refitted, and the chosen model
     std::string refitted;                     ///< what a recalibration refits (TransitionModel::recalibrated)
     std::vector<EstimatedParameter> contact;  ///< recalibrated
@@ -141,6 +151,7 @@ struct Diagnosis {
   struct Causes {
     std::vector<Cause> ranked;  ///< by falling probability; singles, then pairs that were tried among them
     std::vector<Cause> not_decided;
+    std::vector<Unnamed> unnamed;  ///< supposed beside the likeliest hypotheses
     std::vector<std::string> set;  ///< names; empty if unexplained or no gap
     std::string size;              ///< of the likeliest beside the nominal model, a sentence; or empty
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t most_parameters = 3;  // of an effect that a sentence names
 constexpr double shown_level = 0.05;        // of a cell, for a sentence
+constexpr double worth_saying = 3;          // evidence in a facet
 constexpr double worth_naming = 10;         // gain of the nearest effect where none explains the gap
 
 std::string with_parameters(const Cause& cause) {
@@ -24,6 +25,21 @@ std::string with_parameters(const Cause& cause) {
     if (!inside.empty() && inside.size() <= most_parameters) text += fmt::format(" ({})", fmt::join(inside, ", "));
   }
   return text;
+}
+
+// Says where something without a name acts, were it at work alone or beside a cause that is.
+void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
+  const auto most = std::max_element(d.causes.unnamed.begin(), d.causes.unnamed.end(),
+                                     [](const Unnamed& a, const Unnamed& b) { return a.evidence < b.evidence; });
+  if (most == d.causes.unnamed.end() || most->facets.empty()) return;
+  const auto facet =
+      std::max_element(most->facets.begin(), most->facets.end(),
+                       [](const LeftInFacet& a, const LeftInFacet& b) { return a.evidence < b.evidence; });
+  if (facet->evidence < worth_saying) return;
+  s.push_back(
+      fmt::format("{} it acts by {}, on the {} of {}.",
+                  most->beside.empty() ? "By itself" : fmt::format("Beside {}", fmt::join(most->beside, " and ")),
+                  facet->facet, facet->aspect, facet->stance ? "stances" : "collisions"));
 }
 
 void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
@@ -64,6 +80,7 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
       else if (!d.causes.ranked.empty() && d.causes.ranked.front().gain > worth_naming)
         s.push_back(fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.",
                                 d.causes.ranked.front().name()));
+      say_unnamed(s, d);
       break;
   }
 }

@@ -79,10 +79,12 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
   s.floor = here[3];
   std::vector<double> gaps, closed;
   std::vector<double> baselines;
+  s.with_effect_least = s.with_effect;
   for (std::uint64_t draw = 0; draw < interval_draws; ++draw) {  // trials drawn anew, by exponential weights
     const auto mean = average([&](std::size_t t) { return exponential_weight(seed, draw, t); });
     baselines.push_back(mean[0]);
     gaps.push_back(mean[0] - mean[3]);
+    s.with_effect_least = std::min(s.with_effect_least, mean[2]);
     if (gaps.back() > 0) closed.push_back((mean[0] - mean[2]) / gaps.back());
   }
   std::sort(baselines.begin(), baselines.end());

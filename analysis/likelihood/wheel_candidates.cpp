@@ -169,8 +169,13 @@ WheelCandidate speed_dependent_friction() {
   return c;
 }
 
-// Variants are the intervals between twelfths of the stretch that was rolled over.
+// Variants are the intervals between twelfths of the stretch that was rolled over. Where every trial has the same
+// footholds, a patch that holds one of them is a collision number and no patch: it takes two.
 WheelCandidate friction_patch(const WheelDesign& design) {
+  const auto is_patch = [footholds = design.footholds](double from, double to) {
+    return footholds.empty() || std::count_if(footholds.begin(), footholds.end(),
+                                              [&](double foot) { return from <= foot && foot <= to; }) > 1;
+  };
   WheelCandidate c;
   c.candidate.id = "friction_patch";
   c.candidate.parameters = {{1, 0.1, 5, 1e-3}};
@@ -179,7 +184,12 @@ WheelCandidate friction_patch(const WheelDesign& design) {
   const double part = (design.furthest + 0.06) / parts;
   for (int from = 0; from < parts; ++from)
     for (int to = from + 1; to <= std::min(parts, from + 8); ++to)
-      c.candidate.variants.push_back({from * part - 0.03, to * part - 0.03});
+      if (is_patch(from * part - 0.03, to * part - 0.03))
+        c.candidate.variants.push_back({from * part - 0.03, to * part - 0.03});
+  if (c.candidate.variants.empty()) {
+    c.candidate.variants.push_back({-0.03, parts * part - 0.03});
+    c.candidate.undecidable = "no patch holds two footholds";
+  }
   c.candidate.refine = {part, part};
   c.candidate.report = [](const Values& variant, const Values& v) {
     return std::vector<NamedValue>{
@@ -188,7 +198,8 @@ WheelCandidate friction_patch(const WheelDesign& design) {
   c.candidate.form_of = [end = design.ramp_length](const Values& v) {
     return FittedForm{{v[0], v[1] > 0 ? v[1] : end}, {v[2]}};
   };
-  c.apply = [](Extension& e, const Values& variant, const Values& v) {
+  c.apply = [is_patch](Extension& e, const Values& variant, const Values& v) {
+    if (!is_patch(variant[0], variant[1])) return;  // nothing is gained by such a variant
     e.patch_from = variant[0];
     e.patch_to = variant[1];
     e.patch_friction = v[0];

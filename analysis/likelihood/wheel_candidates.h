@@ -26,7 +26,9 @@ struct WheelDesign {
   std::vector<double> leg_lengths;  ///< stated [m]
   std::vector<double> speeds;       ///< between the measured omega-, rising: quantiles [rad/s]
   double furthest = 1.8;            ///< landing foot [m]
-  double ramp_length = 3.66;        ///< [m]
+  /// By collision number: where its foot lands [m], while all trials land it there; empty: they start anywhere.
+  std::vector<double> footholds;
+  double ramp_length = 3.66;  ///< [m]
   dynamics::Law law = dynamics::Law::published;
 };
 

@@ -40,6 +40,24 @@ WheelRuns runs_with_legs(const Experiment& experiment) {
 
 constexpr double least_shift = 1e-4;  // of mu from day to day: no two days are more alike
 
+// Says where the foot of each collision lands, by number; nothing where trials differ by more than a quarter of a step.
+std::vector<double> fixed_footholds(const std::vector<WheelRun>& runs) {
+  std::vector<std::pair<double, double>> ends;  // least and largest
+  for (const WheelRun& run : runs)
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) {
+      const double at = run.collisions[k].context.position;
+      if (k == ends.size()) ends.emplace_back(at, at);
+      ends[k] = {std::min(ends[k].first, at), std::max(ends[k].second, at)};
+    }
+  std::vector<double> footholds;
+  for (const auto& [least, most] : ends) {
+    const double step = ends.back().second / static_cast<double>(std::max<std::size_t>(1, ends.size() - 1));
+    if (most - least > 0.25 * step) return {};
+    footholds.push_back((least + most) / 2);
+  }
+  return footholds;
+}
+
 class WheelTransitions : public TransitionModel {
  public:
   explicit WheelTransitions(const Experiment& experiment);
@@ -114,6 +132,7 @@ void WheelTransitions::set_up_parameters() {
   design.furthest = 0.1;
   for (const WheelRun& run : measured_.runs)
     design.furthest = std::max(design.furthest, run.collisions.back().context.position);
+  design.footholds = fixed_footholds(measured_.runs);
   std::vector<double> speeds;
   for (const WheelRun& run : measured_.runs)
     for (const RunCollision& m : run.collisions) speeds.push_back(m.before);

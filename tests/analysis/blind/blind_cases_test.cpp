@@ -133,7 +133,7 @@ TEST(BlindCases, LeftOutEffectsAreNotInTheCatalogueGiven) {
   EXPECT_EQ(made.catalogue.size(), 22U);
   for (const std::string& id : made.catalogue) EXPECT_NE(id, "inertia");
   EXPECT_EQ(made.truth.left_out, std::vector<std::string>{"inertia"});
-  const BlindCase outside = blind_case({BlindKind::outside, {"planks"}, 0}, 2, 9, square_power);
+  const BlindCase outside = blind_case({BlindKind::outside, {"planks"}, 2}, 2, 9, square_power);
   ASSERT_TRUE(outside.truth.outside);
   EXPECT_GT(outside.truth.outside->size, 0);
   EXPECT_THROW(blind_kind("some"), std::invalid_argument);

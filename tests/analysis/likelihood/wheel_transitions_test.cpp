@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "analysis/diagnosis/model_fit.h"
 #include "analysis/experiment/experiment_folder.h"
@@ -42,6 +44,24 @@ TEST(WheelTransitions, FitsFindTheSizesOfEffects) {
     }
     EXPECT_GT(found.penalised, fit(*data, nominal_values(*data), {}).penalised + 8) << one.id;
   }
+}
+
+// Where all trials land on the same footholds, a patch that holds one of them alone is a collision number.
+TEST(WheelTransitions, PatchesHoldTwoFootholdsWhereTheseAreFixed) {
+  Experiment experiment = test::wheel_design(8, 16);
+  const auto narrow = [&] {  // patches that hold one foothold or none; and of all, how many there are
+    const auto patch = term(*wheel_transitions(experiment), "friction_patch", {}, {}).candidate->variants;
+    return std::pair(std::count_if(patch.begin(), patch.end(),
+                                   [](const std::vector<double>& v) {
+                                     return std::floor(v[1] / 0.1163) - std::ceil(std::max(0.0, v[0]) / 0.1163) < 1;
+                                   }),
+                     patch.size());
+  };
+  const auto fixed = narrow();
+  EXPECT_EQ(fixed.first, 0);
+  EXPECT_GT(fixed.second, 30U);
+  for (MeasuredCollision& c : experiment.trials[3].collisions) *c.position += 0.06;  // starts half a step further down
+  EXPECT_GT(narrow().first, 0);
 }
 
 // Makes transitions of trials rolled event by event under `settled`, with feet that hop and slide; next speeds after

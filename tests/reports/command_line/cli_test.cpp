@@ -419,7 +419,7 @@ TEST_F(CommandLine, StandardErrorsOfWhatDoesNotMatterAreRefused) {
 TEST_F(CommandLine, DiagnoseNamesTheKnownEffects) {
   const Ran ran = metastable({"diagnose", path("none"), "--catalogue", "lag_contact"});
   EXPECT_EQ(ran.code, 2);
-  for (const char* part : {"\"lag_contact\"", "leg_contact", "slip_reversal"})
+  for (const char* part : {"'lag_contact'", "leg_contact", "slip_reversal"})
     EXPECT_NE(ran.err.find(part), std::string::npos) << part << "\n" << ran.err;
 }
 

@@ -1,0 +1,32 @@
+#pragma once
+// What a hypothesis leaves, facet by facet: evidence that something acts there which has no name.
+
+#include <string>
+#include <vector>
+
+namespace metastable::analysis {
+
+class TransitionModel;
+struct Fit;
+
+/// Holds what is left in one facet and aspect of it, all its cells together.
+struct LeftInFacet {
+  std::string facet, aspect;  ///< as GapCell's, or of a facet that the map lacks
+  bool stance = false;
+  double quadratic = 0;  ///< chi-squared of that many degrees where nothing is left
+  double degrees = 0;
+  double p_value = 1;   ///< of it
+  double evidence = 0;  ///< log Bayes factor of shifts of all its cells, see rank_causes() for their prior
+};
+
+/// Judges the facets of the map; and what no effect of a catalogue does: every other trial, slow swings over the
+/// trials, smooth changes along them, trends of single legs, memory beyond the last collision, the change of speed
+/// since then. What the fit's parameters could take up is projected out. Empty of a fit that did not settle.
+/// @param collisions, stances  2 Delta log likelihood that an error of form may leave in a facet, see PhaseGain
+std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, double collisions, double stances);
+
+/// Returns the log of the mean of the facets' Bayes factors: something without a name, in a facet that nobody told.
+/// -infinity where there are none.
+double evidence_of_more(const std::vector<LeftInFacet>& facets);
+
+}  // namespace metastable::analysis
