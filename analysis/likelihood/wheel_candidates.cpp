@@ -316,7 +316,7 @@ std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
       leg_contact(design),
       hub_eccentricity(design),
       simple("inertia", "ratio", &Extension::inertia_ratio, {1, 0.5, 2, 1e-4}),
-      simple("slope_offset", "offset_deg", &Extension::slope_offset, {0, -3, 3, 1e-3}, degree),
+      simple("slope_offset", "offset_deg", &Extension::slope_offset_rad, {0, -3, 3, 1e-3}, degree),
       needing(2, design.away, away, slope_profile(design)),
       simple("axle_drag_viscous", "n_m_s", &Extension::viscous, {0, -0.1, 0.1, 1e-6}),
       simple("rolling_resistance", "torque_n_m", &Extension::rolling, {0, -0.3, 0.3, 1e-5}),

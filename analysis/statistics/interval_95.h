@@ -4,11 +4,11 @@
 #include <cstddef>
 
 #include "analysis/statistics/estimate.h"
+#include "markov/normal_95.h"
 
 namespace metastable::analysis {
 
-/// Is the half-width of a normal estimate's 95 % interval, in standard errors: the normal's 97.5 % quantile.
-inline constexpr double normal_95 = 1.959963984540054;
+using markov::normal_95;
 
 /// Returns count/of with its exact binomial 95 % interval (Clopper and Pearson 1934). O(1).
 /// @param count  <= of

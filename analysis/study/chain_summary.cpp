@@ -254,7 +254,8 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
         markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   }
   describe_survivors(problem, space, states, quasi.distribution, result);
-  if (dot(launch.after, launch.after) > 0) {
+  constexpr double nobody = 1e-15;  // survivors of a launch that nodes and draws tell from none
+  if (std::accumulate(launch.after.begin(), launch.after.end(), 0.0) > nobody) {
     const MeanSd restarted = observe(problem, states, markov::stationary_with_restart(solver, launch.after));
     result.survivors.restart_mean = restarted.mean;
     result.survivors.restart_sd = restarted.sd;

@@ -16,6 +16,12 @@ class Contradiction : public markov::ConvergenceError {
   explicit Contradiction(const std::string& what) : ConvergenceError("contradiction: " + what) {}
 };
 
+/// Says that the chain's states leave out too much for its numbers to be known.
+class StatesTooCoarse : public markov::ConvergenceError {
+ public:
+  explicit StatesTooCoarse(const std::string& what) : ConvergenceError("not known: " + what) {}
+};
+
 /// Survival starts at 1, does not rise, and sums to no more than the expected steps; every interval holds its value;
 /// expected steps are at least 1, rates lie in [0, 1]; and all of Metastability::agreements hold.
 /// study() asks this of every result. @throws Contradiction
@@ -23,6 +29,12 @@ void require_consistent(const Metastability& study);
 
 /// Do the study's interval of the expected steps and the guaranteed bounds overlap? @throws Contradiction if not
 void require_consistent(const Metastability& study, const CertifiedSteps& certified);
+
+/// Where landings read from a table, or what states leave out, may move the expected steps by a tenth and more, an
+/// estimate of first order may miss how much: the events themselves are followed from 4000 launches, no further than
+/// survival is known, if `problem` can. @throws StatesTooCoarse with both numbers if what is followed lies outside the
+/// interval of the study by more than 4 standard errors
+void require_followed(const Problem& problem, const Metastability& study, const StudyOptions& options);
 
 /// Do two 95 % intervals of one quantity overlap? @throws Contradiction if not, naming both
 void require_overlap(const std::string& what, const std::string& name_a, const Estimate& a, const std::string& name_b,

@@ -63,9 +63,10 @@ markov::IntegratedChain ExactRows::chain(const Problem& problem, const markov::N
                      : markov::integrate(problem.map, space, problem.launch, threads_);
 }
 
-markov::Launch ExactRows::row(const Problem& problem, const markov::NodeSpace& space, double state, int phase) const {
-  return collocated_ ? markov::collocated_row(problem.map, space, state, phase)
-                     : markov::integrated_row(problem.map, space, state, phase);
+markov::Launch ExactRows::launch(const Problem& problem, const markov::NodeSpace& space,
+                                 const markov::LaunchState& launch, int halvings) const {
+  return collocated_ ? markov::collocated_launch(problem.map, space, launch, halvings, threads_)
+                     : markov::integrated_launch(problem.map, space, launch, halvings, threads_);
 }
 
 }  // namespace metastable::analysis

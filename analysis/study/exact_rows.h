@@ -29,8 +29,9 @@ class ExactRows {
   /// Has coarsest() times `panels` nodes a phase; phase p moved by shift[p], if given.
   markov::NodeSpace space(std::size_t panels, const std::vector<double>& shift = {}) const;
   markov::IntegratedChain chain(const Problem& problem, const markov::NodeSpace& space) const;
-  /// Says where one event from `state` at `phase` leads.
-  markov::Launch row(const Problem& problem, const markov::NodeSpace& space, double state, int phase) const;
+  /// Says where a launch leads, by a quadrature of its states that is halved so often.
+  markov::Launch launch(const Problem& problem, const markov::NodeSpace& space, const markov::LaunchState& launch,
+                        int halvings = 0) const;
 
  private:
   bool collocated_ = false;

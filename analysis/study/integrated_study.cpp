@@ -22,12 +22,12 @@ namespace {
 constexpr std::size_t first_panels = 1;
 constexpr double most_unseen = 1e-9;  // launches that land between the nodes
 constexpr double safety = 2;          // of the error over the changes it is told from
+constexpr int most_halvings = 7;      // of the launch's quadrature
 
 struct Level {
   markov::NodeSpace space;
   markov::SampledChain chain;
   SolvedChain solved;
-  double launch_error = 0;  // relative, of from_start()
   double worst_start = 0;
 
   double from_start() const { return solved.from_start; }
@@ -42,7 +42,7 @@ double inner(const std::vector<double>& a, const std::vector<double>& b) {
 // interpolation makes nonsense of it.
 std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::size_t panels) {
   const markov::NodeSpace space = rows.space(panels);
-  auto [chain, row_error, launch_error] = rows.chain(problem, space);
+  markov::SampledChain chain = rows.chain(problem, space).chain;
   const markov::Launch& launch = chain.launch;
   if (std::accumulate(launch.after.begin(), launch.after.end(), launch.rest) < 1 - most_unseen) return std::nullopt;
   const markov::Reachability reach = markov::classify(chain.chain);
@@ -56,17 +56,30 @@ std::optional<Level> solve(const Problem& problem, const ExactRows& rows, std::s
   } catch (const std::domain_error&) {  // from some node no entry leads to rest
     return std::nullopt;
   }
-  Level level{space, std::move(chain), *std::move(solved), launch_error};
+  Level level{space, std::move(chain), *std::move(solved)};
   const std::vector<double>& mean = level.solved.mean;
-  level.launch_error *= *std::max_element(mean.begin(), mean.end()) / level.from_start();
   int worst = 0;
   for (int p = 1; p < space.phases(); ++p)
     if (mean[static_cast<std::size_t>(p) * space.nodes()] < mean[static_cast<std::size_t>(worst) * space.nodes()])
       worst = p;
   const double lowest = problem.map.state_interval(worst).first;
-  level.worst_start = 1 + inner(rows.row(problem, space, lowest, worst).after, mean);
+  level.worst_start = 1 + inner(rows.launch(problem, space, {[lowest](double) { return lowest; }, worst}).after, mean);
   if (level.from_start() >= 1 && level.worst_start >= 1 && level.failure_rate() > 0) return level;
   return std::nullopt;
+}
+
+// Halves the launch's quadrature until the expected steps settle: a launch that spreads wider than its landings meets
+// rows that differ more than the coarsest sees. Returns the last change, relative.
+double refine_launch(const Problem& problem, const ExactRows& rows, double settled, Level& level) {
+  double change = 0;
+  for (int halvings = 1; halvings <= most_halvings; ++halvings) {
+    level.chain.launch = rows.launch(problem, level.space, problem.launch, halvings);
+    const double steps = 1 + inner(level.chain.launch.after, level.solved.mean);
+    change = std::abs(std::log(steps / level.from_start()));
+    level.solved.from_start = steps;
+    if (change <= settled) break;
+  }
+  return change;
 }
 
 // Follows the error left in one result after each refinement. Two levels may agree by chance, and the corner of the
@@ -128,7 +141,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
       steps_error.refine(fine->from_start(), coarse->from_start());
       rate_error.refine(fine->failure_rate(), coarse->failure_rate());
       worst_error.refine(fine->worst_start, coarse->worst_start);
-      error = std::max(steps_error.error() + fine->launch_error, rate_error.error());
+      error = std::max(steps_error.error(), rate_error.error());
       met = error <= options.tolerance;
     }
     const bool last = free ? met || more(panels) > std::max<std::size_t>(most, 4)
@@ -142,10 +155,13 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
         fmt::format("{} nodes are too few to follow the launch and lead to rest; method sampled may tell",
                     panels * rows.coarsest()));
 
+  const double launch_error = refine_launch(problem, rows, options.tolerance / 10, *fine);
+  error = std::max(error, steps_error.error() + launch_error);
+
   Metastability result;
   result.method = Method::integrated;
   result.cells = fine->space.nodes();
-  result.steps.from_start = estimate(fine->from_start(), steps_error.error() + fine->launch_error);
+  result.steps.from_start = estimate(fine->from_start(), steps_error.error() + launch_error);
   result.spectrum.failure_rate = estimate(fine->failure_rate(), rate_error.error());
   result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate(), rate_error.error());
   result.steps.worst_start = estimate(fine->worst_start, worst_error.error());

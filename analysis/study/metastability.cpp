@@ -306,6 +306,7 @@ Metastability study(const Problem& problem, const StudyOptions& options) {
     Metastability result =
         options.method == Method::integrated ? integrated_study(problem, options) : Study(problem, options).run();
     require_consistent(result);
+    require_followed(problem, result, options);
     // Interpolated rows keep to that within their error; a curve that rises in its ninth digit is not to be shown.
     for (std::size_t n = 1; n < result.steps.survival.size(); ++n)
       result.steps.survival[n] = std::min(result.steps.survival[n], result.steps.survival[n - 1]);

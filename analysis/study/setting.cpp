@@ -106,7 +106,7 @@ Problem Setting::problem(const LandingOptions& landings) const {
     return omega * omega;
   };
   const auto problem_of = [&](const auto& map) {
-    Problem problem{map, {state, first_landing_leg % map.phases()}, [](double x) { return std::sqrt(x); }, {}};
+    Problem problem{map, {state, first_landing_leg % map.phases()}, [](double x) { return std::sqrt(x); }, {}, {}};
     std::vector<double> advance;
     for (int p = 0; p < map.phases(); ++p) advance.push_back(map.advance(p));
     if (std::isfinite(ramp_length))
@@ -118,8 +118,12 @@ Problem Setting::problem(const LandingOptions& landings) const {
   options.direct = landings.direct;
   options.progress = landings.progress;
   options.executor = markov::on_threads(landings.threads);
-  return problem_of(dynamics::SettledReturnMap(wheel, slope_deg * std::numbers::pi / 180.0, noise(),
-                                               speed.at_score(launch_reach), std::move(options)));
+  Problem problem = problem_of(dynamics::SettledReturnMap(wheel, slope_deg * std::numbers::pi / 180.0, noise(),
+                                                          speed.at_score(launch_reach), std::move(options)));
+  problem.follow = [=, motion = motion(), noise = noise(), leg = first_landing_leg](auto seed, auto index, auto most) {
+    return dynamics::steps_to_rest(motion, noise, speed, leg, seed, index, most);
+  };
+  return problem;
 }
 
 std::string Setting::describe() const {

@@ -173,7 +173,7 @@ ImpactWork integrate_impact(const Impact& impact) {
   if (march.impulse > before_impulse)
     uphill -= (march.charge() - before_charge) / (march.impulse - before_impulse) * (whole - before);
   if (impact.along > 0) uphill = -uphill;
-  work.potential = impact.mass * impact.gravity * uphill * std::sin(impact.slope);
+  work.potential = impact.mass * impact.gravity * uphill * std::sin(impact.slope_rad);
   return work;
 }
 

@@ -16,7 +16,7 @@ struct Impact {
   double along = 0;          ///< its speed down the ramp [m/s]
   double restitution = 0;    ///< eta, energetic
   double friction = 0;       ///< mu
-  double slope = 0;          ///< of the surface [rad]; published
+  double slope_rad = 0;      ///< of the surface [rad]; published
   double gravity = 9.81;     ///< [m/s^2]; published
   double stiffness = 9000;   ///< of the ramp [N/m]; published
   double contact_mass = 0;   ///< in the Kelvin-Voigt contact [kg]; published

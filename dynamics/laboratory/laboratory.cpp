@@ -293,7 +293,7 @@ class Laboratory::Roll {
     impact.along = touch.flew ? dot(touch.tip_velocity, along) : 0;  // a standing wheel turns about the old foot
     impact.restitution = contact.restitution;
     impact.friction = contact.friction;
-    impact.slope = body_.slope_rad - rise;
+    impact.slope_rad = body_.slope_rad - rise;
     impact.gravity = body_.gravity;
     impact.stiffness = lab_.model_.ramp_stiffness;
     impact.contact_mass = lab_.model_.contact_mass;

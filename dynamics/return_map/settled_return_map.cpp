@@ -401,7 +401,7 @@ bool SettledReturnMap::violates(int which, double state, int phase, std::span<co
   const std::optional<SettledSlice> slice = landings_->slice(phase, contact.restitution);
   if (slice) {
     if (omega < slice->lowest_speed()) return false;  // at rest, as below mu_r
-    const SettledSlice::Place place = slice->at(omega);
+    const SettledSlice::SliceAtSpeed place = slice->at(omega);
     if (contact.friction < place.resting_friction() || !place.rough(contact.friction)) return false;
   }
   return landings_->motion().land(phase, omega, contact).end == LandingEnd::unsettled;

@@ -461,7 +461,7 @@ void SettledMap::check() {
     const double eta = range.eta_low + (range.eta_high - range.eta_low) * spread(index, 0);
     const SettledSlice read = table.slice(eta);
     const double omega = read.lowest_speed() + (range.omega_high - read.lowest_speed()) * spread(index, 1);
-    const SettledSlice::Place place = read.at(omega);
+    const SettledSlice::SliceAtSpeed place = read.at(omega);
     const double resting = place.resting_friction();
     const double mu = std::max(0.0, resting + (table.sticking - resting) * (1.3 * spread(index, 2) - 0.1));
     const MappedLanding by_table = place.land(mu);

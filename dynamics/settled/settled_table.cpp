@@ -109,9 +109,9 @@ double SettledSlice::value(const std::vector<double>& values, std::size_t speed,
   return sum;
 }
 
-SettledSlice::Place SettledSlice::at(double omega) const {
+SettledSlice::SliceAtSpeed SettledSlice::at(double omega) const {
   constexpr std::size_t stops = SettledTable::stops;
-  Place place;
+  SliceAtSpeed place;
   place.slice_ = this;
   place.omega_ = omega;
   place.place_ = place_of(omega);
@@ -139,15 +139,15 @@ double SettledSlice::place_of(double omega) const {
   return table_->share(standstill_, std::min(omega, table_->omega_high)) * (table_->speeds - 1);
 }
 
-std::size_t SettledSlice::Place::piece_of(double friction) const {
+std::size_t SettledSlice::SliceAtSpeed::piece_of(double friction) const {
   std::size_t n = 0;
   while (n < SettledTable::stops && friction < edge_[n]) ++n;
   return n;
 }
 
-bool SettledSlice::Place::rough(double friction) const { return (rough_ >> piece_of(friction) & 1) != 0; }
+bool SettledSlice::SliceAtSpeed::rough(double friction) const { return (rough_ >> piece_of(friction) & 1) != 0; }
 
-MappedLanding SettledSlice::Place::land(double friction) const {
+MappedLanding SettledSlice::SliceAtSpeed::land(double friction) const {
   constexpr int stops = SettledTable::stops, piece = SettledTable::piece;
   const SettledTable& table = *slice_->table_;
   if (friction < resting_friction() && friction < table.sticking) return {0, 0, true};

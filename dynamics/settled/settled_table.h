@@ -76,7 +76,7 @@ class SettledSlice {
   double lowest_speed() const { return standstill_ + SettledTable::clear_of_rest; }
   bool holds(double omega) const { return omega >= lowest_speed() && omega <= table_->omega_high; }
   /// Is the table at one of its speeds.
-  class Place {
+  class SliceAtSpeed {
    public:
     double resting_friction() const { return edge_[SettledTable::stops]; }
     /// Returns mu_2', mu_2, mu_3, ..., mu_r: where the landing has a kink.
@@ -95,7 +95,7 @@ class SettledSlice {
     std::uint16_t rough_ = 0;  // of any node around: a bit for each piece
   };
   /// @param omega at least lowest_speed(); above the table's speeds the last one's share of omega^2 is kept
-  Place at(double omega) const;
+  SliceAtSpeed at(double omega) const;
   double resting_friction(double omega) const;  ///< likewise
   /// Returns the least speed in [low, high] that `friction` survives; high if none.
   double slowest(double friction, double low, double high) const;
@@ -111,7 +111,7 @@ class SettledSlice {
   Stencil row_;
   std::vector<double> edges_;         // by speed
   std::vector<std::uint16_t> rough_;  // by speed: of any row around, a bit for each piece
-  friend class Place;
+  friend class SliceAtSpeed;
 };
 
 }  // namespace metastable::dynamics

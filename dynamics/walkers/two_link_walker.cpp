@@ -89,7 +89,7 @@ METASTABLE_WIDE void advance(const Motion& m, double time, Motion& end) {
 }
 
 void start(Motion& m, std::size_t lane, const Stride& stride, const Ground& ground) {
-  const double slope = ground.slope, turn = ground.slope - ground.last_slope;
+  const double slope = ground.slope_rad, turn = ground.slope_rad - ground.last_slope_rad;
   const double theta = stride.half_angle_rad + turn, psi = -stride.half_angle_rad + turn;
   m.theta[0][lane] = theta;
   m.psi[0][lane] = psi;
@@ -160,9 +160,9 @@ void require_positive(double value, const char* name, const char* unit) {
 }
 
 void require_ground(const Ground& ground) {
-  if (!(std::isfinite(ground.slope) && std::isfinite(ground.last_slope)))
+  if (!(std::isfinite(ground.slope_rad) && std::isfinite(ground.last_slope_rad)))
     throw std::invalid_argument(
-        fmt::format("walker: slopes of {} and {} rad are not finite", ground.slope, ground.last_slope));
+        fmt::format("walker: slopes of {} and {} rad are not finite", ground.slope_rad, ground.last_slope_rad));
 }
 
 void require_walkable(const Stride& s) {

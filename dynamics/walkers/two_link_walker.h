@@ -36,8 +36,8 @@ struct LegMotion {
 /// Holds the slope [rad] of the ground that the next strike is on, and of the ground on which both feet stand: both
 /// angles turn by the difference. Equal, if the ground is one plane that only tilts.
 struct Ground {
-  double slope = 0;
-  double last_slope = 0;
+  double slope_rad = 0;
+  double last_slope_rad = 0;
 };
 
 /// Walks on two equal legs with point masses, feet that neither slip nor bounce. The swing foot may pass through the

@@ -43,7 +43,7 @@ void WalkerMap::step(std::span<const double> states, std::span<const double> sco
   walker_.step(from, ground, to, fell);
   for (std::size_t i = 0; i < n; ++i) {
     std::copy_n(to.data() + i * own, own, next.data() + i * all);
-    next[i * all + own] = ground[i].slope;
+    next[i * all + own] = ground[i].slope_rad;
   }
 }
 

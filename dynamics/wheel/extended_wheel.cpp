@@ -23,7 +23,7 @@ Wheel changed(Wheel wheel, const Extension& extension) {
 ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const ContactSpread& contact,
                              const Extension& extension, std::shared_ptr<const LandingShares> landings)
     : extension_(extension),
-      slope_(slope + extension.slope_offset),
+      slope_(slope + extension.slope_offset_rad),
       model_(contact_model(stated, extension.law.value_or(law))),
       contact_(contact),
       density_(model_, contact),

@@ -17,7 +17,7 @@ struct Extension {
   std::vector<double> leg_change;         ///< added to each leg's length [m]; empty: none
   double hub_forward = 0, hub_aside = 0;  ///< centre of mass off the hub [m]: towards leg 0, and a right angle further
   double inertia_ratio = 1;               ///< of the inertia about the foot
-  double slope_offset = 0;                ///< true minus stated slope [rad]
+  double slope_offset_rad = 0;            ///< true minus stated slope [rad]
   enum class Shape { parabola, sine, step };
   Shape sag_shape = Shape::parabola;             ///< of the surface between sag_from and sag_to
   double sag = 0;                                ///< depth in the middle of that stretch [m]

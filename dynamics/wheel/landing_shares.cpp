@@ -9,7 +9,7 @@ namespace metastable::dynamics {
 namespace {
 
 // Returns the index of the node below a value and the weight of the one above.
-std::pair<int, double> between_nodes(const LandingShares::Axis& axis, double value) {
+std::pair<int, double> between_nodes(const LandingShares::GridAxis& axis, double value) {
   const double at = std::clamp((value - axis.low) / (axis.high - axis.low), 0.0, 1.0) * (axis.count - 1);
   const int below = std::min(static_cast<int>(at), axis.count - 2);
   return {below, at - below};
@@ -17,7 +17,7 @@ std::pair<int, double> between_nodes(const LandingShares::Axis& axis, double val
 
 }  // namespace
 
-struct LandingShares::Place::Corners {
+struct LandingShares::SharesAtSpeed::Corners {
   std::array<std::size_t, 4> cell;
   std::array<double, 4> weight;
   double of(const std::vector<float>& values, std::size_t stride, std::size_t place) const {
@@ -43,7 +43,7 @@ std::size_t LandingShares::cell(int leg, int at_speed, int at_restitution) const
   return static_cast<std::size_t>((leg * speed.count + at_speed) * restitution.count + at_restitution);
 }
 
-LandingShares::Place::Place(const LandingShares& grid, int leg, double omega)
+LandingShares::SharesAtSpeed::SharesAtSpeed(const LandingShares& grid, int leg, double omega)
     : grid_(&grid), leg_(&grid.legs[static_cast<std::size_t>(leg)]) {
   const auto [below, weight] = between_nodes(grid.speed, omega);
   slow_ = grid.cell(leg, below, 0);
@@ -51,16 +51,16 @@ LandingShares::Place::Place(const LandingShares& grid, int leg, double omega)
   faster_ = weight;
 }
 
-LandingShares::Place::Corners LandingShares::Place::around(double eta) const {
+LandingShares::SharesAtSpeed::Corners LandingShares::SharesAtSpeed::around(double eta) const {
   const auto [below, weight] = between_nodes(grid_->restitution, eta);
   const auto row = static_cast<std::size_t>(below);
   return {{slow_ + row, slow_ + row + 1, fast_ + row, fast_ + row + 1},
           {(1 - faster_) * (1 - weight), (1 - faster_) * weight, faster_ * (1 - weight), faster_ * weight}};
 }
 
-double LandingShares::Place::resting_friction(double eta) const { return around(eta).of(grid_->resting, 1, 0); }
+double LandingShares::SharesAtSpeed::resting_friction(double eta) const { return around(eta).of(grid_->resting, 1, 0); }
 
-LandingShares::Kept LandingShares::Place::at(double eta, double friction) const {
+LandingShares::Kept LandingShares::SharesAtSpeed::at(double eta, double friction) const {
   const Corners corners = around(eta);
   const double resting = corners.of(grid_->resting, 1, 0);
   const double part = std::min(1.0, (friction - resting) / std::max(1e-6, leg_->sticking - resting));

@@ -11,7 +11,7 @@ namespace metastable::dynamics {
 /// Says what landings on one slope keep, leg by leg. Along the axes of speed and restitution values are read by
 /// straight lines, along friction at places as the squares of even numbers between mu_r, where it is steep, and mu_c.
 struct LandingShares {
-  struct Axis {
+  struct GridAxis {
     double low = 0, high = 1;
     int count = 2;
     double at(int i) const { return low + (high - low) * i / (count - 1); }
@@ -32,7 +32,7 @@ struct LandingShares {
     double pace = 0;             ///< from touch to touch of two standing feet [m]
     double settles_below = 0;    ///< omega- up to which the landed foot stands before the next leg touches [rad/s]
   };
-  Axis speed, restitution;
+  GridAxis speed, restitution;
   int parts = 20;  ///< places between mu_r and mu_c, both included
   std::vector<Leg> legs;
   std::vector<float> resting;             ///< by leg, speed, restitution: mu_r; mu_c where even a sticking foot rests
@@ -48,9 +48,9 @@ struct LandingShares {
     double share = 0, displacement = 0;
   };
   /// Is one leg at one speed; beyond the axes the last values are kept. It refers to the grid.
-  class Place {
+  class SharesAtSpeed {
    public:
-    Place(const LandingShares& grid, int leg, double omega);
+    SharesAtSpeed(const LandingShares& grid, int leg, double omega);
     const Leg& leg() const { return *leg_; }
     double resting_friction(double eta) const;
     /// Friction above mu_c is read as mu_c; below mu_r the share falls on as it does just above.
@@ -64,7 +64,7 @@ struct LandingShares {
     std::size_t slow_, fast_;  // first cells of the speeds around
     double faster_;            // weight of the second
   };
-  Place place(int leg, double omega) const { return {*this, leg, omega}; }
+  SharesAtSpeed place(int leg, double omega) const { return {*this, leg, omega}; }
 };
 
 /// Returns the share of omega^2 that a foot keeps which sticks and does not spring. @param chord between the feet [m]

@@ -12,13 +12,13 @@ namespace metastable::dynamics {
 
 /// Is a landing of a wheel that may differ from the grid's own.
 struct SettledLanding {
-  LandingShares::Place place;    ///< of the grid, at `omega`
-  double omega = 0;              ///< omega- [rad/s]
-  double ahead = 0, height = 0;  ///< of the landing foot: ahead of the centre of mass, below it [m]
-  double chord = 0;              ///< between the feet [m]
-  double gyration_sq = 0;        ///< J / M about the centre of mass [m^2]
-  double barrier_squared = 0;    ///< [rad^2/s^2]
-  double loss_ratio = 1;         ///< multiplies what is lost of omega^2
+  LandingShares::SharesAtSpeed place;  ///< of the grid, at `omega`
+  double omega = 0;                    ///< omega- [rad/s]
+  double ahead = 0, height = 0;        ///< of the landing foot: ahead of the centre of mass, below it [m]
+  double chord = 0;                    ///< between the feet [m]
+  double gyration_sq = 0;              ///< J / M about the centre of mass [m^2]
+  double barrier_squared = 0;          ///< [rad^2/s^2]
+  double loss_ratio = 1;               ///< multiplies what is lost of omega^2
   /// omega-^2 of the next touch is next_rate omega_eq^2 + next_gain less what resisting torques take: a parabola, whose
   /// coefficients these are, of omega_eq^2 [rad^2/s^2].
   double next_rate = 1, next_gain = 0;

@@ -12,12 +12,12 @@
 #include "markov/mesh/guided_sampling.h"
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/noise_frame.h"
+#include "markov/normal_95.h"
 #include "markov/parallel.h"
 
 namespace metastable::markov {
 namespace {
 
-constexpr double kNormal95 = 1.959963984540054;
 constexpr double kDisagrees = 1.7;     // joint half-widths: 99.9 % of the normal
 constexpr double kSampledWindows = 3;  // of guided samples: within one, failures are still few
 constexpr double kSampledFrom = 100;   // expected steps above which guided samples settle before they fail
@@ -202,7 +202,7 @@ class Run {
                                            .threads = options_.threads,
                                            .most_steps = 4 * options_.simulated_steps});
     if (!simulated) return;
-    const double half = kNormal95 * simulated->standard_error;
+    const double half = normal_95 * simulated->standard_error;
     study_.simulated = MeshEstimate{simulated->mean, simulated->mean - half, simulated->mean + half};
     study_.simulated_trials = trials;
   }
@@ -222,7 +222,7 @@ class Run {
                                                    .threads = options_.threads});
     if (!(guided.rate > 0)) return;
     const double beyond = study_.steps.value - 1 / study_.failure_rate.value;  // what the start is worth
-    const double half = kNormal95 * guided.standard_error / guided.rate;
+    const double half = normal_95 * guided.standard_error / guided.rate;
     const double sampled = 1 / guided.rate + beyond;
     study_.guided = MeshEstimate{sampled, sampled / (1 + half), half < 1 ? sampled / (1 - half) : sampled / 1e-3};
     study_.guided_samples = options_.guided_samples;

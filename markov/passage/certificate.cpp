@@ -139,31 +139,56 @@ std::vector<std::vector<double>> solve(const std::vector<Rows>& rows, bool lower
   return v;
 }
 
+// Sums v - Q v at node i of a phase, from a row of C and v at the next phase.
+struct Left {
+  Left(const std::vector<double>& c, long double here, const std::vector<double>& next) : sum(c[0] * here) {
+    const std::size_t n = next.size();
+    long double size = sum;
+    for (std::size_t j = 0; j < n; ++j) {
+      const long double weight = (j + 1 < n ? static_cast<long double>(c[j + 1]) : 1.0L) - c[j];
+      const long double term = weight * (here - next[j]);
+      sum += term;
+      size += std::abs(term);
+    }
+    // Each term has three roundings, the sum n: relative (n + 4) eps of the sum of magnitudes, and to spare.
+    error = size * std::numeric_limits<long double>::epsilon() * static_cast<long double>(2 * n + 16);
+  }
+  long double sum, error;
+};
+
 // Bounds (v - Q v) / rhs over all nodes.
 Range residual(const std::vector<Rows>& rows, const std::vector<std::vector<double>>& v, bool lower) {
   const std::size_t phases = rows.size(), n = rows.front().upper.size();
   Range all{std::numeric_limits<double>::infinity(), 0};
-  for (std::size_t p = 0; p < phases; ++p) {
-    const std::vector<double>& next = v[(p + 1) % phases];
+  for (std::size_t p = 0; p < phases; ++p)
     for (std::size_t i = 0; i < n; ++i) {
-      const std::vector<double>& c = lower ? rows[p].upper[i] : rows[p].lower[i];
-      const long double here = v[p][i];
-      long double sum = c[0] * here, size = sum;
-      for (std::size_t j = 0; j < n; ++j) {
-        const long double weight = (j + 1 < n ? static_cast<long double>(c[j + 1]) : 1.0L) - c[j];
-        const long double term = weight * (here - next[j]);
-        sum += term;
-        size += std::abs(term);
-      }
-      // Each term has three roundings, the sum n: relative (n + 4) eps of the sum of magnitudes, and to spare.
-      const long double error =
-          size * std::numeric_limits<long double>::epsilon() * static_cast<long double>(2 * n + 16);
+      const Left left(lower ? rows[p].upper[i] : rows[p].lower[i], v[p][i], v[(p + 1) % phases]);
       const double rhs = lower ? 1 : 1 + rows[p].surplus[i];
-      all.lower = std::min(all.lower, down(down(static_cast<double>(sum - error)) / up(rhs)));
-      all.upper = std::max(all.upper, up(up(static_cast<double>(sum + error)) / down(rhs)));
+      all.lower = std::min(all.lower, down(down(static_cast<double>(left.sum - left.error)) / up(rhs)));
+      all.upper = std::max(all.upper, up(up(static_cast<double>(left.sum + left.error)) / down(rhs)));
     }
-  }
   return all;
+}
+
+// Lowers v, where it is above 1 + Q v, until it nowhere is by much. Rows of states from which landings change sharply
+// bound them loosely, so that the solution falls along some nodes, and what raised it there breaks its equations; few
+// landings lead to such states, so that lowering v at them costs the others little.
+void lower_to_its_rows(const std::vector<Rows>& rows, std::vector<std::vector<double>>& v) {
+  constexpr double enough = 1e-9;
+  constexpr int most_rounds = 100;
+  const std::size_t phases = rows.size(), n = rows.front().upper.size();
+  for (int round = 0; round < most_rounds; ++round) {
+    bool lowered = false;
+    for (std::size_t p = 0; p < phases; ++p)
+      for (std::size_t i = n; i-- > 0;) {
+        const Left left(rows[p].upper[i], v[p][i], v[(p + 1) % phases]);
+        const double excess = static_cast<double>(left.sum) - 1;
+        const double fits = excess > enough ? std::max(0.0, v[p][i] - excess) : v[p][i];
+        lowered = lowered || excess > enough;
+        v[p][i] = i + 1 < n ? std::min(fits, v[p][i + 1]) : fits;
+      }
+    if (!lowered) return;
+  }
 }
 
 void check(const std::vector<std::vector<double>>& nodes, int phases, double beyond) {
@@ -207,6 +232,7 @@ Certificate certify(const LandingSource& source, std::vector<std::vector<double>
     rows[p] = make_rows(source, static_cast<int>(p), nodes[p], nodes[(p + 1) % phases], threads);
 
   certificate.lower = solve(rows, true);
+  lower_to_its_rows(rows, certificate.lower);
   const Range below = residual(rows, certificate.lower, true);
   if (!(below.upper < 2))
     throw ConvergenceError("certificate", below.upper, "expected steps are too many for double precision");

@@ -111,6 +111,12 @@ LeadingPair last_survivors(const Chain& chain) {
   }
 }
 
+std::string still_changing(int iterations) {
+  return "still changing after " + std::to_string(iterations) +
+         " iterations: survivors of two kinds fade at nearly the same rate; other --cells or --method may tell them "
+         "apart";
+}
+
 /// Goes on with (sigma I - Q)^{-1} where sigma is the largest (Qx)_i / x_i, hardly above lambda_1 (Noda 1971): it tells
 /// neighbouring eigenvalues apart by squaring the error each time. Solved for x_i = 1 (Doob's transform), the matrix is
 /// again a chain, which rests from state i with probability 1 - (Qx)_i / (sigma x_i).
@@ -154,8 +160,7 @@ LeadingPair iterate_shifted(const Chain& chain, LeadingPair pair) {
     pair.right = std::move(right);
     if (pair.residual <= kRounding) return pair;
   }
-  throw ConvergenceError("inverse iteration", pair.residual,
-                         "still changing after " + std::to_string(pair.iterations) + " iterations");
+  throw ConvergenceError("inverse iteration", pair.residual, still_changing(pair.iterations));
 }
 
 /// Iterates with Q (I - Q)^{-1}, whose eigenvalues are lambda / (1 - lambda): lambda_2 fades at least as fast as under
@@ -195,8 +200,7 @@ LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
     }
   }
   if (chain.interpolated())
-    throw ConvergenceError("inverse iteration", pair.residual,
-                           "still changing after " + std::to_string(kIterations) + " iterations");
+    throw ConvergenceError("inverse iteration", pair.residual, still_changing(kIterations));
   pair = iterate_shifted(chain, std::move(pair));
   pair.rate = 1 / total(elimination.solve_left(pair.left));
   return pair;

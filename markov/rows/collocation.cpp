@@ -88,20 +88,23 @@ MakeNodeRow rows(const AnyReturnMap& map, const NodeSpace& space) {
   return [&](double state, int phase) { return make_row(map, space, state, phase); };
 }
 
+// Finds the states of a launch from which extreme landings meet an edge: rows have kinks there.
+std::vector<double> launch_kinks(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch) {
+  const std::span<const double> met = space.edges((launch.phase + 1) % space.phases());
+  return map.states_of_extremes(launch.phase, cheap(map) ? met.first(met.size() - 1) : met.first(1));
+}
+
 }  // namespace
 
 IntegratedChain collocate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads) {
-  const int next = (launch.phase + 1) % space.phases();
-  const std::span<const double> met = space.edges(next);
-  const std::vector<double> kinks =
-      map.states_of_extremes(launch.phase, cheap(map) ? met.first(met.size() - 1) : met.first(1));
-  return chain_of_rows(map, space, launch, rows(map, space), true, kinks, threads);
+  return chain_of_rows(map, space, launch, rows(map, space), true, launch_kinks(map, space, launch), threads);
 }
 
-Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
-  Launch row = launch_of_rows(rows(map, space), space, {[state](double) { return state; }, phase}, {}, 1);
-  row.interpolated = true;
-  return row;
+Launch collocated_launch(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int halvings,
+                         int threads) {
+  Launch result = launch_of_rows(rows(map, space), space, launch, launch_kinks(map, space, launch), halvings, threads);
+  result.interpolated = true;
+  return result;
 }
 
 std::vector<std::vector<double>> collocation_edges(const AnyReturnMap& map,

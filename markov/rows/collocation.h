@@ -16,8 +16,10 @@ namespace metastable::markov {
 /// @throws std::invalid_argument if the map tells no points (names the sampled method)
 IntegratedChain collocate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads = 1);
 
-/// Says where one event from `state` at `phase` leads, as a launch.
-Launch collocated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase);
+/// Returns where a launch leads by collocate()'s rows.
+/// @param halvings  of launch_points()
+Launch collocated_launch(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int halvings = 0,
+                         int threads = 1);
 
 /// Finds ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings,
 /// found on cells; nothing if no state comes to rest with a probability that a double can hold.

@@ -46,8 +46,9 @@ IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const
   return chain_of_rows(map, space, launch, panel_rows(map, space), false, {}, threads);
 }
 
-Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase) {
-  return launch_of_rows(panel_rows(map, space), space, {[state](double) { return state; }, phase}, {}, 1);
+Launch integrated_launch(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int halvings,
+                         int threads) {
+  return launch_of_rows(panel_rows(map, space), space, launch, {}, halvings, threads);
 }
 
 std::vector<std::pair<double, double>> node_ranges(const AnyReturnMap& map, const LaunchState& launch, int threads,

@@ -18,8 +18,10 @@ namespace metastable::markov {
 /// @throws std::invalid_argument if the map tells no density or no rest probability (names the sampled method)
 IntegratedChain integrate(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int threads = 1);
 
-/// Returns where one event from `state` at `phase` leads, as a launch.
-Launch integrated_row(const AnyReturnMap& map, const NodeSpace& space, double state, int phase);
+/// Returns where a launch leads by integrate()'s rows.
+/// @param halvings  of launch_points()
+Launch integrated_launch(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch, int halvings = 0,
+                         int threads = 1);
 
 /// Finds ranges per phase (one upper edge) that hold all but 1e-13 of the survivors and 1e-9 of the launch's landings,
 /// found on a coarse chain of exact rows; nothing if no state comes to rest with a probability that a double can hold.

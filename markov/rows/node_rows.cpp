@@ -13,10 +13,8 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double score_step = 0.5;       // of the coarsest trapezoidal rule
-constexpr int score_steps = 13;          // on each side: 8e-11 of the launches are beyond
-constexpr int most_halvings = 6;         // of its steps
-constexpr double launch_settles = 1e-4;  // change of the launch's probabilities at a halving, which squares the error
+constexpr double score_step = 0.5;  // of the coarsest trapezoidal rule
+constexpr int score_steps = 13;     // on each side: 8e-11 of the launches are beyond
 
 }  // namespace
 
@@ -70,37 +68,21 @@ std::vector<double> survivors_or_visits(const Chain& chain, std::span<const doub
 }
 
 Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,
-                      std::span<const double> kinks, int threads, double* error) {
+                      std::span<const double> kinks, int halvings, int threads) {
   const std::size_t base = static_cast<std::size_t>((launch.phase + 1) % space.phases()) * space.nodes();
-  const auto by_rule = [&](const std::vector<LaunchPoint>& rule) {
-    std::vector<NodeRow> rows(rule.size());
-    parallel_for(rule.size(), threads,
-                 [&](std::size_t k) { rows[k] = make_row(launch.state(rule[k].score), launch.phase); });
-    Launch result;
-    result.after.assign(space.size(), 0.0);
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-      result.rest += rule[k].weight * rows[k].rest;
-      for (std::size_t j = 0; j < space.nodes(); ++j) result.after[base + j] += rule[k].weight * rows[k].landing[j];
-    }
-    const double after = std::accumulate(result.after.begin(), result.after.end(), 0.0);
-    if (after > 0)
-      for (double& p : result.after) p *= (1 - result.rest) / after;
-    return result;
-  };
-  std::vector<LaunchPoint> rule = launch_points(launch, kinks);
-  Launch result = by_rule(rule);
-  double change = 0;
-  // A launch that spreads wider than its landings meets rows that differ more than a coarse rule sees. Weights of
-  // interpolation tell nothing of that one by one; there the kinks cut the rule.
-  for (int halvings = 1; error && rule.size() > 1 && halvings <= most_halvings; ++halvings) {
-    rule = launch_points(launch, kinks, halvings);
-    Launch finer = by_rule(rule);
-    change = std::abs(finer.rest - result.rest);
-    for (std::size_t j = 0; j < space.nodes(); ++j) change += std::abs(finer.after[base + j] - result.after[base + j]);
-    result = std::move(finer);
-    if (change <= launch_settles) break;
+  const std::vector<LaunchPoint> rule = launch_points(launch, kinks, halvings);
+  std::vector<NodeRow> rows(rule.size());
+  parallel_for(rule.size(), threads,
+               [&](std::size_t k) { rows[k] = make_row(launch.state(rule[k].score), launch.phase); });
+  Launch result;
+  result.after.assign(space.size(), 0.0);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    result.rest += rule[k].weight * rows[k].rest;
+    for (std::size_t j = 0; j < space.nodes(); ++j) result.after[base + j] += rule[k].weight * rows[k].landing[j];
   }
-  if (error) *error = change <= launch_settles ? change * change : change;
+  const double after = std::accumulate(result.after.begin(), result.after.end(), 0.0);
+  if (after > 0)
+    for (double& p : result.after) p *= (1 - result.rest) / after;
   return result;
 }
 
@@ -130,8 +112,7 @@ IntegratedChain chain_of_rows(const AnyReturnMap& map, const NodeSpace& space, c
   result.chain.chain =
       interpolated ? Chain::interpolated(std::move(row_start), std::move(column), std::move(value), std::move(kill))
                    : Chain(std::move(row_start), std::move(column), std::move(value), std::move(kill), 1.0);
-  result.chain.launch =
-      launch_of_rows(make_row, space, launch, kinks, threads, interpolated ? nullptr : &result.launch_error);
+  result.chain.launch = launch_of_rows(make_row, space, launch, kinks, 0, threads);
   result.chain.launch.interpolated = interpolated;
   const auto before = [&](std::size_t i) { return (space.phase(i) + space.phases() - 1) % space.phases(); };
   if (map.duration(space.node(0), before(0)))

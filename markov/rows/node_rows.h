@@ -22,9 +22,8 @@ using MakeNodeRow = std::function<NodeRow(double state, int phase)>;
 
 /// Holds a chain of exact rows and says how well the nodes resolve them.
 struct IntegratedChain {
-  SampledChain chain;       ///< `chain.launch` by quadrature over the launch state
-  double row_error = 0;     ///< largest |sum of a row - probability of surviving| before it was removed
-  double launch_error = 0;  ///< of the launch's probabilities together, by the change at the quadrature's last halving
+  SampledChain chain;    ///< `chain.launch` by the coarsest launch_points()
+  double row_error = 0;  ///< largest |sum of a row - probability of surviving| before it was removed
 };
 
 /// @param interpolated  entries may have any sign (Chain::interpolated)
@@ -37,7 +36,8 @@ struct LaunchPoint {
   double score, weight;
 };
 /// Cuts the launch's score by the trapezoidal rule, exact to rounding for densities wider than a third of the launch's
-/// spread; by panels where rows, as functions of the state, have kinks at some of `states`.
+/// spread; by panels where rows, as functions of the state, have kinks at some of `states`. A launch that spreads wider
+/// than its landings wants halvings, until what is asked of it settles.
 /// @param halvings  of the rule's steps or panels
 std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<const double> states, int halvings = 0);
 
@@ -51,9 +51,7 @@ inline constexpr double most_growth = 1e6;
 std::vector<double> survivors_or_visits(const Chain& chain, std::span<const double> after);
 
 /// Finds where the launch leads, by launch_points().
-/// @param error  if given, they are refined until the probabilities settle, and it becomes
-/// IntegratedChain::launch_error
 Launch launch_of_rows(const MakeNodeRow& make_row, const NodeSpace& space, const LaunchState& launch,
-                      std::span<const double> kinks, int threads, double* error = nullptr);
+                      std::span<const double> kinks, int halvings, int threads);
 
 }  // namespace metastable::markov

@@ -224,6 +224,8 @@ analysis::StudyOptions study_options(const Options& options) {
   study.tolerance = options.number("tolerance");
   study.sequence = options.text("sequence") == "sobol" ? markov::Sequence::sobol : markov::Sequence::random;
   study.weighting = options.text("draws") == "weighted" ? markov::Weighting::weighted : markov::Weighting::plain;
+  if (study.weighting == markov::Weighting::plain && options.given("tail"))
+    throw std::invalid_argument("--tail: plain draws have none; --draws weighted reaches it");
   study.tail = options.number("tail");
   study.replicates = options.count("replicates", 2, 64);
   study.mixing_distance = options.number("mixing-distance");

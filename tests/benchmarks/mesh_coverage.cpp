@@ -13,6 +13,7 @@
 #include "analysis/walkers/walker_study.h"
 #include "markov/mesh/batch_simulation.h"
 #include "markov/mesh/mesh_study.h"
+#include "markov/normal_95.h"
 #include "tests/markov/mesh/maps.h"
 
 namespace {
@@ -70,7 +71,7 @@ int main(int argc, char** argv) {
           {.seed = static_cast<std::uint64_t>(seed), .threads = 1, .guided_samples = 0, .simulated_steps = 0});
       const double off = std::log(study.steps.value / simulated->mean),
                    half = 0.5 * std::log(study.steps.upper / study.steps.lower);
-      held += std::abs(off) <= std::hypot(half, 1.96 * relative);
+      held += std::abs(off) <= std::hypot(half, normal_95 * relative);
       width += half / seeds;
       bias += off / seeds;
     }

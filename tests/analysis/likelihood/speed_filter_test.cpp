@@ -14,7 +14,7 @@ constexpr double degree = std::numbers::pi / 180;
 // for the rests it predicts would win over the truth.
 TEST(SpeedFilter, NextSpeedAndRestShareAProbabilityOfOne) {
   dynamics::Extension plain, steeper, softer, dragged;
-  steeper.slope_offset = 2 * degree;
+  steeper.slope_offset_rad = 2 * degree;
   softer.restitution_exponent = 0.4;
   softer.stribeck = -0.27;
   softer.stribeck_speed = 8;

@@ -69,15 +69,17 @@ TEST(Certify, AConstantLaunchIsThatState) {
   EXPECT_LT(c.upper, 6.4);
 }
 
-// Nodes once had to begin above where they ended.
+// Nodes once had to begin above where they ended; where failures are rare, what a slow wheel may do is bounded loosely.
 TEST(Certify, LaunchesTooSlowToVaultTakeOneStep) {
-  Setting setting = with_friction(9.59, true, {0.4, 0.1});
-  setting.initial_speed = {1, 0.1};
-  const CertifiedSteps c = certify(setting, {.largest_cells = 100});
-  ASSERT_TRUE(c.exists);
-  EXPECT_LE(c.lower, 1);
-  EXPECT_GE(c.upper, 1);
-  EXPECT_LT(c.width(), 0.01);
+  for (const Spread friction : {Spread{0.4, 0.1}, Spread{0.3, 0.05}}) {
+    Setting setting = with_friction(9.59, true, friction);
+    setting.initial_speed = {1, 0.1};
+    const CertifiedSteps c = certify(setting, {.largest_cells = 100});
+    ASSERT_TRUE(c.exists) << c.reason;
+    EXPECT_LE(c.lower, 1);
+    EXPECT_GE(c.upper, 1);
+    EXPECT_LT(c.width(), 0.01);
+  }
 }
 
 TEST(Certify, ThreadsDoNotMatter) {

@@ -42,6 +42,30 @@ TEST(Consistency, ASoundStudyPassesAndEachFaultIsNamed) {
   expect_contradiction([&] { require_consistent(rate); }, "by another");
 }
 
+// A tenth of the steps and more that hang on what is said to first order: events are followed, and have the last word.
+TEST(Consistency, CoarseStatesAreHeldAgainstWhatIsFollowed) {
+  Metastability study = sound();
+  double expected = 0;
+  for (const double s : study.steps.survival) expected += s;
+  std::uint64_t followed = 0;
+  Problem problem = paper_setting(9.59, true).problem();
+  problem.follow = [&](std::uint64_t, std::uint64_t, std::uint64_t most) {
+    EXPECT_EQ(most, study.steps.survival.size());
+    return followed;
+  };
+  const StudyOptions options{.threads = 1};
+  study.steps.memory = {0.2, 0.05, 0.35};
+  study.steps.from_start.upper *= std::exp(0.35);
+  followed = static_cast<std::uint64_t>(1.2 * expected);
+  EXPECT_NO_THROW(require_followed(problem, study, options));
+  for (const double factor : {2.0, 0.5}) {
+    followed = static_cast<std::uint64_t>(factor * expected);
+    EXPECT_THROW(require_followed(problem, study, options), StatesTooCoarse) << factor;
+  }
+  study.steps.memory = {0.05, 0.01, 0.09};
+  EXPECT_NO_THROW(require_followed(problem, study, options));
+}
+
 // Interpolated rows know a probability to the error that the study found: a rise below it is no contradiction.
 TEST(Consistency, IntegratedSurvivalMayRiseWithinItsErrorOnly) {
   Metastability study = sound();

@@ -21,7 +21,7 @@ Impact impact_of(Law law, const Collision& c, const ContactModel& model, const C
           .along = -c.tangential_speed,
           .restitution = contact.restitution,
           .friction = contact.friction,
-          .slope = c.slope_rad,
+          .slope_rad = c.slope_rad,
           .gravity = model.gravity,
           .stiffness = model.ramp_stiffness,
           .contact_mass = model.contact_mass};

@@ -79,7 +79,7 @@ TEST(ShareGrid, KeepsWhatLandingsThatAreFollowedKeep) {
     const double omega = 4.2 + 1.5 * i / 400;
     const Contact contact = draws.contact();
     const Landing landing = motion.land(3, omega, contact);
-    const LandingShares::Place place = grid()->place(3, omega);
+    const LandingShares::SharesAtSpeed place = grid()->place(3, omega);
     const LandingShares::Kept kept = place.at(contact.restitution, contact.friction);
     const bool rests = kept.share * omega * omega < place.leg().barrier_squared;
     misjudged += rests != (landing.end == LandingEnd::rest);
@@ -177,7 +177,7 @@ std::vector<BuiltEffect> built_effects() {
     return SettledMotion(wheel);
   };
   return {
-      {"slope_offset", with([](Extension& e) { e.slope_offset = 0.25 * degree; }),
+      {"slope_offset", with([](Extension& e) { e.slope_offset_rad = 0.25 * degree; }),
        [] { return SettledMotion(rigid(equal_wheel(), slope + 0.25 * degree)); }, 0.05},
       {"hub_inertia", with([](Extension& e) { e.hub_inertia_ratio = 1.2; }),
        [heavier] { return heavier(rigid(equal_wheel()), 1.2); }, 0.35},

@@ -37,9 +37,9 @@ TEST(TwoLinkWalker, KeepsItsEnergyBetweenStrikes) {
                                                std::tuple{simplest, garcia, Ground{0.009, 0.009}}}) {
     const auto end = walker.before_strike(stride, ground);
     ASSERT_TRUE(end);
-    const double first = walker.energy(walker.at(stride, ground, 0), ground.slope);
+    const double first = walker.energy(walker.at(stride, ground, 0), ground.slope_rad);
     for (const double share : {0.3, 0.7, 1.0})
-      EXPECT_NEAR(walker.energy(walker.at(stride, ground, share * end->time), ground.slope), first, 1e-10 * first);
+      EXPECT_NEAR(walker.energy(walker.at(stride, ground, share * end->time), ground.slope_rad), first, 1e-10 * first);
     EXPECT_NEAR(end->stance_angle + end->swing_angle, 0, 1e-14);
     EXPECT_LT(end->stance_angle, 0);
   }

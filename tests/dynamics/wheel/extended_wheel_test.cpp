@@ -82,7 +82,7 @@ TEST(ExtendedWheel, DensityIsThatOfDrawnSteps) {
   cases[5].outlier_share = 0.2, cases[5].outlier_friction = 1.3;
   cases[6].rebound_lost = 0.3;
   cases[7].ring_cosine = 0.1, cases[7].ring_sine = -0.05, cases[7].ring_frequency = 7;
-  cases[8].inertia_ratio = 1.05, cases[8].slope_offset = 0.5 * degree, cases[8].leg_change.assign(8, 1e-3);
+  cases[8].inertia_ratio = 1.05, cases[8].slope_offset_rad = 0.5 * degree, cases[8].leg_change.assign(8, 1e-3);
   const StepContext context{
       .leg = 2, .position = 0.4, .since_previous = 0.21, .run_share = 0.7, .friction_shift = 0.01};
   std::mt19937_64 generator(3);

@@ -62,7 +62,7 @@ inline double linear_steps(double sd, double x) {
   const NodeSpace space(node_ranges(map, linear_launch(), 1), 8);
   const IntegratedChain rows = integrate(map, space, linear_launch());
   const std::vector<double> mean = mean_first_passage(ChainSolver(rows.chain.chain));
-  const Launch row = integrated_row(map, space, x, 0);
+  const Launch row = integrated_launch(map, space, {[x](double) { return x; }});
   return 1 + std::inner_product(mean.begin(), mean.end(), row.after.begin(), 0.0);
 }
 

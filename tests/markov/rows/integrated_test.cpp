@@ -52,7 +52,7 @@ TEST(Integrate, RowsAndLaunchSumToOne) {
   const IntegratedChain integrated = integrate(map, space, linear_launch(), 2);
   const Launch& start = integrated.chain.launch;
   EXPECT_NEAR(std::accumulate(start.after.begin(), start.after.end(), start.rest), 1, 1e-14);
-  const Launch row = integrated_row(map, space, 0.0, 0);
+  const Launch row = integrated_launch(map, space, {[](double) { return 0.0; }});
   EXPECT_NEAR(std::accumulate(row.after.begin(), row.after.end(), row.rest), 1, 1e-14);
   EXPECT_DOUBLE_EQ(row.rest, *map.rest_probability(0, 0));
   EXPECT_LT(integrated.row_error, 1e-3);  // of the topmost rows, which land beyond the range

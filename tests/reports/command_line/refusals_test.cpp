@@ -77,6 +77,7 @@ TEST_F(Refusals, OfOptionsThatDoNothing) {
       {{"sweep", "--law", "plastic", "--friction-sd", "0.1,0.2", "--out", path("s.csv")},
        "--friction-sd: has no meaning under --law plastic"},
       {{"steps", "--method", "integrated", "--samples", "256"}, "--samples: has a meaning under --method sampled only"},
+      {{"steps", "--draws", "plain", "--tail", "1e-9"}, "--tail: plain draws have none; --draws weighted reaches it"},
       {{"steps", "--json", ""}, "--json: what is given is empty"},
       {{"effects", "--json", ""}, "--json: what is given is empty"},
       {{"diagnose", ""}, "DIR: what is given is empty"},
