@@ -109,7 +109,10 @@ std::string zsh(const std::vector<ManualCommand>& commands) {
     }
     text += " ;;\n";
   }
-  return text + "  esac\n}\n_metastable \"$@\"\n";
+  // Where it lies on zsh's path it is this function's body, on its first call; where it is sourced it says whose it is.
+  return text +
+         "  esac\n}\nif [[ ${funcstack[1]} == _metastable ]]; then\n  _metastable \"$@\"\nelse\n"
+         "  compdef _metastable metastable\nfi\n";
 }
 
 std::string fish(const std::vector<ManualCommand>& commands) {

@@ -5,8 +5,8 @@
 
 A PAGE is a page of Markdown or a notebook, whose code is run (exit code 77 without Matplotlib). Blocks fenced as `console` hold commands behind "$ " (continued lines end with a backslash) and what they print, on
 either stream. Blocks fenced as `pycon` hold a Python session. The blocks of a page run in order, in one empty folder
-of their own, with the files of samples/ that the page offers; a line "..." stands for lines that are left out. Other
-blocks are not run.
+of their own, with the files of samples/ that the page offers; a line "..." stands for lines that are left out. A
+session that begins with the import of what is not there (SciPy) is not run, nor are other blocks.
 
 With METASTABLE_WRITE_PAGES=1 in the environment the pages are rewritten to say what came of it now; "..." stays where
 it stands.
@@ -53,6 +53,14 @@ def fits(shown, printed):
     """Is `printed` what is shown, with any lines in the place of each "..."?"""
     pattern = "".join("(?:.*\n)*?" if line == "..." else re.escape(line) + "\n" for line in shown)
     return re.fullmatch(pattern, "".join(line + "\n" for line in printed)) is not None
+
+
+def there(body):
+    """Is there what a Python session begins to import? One that needs SciPy is left out where SciPy is not."""
+    imported = re.match(r">>> import (.+)\n", body)
+    names = imported.group(1).split(", ") if imported else []
+    return all(name.startswith("metastable") or importlib.util.find_spec(name.split(".")[0].split(" ")[0])
+               for name in names)
 
 
 def cut(shown, printed):
@@ -117,6 +125,8 @@ def check(page, programs, python_folder, write):
 
         def run_block(match):
             kind, body = match.group(1), []
+            if not there(match.group(2)):
+                return match.group(0)
             for given, shown in steps_of(kind, match.group(2)):
                 printed = [line.rstrip() for line in session.run(kind, given)]
                 # What is shown ends where the next prompt or the fence begins: empty lines at the end do not count.

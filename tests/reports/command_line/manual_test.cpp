@@ -27,13 +27,29 @@ const std::vector<ManualCommand> manual{
     {"man", "The manual", {{"COMMAND", "", "", "One of them", true}}}};
 
 // Returns what bash itself makes of the script, for the words of a command line of which the last is to be completed.
-std::string completed(const std::string& words, int last) {
-  const std::filesystem::path script = std::filesystem::path(testing::TempDir()) / "metastable_completion.bash";
-  std::ofstream(script) << completion_script(manual, "bash") << "COMP_WORDS=(" << words << ")\nCOMP_CWORD=" << last
-                        << "\n_metastable\necho \"${COMPREPLY[*]}\"\n";
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(::popen(("bash " + script.string()).c_str(), "r"), ::pclose);
+// Runs a script in a shell and returns the first line it prints.
+std::string first_line(const std::string& shell, const std::string& text) {
+  const std::filesystem::path script = std::filesystem::path(testing::TempDir()) / "metastable_completion";
+  std::ofstream(script) << text;
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(::popen((shell + " " + script.string()).c_str(), "r"), ::pclose);
   std::array<char, 400> line{};
   return std::fgets(line.data(), line.size(), pipe.get()) == nullptr ? "" : line.data();
+}
+
+std::string completed(const std::string& words, int last) {
+  return first_line("bash", completion_script(manual, "bash") + "COMP_WORDS=(" + words +
+                                ")\nCOMP_CWORD=" + std::to_string(last) + "\n_metastable\necho \"${COMPREPLY[*]}\"\n");
+}
+
+// Sourced, or found on the path, where zsh is there.
+TEST(Manual, ZshLearnsWhoseCompletionItIs) {
+  if (first_line("zsh -f 2>/dev/null", "echo there") != "there\n") GTEST_SKIP() << "zsh is not there";
+  const std::string begin = "autoload -U compinit; compinit -u -D\n", script = completion_script(manual, "zsh");
+  EXPECT_EQ(first_line("zsh -f", begin + script + "echo ${_comps[metastable]}\n"), "_metastable\n");
+  // On the path the script is the function's body.
+  EXPECT_EQ(first_line("zsh -f",
+                       "_describe() { echo described }; CURRENT=2\n_metastable() {\n" + script + "}\n_metastable\n"),
+            "described\n");
 }
 
 TEST(Manual, BashCompletesCommandsOptionsAndValues) {
