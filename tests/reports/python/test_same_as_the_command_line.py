@@ -85,7 +85,8 @@ class SameAsTheCommandLine(unittest.TestCase):
             command_line("blind", "answer", str(theirs), "--tool", str(tool))
             mine, other = bytes_below(ours), bytes_below(theirs)
             self.assertEqual(mine.keys(), other.keys())
-            self.assertEqual([name for name in mine if mine[name] != other[name]], ["answers/record.csv"])  # it has times
+            differ = {name for name in mine if mine[name] != other[name]}
+        self.assertLessEqual(differ, {"answers/record.csv"})  # it has times, of seconds
             grades = metastable.blind.open(ours)
             self.assertEqual(grades.to_dict()["tables"], command_line("blind", "open", str(theirs))["tables"])
             self.assertIn("<table", grades._repr_html_())
