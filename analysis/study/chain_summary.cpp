@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -20,7 +21,8 @@ namespace {
 
 constexpr double quantile_levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
 constexpr std::size_t least_survival = 64, most_survival = 10000;  // values of the curve
-constexpr std::size_t violation_draws = 64;                        // a state
+constexpr std::size_t violation_draws = 65536, launch_violation_draws = 4096, fewest_violation_draws = 16;
+constexpr double least_violated = 1e-9;  // share of collisions at a state
 constexpr std::size_t slowest_draws = 16384;
 constexpr std::size_t most_forward = 100000;  // steps followed where some states never rest
 constexpr double same_chain = 1e-6;           // agreement wanted of two ways to solve it
@@ -105,24 +107,37 @@ std::vector<double> moduli_per_step(const Problem& problem, const markov::Chain&
   return moduli;
 }
 
+// Draws go to states as they are visited, so that shares have the error of so many draws altogether.
 void describe_violations(const Problem& problem, const markov::StateSpace& space, const std::vector<double>& nu,
                          const std::vector<double>& visits, const StudyOptions& options, Metastability& result) {
   const std::vector<std::string> names = problem.map.assumptions();
   if (names.empty()) return;
   const double nu_total = std::accumulate(nu.begin(), nu.end(), 0.0);
   const double visit_total = 1.0 + std::accumulate(visits.begin(), visits.end(), 0.0);
-  std::vector<double> mask(space.size());
-  for (std::size_t i = 0; i < space.size(); ++i)
-    mask[i] = nu[i] / nu_total > 1e-9 || visits[i] / visit_total > 1e-9 ? 1.0 : 0.0;
-  const auto rates = markov::violation_rates(problem.map, space, problem.launch, mask,
-                                             {.count = violation_draws, .seed = options.seed});
+  std::vector<std::size_t> counts(space.size());
+  for (std::size_t i = 0; i < space.size(); ++i) {
+    const double share = std::max(nu[i] / nu_total, visits[i] / visit_total);
+    if (share > least_violated)
+      counts[i] = std::bit_ceil(
+          std::max(fewest_violation_draws, static_cast<std::size_t>(share * static_cast<double>(violation_draws))));
+  }
+  const auto rates = markov::violation_rates(problem.map, space, problem.launch, counts,
+                                             {.count = launch_violation_draws, .seed = options.seed});
   // Interpolated weights, some of them below 0, may put a share of nothing as far below it.
   const auto share = [](double weight, double total) { return std::clamp(weight / total, 0.0, 1.0); };
   for (std::size_t a = 0; a < names.size(); ++a) {
     const double at_launch = rates[a].back();
     const std::vector<double> by_state(rates[a].begin(), std::prev(rates[a].end()));
+    double nu_variance = 0, visit_variance = at_launch * (1 - at_launch) / launch_violation_draws;
+    for (std::size_t i = 0; i < by_state.size(); ++i) {
+      if (counts[i] == 0) continue;
+      const double one = by_state[i] * (1 - by_state[i]) / static_cast<double>(counts[i]);
+      nu_variance += nu[i] * nu[i] * one;
+      visit_variance += visits[i] * visits[i] * one;
+    }
     result.violations.push_back(
-        {names[a], share(dot(nu, by_state), nu_total), share(dot(visits, by_state) + at_launch, visit_total)});
+        {names[a], share(dot(nu, by_state), nu_total), share(dot(visits, by_state) + at_launch, visit_total),
+         std::sqrt(std::max(0.0, nu_variance)) / nu_total, std::sqrt(std::max(0.0, visit_variance)) / visit_total});
   }
 }
 
@@ -254,8 +269,7 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
         markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   }
   describe_survivors(problem, space, states, quasi.distribution, result);
-  constexpr double nobody = 1e-15;  // survivors of a launch that nodes and draws tell from none
-  if (std::accumulate(launch.after.begin(), launch.after.end(), 0.0) > nobody) {
+  if (std::accumulate(launch.after.begin(), launch.after.end(), 0.0) > rarest_launch) {
     const MeanSd restarted = observe(problem, states, markov::stationary_with_restart(solver, launch.after));
     result.survivors.restart_mean = restarted.mean;
     result.survivors.restart_sd = restarted.sd;

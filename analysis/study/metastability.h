@@ -95,6 +95,7 @@ struct ViolationShare {
   double quasi_stationary = 0;  ///< of collisions in the metastable regime
   double until_rest =
       0;  ///< of all collisions from the launch to rest (to the end of `survival` where some never rest)
+  double quasi_stationary_error = 0, until_rest_error = 0;  ///< standard errors of their draws
 };
 
 /// Holds the steps before failure, and what goes with them until then.

@@ -193,17 +193,17 @@ Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const Launch
 }
 
 std::vector<std::vector<double>> violation_rates(const AnyReturnMap& map, const StateSpace& space,
-                                                 const LaunchState& launch, std::span<const double> mask,
+                                                 const LaunchState& launch, std::span<const std::size_t> counts,
                                                  DrawOptions options) {
   std::vector<std::vector<double>> rate(map.assumptions().size(), std::vector<double>(space.size() + 1, 0.0));
   options.weighting = Weighting::plain;
   const auto dimension = static_cast<std::size_t>(map.noise_dimension());
-  const std::size_t per_state = options.count;
+  const std::size_t launched = options.count;
   for (std::size_t i = 0; i <= space.size(); ++i) {
     const bool at_launch = i == space.size();
-    if (!at_launch && mask[i] == 0) continue;
+    options.count = at_launch ? launched : counts[i];
+    if (options.count == 0) continue;
     options.replicate = static_cast<std::uint32_t>(i);
-    options.count = at_launch ? 64 * per_state : per_state;  // many cells join in a share, the launch stands alone
     const Draws draws = make_draws(map.noise_dimension(), options);
     const int phase = at_launch ? launch.phase : space.phase(i);
     for (std::size_t k = 0; k < draws.count(); ++k) {

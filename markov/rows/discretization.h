@@ -45,10 +45,11 @@ Launch launch_row(const AnyReturnMap& map, const StateSpace& space, const Launch
                   int threads = 1);
 
 /// Says how often events violate each of the map's assumptions: [assumption][state], and for the launch [assumption] at
-/// the back (one extra entry: index size()). `draws.count` plain draws a state (64 times as many at the launch),
-/// another randomisation for each; states with mask[i] == 0 are left at 0.
+/// the back (one extra entry: index size()). Plain draws, another randomisation for each state.
+/// @param counts  of draws at each state; where 0, rates are left at 0
+/// @param draws  their `count` is that at the launch
 std::vector<std::vector<double>> violation_rates(const AnyReturnMap& map, const StateSpace& space,
-                                                 const LaunchState& launch, std::span<const double> mask,
+                                                 const LaunchState& launch, std::span<const std::size_t> counts,
                                                  DrawOptions draws);
 
 }  // namespace metastable::markov

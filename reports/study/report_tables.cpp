@@ -73,17 +73,22 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
       if (std::find(assumptions.begin(), assumptions.end(), share.name) == assumptions.end())
         assumptions.push_back(share.name);
   for (const std::string& name : assumptions) {
-    const auto share = [&](double analysis::ViolationShare::*which) {
-      return [name, which](S s) {
-        for (const analysis::ViolationShare& one : s.study.violations)
-          if (one.name == name) return Cell(one.*which);
+    using Share = analysis::ViolationShare;
+    const auto share = [&](double Share::*which, double Share::*error) {
+      return [name, which, error](S s) {
+        for (const Share& one : s.study.violations) {
+          if (one.name != name) continue;
+          if (!(one.*error > 0)) return Cell(one.*which);
+          const analysis::Estimate drawn = with_error(one.*which, one.*error);
+          return Cell(analysis::Estimate{drawn.value, std::max(0.0, drawn.lower), std::min(1.0, drawn.upper)});
+        }
         return Cell("");
       };
     };
     add(fmt::format("“{}”, share of collisions, long run", name), "1",
-        share(&analysis::ViolationShare::quasi_stationary));
+        share(&Share::quasi_stationary, &Share::quasi_stationary_error));
     add(fmt::format("“{}”, share of all collisions until rest", name), "1",
-        share(&analysis::ViolationShare::until_rest));
+        share(&Share::until_rest, &Share::until_rest_error));
   }
   table.notes = {
       "Brackets hold 95 % intervals: replicated randomisations plus the estimated discretization error. An empty cell "

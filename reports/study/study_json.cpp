@@ -116,7 +116,10 @@ Json study_json(const analysis::Metastability& study, const analysis::RestThresh
   json["reach_ramp_end"] = optional_number(study.steps.reach_end);
   Json shares = Json::object();
   for (const analysis::ViolationShare& share : study.violations)
-    shares[share.name] = {{"quasi_stationary", share.quasi_stationary}, {"until_rest", share.until_rest}};
+    shares[share.name] = {{"quasi_stationary", share.quasi_stationary},
+                          {"quasi_stationary_standard_error", share.quasi_stationary_error},
+                          {"until_rest", share.until_rest},
+                          {"until_rest_standard_error", share.until_rest_error}};
   json["outside_assumptions"] = shares;
   json["rest_unreachable_above"] = {{"speed_rad_s", optional_number(thresholds.safe_speed)},
                                     {"slope_deg", optional_number(thresholds.safe_slope_deg)}};

@@ -18,6 +18,13 @@ std::string show(double value, double error) {
   return plain_text(to_decimal(value, NumberFormat::general, digits));
 }
 
+// Shows a share of draws; of none seen it says what so many draws would have shown.
+std::string percent(double share, double standard_error) {
+  constexpr double shown = 1e-4;
+  if (share < shown) return "< 0.01 %";
+  return show(100 * share, analysis::normal_95 * standard_error / share) + " %";
+}
+
 double relative_error(const analysis::Estimate& e) {
   return std::isfinite(e.value) ? 0.5 * (e.upper - e.lower) / e.value : 0;
 }
@@ -159,10 +166,11 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
   text += "\n";
   text += line("rest", thresholds_text(thresholds));
   for (const analysis::ViolationShare& share : study.violations)
-    text += line(fmt::format("collisions with '{}'", share.name),
-                 fmt::format("{:.3f} % in the {} regime, {:.3f} % {}", 100 * share.quasi_stationary,
-                             endless ? "stationary" : "metastable", 100 * share.until_rest,
-                             endless ? "on the ramp" : "until rest"));
+    text +=
+        line(fmt::format("collisions with '{}'", share.name),
+             fmt::format("{} in the {} regime, {} {}", percent(share.quasi_stationary, share.quasi_stationary_error),
+                         endless ? "stationary" : "metastable", percent(share.until_rest, share.until_rest_error),
+                         endless ? "on the ramp" : "until rest"));
   const std::string legs = study.phases > 1 ? fmt::format(" for each of {} legs", study.phases) : "";
   text += line("resolution", study.method == analysis::Method::integrated
                                  ? fmt::format("{} nodes{}, integrated", study.cells, legs)

@@ -16,6 +16,7 @@ import html
 import json
 import numbers
 import os
+import statistics
 from typing import Optional, Sequence, Tuple, Union
 
 import numpy
@@ -487,7 +488,7 @@ class SimulatedSteps(Record):
     @property
     def interval_95(self):
         """Normal 95 % interval of the mean."""
-        half = 1.959963984540054 * self.standard_error
+        half = statistics.NormalDist().inv_cdf(0.975) * self.standard_error
         return self.mean - half, self.mean + half
 
     def __repr__(self):

@@ -209,11 +209,11 @@ TEST(ViolationRates, CountWhatTheMapReports) {
     }
   };
   const StateSpace space({Grid::uniform(0, 8, 4)});
-  const std::vector<double> mask{1, 0, 1, 1};
-  const auto rates = violation_rates(Watched{}, space, {[](double) { return 5.0; }, 0}, mask, {.count = 64});
+  const std::vector<std::size_t> counts{64, 0, 32, 64};
+  const auto rates = violation_rates(Watched{}, space, {[](double) { return 5.0; }, 0}, counts, {.count = 64});
   ASSERT_EQ(rates.size(), 2u);
   EXPECT_NEAR(rates[0][0], 0.5, 0.02);
-  EXPECT_EQ(rates[0][1], 0.0);  // masked
+  EXPECT_EQ(rates[0][1], 0.0);  // without draws
   EXPECT_EQ(rates[1][0], 0.0);
   EXPECT_NEAR(rates[1][3], 1.0, 1e-12);
   EXPECT_NEAR(rates[1].back(), 1.0, 1e-12);  // the launch
