@@ -374,7 +374,14 @@ double pair_log_prior(std::size_t candidates) {
   return std::log(pair_prior / std::max(1.0, 0.5 * static_cast<double>(candidates - 1)));
 }
 
-// Scans again what the leaders leave.
+// Says whether the model itself tells where the last term starts beside the others.
+bool knows_start(const TransitionModel& model, const std::vector<EffectTerm>& terms) {
+  const std::vector<FitStart> starts = model.starts(terms);
+  return std::any_of(starts.begin(), starts.end(),
+                     [&](const FitStart& start) { return start.values.back() != terms.back().values; });
+}
+
+// Scans again what the leaders leave. Where the model knows better starts than the scores, the scores do not decide.
 void Ranker::scan_pairs() {
   const double prior = pair_log_prior(candidates_.size());
   for (const std::size_t leader : leaders(false)) {
@@ -386,7 +393,12 @@ void Ranker::scan_pairs() {
     std::vector<std::pair<double, const ScannedEffect*>> promising;
     for (const ScannedEffect& effect : scan.effects) {
       const double promised = log_evidence(effect, effect.gain[effect.best]);
-      if (promised + prior > least_pair_evidence) promising.emplace_back(promised, &effect);
+      std::vector<EffectTerm> both = first.terms;
+      both.push_back(term_at(effect, effect.best));
+      if (knows_start(model_, both))
+        tries_.push_back({leader, effect});
+      else if (promised + prior > least_pair_evidence)
+        promising.emplace_back(promised, &effect);
     }
     std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
     for (std::size_t k = 0; k < std::min(effort_.most_partners, promising.size()); ++k)

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -94,9 +95,18 @@ TEST(CoastDownDiagnosis, NamesTheRollingResistanceOfATyre) {
   }
 }
 
+// Both drags are tried beside the torque, whatever the scores promise: without them the rest looks like a wandering
+// loss.
 TEST(CoastDownDiagnosis, FindsTheTorqueOfARoughTyreToo) {
-  for (const bool linear : {false, true})
-    expect_the_torque(diagnosed(measured({}, 1, "free"), linear, {measured(rough, 11, "tyre")}));
+  for (const bool linear : {false, true}) {
+    const Diagnosis d = diagnosed(measured({}, 1, "free"), linear, {measured(rough, 11, "tyre")});
+    expect_the_torque(d);
+    for (const char* drag : {"axle_drag_viscous", "air_drag"})
+      EXPECT_TRUE(std::any_of(d.causes.ranked.begin(), d.causes.ranked.end(), [&](const Cause& cause) {
+        return cause.name().find("rolling_resistance") != std::string::npos &&
+               cause.name().find(drag) != std::string::npos;
+      })) << drag;
+  }
 }
 
 // Bearings and air differ by some per cent from run to run: no missing physics.
