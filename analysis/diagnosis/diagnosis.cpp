@@ -39,6 +39,7 @@ constexpr double left_over_square = 15;    // of a cell's statistic, beyond the 
 constexpr double least_left_over = 0.05;   // held-out gap that counts as one [nats a collision]
 constexpr double least_left_in_all = 6;    //   or that no draw of the trials takes away [nats, all collisions]
 constexpr double left_over_errors = 6;     // squared model errors of the gap as given that count as none, held out
+constexpr double facet_errors = 3;         // squared model errors that may be spread over the cells of a facet
 constexpr double largest_log_odds = 300;   // of none: their exponential stays finite
 // Prior odds of something without a name: to one effect of the catalogue; beside a hypothesis to the hypothesis alone.
 constexpr double unnamed_alone = 4, unnamed_beside = 0.03;
@@ -362,6 +363,19 @@ struct Chosen {
   double bent = 1;           // share of its gain that an error of form may bend
 };
 
+// Says whether a hypothesis adds an effect to a likelier one: what it leaves is then the likelier one's to leave.
+bool extends_likelier(const RankedCause& cause, const std::vector<const RankedCause*>& ordered) {
+  const auto holds = [&](const EffectTerm& wanted) {
+    return std::any_of(cause.terms.begin(), cause.terms.end(),
+                       [&](const EffectTerm& term) { return term.candidate == wanted.candidate; });
+  };
+  for (const RankedCause* likelier : ordered) {
+    if (likelier == &cause) return false;
+    if (std::all_of(likelier->terms.begin(), likelier->terms.end(), holds)) return true;
+  }
+  return false;
+}
+
 // Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds to all hypotheses; few
 // trials cannot show that events scatter as they would by themselves, and facets are then not judged.
 double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
@@ -372,12 +386,12 @@ double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRa
   for (const RankedCause* cause : ordered) {
     all += std::exp(cause->evidence - top);
     if (d.causes.unnamed.size() > most_beside || cause->evidence < top - beside_margin) continue;
-    if (cause->fit.nuisance.empty()) continue;
+    if (cause->fit.nuisance.empty() || extends_likelier(*cause, ordered)) continue;
     const PhaseGain gained = phase_gain(model, cause->fit, exact_part(ranking.singles, cause->terms, recalibrated));
+    constexpr double tolerated = facet_errors * model_error * model_error;
     Unnamed one{{},
                 cause->evidence,
-                left_by_facet(model, cause->fit, model_error * model_error * gained.collisions,
-                              model_error * model_error * gained.stances)};
+                left_by_facet(model, cause->fit, tolerated * gained.collisions, tolerated * gained.stances)};
     for (const EffectTerm& term : cause->terms) one.beside.push_back(term.candidate->id);
     one.evidence += evidence_of_more(one.facets);
     joined += std::exp(cause->evidence - top);
