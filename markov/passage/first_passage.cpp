@@ -1,6 +1,7 @@
 #include "markov/passage/first_passage.h"
 
 #include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -184,16 +185,29 @@ double Survival::quantile(double p) const {
 
 namespace {
 
-/// Holds what is known of the reward of the trials that come to rest at one step: a normal with their mean and
-/// variance. For a block of steps its mean is spread evenly over `width`.
+/// Holds what is known of the reward of the trials that come to rest at one step: a shifted gamma with their mean,
+/// variance and third cumulant. For a block of steps its mean is spread evenly over `width`.
 struct Component {
   double weight = 0;
   double mean = 0;
   double variance = 0;
+  double third = 0;
   double width = 0;
 
   double distribution(double t) const;
 };
+
+/// Returns the distribution function of the shifted gamma of mean 0, sd 1 and the given skewness (Pearson's type III);
+/// without skewness it is the normal's.
+double skewed_distribution(double z, double skewness) {
+  constexpr double kSymmetric = 1e-4;
+  constexpr double kSteepest = 20;  // beyond, a variance of rounding alone speaks
+  skewness = std::clamp(skewness, -kSteepest, kSteepest);
+  if (std::abs(skewness) < kSymmetric) return 0.5 * std::erfc(-z / std::numbers::sqrt2);
+  const double shape = 4 / (skewness * skewness);
+  const double x = std::max(0.0, shape + 2 * z / skewness);
+  return skewness > 0 ? boost::math::gamma_p(shape, x) : boost::math::gamma_q(shape, x);
+}
 
 /// Integrates the normal distribution function with the given sd from -infinity to x.
 double normal_ramp(double x, double sd) {
@@ -207,13 +221,15 @@ double Component::distribution(double t) const {
   const double distance = t - mean;
   const bool spread = width * width > variance;
   const double sd = std::sqrt(spread ? variance : variance + width * width / 12);
+  if (sd == 0 && width == 0) return distance >= 0 ? 1 : 0;
+  if (!spread) return skewed_distribution(distance / sd, third / (sd * sd * sd));
   if (std::abs(distance) >= kNormalReach * sd + 0.5 * width) return distance >= 0 ? 1 : 0;
-  if (!spread) return 0.5 * std::erfc(-distance / (sd * std::numbers::sqrt2));
   return (normal_ramp(distance + 0.5 * width, sd) - normal_ramp(distance - 0.5 * width, sd)) / width;
 }
 
-/// Holds the accumulated reward's law as a mixture of normals, one for every step at which rest may come; steps far out
-/// in the geometric tail are put together in blocks whose length is a small fraction of the steps before them.
+/// Holds the accumulated reward's law as a mixture of shifted gammas, one for every step at which rest may come; steps
+/// far out in the geometric tail are put together in blocks whose length is a small fraction of the steps before them.
+/// Trials that rest one step after the launch are taken as they are, state by state.
 class RewardMixture {
  public:
   RewardMixture(const ChainSolver& solver, const QuasiStationary& quasi, const Launch& launch,
@@ -222,10 +238,11 @@ class RewardMixture {
 
  private:
   using Row = std::vector<double>;
-  void enter(const Row& mass, const Row& first, const Row& second);
+  void enter(const Row& mass, const Row& first, const Row& second, const Row& third);
   void advance();
   Component absorb() const;
   bool settled() const;
+  void add_head();
   void add_tail();
   double distribution(double total_reward) const;
 
@@ -237,8 +254,10 @@ class RewardMixture {
   double drift_ = 0;   ///< mean reward of a step; moments are kept relative to it, so that they stay small
   double largest_reward_;
   double log_surviving_ = 0;
-  Row mass_, first_, second_;    ///< of the survivors, by state: probability, and moments of reward - drift_ per step
-  std::vector<Component> head_;  ///< one a step, means relative to the drift
+  /// Of the survivors, by state: probability, and moments of reward - drift_ per step.
+  Row mass_, first_, second_, third_;
+  std::vector<Component> atoms_;    ///< rests at the first step after the launch, a state each, absolute
+  std::vector<Component> head_;     ///< one a step, means relative to the drift
   std::vector<Component> mixture_;  ///< absolute
 };
 
@@ -273,7 +292,12 @@ RewardMixture::RewardMixture(const ChainSolver& solver, const QuasiStationary& q
   drift_ = dot(quasi.distribution, reward) / total(quasi.distribution);
   const Row nothing(chain_.size(), 0.0);
   log_surviving_ = log_survival(total(launch.after), launch.rest);
-  enter(launch.after, nothing, nothing);
+  enter(launch.after, nothing, nothing, nothing);
+  // Weights of either sign have no law by state: there the cumulants speak for the first step too.
+  for (std::size_t i = 0; i < chain_.size() && !chain_.interpolated() && !launch.interpolated; ++i) {
+    const double weight = launch.after[i] * chain_.kill()[i];
+    if (weight > 0) atoms_.push_back({weight, reward[i], 0, 0, 0});
+  }
   while (log_surviving_ > kLogNegligible) {
     head_.push_back(absorb());
     if (settled()) {
@@ -287,23 +311,33 @@ RewardMixture::RewardMixture(const ChainSolver& solver, const QuasiStationary& q
     }
     advance();
   }
-  for (std::size_t n = 0; n < head_.size(); ++n) {
+  add_head();
+}
+
+void RewardMixture::add_head() {
+  mixture_.insert(mixture_.end(), atoms_.begin(), atoms_.end());
+  for (std::size_t n = atoms_.empty() ? 0 : 1; n < head_.size(); ++n) {
     mixture_.push_back(head_[n]);
     mixture_.back().mean += drift_ * static_cast<double>(n + 1);
   }
 }
 
 /// Survivors arrive in their states, are made to sum to one, and each is paid the reward of its state.
-void RewardMixture::enter(const Row& mass, const Row& first, const Row& second) {
+void RewardMixture::enter(const Row& mass, const Row& first, const Row& second, const Row& third) {
   const double sum = total(mass);
   mass_.resize(mass.size());
   first_.resize(mass.size());
   second_.resize(mass.size());
+  third_.resize(mass.size());
   for (std::size_t i = 0; i < mass.size(); ++i) {
     const double paid = reward_[i] - drift_;
-    mass_[i] = sum > 0 ? mass[i] / sum : 0;
-    first_[i] = (sum > 0 ? first[i] / sum : 0) + paid * mass_[i];
-    second_[i] = (sum > 0 ? second[i] / sum : 0) + paid * (2 * first_[i] - paid * mass_[i]);
+    const double scale = sum > 0 ? 1 / sum : 0;
+    mass_[i] = mass[i] * scale;
+    first_[i] = first[i] * scale;
+    second_[i] = second[i] * scale;
+    third_[i] = third[i] * scale + paid * (3 * second_[i] + paid * (3 * first_[i] + paid * mass_[i]));
+    second_[i] += paid * (2 * first_[i] + paid * mass_[i]);
+    first_[i] += paid * mass_[i];
   }
 }
 
@@ -311,7 +345,7 @@ void RewardMixture::advance() {
   const double failing = dot(mass_, chain_.kill());
   const Row mass = apply_left(chain_, mass_);
   log_surviving_ += log_survival(total(mass), failing);
-  enter(mass, apply_left(chain_, first_), apply_left(chain_, second_));
+  enter(mass, apply_left(chain_, first_), apply_left(chain_, second_), apply_left(chain_, third_));
 }
 
 /// Returns the trials that come to rest at the next step.
@@ -319,8 +353,9 @@ Component RewardMixture::absorb() const {
   const double failing = dot(mass_, chain_.kill());
   if (failing == 0) return {};
   const double mean = dot(first_, chain_.kill()) / failing;
-  const double variance = dot(second_, chain_.kill()) / failing - mean * mean;
-  return {failing * std::exp(log_surviving_), mean, std::max(0.0, variance), 0};
+  const double square = dot(second_, chain_.kill()) / failing;
+  const double third = dot(third_, chain_.kill()) / failing - mean * (3 * square - 2 * mean * mean);
+  return {failing * std::exp(log_surviving_), mean, std::max(0.0, square - mean * mean), third, 0};
 }
 
 /// Over the last three periods, weights fall by the failure rate, and means and variances grow evenly; and what the
@@ -365,9 +400,11 @@ void RewardMixture::add_tail() {
       if (last.weight == 0) continue;
       const double mean_growth = last.mean - head_[i - period_].mean + drift_ * static_cast<double>(period_);
       const double variance_growth = std::max(0.0, last.variance - head_[i - period_].variance);
+      const double third_growth = last.third - head_[i - period_].third;
       const double periods = period + block.mean;
       mixture_.push_back({last.weight * share, last.mean + drift_ * static_cast<double>(i + 1) + mean_growth * periods,
-                          last.variance + variance_growth * periods, mean_growth * std::sqrt(12 * block.variance)});
+                          last.variance + variance_growth * periods, last.third + third_growth * periods,
+                          mean_growth * std::sqrt(12 * block.variance)});
     }
   }
 }

@@ -65,10 +65,11 @@ class Survival {
 };
 
 /// Returns quantiles of a reward accumulated until rest (seconds): given the number of steps, the total is matched by a
-/// normal with its exact conditional mean and variance; the mixture over steps is inverted. `probabilities` in (0,1),
-/// one quantile each. Mean and variance are exact, the shape is approximate: the tests hold it against trials. A launch
-/// that rests at once is an atom at 0. Costs O(entries) a step until the law of a step has settled, and then does not
-/// depend on how rare rest is: steps of the geometric tail count in blocks of 1/500 of the steps before them.
+/// shifted gamma with its exact conditional mean, variance and skewness (trials of one reward are taken as they are);
+/// the mixture over steps is inverted. `probabilities` in (0,1), one quantile each. The moments are exact, the shape is
+/// approximate: the tests hold it against trials. A launch that rests at once is an atom at 0. Costs O(entries) a step
+/// until the law of a step has settled, and then does not depend on how rare rest is: steps of the geometric tail count
+/// in blocks of 1/500 of the steps before them.
 /// @throws ConvergenceError("reward iteration", ...) when it has not settled after 200000 steps; std::invalid_argument
 /// on a probability outside (0,1), a negative reward, or a launch that is no distribution.
 std::vector<double> reward_quantiles(const ChainSolver& solver, const QuasiStationary& quasi, const Launch& launch,

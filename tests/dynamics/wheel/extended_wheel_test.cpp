@@ -110,9 +110,9 @@ TEST(ExtendedWheel, FeetHopFromTheirOnsetOn) {
   hopping.rebound_lost = 0.5;
   hopping.hops_from = 5;
   const ExtendedWheel wheel = extended(hopping), plain = extended({});
-  const Contact contact{0.5, 0.35};
-  EXPECT_EQ(wheel.omega_plus({.leg = 0}, 4.9, contact, false), plain.omega_plus({.leg = 0}, 4.9, contact, false));
-  EXPECT_LT(*wheel.omega_plus({.leg = 0}, 5, contact, false), *plain.omega_plus({.leg = 0}, 5, contact, false) - 0.1);
+  const Contact drawn{0.5, 0.35};
+  EXPECT_EQ(wheel.omega_plus({.leg = 0}, 4.9, drawn, false), plain.omega_plus({.leg = 0}, 4.9, drawn, false));
+  EXPECT_LT(*wheel.omega_plus({.leg = 0}, 5, drawn, false), *plain.omega_plus({.leg = 0}, 5, drawn, false) - 0.1);
   EXPECT_EQ(wheel.after_collision({.leg = 0}, 4.9, 3.4).below, plain.after_collision({.leg = 0}, 4.9, 3.4).below);
   EXPECT_GT(wheel.after_collision({.leg = 0}, 5, 3.4).below, plain.after_collision({.leg = 0}, 5, 3.4).below);
 }
