@@ -39,6 +39,10 @@ struct MeanSd {
   double mean = 0, sd = 0;
 };
 
+bool goes_on(const markov::Launch& launch) {
+  return std::accumulate(launch.after.begin(), launch.after.end(), 0.0) > rarest_launch;
+}
+
 // Returns mean and sd of the observable, states weighted by `mass` (any total).
 MeanSd observe(const Problem& problem, std::span<const double> states, std::span<const double> mass) {
   double total = 0, first = 0, second = 0;
@@ -68,6 +72,14 @@ void describe_survivors(const Problem& problem, const markov::StateSpace& space,
   const MeanSd all = observe(problem, states, nu);
   result.survivors.mean = all.mean;
   result.survivors.sd = all.sd;
+}
+
+// Returns what the observable is if every wheel that rests is launched again; NaN where no launch goes on.
+MeanSd relaunched(const Problem& problem, std::span<const double> states, const markov::ChainSolver& solver,
+                  const markov::Launch& launch) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  if (!goes_on(launch)) return {none, none};
+  return observe(problem, states, markov::stationary_with_restart(solver, launch.after));
 }
 
 // Does the noise leave the landings of the launches alone? Then the chain is an orbit smeared over cells: nilpotent but
@@ -265,17 +277,14 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
     result.spectrum.moduli = moduli_per_step(problem, solver.revolution(), result.spectrum.period, options.eigenvalues,
                                              quasi.failure_rate, result.message);
     result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
-    result.spectrum.total_variation_steps =
-        markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
+    if (goes_on(launch))
+      result.spectrum.total_variation_steps =
+          markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   }
   describe_survivors(problem, space, states, quasi.distribution, result);
-  if (std::accumulate(launch.after.begin(), launch.after.end(), 0.0) > rarest_launch) {
-    const MeanSd restarted = observe(problem, states, markov::stationary_with_restart(solver, launch.after));
-    result.survivors.restart_mean = restarted.mean;
-    result.survivors.restart_sd = restarted.sd;
-  } else {  // no launch survives its first collision
-    result.survivors.restart_mean = result.survivors.restart_sd = std::numeric_limits<double>::quiet_NaN();
-  }
+  const MeanSd again = relaunched(problem, states, solver, launch);
+  result.survivors.restart_mean = again.mean;
+  result.survivors.restart_sd = again.sd;
   if (!options.brief)
     describe_violations(problem, space, quasi.distribution, solver.solve_left(launch.after), options, result);
 
@@ -285,6 +294,16 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
   for (std::size_t i = 0; i < ones.size(); ++i)
     result.steps.solver_disagreement =
         std::max(result.steps.solver_disagreement, std::abs(by_klu[i] - by_elimination[i]) / by_elimination[i]);
+}
+
+void compare_survivors(const Problem& problem, std::span<const double> states, const markov::SampledChain& sampled,
+                       const SolvedChain& solved, Metastability& result) {
+  Survivors& fine = result.survivors;
+  const MeanSd coarse = observe(problem, states, solved.quasi.distribution),
+               again = relaunched(problem, states, solved.solver, sampled.launch);
+  fine.error = std::max(std::abs(fine.mean - coarse.mean), std::abs(fine.sd - coarse.sd));
+  if (!std::isnan(fine.restart_mean))
+    fine.restart_error = std::max(std::abs(fine.restart_mean - again.mean), std::abs(fine.restart_sd - again.sd));
 }
 
 void summarize_endless(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
@@ -321,8 +340,6 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
                                            options.eigenvalues, 0.0, result.message);
   result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
   describe_survivors(problem, space, midpoints(space), stationary, result);
-  result.survivors.restart_mean = ever ? result.survivors.mean : std::numeric_limits<double>::quiet_NaN();
-  result.survivors.restart_sd = ever ? result.survivors.sd : std::numeric_limits<double>::quiet_NaN();
 
   // Launches are followed until rest or for ever: the share that never rests, and the steps of the
   // others.
@@ -340,6 +357,9 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
     steps += std::accumulate(visits.begin(), visits.end(), 0.0);
   }
   const bool finite = never < rarest_launch;
+  const bool relaunches = ever && !finite;  // else the long run is one of launches that rest
+  result.survivors.restart_mean = relaunches ? result.survivors.mean : std::numeric_limits<double>::quiet_NaN();
+  result.survivors.restart_sd = relaunches ? result.survivors.sd : std::numeric_limits<double>::quiet_NaN();
   result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, infinite, infinite};
   result.steps.from_start = finite ? Estimate{steps, steps, steps} : result.steps.from_quasi_stationary;
 

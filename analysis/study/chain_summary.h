@@ -49,7 +49,12 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
                const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options,
                Metastability& result);
 
-/// Does the same for a chain with states that never come to rest. Expected steps are infinite unless all launches rest.
+/// Fills the errors of result.survivors by what the same chain of half as many cells says.
+void compare_survivors(const Problem& problem, std::span<const double> states, const markov::SampledChain& sampled,
+                       const SolvedChain& solved, Metastability& result);
+
+/// Fills `result` for a chain with states that never come to rest. Expected steps are infinite unless all launches
+/// rest.
 void summarize_endless(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
                        const StudyOptions& options, Metastability& result);
 

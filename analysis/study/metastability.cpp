@@ -169,6 +169,8 @@ class Study {
       const markov::StateSpace& space = ladder.spaces.back();
       const std::vector<double> states = midpoints(space);
       summarize(problem_, space, states, ladder.pooled.back(), assessed.finest, options_, result);
+      compare_survivors(problem_, midpoints(ladder.spaces[sizes - 2]), ladder.pooled[sizes - 2], assessed.middle,
+                        result);
       add_landing_error(
           result, landing_error(problem_, space.phases(), states, ladder.pooled.back(), assessed.finest, options_),
           options_.tolerance);
@@ -178,7 +180,7 @@ class Study {
 
   struct Assessed {
     Metastability result;
-    SolvedChain finest;
+    SolvedChain middle, finest;
   };
 
   // Gives the expected steps with their errors from the ladder.
@@ -186,8 +188,9 @@ class Study {
     std::vector<markov::DrawOptions> draws;
     for (int r = 0; r < options_.replicates; ++r) draws.push_back(draw_options(options_, samples, r));
     std::vector<ChainSteps> pooled;
-    std::optional<SolvedChain> finest;
+    std::optional<SolvedChain> before_finest, finest;
     for (std::size_t s = 0; s < sizes; ++s) {
+      std::swap(before_finest, finest);
       finest.emplace(ladder.pooled[s], pilot.regime(ladder.spaces[s]));
       pooled.push_back(chain_steps(problem_.map, ladder.spaces[s], *finest, draws));
     }
@@ -221,7 +224,7 @@ class Study {
     for (std::size_t r = 0; r < ladder.replicate[2].size(); ++r)
       result.steps.replicate_logs.push_back(
           extrapolate(std::log(ladder.replicate[2][r].from_start), std::log(ladder.replicate[1][r].from_start)));
-    return {std::move(result), *std::move(finest)};
+    return {std::move(result), *std::move(before_finest), *std::move(finest)};
   }
 
   // Answers where some states never come to rest: there is no first passage, but a stationary regime.
@@ -252,6 +255,9 @@ class Study {
     if (std::isfinite(result.steps.from_start.value)) {
       result.status = Status::converged;
       result.message.clear();
+      if (!result.survivors.by_phase.empty())
+        result.message =
+            "the metastable regime is of wheels that never rest: fewer than 1e-15 of the launches come to such speeds";
     }
     return result;
   }

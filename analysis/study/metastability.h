@@ -131,8 +131,10 @@ struct Spectrum {
 struct Survivors {
   std::vector<PhaseDistribution> by_phase;
   double mean = 0, sd = 0;  ///< of the observable over all phases (equal shares)
-  /// These are stationary, with a new launch after each rest; NaN where every launch rests at its first collision.
+  /// These are stationary, with a new launch after each rest; NaN where no launch goes on.
   double restart_mean = 0, restart_sd = 0;
+  /// Say how far mean or sd moved with the last halving of the cells, at most; 0 where there was none.
+  double error = 0, restart_error = 0;
 };
 
 /// Holds one number of a chain, told in two ways that share little.

@@ -70,7 +70,7 @@ class Survival {
 /// approximate: the tests hold it against trials. A launch that rests at once is an atom at 0. Costs O(entries) a step
 /// until the law of a step has settled, and then does not depend on how rare rest is: steps of the geometric tail count
 /// in blocks of 1/500 of the steps before them.
-/// @throws ConvergenceError("reward iteration", ...) when it has not settled after 200000 steps; std::invalid_argument
+/// @throws ConvergenceError("reward iteration", ...) when it has not settled after 20000 steps; std::invalid_argument
 /// on a probability outside (0,1), a negative reward, or a launch that is no distribution.
 std::vector<double> reward_quantiles(const ChainSolver& solver, const QuasiStationary& quasi, const Launch& launch,
                                      std::span<const double> reward, std::span<const double> probabilities);

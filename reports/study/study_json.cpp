@@ -109,10 +109,13 @@ Json study_json(const analysis::Metastability& study, const analysis::RestThresh
   Json legs = Json::array();
   for (const analysis::PhaseDistribution& phase : study.survivors.by_phase)
     legs.push_back({{"mean_rad_s", phase.mean}, {"sd_rad_s", phase.sd}});
-  json["quasi_stationary"] = {
-      {"mean_rad_s", study.survivors.mean}, {"sd_rad_s", study.survivors.sd}, {"per_leg", legs}};
+  json["quasi_stationary"] = {{"mean_rad_s", study.survivors.mean},
+                              {"sd_rad_s", study.survivors.sd},
+                              {"error_rad_s", study.survivors.error},
+                              {"per_leg", legs}};
   json["stationary_with_restart"] = {{"mean_rad_s", study.survivors.restart_mean},
-                                     {"sd_rad_s", study.survivors.restart_sd}};
+                                     {"sd_rad_s", study.survivors.restart_sd},
+                                     {"error_rad_s", study.survivors.restart_error}};
   json["reach_ramp_end"] = optional_number(study.steps.reach_end);
   Json shares = Json::object();
   for (const analysis::ViolationShare& share : study.violations)

@@ -25,6 +25,12 @@ std::string percent(double share, double standard_error) {
   return show(100 * share, analysis::normal_95 * standard_error / share) + " %";
 }
 
+/// Shows mean and sd of a speed, both known to `error` [rad/s]: to as many decimals as that knows.
+std::string speed_text(double mean, double sd, double error) {
+  const int decimals = error > 0 ? std::clamp(static_cast<int>(std::floor(-std::log10(error))), 1, 4) : 4;
+  return fmt::format("{:.{}f} rad/s, sd {:.{}f}", mean, decimals, sd, decimals);
+}
+
 double relative_error(const analysis::Estimate& e) {
   return std::isfinite(e.value) ? 0.5 * (e.upper - e.lower) / e.value : 0;
 }
@@ -57,13 +63,15 @@ constexpr Word assumptions[] = {
     {"energy gain", "the collision gives energy to the wheel",
      "No passive contact does; a share that is not small speaks against the law or its friction and restitution."}};
 
-std::string spread_text(const analysis::Accumulated& total, double error) {
-  return fmt::format("sd {}, median {}, 5 to 95 %: {} to {}", show(total.sd, error), show(*total.quantile(0.5), error),
+std::string quantiles_text(const analysis::Accumulated& total, double error) {
+  return fmt::format("median {}, 5 to 95 %: {} to {}", show(*total.quantile(0.5), error),
                      show(*total.quantile(0.05), error), show(*total.quantile(0.95), error));
 }
 
 std::string total_line(const std::string& name, const analysis::Accumulated& total, double error) {
-  return line(name, fmt::format("mean {}, {}", show(total.mean, error), spread_text(total, error)));
+  // Mean and sd are the chain's; the quantiles' shape is matched (markov::reward_quantiles).
+  return line(name, fmt::format("mean {}, sd {}, {}", show(total.mean, error), show(total.sd, error),
+                                quantiles_text(total, std::max(error, 0.002))));
 }
 
 }  // namespace
@@ -139,7 +147,8 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
     text += line("  from the metastable regime", estimate_text(study.steps.from_quasi_stationary));
     text += line("  from the worst start", estimate_text(study.steps.worst_start));
     text += line("failure rate per step", estimate_text(study.spectrum.failure_rate));
-    text += line("steps", spread_text(study.steps.distribution, error));
+    text += line("steps", fmt::format("sd {}, {}", show(study.steps.distribution.sd, error),
+                                      quantiles_text(study.steps.distribution, error)));
     if (study.steps.seconds) text += total_line("seconds", *study.steps.seconds, error);
     if (study.steps.metres) text += total_line("metres", *study.steps.metres, error);
   }
@@ -148,14 +157,14 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
     text += line(fmt::format("reaches the end of {} m", setting.ramp_length),
                  show(reached, reached > 0 ? -std::log(reached) * std::max(error, 0.001) : 0));
   }
+  const analysis::Survivors& survivors = study.survivors;
   text += line(endless ? "stationary speed" : "quasi-stationary speed",
-               fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.mean, study.survivors.sd));
+               speed_text(survivors.mean, survivors.sd, survivors.error));
   if (!endless)
-    text +=
-        line("stationary speed, relaunched",
-             std::isnan(study.survivors.restart_mean)
-                 ? "none: every launch rests at its first collision"
-                 : fmt::format("{:.4f} rad/s, sd {:.4f}", study.survivors.restart_mean, study.survivors.restart_sd));
+    text += line("stationary speed, relaunched",
+                 std::isnan(survivors.restart_mean)
+                     ? "none: every launch rests at its first collision"
+                     : speed_text(survivors.restart_mean, survivors.restart_sd, survivors.restart_error));
   text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.spectrum.moduli, ", ")));
   std::string mixing;
   if (study.spectrum.moduli.size() > 1) mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);

@@ -198,7 +198,7 @@ std::vector<BuiltEffect> built_effects() {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, EffectOnLanding, testing::ValuesIn(built_effects()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& effect) { return std::string(effect.param.name); });
 
 }  // namespace
 }  // namespace metastable::dynamics

@@ -70,7 +70,7 @@ TEST_F(JsonOfEveryCommand, IsAllOfStandardOutput) {
 TEST_F(JsonOfEveryCommand, IsAFileBesideWhatIsPrintedOrRefused) {
   const Ran plain = metastable({"doctor"}), both = metastable({"doctor", "--json", path("doctor.json")});
   EXPECT_EQ(both.out, plain.out);
-  EXPECT_TRUE(Json::parse(read(path("doctor.json")))["facts"].contains("version"));
+  EXPECT_TRUE(Json::parse(test::read(path("doctor.json")))["facts"].contains("version"));
   const Ran full = metastable({"doctor", "--json", "/dev/full"}), none = metastable({"doctor", "--json", ""});
   EXPECT_EQ(full.code, 2);
   EXPECT_EQ(full.err, "metastable: cannot write /dev/full: No space left on device\n");
