@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "dynamics/laboratory/impulse_collision.h"
+#include "dynamics/laboratory/rigid_roll.h"
 
 namespace metastable::dynamics {
 namespace {
@@ -73,6 +74,22 @@ double foot_inertia(const Wheel& wheel, Law law, double radius_of_gyration, doub
   return mass * (radius_of_gyration * radius_of_gyration + length * length);
 }
 
+// Bounces of more than that leave feet in the air for longer than a step.
+constexpr double most_bouncing = 0.95;
+
+// A rigid body that is followed through its hops has no loss of a collision that an effect could change.
+void require_rigid(const LaboratorySetup& setup, const LaboratoryChanges& c) {
+  const auto refuse = [](const char* what) {
+    throw std::invalid_argument(fmt::format("laboratory: {} acts on no rigid body; law settled has none", what));
+  };
+  if (setup.wheel.tip_radius > 0) refuse("tip_radius: a round tip");
+  if (c.rebound_lost != 0) refuse("effect bounce");
+  if (c.vibration != 0) refuse("effect ramp_vibration");
+  if (c.slip_reversal) refuse("effect slip_reversal");
+  if (c.stored != 0) refuse("effect stored_energy");
+  if (c.slosh != 0) refuse("effect sloshing_fluid");
+}
+
 void require(bool fine, const char* name, double value, const char* range) {
   if (!fine) throw std::invalid_argument(fmt::format("laboratory: {}: {} is outside {}", name, value, range));
 }
@@ -87,7 +104,9 @@ Laboratory::Laboratory(LaboratorySetup setup)
       restitution_(changes_.stated.restitution_mean, changes_.stated.restitution_sd, 0, 1),
       friction_(changes_.stated.friction_mean, changes_.stated.friction_sd, 0) {
   wheel_.validate();
+  if (setup_.law == Law::settled) require_rigid(setup_, changes_);
   model_ = contact_model(wheel_, law_);
+  if (law_ == Law::settled) require(rigid_inertia() > 0, "inertia about the hub", rigid_inertia(), "(0, inf) kg m^2");
   require(std::abs(setup_.restitution_skewness) < 2, "restitution_skewness", setup_.restitution_skewness, "(-2, 2)");
   require(setup_.sensor_noise >= 0, "sensor_noise", setup_.sensor_noise, "[0, inf) rad/s");
   require(setup_.smoothing >= 0 && setup_.smoothing <= 0.1, "smoothing", setup_.smoothing, "[0, 0.1] s");
@@ -157,6 +176,7 @@ class Laboratory::Roll {
   LaboratoryTrial run() {
     const LaboratoryCondition& condition = lab_.setup_.conditions[condition_];
     trial_.condition = condition_;
+    if (lab_.law_ == Law::settled) return run_rigid(condition);
     const Pose first = landing_pose(body_, surface_, condition.first_landing_leg, 0, launch_);
     Touch touch = touch_standing(body_, first, inertia(first.leg));
     trial_.motion = run_up(body_, surface_, first, inertia(first.leg), lead);
@@ -185,6 +205,26 @@ class Laboratory::Roll {
   double inertia(int leg) const {
     const double length = body_.leg_length[static_cast<std::size_t>(leg)];
     return c_.inertia_ratio * foot_inertia(lab_.wheel_, lab_.law_, lab_.model_.radius_of_gyration, length);
+  }
+
+  // The trial in the second laboratory.
+  LaboratoryTrial run_rigid(const LaboratoryCondition& condition) {
+    const double inertia = lab_.rigid_inertia();
+    RigidRoll roll(body_, surface_, inertia, condition.first_landing_leg, launch_);
+    for (;;) {
+      LaboratoryCollision& collision = add_collision(roll.leg(), roll.position(), roll.spin(), roll.time());
+      collision.flew = !roll.on_ground();
+      collision.contact.restitution = std::min(collision.contact.restitution, most_bouncing);
+      if (trial_.motion.empty()) trial_.motion.push_back({0, 0, roll.spin()});
+      report_before();
+      const bool touched = roll.step(collision.contact, &trial_.motion);
+      collision.omega_plus = roll.after_impact();
+      report_after();
+      if (!touched) return finish(Outcome::rest);
+      if (roll.position() > condition.ramp_length) return finish(Outcome::end_of_ramp);
+      if (static_cast<int>(trial_.collisions.size()) == lab_.setup_.max_collisions)
+        return finish(Outcome::max_collisions);
+    }
   }
 
   LaboratoryTrial finish(Outcome outcome) {
@@ -321,24 +361,36 @@ class Laboratory::Roll {
   }
 
   Pose land(const Touch& touch, double time) {
-    LaboratoryCollision collision;
-    collision.leg = touch.leg;
-    collision.time = time;
-    collision.position = tip(body_, touch.before, touch.leg).x;
-    collision.omega_minus = touch.before.speed;
-    collision.flew = touch.flew;
-    collision.contact = contact_ = draw(touch.leg, collision.position, touch.before.speed, time);
     const double since = trial_.collisions.empty() ? 0 : time - trial_.collisions.back().time;
     const double factor =
         trial_.collisions.empty() ? 1 : 1 + c_.vibration * std::cos(2 * std::numbers::pi * c_.vibration_hz * since);
+    LaboratoryCollision& collision =
+        add_collision(touch.leg, tip(body_, touch.before, touch.leg).x, touch.before.speed, time);
+    collision.flew = touch.flew;
+    contact_ = collision.contact;
     const Pose pose = next_pose(touch, collide(touch, contact_, factor));
     collision.omega_plus = pose.speed;
-    const double window = lab_.setup_.smoothing;
-    double seen = collision.omega_minus;
-    if (window > 0) seen = mean_speed(std::max(time - window, trial_.motion.front().time), time);
-    collision.reported_minus = sensed(seen, 0);
-    trial_.collisions.push_back(collision);
+    report_before();
     return pose;
+  }
+
+  LaboratoryCollision& add_collision(int leg, double position, double speed, double time) {
+    LaboratoryCollision collision;
+    collision.contact = draw(leg, position, speed, time);
+    collision.leg = leg;
+    collision.time = time;
+    collision.position = position;
+    collision.omega_minus = speed;
+    return trial_.collisions.emplace_back(collision);
+  }
+
+  void report_before() {
+    LaboratoryCollision& last = trial_.collisions.back();
+    const double window = lab_.setup_.smoothing;
+    double seen = last.omega_minus;
+    if (window > 0 && last.time > trial_.motion.front().time)
+      seen = mean_speed(std::max(last.time - window, trial_.motion.front().time), last.time);
+    last.reported_minus = sensed(seen, 2 * (trial_.collisions.size() - 1));
   }
 
   // Lets the old foot come down again, which no camera would call a collision.
@@ -349,16 +401,16 @@ class Laboratory::Roll {
     const double window = lab_.setup_.smoothing, end = trial_.motion.back().time;
     double seen = last.omega_plus;
     if (window > 0 && end > last.time) seen = mean_speed(last.time, std::min(end, last.time + window));
-    last.reported_plus = sensed(seen, 1);
+    last.reported_plus = sensed(seen, 2 * trial_.collisions.size() + 1);
   }
 
   double mean_speed(double from, double to) const {
     return (angle_at(trial_.motion, to) - angle_at(trial_.motion, from)) / (to - from);
   }
 
-  double sensed(double speed, int which) const {
-    const Draws d =
-        draws(lab_.setup_.seed, index_, 2 * trial_.collisions.size() + static_cast<std::size_t>(which), Stream::sensor);
+  // @param event of the sensor: 2 k before collision k, from 0, and 2 k + 3 after it
+  double sensed(double speed, std::size_t event) const {
+    const Draws d = draws(lab_.setup_.seed, index_, event, Stream::sensor);
     const double noise = lab_.setup_.sensor_noise * d.score[0] + c_.sensor_noise * d.score[1];
     return std::max(0.0, speed + c_.sensor_bias + noise);
   }
@@ -376,6 +428,11 @@ class Laboratory::Roll {
   double loss_sum_ = 0, last_loss_ = 0;
   int losses_ = 0;
 };
+
+double Laboratory::rigid_inertia() const {
+  const double mass = wheel_.hub_mass, mean = wheel_.mean_leg_length(), gyration = model_.radius_of_gyration;
+  return mass * (changes_.inertia_ratio * (gyration * gyration + mean * mean) - mean * mean);
+}
 
 LaboratoryTrial Laboratory::run(std::size_t index) const { return Roll(*this, index).run(); }
 

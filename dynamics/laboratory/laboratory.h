@@ -3,7 +3,8 @@
 //
 // Shares no formula with WheelMap or the contact laws: the stance is integrated in time (rolling_motion), the collision
 // over its impulse (impulse_collision). The balance of energy over a collision is the paper's: what the impulse does
-// not take stays as rotation about the landed foot.
+// not take stays as rotation about the landed foot. Under the law `settled` a second laboratory rolls the wheel as a
+// rigid body (rigid_roll), with the same draws of contact, launch and sensor.
 
 #include <cstdint>
 #include <string>
@@ -53,7 +54,7 @@ struct LaboratoryCollision {
   double omega_minus = 0, omega_plus = 0;        ///< true [rad/s]
   double reported_minus = 0, reported_plus = 0;  ///< as the sensor has them [rad/s], not below 0
   Contact contact;                               ///< eta, mu of this collision, effects included
-  bool flew = false;                             ///< the old foot had lifted
+  bool flew = false;                             ///< the old foot had lifted; `settled`: it did not stand
 };
 
 struct LaboratoryTrial {
@@ -67,16 +68,20 @@ struct LaboratoryTrial {
 
 class Laboratory {
  public:
-  /// @throws std::invalid_argument naming what is out of range (setup, effect, or a condition by its index)
+  /// @throws std::invalid_argument naming what is out of range (setup, effect, or a condition by its index), and under
+  ///         `settled` round tips and effects on what a collision loses (bounce, ramp_vibration, stored_energy),
+  ///         slip_reversal, sloshing_fluid: a rigid body has none of these
   explicit Laboratory(LaboratorySetup setup);
 
   const LaboratorySetup& setup() const { return setup_; }
   /// Runs trial `index` of the order. Random numbers come from Philox at counter (trial, event): the bits are the same
-  /// in any order. A collision takes some 50 us.
+  /// in any order. A collision takes some 50 us, under `settled` 0.5 ms.
   LaboratoryTrial run(std::size_t index) const;
 
  private:
   class Roll;
+  // About the mass centre, of a rigid wheel that is as stated, or as much heavier to turn about a foot [kg m^2].
+  double rigid_inertia() const;
   LaboratorySetup setup_;
   LaboratoryChanges changes_;
   Wheel wheel_;  // as it is
