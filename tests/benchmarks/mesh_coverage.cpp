@@ -71,7 +71,7 @@ int main(int argc, char** argv) {
           {.seed = static_cast<std::uint64_t>(seed), .threads = 1, .guided_samples = 0, .simulated_steps = 0});
       const double off = std::log(study.steps.value / simulated->mean),
                    half = 0.5 * std::log(study.steps.upper / study.steps.lower);
-      held += std::abs(off) <= std::hypot(half, normal_95 * relative);
+      held += std::abs(off) <= std::hypot(half, markov::normal_95 * relative);
       width += half / seeds;
       bias += off / seeds;
     }
