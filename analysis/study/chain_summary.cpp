@@ -30,6 +30,7 @@ constexpr double same_spectrum = 1e-6;        // and of two ways to its lambda_1
 constexpr double frequent_rest = 0.01;        // a step
 constexpr double rarest_launch = 1e-15;       // that counts: beyond 8 sds
 constexpr double rarest_rest = 1e-9;          // worth a word where the others never rest
+constexpr double least_regime = 1e-12;        // survivors of a step: fewer are the rounding of row sums
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -282,11 +283,16 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
           markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   }
   describe_survivors(problem, space, states, quasi.distribution, result);
+  const bool regime = 1 - quasi.failure_rate > least_regime;
+  if (!regime) result.survivors.mean = result.survivors.sd = std::numeric_limits<double>::quiet_NaN();
   const MeanSd again = relaunched(problem, states, solver, launch);
   result.survivors.restart_mean = again.mean;
   result.survivors.restart_sd = again.sd;
   if (!options.brief)
     describe_violations(problem, space, quasi.distribution, solver.solve_left(launch.after), options, result);
+  if (!regime)
+    for (ViolationShare& share : result.violations)
+      share.quasi_stationary = share.quasi_stationary_error = std::numeric_limits<double>::quiet_NaN();
 
   const markov::SparseSolver check(solver.revolution());
   const std::vector<double> ones(solver.revolution().size(), 1.0);
@@ -301,7 +307,7 @@ void compare_survivors(const Problem& problem, std::span<const double> states, c
   Survivors& fine = result.survivors;
   const MeanSd coarse = observe(problem, states, solved.quasi.distribution),
                again = relaunched(problem, states, solved.solver, sampled.launch);
-  fine.error = std::max(std::abs(fine.mean - coarse.mean), std::abs(fine.sd - coarse.sd));
+  if (!std::isnan(fine.mean)) fine.error = std::max(std::abs(fine.mean - coarse.mean), std::abs(fine.sd - coarse.sd));
   if (!std::isnan(fine.restart_mean))
     fine.restart_error = std::max(std::abs(fine.restart_mean - again.mean), std::abs(fine.restart_sd - again.sd));
 }

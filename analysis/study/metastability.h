@@ -92,7 +92,7 @@ struct PhaseDistribution {
 
 struct ViolationShare {
   std::string name;
-  double quasi_stationary = 0;  ///< of collisions in the metastable regime
+  double quasi_stationary = 0;  ///< of collisions in the metastable regime; NaN where there is none
   double until_rest =
       0;  ///< of all collisions from the launch to rest (to the end of `survival` where some never rest)
   double quasi_stationary_error = 0, until_rest_error = 0;  ///< standard errors of their draws
@@ -130,7 +130,7 @@ struct Spectrum {
 /// Describes the metastable regime: what survivors look like once the start is forgotten.
 struct Survivors {
   std::vector<PhaseDistribution> by_phase;
-  double mean = 0, sd = 0;  ///< of the observable over all phases (equal shares)
+  double mean = 0, sd = 0;  ///< of the observable over all phases (equal shares); NaN where hardly any survives a step
   /// These are stationary, with a new launch after each rest; NaN where no launch goes on.
   double restart_mean = 0, restart_sd = 0;
   /// Say how far mean or sd moved with the last halving of the cells, at most; 0 where there was none.

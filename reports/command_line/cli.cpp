@@ -288,9 +288,15 @@ int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, in
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!subcommands[i]->parsed()) continue;
     if (!config_files[i].empty()) options[i].read(config_files[i]);
-    options[i].check_given();
-    check_written_paths(options[i], config_files[i]);
-    all[i].run(options[i], command_line(argc, argv));
+    try {
+      options[i].check_given();
+      check_written_paths(options[i], config_files[i]);
+      all[i].run(options[i], command_line(argc, argv));
+    } catch (const analysis::InputError&) {
+      throw;
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(options[i].placed(error.what()));
+    }
   }
   return 0;
 }

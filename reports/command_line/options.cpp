@@ -100,8 +100,16 @@ void Options::read(const std::string& file) {
           fmt::format("{}:{}: unknown key '{}' (keys are the long options of 'metastable {}'){}", file, entry.line,
                       entry.key, command_.get_name(), analysis::did_you_mean(entry.key, names())));
     std::vector<std::string>& texts = texts_[entry.key];
-    if (texts.empty()) texts = entry.values;
+    if (!texts.empty()) continue;
+    texts = entry.values;
+    places_[entry.key] = fmt::format("{}:{}: ", file, entry.line);
   }
+}
+
+std::string Options::placed(const std::string& message) const {
+  for (const auto& [name, place] : places_)
+    if (message.starts_with(named(name) + ":")) return place + message;
+  return message;
 }
 
 std::string Options::value(const std::string& name) const {

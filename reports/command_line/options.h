@@ -46,6 +46,8 @@ class Options {
   void add_places(const std::string& name, const std::string& help);
   /// Reads the keys of the file that the command line did not give.
   void read(const std::string& file);
+  /// Returns a message about an option with the file and line before it that the option was read from, if it was.
+  std::string placed(const std::string& message) const;
   /// Says of an option what a command line would say, once for each time it would be given; nothing forgets.
   void give(const std::string& name, std::vector<std::string> values) { texts_.at(name) = std::move(values); }
   /// Nothing that was given may be empty; where the value is one of some words ("fresh|facets"), it is one of these.
@@ -75,6 +77,7 @@ class Options {
   CLI::App& command_;
   std::map<std::string, std::vector<std::string>> texts_;
   std::map<std::string, std::string> fallback_;
+  std::map<std::string, std::string> places_;  ///< "file:line: " of what a file gave
   std::map<std::string, dynamics::Range> ranges_;
 };
 

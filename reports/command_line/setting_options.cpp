@@ -191,6 +191,8 @@ analysis::Setting one_setting(const Options& options, const Pairs& pairs) {
   std::optional<std::string> launch;
   if (options.given("initial-speed")) launch = options.text("initial-speed");
   setting.initial_speed = launch_for(setting.slope_deg, launch);
+  if (setting.correlation != 0 && (setting.restitution.sd == 0 || setting.friction.sd == 0))
+    throw std::invalid_argument("--correlation: has a meaning where --restitution and --friction both have an sd");
   return checked(std::move(setting));
 }
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <stdexcept>
 #include <vector>
 
 #include "analysis/experiment/experiment_folder.h"
@@ -51,6 +53,8 @@ void run_into_folder(const Request& request) {
 }  // namespace
 
 SimulatedExperiment simulated_experiment(const SimulateRequest& request, const BeginPart& begin) {
+  if (std::isinf(request.setting.ramp_length))  // experiment.toml states where the ramp ends
+    throw std::invalid_argument("--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do");
   const markov::Share progress = begun(begin, "simulate");
   const std::vector<analysis::SimulatedCondition> conditions =
       request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads, progress)

@@ -41,7 +41,10 @@ std::string head(const SweepRequest& request) {
   return text;
 }
 
-std::string number(double value) { return std::isinf(value) ? "infinite" : fmt::format("{}", value); }
+std::string number(double value) {
+  if (std::isnan(value)) return "";  // there is none
+  return std::isinf(value) ? "infinite" : fmt::format("{}", value);
+}
 
 std::string row(const analysis::SweepPoint& point) {
   const analysis::Metastability& study = point.study;
@@ -52,7 +55,7 @@ std::string row(const analysis::SweepPoint& point) {
   return text + fmt::format("{},{},{},{},{},{},{},{},{}\n", number(study.steps.from_start.value),
                             number(study.steps.from_start.lower), number(study.steps.from_start.upper),
                             number(study.steps.from_quasi_stationary.value), number(study.spectrum.failure_rate.value),
-                            study.survivors.mean, study.survivors.sd,
+                            number(study.survivors.mean), number(study.survivors.sd),
                             study.steps.reach_end ? number(*study.steps.reach_end) : "",
                             analysis::status_text(study.status));
 }

@@ -148,7 +148,13 @@ std::size_t size_of(const SweepFile& sweep) {
 }  // namespace
 
 void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
-  const std::filesystem::path out = sweep.out, partial = sweep.out + ".partial";
+  if (sweep.out == "-")
+    throw std::invalid_argument("--out: a sweep keeps its points in a file as they come; --json - prints them");
+  // Of a link, what it leads to is written and locked.
+  const std::filesystem::path out = std::filesystem::is_symlink(sweep.out)
+                                        ? std::filesystem::weakly_canonical(sweep.out)
+                                        : std::filesystem::path(sweep.out);
+  const std::filesystem::path partial = out.string() + ".partial";
   const std::size_t size = size_of(sweep);
   std::filesystem::path picture = out;
   picture.replace_extension(".svg");
@@ -192,6 +198,8 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
     if (error) throw OutputError(out, error.message());
   }
   Table table = table_of(sweep, rows);
+  const bool none = std::all_of(rows.begin(), rows.end(),
+                                [&](const std::string& row) { return fields_of(row)[sweep.axes.size()].empty(); });
   const std::optional<Figure> drawn = figure_of(sweep, table);
   if (drawn) write_file(picture, render_svg(*drawn));
   answer.say("{}: {} points ({} taken over); {}", out.string(), size, had,
@@ -200,6 +208,7 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   answer.file(out.string());
   if (drawn) answer.file(picture.string());
   answer.finish(sweep.provenance);
+  if (none) throw std::runtime_error(fmt::format("no point has a number; {} says why, point by point", out.string()));
 }
 
 void share_sweep_file(const SweepFile& sweep, const Sharing& sharing,

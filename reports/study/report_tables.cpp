@@ -22,6 +22,9 @@ Cell cell(const std::optional<double>& value) {
   return "";
 }
 
+// Of what there may be none, NaN then.
+Cell known(double value) { return std::isnan(value) ? Cell("") : Cell(value); }
+
 }  // namespace
 
 Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance) {
@@ -59,12 +62,10 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
     return s.study.spectrum.total_variation_steps ? Cell(*s.study.spectrum.total_variation_steps) : Cell("");
   });
   add("reaches the end of the ramp", "1", [](S s) { return cell(s.study.steps.reach_end); });
-  add("speed before a collision, long-run mean", "rad/s", [](S s) { return Cell(s.study.survivors.mean); });
-  add("its standard deviation", "rad/s", [](S s) { return Cell(s.study.survivors.sd); });
-  add("the same mean with a new launch after each rest", "rad/s", [](S s) {
-    const double mean = s.study.survivors.restart_mean;  // none where every launch rests at its first collision
-    return std::isnan(mean) ? Cell("") : Cell(mean);
-  });
+  add("speed before a collision, long-run mean", "rad/s", [](S s) { return known(s.study.survivors.mean); });
+  add("its standard deviation", "rad/s", [](S s) { return known(s.study.survivors.sd); });
+  add("the same mean with a new launch after each rest", "rad/s",
+      [](S s) { return known(s.study.survivors.restart_mean); });
   add("rest is unreachable for launches from", "rad/s", [](S s) { return cell(s.thresholds.safe_speed); });
   add("slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); });
   std::vector<std::string> assumptions;  // of any law, in their order
@@ -78,6 +79,7 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
       return [name, which, error](S s) {
         for (const Share& one : s.study.violations) {
           if (one.name != name) continue;
+          if (std::isnan(one.*which)) break;
           if (!(one.*error > 0)) return Cell(one.*which);
           const analysis::Estimate drawn = with_error(one.*which, one.*error);
           return Cell(analysis::Estimate{drawn.value, std::max(0.0, drawn.lower), std::min(1.0, drawn.upper)});

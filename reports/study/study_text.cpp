@@ -21,12 +21,14 @@ std::string show(double value, double error) {
 // Shows a share of draws; of none seen it says what so many draws would have shown.
 std::string percent(double share, double standard_error) {
   constexpr double shown = 1e-4;
+  if (std::isnan(share)) return "none";
   if (share < shown) return "< 0.01 %";
   return show(100 * share, analysis::normal_95 * standard_error / share) + " %";
 }
 
 /// Shows mean and sd of a speed, both known to `error` [rad/s]: to as many decimals as that knows.
 std::string speed_text(double mean, double sd, double error) {
+  if (std::isnan(mean)) return "none: fewer than 1e-12 of the wheels survive a step";
   const int decimals = error > 0 ? std::clamp(static_cast<int>(std::floor(-std::log10(error))), 1, 4) : 4;
   return fmt::format("{:.{}f} rad/s, sd {:.{}f}", mean, decimals, sd, decimals);
 }

@@ -90,13 +90,27 @@ TEST(RestReachability, LaunchesThatAllRestAreFiniteBesideStatesThatNeverDo) {
       options.method = method;
       const Metastability result = study(setting.problem(), options);
       EXPECT_EQ(result.status, Status::converged);
-      EXPECT_EQ(result.message.substr(0, 54), "the metastable regime is of wheels that never rest: few");
+      EXPECT_EQ(result.message.substr(0, 55), "the metastable regime is of wheels that never rest: few");
       EXPECT_TRUE(std::isnan(result.survivors.restart_mean));
       EXPECT_NEAR(result.steps.from_start.value, 1, 1e-12);
       EXPECT_LT(result.steps.survival[1], 1e-15);
       EXPECT_EQ(result.steps.distribution.quantile(0.95), 1);
       EXPECT_TRUE(std::isinf(result.steps.from_quasi_stationary.value));
     }
+  }
+}
+
+// What the cells make of wheels that all rest at once is no regime (speeds of hundreds of rad/s stood there).
+TEST(RestReachability, WhereHardlyAnySurvivesAStepThereIsNoRegime) {
+  Setting heavy;
+  heavy.friction = {10, 0.1};
+  Setting slow = coulomb(5);
+  slow.initial_speed = {1, 0.1};
+  for (const Setting& setting : {heavy, slow}) {
+    const Metastability result = study(setting.problem(), {});
+    EXPECT_NEAR(result.steps.from_start.value, 1, 1e-6) << setting.describe();
+    EXPECT_TRUE(std::isnan(result.survivors.mean)) << result.survivors.mean;
+    for (const ViolationShare& share : result.violations) EXPECT_TRUE(std::isnan(share.quasi_stationary)) << share.name;
   }
 }
 

@@ -78,13 +78,19 @@ TEST_F(Refusals, OfOptionsThatDoNothing) {
        "--friction-sd: has no meaning under --law plastic"},
       {{"steps", "--method", "integrated", "--samples", "256"}, "--samples: has a meaning under --method sampled only"},
       {{"steps", "--draws", "plain", "--tail", "1e-9"}, "--tail: plain draws have none; --draws weighted reaches it"},
+      {{"steps", "--friction", "0.4", "--restitution", "0.4", "--correlation", "0.5"},
+       "--correlation: has a meaning where --restitution and --friction both have an sd"},
+      {{"sweep", "--slope", "7,8", "--initial-speed", "7,0.2", "--out", "-"},
+       "--out: a sweep keeps its points in a file as they come; --json - prints them"},
+      {{"simulate", "--ramp-length", "inf", "--out", path("endless")},
+       "--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do"},
       {{"steps", "--json", ""}, "--json: what is given is empty"},
       {{"effects", "--json", ""}, "--json: what is given is empty"},
       {{"diagnose", ""}, "DIR: what is given is empty"},
       {{"steps", "--config", file("a.toml", "leg-count = 12\n")},
-       "--leg-count: has a meaning where --legs is one length; it is 'paper'"},
+       path("a.toml") + ":1: --leg-count: has a meaning where --legs is one length; it is 'paper'"},
       {{"steps", "--config", file("b.toml", "law = \"coulomb\"\ncontact-mass = 2\n")},
-       "--contact-mass: has a meaning under --law published only"},
+       path("b.toml") + ":2: --contact-mass: has a meaning under --law published only"},
   });
   EXPECT_EQ(metastable({"steps", "--config", ""}).code, 2);
 }
@@ -107,7 +113,8 @@ TEST_F(Refusals, OfWhatNoWheelCanHave) {
       {{"sweep", "--friction-mean", "0:20:1", "--out", path("s.csv")}, "--friction-mean: 20 is outside [0, 10]"},
       {{"sweep", "--slope", "5,6", "--initial-speed", "1e5", "--out", path("s.csv")},
        "--initial-speed: mean 100000 is outside [0, 1000]"},
-      {{"steps", "--config", file("c.toml", "mass = 1e250\n")}, "--mass: 1e+250 is outside [1e-06, 1e+06]"},
+      {{"steps", "--config", file("c.toml", "slope = 5\nmass = 1e250\n")},
+       path("c.toml") + ":2: --mass: 1e+250 is outside [1e-06, 1e+06]"},
       // It is the inertia about the hub, where that about the foot is asked for.
       {{"steps", "--inertia", "0.0035"},
        "--inertia: 0.0035 kg m^2 is below M (mean L)^2 = 0.03207 kg m^2, the least about the stance foot; if it is the "
@@ -132,7 +139,7 @@ TEST_F(Refusals, OfWrongWordsHintAtTheNearest) {
       {{"steps", "--law", "plastik"}, "--law: 'plastik' " + laws + "; did you mean 'plastic'?"},
       {{"steps", "--law", "newton"}, "--law: 'newton' " + laws},
       {{"steps", "--config", file("law.toml", "law = \"colomb\"\n")},
-       "--law: 'colomb' " + laws + "; did you mean 'coulomb'?"},
+       path("law.toml") + ":1: --law: 'colomb' " + laws + "; did you mean 'coulomb'?"},
       {{"steps", "--config", file("key.toml", "slope = 5\nfrictoin = 0.3\n")},
        path("key.toml") + ":2: unknown key 'frictoin' (keys are the long options of 'metastable steps'); did you mean "
                           "'friction'?"},
