@@ -49,7 +49,7 @@ std::optional<std::string> file_text(const fs::path& path) {
 std::string name_of(int number) { return fmt::format("{:04}", number); }
 
 struct Places {
-  fs::path run, cases, answers, record, sealed, marker, plan;
+  fs::path run, cases, answers, record, sealed, marker, plan, planned;
   explicit Places(const BlindRequest& request)
       : run(request.folder),
         cases(run / "cases"),
@@ -57,7 +57,8 @@ struct Places {
         record(answers / "record.csv"),
         sealed(request.sealed.empty() ? fs::path(request.folder + "-sealed") : fs::path(request.sealed)),
         marker(sealed / "opened.csv"),
-        plan(sealed / "plan.txt") {}
+        plan(sealed / "plan.txt"),
+        planned(cases / "planned.txt") {}
   fs::path case_folder(int number) const { return cases / name_of(number); }
   fs::path truth(int number) const { return sealed / (name_of(number) + ".json"); }
   fs::path answer(int number) const { return answers / (name_of(number) + ".json"); }
@@ -86,6 +87,13 @@ std::vector<int> case_numbers(const Places& places) {
     throw std::invalid_argument(
         fmt::format("{}: holds no blind case; `blind make` writes them", places.cases.string()));
   return numbers;
+}
+
+// Returns how many cases there are to be, made or not.
+std::size_t planned_cases(const Places& places, std::size_t made) {
+  std::size_t planned = 0;
+  std::sscanf(file_text(places.planned).value_or("").c_str(), "%zu", &planned);
+  return std::max(planned, made);
 }
 
 std::string now() {
@@ -180,6 +188,8 @@ BlindMade make_blind(const BlindRequest& request, const CaseProgress& progress) 
                        size.per_effect_and_strength, size.none, size.pairs, size.outside, size.left_out_per_effect,
                        laws);
   };
+  if (analysis::blind_plan(size, seed).empty())
+    throw std::invalid_argument("blind make: no case of any kind is asked for");
   make_folder(places.sealed);
   make_folder(places.cases);
   if (const std::optional<std::string> before = file_text(places.plan)) {
@@ -196,8 +206,9 @@ BlindMade make_blind(const BlindRequest& request, const CaseProgress& progress) 
   std::vector<std::size_t> open;
   for (std::size_t i = 0; i < plan.size(); ++i)
     if (!made_before(i)) open.push_back(i);
+  write_file(places.planned, fmt::format("{}\n", plan.size()));
   progress.begin(plan.size(), plan.size() - open.size());
-  markov::parallel_for(open.size(), request.threads, [&](std::size_t k) {
+  const auto make = [&](std::size_t k) {
     progress.check();
     const std::size_t i = open[k];
     const int number = static_cast<int>(i) + 1;
@@ -209,7 +220,14 @@ BlindMade make_blind(const BlindRequest& request, const CaseProgress& progress) 
     analysis::complete_truth(made);
     write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
     progress.done();
-  });
+  };
+  try {
+    markov::parallel_for(open.size(), request.threads, make);
+  } catch (const Interrupted& interrupted) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < plan.size(); ++i) kept += made_before(i);
+    throw Interrupted(interrupted, fmt::format("{} of {} cases kept; the same command goes on", kept, plan.size()));
+  }
   return {plan.size(), places.sealed.string()};
 }
 
@@ -231,7 +249,7 @@ BlindAnswered answer_blind(const BlindRequest& request, const CaseProgress& prog
   std::mutex mutex;
   std::atomic<std::size_t> failed = 0;
   progress.begin(open.size(), 0);
-  markov::parallel_for(open.size(), request.threads, [&](std::size_t i) {
+  const auto answer_one = [&](std::size_t i) {
     progress.check();
     const int number = open[i];
     const fs::path folder = places.case_folder(number), answer = places.answer(number);
@@ -265,8 +283,15 @@ BlindAnswered answer_blind(const BlindRequest& request, const CaseProgress& prog
       write_file(places.record, lines);
     }
     progress.done();
-  });
-  return {numbers.size(), record.size(), failed, places.answers.string()};
+  };
+  const std::size_t planned = planned_cases(places, numbers.size());
+  try {
+    markov::parallel_for(open.size(), request.threads, answer_one);
+  } catch (const Interrupted& interrupted) {
+    throw Interrupted(interrupted,
+                      fmt::format("{} of {} cases answered; the same command goes on", record.size(), planned));
+  }
+  return {planned, record.size(), failed, places.answers.string()};
 }
 
 BlindOpened open_blind(const BlindRequest& request, Unanswered unanswered) {
@@ -298,12 +323,12 @@ BlindOpened open_blind(const BlindRequest& request, Unanswered unanswered) {
   }
   const auto reached_cases = static_cast<std::size_t>(std::ranges::count_if(
       numbers, [&](int number) { return given.contains(number) || tool_failed(places, number); }));
-  if (reached_cases < numbers.size() && unanswered == Unanswered::refused && !fs::exists(places.marker))
-    throw std::invalid_argument(
-        fmt::format("{}: {} of {} cases are answered, and opening the truths ends the run: answer the others first "
-                    "(`blind answer`),"
-                    " or give --partial to grade these alone",
-                    request.folder, reached_cases, numbers.size()));
+  const std::size_t planned = planned_cases(places, numbers.size());
+  if (reached_cases < planned && unanswered == Unanswered::refused && !fs::exists(places.marker))
+    throw std::invalid_argument(fmt::format(
+        "{}: {} of {} cases are answered, and opening the truths ends the run: answer the others first "
+        "(`blind make` where they are not made yet, `blind answer`), or give --partial to grade these alone",
+        request.folder, reached_cases, planned));
   // From the first opening on the record is closed.
   const std::string head = fmt::format("{},{}\n", record.size(), record.back().chain);
   if (const std::optional<std::string> marker = file_text(places.marker)) {

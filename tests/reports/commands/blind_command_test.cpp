@@ -150,13 +150,29 @@ TEST_F(BlindRun, RefusesChangedTruthsAndAnswersAndLateOnes) {
   EXPECT_EQ(message_of([&] { run_blind_open(request_); }),
             request_.folder +
                 ": 2 of 3 cases are answered, and opening the truths ends the run: answer the others first "
-                "(`blind answer`), or give --partial to grade these alone");
+                "(`blind make` where they are not made yet, `blind answer`), or give --partial to grade these alone");
   EXPECT_FALSE(fs::exists(request_.folder + "-sealed/opened.csv"));
   run_blind_open(request_, Unanswered::left_out);
   EXPECT_NE(message_of([&] { run_blind_answer(request_); }).find("was opened"), std::string::npos);
   write(record, all);
   EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("written after the truths had been opened"),
             std::string::npos);
+}
+
+// An interrupted `make` leaves a run that is not whole: it goes on, and until then is not opened.
+TEST_F(BlindRun, CasesNotMadeYetAreMissed) {
+  run_blind_make(request_);
+  fs::remove_all(fs::path(request_.folder) / "cases" / "0003");
+  run_blind_answer(request_);
+  EXPECT_NE(message_of([&] { run_blind_open(request_); }).find("2 of 3 cases are answered"), std::string::npos);
+  run_blind_make(request_);
+  run_blind_answer(request_);
+  run_blind_open(request_);
+
+  request_.folder += "-of-nothing";
+  request_.size = {.per_effect_and_strength = 0, .none = 0, .pairs = 0, .outside = 0, .left_out_per_effect = 0};
+  EXPECT_EQ(message_of([&] { run_blind_make(request_); }), "blind make: no case of any kind is asked for");
+  EXPECT_FALSE(fs::exists(request_.folder));
 }
 
 // A case that the tool failed on is answered, and wrongly; one whose tool was killed with the program is not.
