@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -49,8 +50,13 @@ double find_size(const SizedEffect& effect, double target,
   return size;
 }
 
-Setting base_setting() {
+Setting base_setting(dynamics::Law law) {
   Setting setting = stand_in_setting();
+  setting.law = law;
+  if (law == dynamics::Law::settled) {
+    setting.wheel.radius_of_gyration = 0.0424;  // J = 0.0025 kg m^2
+    return setting;
+  }
   // Both are stated, so that the folder alone says what `coulomb` would be.
   setting.wheel.inertia = 0.0320723;  // M (mean L)^2
   setting.wheel.radius_of_gyration = 0.05;
@@ -88,6 +94,14 @@ BlindKind blind_kind(std::string_view name) {
   throw std::invalid_argument(fmt::format("kind: \"{}\" is none of none, effect, pair, outside, left_out", name));
 }
 
+bool can_be_had(std::string_view effect, dynamics::Law law) {
+  if (law != dynamics::Law::settled) return true;
+  for (const std::string_view lacking :
+       {"bounce", "ramp_vibration", "slip_reversal", "inertia", "stored_energy", "sloshing_fluid"})
+    if (effect == lacking) return false;
+  return true;
+}
+
 std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   for (const auto& [name, count] :
        {std::pair<std::string_view, int>{"per_effect_and_strength", size.per_effect_and_strength},
@@ -96,16 +110,33 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
         {"outside", size.outside},
         {"left_out_per_effect", size.left_out_per_effect}})
     if (count < 0) throw std::invalid_argument(fmt::format("{}: {} is below 0", name, count));
+  if (size.laws.empty()) throw std::invalid_argument("laws: none is given");
+  for (const dynamics::Law law : size.laws)
+    if (law != dynamics::Law::published && law != dynamics::Law::settled)
+      throw std::invalid_argument(fmt::format("laws: \"{}\" is none of published, settled", dynamics::law_name(law)));
   BlindDice dice(seed, 0);
-  std::vector<BlindPlan> plan(static_cast<std::size_t>(size.none), BlindPlan{BlindKind::none, {}, 0});
+  std::vector<BlindPlan> plan;
+  std::map<BlindKind, std::size_t> turn;
+  const auto add = [&](BlindPlan one) {
+    const auto had = [&](dynamics::Law law) {
+      return std::ranges::all_of(one.effects, [&](const std::string& id) { return can_be_had(id, law); });
+    };
+    one.law = size.laws[turn[one.kind] % size.laws.size()];
+    if (!had(one.law)) {
+      if (std::ranges::find(size.laws, dynamics::Law::published) == size.laws.end()) return;
+      one.law = dynamics::Law::published;
+    } else {
+      ++turn[one.kind];
+    }
+    plan.push_back(std::move(one));
+  };
+  for (int n = 0; n < size.none; ++n) add({BlindKind::none, {}, 0});
   std::vector<std::string> paired;
   for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
     for (const int strength : {1, 2, 4})
-      plan.insert(plan.end(), static_cast<std::size_t>(size.per_effect_and_strength),
-                  BlindPlan{BlindKind::effect, {info.id}, strength});
+      for (int n = 0; n < size.per_effect_and_strength; ++n) add({BlindKind::effect, {info.id}, strength});
     if (info.id == recalibration) continue;
-    plan.insert(plan.end(), static_cast<std::size_t>(size.left_out_per_effect),
-                BlindPlan{BlindKind::left_out, {info.id}, 2});
+    for (int n = 0; n < size.left_out_per_effect; ++n) add({BlindKind::left_out, {info.id}, 2});
     // An effect without a size is there or not: it cannot be made as visible as another one beside it.
     if (!info.parameters.empty()) paired.push_back(info.id);
   }
@@ -115,13 +146,13 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
       const std::string& id = paired[static_cast<std::size_t>(dice.whole(0, static_cast<int>(paired.size()) - 1))];
       if (two.empty() || two.front() != id) two.push_back(id);
     }
-    plan.push_back({BlindKind::pair, two, 2});
+    add({BlindKind::pair, two, 2});
   }
   const auto& outside = dynamics::outside_effects();
   for (int o = 0; o < size.outside; ++o)
-    plan.push_back({BlindKind::outside,
-                    {outside[static_cast<std::size_t>(o) % outside.size()].id},
-                    static_cast<std::size_t>(o) / outside.size() % 2 == 0 ? 2 : 4});
+    add({BlindKind::outside,
+         {outside[static_cast<std::size_t>(o) % outside.size()].id},
+         static_cast<std::size_t>(o) / outside.size() % 2 == 0 ? 2 : 4});
   for (std::size_t i = plan.size(); i > 1; --i)
     std::swap(plan[i - 1], plan[static_cast<std::size_t>(dice.whole(0, static_cast<int>(i) - 1))]);
   return plan;
@@ -135,9 +166,14 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   truth.kind = plan.kind;
   truth.strength = plan.strength;
   truth.seed = dice.word();
+  truth.law = plan.law;
   truth.restitution = {dice.uniform(0.5, 0.58), dice.uniform(0.035, 0.06)};
   truth.friction = {dice.uniform(0.33, 0.38), dice.uniform(0.035, 0.05)};
-  Setting base = base_setting();
+  if (plan.law == dynamics::Law::settled) {  // as rigid-body engines roll steadily, and now and then rest
+    truth.restitution.mean -= 0.15;
+    truth.friction = {truth.friction.mean + 0.05, truth.friction.sd - 0.01};
+  }
+  Setting base = base_setting(plan.law);
   base.restitution = truth.restitution;
   base.friction = truth.friction;
   const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, base.wheel.leg_length);

@@ -31,12 +31,20 @@ struct BlindSize {
   int pairs = 50;
   int outside = 50;
   int left_out_per_effect = 3;
+  /// Laws that the cases of every kind obey in turn: published, or settled (by the laboratory's rigid body). Effects
+  /// that no rigid body has (can_be_had()) stay with published; without it among the laws they have no case.
+  std::vector<dynamics::Law> laws = {dynamics::Law::published};
 };
+/// Says whether the laboratory has cases of an effect, of the catalogue or outside, under a law. Under settled it has
+/// none of what acts on the loss of a collision, of slip_reversal, sloshing_fluid, and of inertia, which is
+/// recalibrated.
+bool can_be_had(std::string_view effect, dynamics::Law law);
 
 /// Holds what is true of a case, sealed until it is answered.
 struct BlindTruth {
   int number = 0;  ///< from 1
   BlindKind kind = BlindKind::none;
+  dynamics::Law law = dynamics::Law::published;  ///< that the wheel obeys and the model states
   std::vector<dynamics::Effect> effects;
   std::optional<dynamics::OutsideEffect> outside;
   int strength = 0;  ///< 1, 2, 4; of `outside` by its size alone; 0 where it is not defined (none)
@@ -68,8 +76,9 @@ struct BlindPlan {
   BlindKind kind;
   std::vector<std::string> effects;  ///< ids; of `outside` the family
   int strength = 0;
+  dynamics::Law law = dynamics::Law::published;
 };
-/// @throws std::invalid_argument naming a count below 0
+/// @throws std::invalid_argument naming a count below 0, or a law that is neither published nor settled
 std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed);
 
 /// Draws case `number` (from 1) of a plan. Sizes are found by a search on `power` for 16, 64, 256 (each effect of a

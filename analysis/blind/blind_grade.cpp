@@ -75,6 +75,7 @@ struct Tally {
   Proportion alarms, alarms_true, alarms_unlike, place_alarms;
   std::map<int, Proportion> found, found_left, cause, holds, facet;
   std::map<int, std::pair<double, int>> set_size;  // sum, sets
+  double beyond_alike = 0, most_beyond_alike = 0;  // names of sets at 2x, sum and most
   Proportion absorbed, interval, shrinkage;
   Proportion both, both_findable, no_third, no_third_first;
   Proportion misnamed, unexplained;
@@ -127,6 +128,12 @@ void count_effect(Tally& tally, const BlindTruth& truth, const Answer& answer) {
     tally.holds[strength].count(in_set);
     tally.set_size[strength].first += static_cast<double>(answer->cause_set.size());
     ++tally.set_size[strength].second;
+    if (strength == 2) {
+      const std::size_t group = std::max<std::size_t>(1, answer->alike.size());
+      const auto beyond = static_cast<double>(answer->cause_set.size() - std::min(group, answer->cause_set.size()));
+      tally.beyond_alike += beyond;
+      tally.most_beyond_alike = std::max(tally.most_beyond_alike, beyond);
+    }
     if (!answer->causes.empty()) tally.forecasts.emplace_back(answer->causes.front().second, first);
   }
   if (first) count_intervals(tally, truth, *answer);
@@ -182,6 +189,50 @@ Groups ambiguity_groups(const std::vector<BlindTruth>& truths, const std::vector
     for (const auto& [other, count] : others)
       if (count >= alike_share * sets[id]) alike[id].push_back(other);
   return alike;
+}
+
+// Lists the effects that one way of answering names.
+std::vector<std::string> named_by(const std::string& way, const BlindAnswer& answer) {
+  if (const auto found = answer.stepwise.find(way); found != answer.stepwise.end()) return found->second;
+  if (answer.verdict != Verdict::explained || answer.cause_set.empty()) return {};
+  return members(answer.cause_set.front());
+}
+
+void count_way(WayGrade& grade, const BlindTruth& truth, const std::vector<std::string>& named) {
+  const auto is_true = [&](const std::string& id) {
+    return std::ranges::any_of(truth.effects, [&](const dynamics::Effect& effect) { return effect.id == id; });
+  };
+  const auto right = static_cast<std::size_t>(std::ranges::count_if(named, is_true));
+  switch (truth.kind) {
+    case BlindKind::none:
+      return grade.alarms.count(!named.empty());
+    case BlindKind::effect:
+      if (truth.effects.front().id == dynamics::contact_distribution_id || truth.left < no_power_left) return;
+      grade.exact.count(right == 1 && named.size() == 1);
+      grade.in.count(right == 1);
+      return grade.wrong.count(named.size() > right);
+    case BlindKind::pair:
+      grade.both.count(right == 2);
+      return grade.third.count(named.size() > right);
+    case BlindKind::outside:
+      return grade.outside.count(!named.empty());
+    case BlindKind::left_out:
+      return;
+  }
+}
+
+// Sets the diagnosis beside the criteria that all answers tell of, over the cases that were answered.
+std::vector<WayGrade> ways(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
+  std::vector<WayGrade> all{{"diagnosis, first of its set", {}, {}, {}, {}, {}, {}, {}}};
+  for (const Answer& answer : answers)
+    if (answer) {
+      for (const auto& [criterion, effects] : answer->stepwise) all.push_back({criterion, {}, {}, {}, {}, {}, {}, {}});
+      break;
+    }
+  for (std::size_t i = 0; i < truths.size(); ++i)
+    if (answers[i])
+      for (WayGrade& grade : all) count_way(grade, truths[i], named_by(grade.way, *answers[i]));
+  return all;
 }
 
 // Lists the measures beside what is asked for.
@@ -278,7 +329,10 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
   result.grades = measures(tally);
   for (const auto& [strength, size] : {std::pair{1, &result.mean_set_size_1x}, {2, &result.mean_set_size_2x}})
     if (tally.set_size[strength].second > 0) *size = tally.set_size[strength].first / tally.set_size[strength].second;
+  if (const int sets = tally.set_size[2].second; sets > 0)
+    result.mean_beyond_alike_2x = tally.beyond_alike / sets, result.most_beyond_alike_2x = tally.most_beyond_alike;
   result.calibration = calibration(tally.forecasts);
+  result.ways = ways(truths, answers);
   return result;
 }
 

@@ -24,6 +24,7 @@ struct BlindAnswer {
   Verdict verdict = Verdict::no_gap;
   std::vector<std::pair<std::string, double>> causes;  ///< by falling probability
   std::vector<std::string> cause_set;
+  std::vector<std::string> alike = {};        ///< of the set: that no data like these could tell from its first
   std::vector<AnsweredParameter> parameters;  ///< of the first cause
   struct ClaimedPlace {
     std::string facet, aspect;
@@ -31,6 +32,8 @@ struct BlindAnswer {
   };
   std::vector<ClaimedPlace> where;
   std::optional<double> closed_lower, closed_upper;  ///< share of the gap that was closed, 90 %
+  /// Lists by criterion (AICc, BIC) the effects that stepwise selection over the same models names.
+  std::map<std::string, std::vector<std::string>> stepwise = {};
 };
 
 struct Proportion {
@@ -48,6 +51,15 @@ struct Grade {
   double most_upper = 1;             ///< the most that the upper end of its interval may be
 };
 
+/// Is how often one way of answering named what: the diagnosis by the first of its set, or a criterion by its effects.
+struct WayGrade {
+  std::string way;
+  Proportion alarms;            ///< named something where there is no gap
+  Proportion exact, in, wrong;  ///< one effect, power left: named it alone; named it; named something else (too)
+  Proportion both, third;       ///< two effects: named both; named something that neither is
+  Proportion outside;           ///< named something for what no catalogue holds
+};
+
 struct CalibrationBin {
   double from = 0, to = 0;
   int count = 0;
@@ -58,7 +70,10 @@ struct CalibrationBin {
 struct BlindGrades {
   std::vector<Grade> grades;
   double mean_set_size_1x = 0, mean_set_size_2x = 0;  ///< of explained effect cases; 0: none
-  std::vector<CalibrationBin> calibration;            ///< probability of the first cause against how often it is right
+  /// Names of the set beside its first and what is alike to that, of explained effect cases at 2x: mean and most.
+  double mean_beyond_alike_2x = 0, most_beyond_alike_2x = 0;
+  std::vector<WayGrade> ways;               ///< the diagnosis first; criteria where answers have them
+  std::vector<CalibrationBin> calibration;  ///< probability of the first cause against how often it is right
   /// Counts what was answered (first cause, or the verdict) by the truth (an effect, or none, outside, ...).
   std::map<std::string, std::map<std::string, int>> confusion;
   std::map<std::string, std::vector<std::string>> alike;  ///< ambiguity groups: what shares the cause sets of an effect

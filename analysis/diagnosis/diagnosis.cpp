@@ -55,6 +55,7 @@ constexpr double least_of_first = 0.05;  // one less likely than this share of t
 constexpr std::size_t most_rivals = 3;  // hypotheses that compete in each fold of the cross-validation:
 constexpr double rival_evidence = 4;    //   those no further behind the best. Saves time
 // A recalibration that did not settle is mentioned beyond this rise that its slope still promises.
+constexpr double told_apart = 6;                             // 2 Delta log likelihood that makes odds of 20 to 1
 constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likelihood; of the largest gain found
 
 constexpr double score_90 = 1.6448536269514722;  // half-width of a two-sided interval
@@ -476,6 +477,20 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const std
   return share * given_gap / sum;
 }
 
+// Lists what the design itself cannot tell from the first of the set.
+void list_alike(Diagnosis& d) {
+  const Cause& first = d.causes.ranked.front();
+  const auto seen = std::ranges::find(d.limits.visible, first.name(), &Visibility::effect);
+  if (seen == d.limits.visible.end()) return;  // a pair
+  std::vector<std::string> alike;
+  for (const std::string& name : d.causes.set) {
+    const auto share = std::ranges::find(seen->alike, name, &std::pair<std::string, double>::first);
+    if (name == first.name() || (share != seen->alike.end() && (1 - share->second) * first.gain < told_apart))
+      alike.push_back(name);
+  }
+  if (alike.size() > 1) d.causes.alike = std::move(alike);
+}
+
 void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) {
   if (!gap) {
     d.verdict = d.gap.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
@@ -495,6 +510,7 @@ void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) 
     d.causes.set.push_back(cause.name());
     covered += cause.probability;
   }
+  list_alike(d);
 }
 
 }  // namespace
@@ -551,6 +567,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
                                       .seed = options.seed,
                                       .pairs = wanted_pairs(candidates, options.catalogue),
                                       .progress = [&](double share) { progress(0.15 + 0.5 * share, "which effect"); }});
+  d.causes.stepwise = stepwise_selection(model, recalibrated, ranking);
   d.causes.unnamed.push_back({{}, 0, left_by_facet(model, recalibrated, 0, 0)});
   test_for_gap(d, ranking, candidates.size(), recalibrated);
   note_what_is_rough(d, ranking, recalibrated, recalibration_gain);

@@ -12,6 +12,7 @@
 
 #include "analysis/diagnosis/gap_cell.h"
 #include "analysis/diagnosis/left_over.h"
+#include "analysis/diagnosis/stepwise.h"
 #include "analysis/diagnosis/transition_model.h"
 
 namespace metastable::analysis {
@@ -153,7 +154,11 @@ struct Diagnosis {
     std::vector<Cause> not_decided;
     std::vector<Unnamed> unnamed;  ///< supposed beside the likeliest hypotheses
     std::vector<std::string> set;  ///< names; empty if unexplained or no gap
-    std::string size;              ///< of the likeliest beside the nominal model, a sentence; or empty
+    /// Lists those of the set that no data like these could tell from its first, that one included: the design's
+    /// information leaves less than 2 Delta log likelihood 6 between them at the size found. Empty where there is none.
+    std::vector<std::string> alike;
+    std::vector<StepwiseChoice> stepwise;  ///< what the field's usual selection names, for comparison
+    std::string size;                      ///< of the likeliest beside the nominal model, a sentence; or empty
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
     double together =

@@ -27,6 +27,30 @@ std::string with_parameters(const Cause& cause) {
   return text;
 }
 
+// Names what effects that act alike have in common, where the field has a word for it.
+std::string common_name(const std::vector<std::string>& alike) {
+  static const std::vector<std::pair<const char*, std::vector<std::string>>> names{
+      {"a constant torque", {"slope_offset", "rolling_resistance"}},
+      {"a torque that grows with speed", {"axle_drag_viscous", "air_drag"}},
+      {"a constant or growing torque", {"slope_offset", "rolling_resistance", "axle_drag_viscous", "air_drag"}},
+      {"legs that differ", {"leg_lengths", "leg_contact", "hub_eccentricity"}},
+      {"trials that differ", {"trial_drift", "trial_spread"}}};
+  for (const auto& [name, members] : names)
+    if (std::ranges::all_of(alike,
+                            [&](const std::string& id) { return std::ranges::find(members, id) != members.end(); }))
+      return name;
+  return "one and the same here";
+}
+
+// Lists the set, what acts alike as one group.
+std::string grouped_set(const Diagnosis& d) {
+  if (d.causes.alike.empty()) return fmt::format("{}", fmt::join(d.causes.set, ", "));
+  std::string text = fmt::format("{} ({})", common_name(d.causes.alike), fmt::join(d.causes.alike, ", "));
+  for (const std::string& name : d.causes.set)
+    if (std::ranges::find(d.causes.alike, name) == d.causes.alike.end()) text += ", " + name;
+  return text;
+}
+
 // Says where something without a name acts, were it at work alone or beside a cause that is.
 void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
   const auto most = std::max_element(d.causes.unnamed.begin(), d.causes.unnamed.end(),
@@ -58,7 +82,7 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
       else {
         s.push_back(fmt::format(
             "There is a gap that recalibration does not remove. These data cannot tell {} causes apart: {}.",
-            d.causes.set.size(), fmt::join(d.causes.set, ", ")));
+            d.causes.set.size(), grouped_set(d)));
         s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.",
                                 with_parameters(d.causes.ranked.front()), d.causes.ranked.front().probability));
       }

@@ -72,11 +72,6 @@ dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& 
   const Setting& first = conditions.front().setting;
   if (first.correlation != 0 || !first.pairs.empty())
     throw std::invalid_argument("laboratory: restitution and friction are independent normals there");
-  if (first.law == dynamics::Law::settled)
-    throw std::invalid_argument(
-        "laboratory: its wheel has no flight and no sliding feet, which settled is about; published, coulomb or "
-        "plastic "
-        "are judged there");
   if (first.rebound_lost != 0)
     throw std::invalid_argument("laboratory: the share of the rebound that is lost is its effect 'bounce'");
   if (options.collisions < 1 || options.collisions > 100000)
@@ -175,6 +170,10 @@ Experiment experiment_of(const std::vector<RealityCondition>& conditions, const 
 
 RealityFiles reality_files(const std::vector<RealityCondition>& conditions, const dynamics::LaboratorySetup& setup,
                            const std::vector<dynamics::LaboratoryTrial>& trials, const FolderOptions& options) {
+  if (options.camera && setup.law == dynamics::Law::settled)
+    throw std::invalid_argument(
+        "laboratory: a camera is pointed at wheels of published, coulomb or plastic; under settled its collisions are "
+        "told alone");
   const Experiment told = experiment_of(conditions, setup, trials, options);
   RealityFiles result;
   ExperimentFiles& files = result.files;

@@ -41,7 +41,7 @@ struct RealityOptions {
 
 /// Sets up the laboratory of these conditions. Wheel and contact are those of the first.
 /// @throws std::invalid_argument where there is no condition, and naming a setting the laboratory cannot take
-/// (correlation, list of pairs) or an option out of range
+/// (correlation, list of pairs; under settled what Laboratory refuses) or an option out of range
 dynamics::LaboratorySetup laboratory_setup(const std::vector<RealityCondition>& conditions,
                                            const RealityOptions& options);
 /// Returns all trials in the order they were run. They have the same bits on any number of threads.

@@ -19,6 +19,8 @@ std::string truth_json(const analysis::BlindTruth& truth, const std::string& sal
   ordered_json j;
   j["case"] = truth.number;
   j["kind"] = std::string(analysis::blind_kind_name(truth.kind));
+  j["law"] = std::string(dynamics::law_name(truth.law));
+  j["laboratory"] = truth.law == dynamics::Law::settled ? "second" : "first";
   j["effects"] = ordered_json::array();
   for (const dynamics::Effect& effect : truth.effects)
     j["effects"].push_back({{"id", effect.id}, {"values", effect.values}, {"text", dynamics::effect_text(effect)}});
@@ -44,6 +46,7 @@ analysis::BlindTruth read_truth(const std::string& file, std::string_view text) 
     analysis::BlindTruth truth;
     truth.number = j.at("case").get<int>();
     truth.kind = analysis::blind_kind(j.at("kind").get<std::string>());
+    truth.law = dynamics::law_from_name(j.value("law", "published"));
     for (const ordered_json& effect : j.at("effects"))
       truth.effects.push_back({effect.at("id").get<std::string>(), effect.at("values").get<std::vector<double>>()});
     if (!j.at("outside").is_null())
@@ -90,6 +93,9 @@ analysis::BlindAnswer read_answer(const std::string& file, std::string_view text
         answer.parameters.push_back(std::move(p));
       }
     }
+    if (j.contains("cause_set_alike")) answer.alike = j.at("cause_set_alike").get<std::vector<std::string>>();
+    if (j.contains("stepwise"))
+      answer.stepwise = j.at("stepwise").get<std::map<std::string, std::vector<std::string>>>();
     for (const ordered_json& w : j.at("where"))
       answer.where.push_back(
           {w.at("facet").get<std::string>(), w.at("aspect").get<std::string>(), w.at("p_adjusted").get<double>()});

@@ -2,20 +2,27 @@
 
 #include <fmt/format.h>
 
+#include <set>
+#include <utility>
+
 namespace metastable::reports {
 namespace {
 
 std::string mean_size(double size) { return size > 0 ? fmt::format("{:.2f}", size) : "no case"; }
 
-Table measures(const analysis::BlindGrades& grades, const Provenance& provenance) {
-  Table table{.id = "blind-measures",
-              .title = "Blind check: what was asked for and what came out",
-              .notes = {"Shares with Wilson's 95 % interval. met: the share reaches the aim; "
-                        "open: it falls short, but its interval does not exclude the aim.",
-                        fmt::format("Mean size of the 95 % set: {} at 1x (aim at most 3), {} at 2x (at most 1.7).",
-                                    mean_size(grades.mean_set_size_1x), mean_size(grades.mean_set_size_2x))},
-              .columns = {{"measure"}, {"right"}, {"of"}, {"share"}, {"aim"}, {"verdict"}},
-              .provenance = provenance};
+Table measures(const analysis::BlindGrades& grades, const std::string& law, const Provenance& provenance) {
+  Table table{
+      .id = law.empty() ? "blind-measures" : "blind-measures-" + law,
+      .title = "Blind check: what was asked for and what came out" + (law.empty() ? "" : ", law " + law),
+      .notes = {"Shares with Wilson's 95 % interval. met: the share reaches the aim; "
+                "open: it falls short, but its interval does not exclude the aim.",
+                fmt::format("Mean size of the 95 % set: {} at 1x (aim at most 3), {} at 2x (at most 1.7).",
+                            mean_size(grades.mean_set_size_1x), mean_size(grades.mean_set_size_2x)),
+                fmt::format("Names in a set at 2x beside its first and what is provably alike to that: {:.2f} in "
+                            "the mean, {:.0f} at most (aim at most 2).",
+                            grades.mean_beyond_alike_2x, grades.most_beyond_alike_2x)},
+      .columns = {{"measure"}, {"right"}, {"of"}, {"share"}, {"aim"}, {"verdict"}},
+      .provenance = provenance};
   for (const analysis::Grade& grade : grades.grades) {
     const auto [low, high] = analysis::wilson(grade.proportion);
     std::string aim = grade.aim_low > 0 && grade.aim_high < 1
@@ -38,6 +45,32 @@ Table measures(const analysis::BlindGrades& grades, const Provenance& provenance
   return table;
 }
 
+// Shows stepwise selection beside the diagnosis.
+Table ways(const analysis::BlindGrades& grades, const Provenance& provenance) {
+  Table table{
+      .id = "blind-stepwise",
+      .title = "The diagnosis beside stepwise selection over the same models",
+      .notes = {"Forward selection from the recalibrated model, at most two effects, each chosen entry of a list "
+                "(a leg, an interval) counted as a parameter; cases that were answered."},
+      .columns = {{"way"}, {"what it names"}, {"cases"}, {"of"}, {"share"}},
+      .provenance = provenance};
+  for (const analysis::WayGrade& way : grades.ways)
+    for (const auto& [what, count] :
+         {std::pair<const char*, const analysis::Proportion&>{"something, where there is no gap", way.alarms},
+          {"the effect and nothing else", way.exact},
+          {"the effect", way.in},
+          {"something else instead of the effect or beside it", way.wrong},
+          {"both of two effects", way.both},
+          {"a third beside or instead of two", way.third},
+          {"something for what no catalogue holds", way.outside}}) {
+      if (count.of == 0) continue;
+      const auto [low, high] = analysis::wilson(count);
+      table.rows.push_back(
+          {way.way, what, count.right, count.of, Estimate{static_cast<double>(count.right) / count.of, low, high}});
+    }
+  return table;
+}
+
 std::string list(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
@@ -49,7 +82,20 @@ std::string list(const std::vector<std::string>& names) {
 std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::vector<analysis::BlindTruth>& truths,
                                 const std::vector<std::optional<analysis::BlindAnswer>>& answers,
                                 const Provenance& provenance) {
-  std::vector<Table> tables{measures(grades, provenance)};
+  std::vector<Table> tables{measures(grades, "", provenance), ways(grades, provenance)};
+  std::set<dynamics::Law> laws;
+  for (const analysis::BlindTruth& truth : truths) laws.insert(truth.law);
+  for (const dynamics::Law law : laws) {
+    if (laws.size() == 1) break;
+    std::vector<analysis::BlindTruth> some;
+    std::vector<std::optional<analysis::BlindAnswer>> theirs;
+    for (std::size_t i = 0; i < truths.size(); ++i)
+      if (truths[i].law == law) {
+        some.push_back(truths[i]);
+        theirs.push_back(answers[i]);
+      }
+    tables.push_back(measures(analysis::grade(some, theirs), std::string(dynamics::law_name(law)), provenance));
+  }
   Table confusion{.id = "blind-confusion",
                   .title = "What was true and what was said",
                   .notes = {"Counts. An explained gap is entered under the first name of its set."},
@@ -79,18 +125,20 @@ std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::
   for (const auto& [effect, others] : grades.alike) alike.rows.push_back({effect, list(others)});
   tables.push_back(std::move(alike));
 
-  Table cases{.id = "blind-cases",
-              .title = "Every case",
-              .notes = {"power: expected 2 Delta log likelihood with the true contact known; left: what recalibration "
-                        "leaves of it in the data."},
-              .columns = {{"case"}, {"kind"}, {"truth"}, {"strength"}, {"power"}, {"left"}, {"verdict"}, {"set"}},
-              .provenance = provenance};
+  Table cases{
+      .id = "blind-cases",
+      .title = "Every case",
+      .notes = {"power: expected 2 Delta log likelihood with the true contact known; left: what recalibration "
+                "leaves of it in the data."},
+      .columns = {{"case"}, {"law"}, {"kind"}, {"truth"}, {"strength"}, {"power"}, {"left"}, {"verdict"}, {"set"}},
+      .provenance = provenance};
   for (std::size_t i = 0; i < truths.size(); ++i) {
     const analysis::BlindTruth& t = truths[i];
     std::string what = t.outside ? fmt::format("{}:{:.3g}", t.outside->id, t.outside->size) : "";
     for (const dynamics::Effect& effect : t.effects) what += (what.empty() ? "" : " ") + dynamics::effect_text(effect);
     if (what.empty()) what = t.nominal_is_true ? "nominal contact" : "other contact";
-    cases.rows.push_back({t.number, std::string(analysis::blind_kind_name(t.kind)), what, t.strength, t.power, t.left,
+    cases.rows.push_back({t.number, std::string(dynamics::law_name(t.law)),
+                          std::string(analysis::blind_kind_name(t.kind)), what, t.strength, t.power, t.left,
                           answers[i] ? analysis::verdict_name(answers[i]->verdict) : "no answer",
                           answers[i] ? list(answers[i]->cause_set) : ""});
   }

@@ -179,6 +179,9 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   json["where_left"] = where_json(left);
   json["causes"] = causes_json(d);
   json["cause_set"] = d.causes.set;
+  json["cause_set_alike"] = d.causes.alike;
+  json["stepwise"] = Json::object();
+  for (const auto& choice : d.causes.stepwise) json["stepwise"][choice.criterion] = choice.effects;
   json["not_decided"] = list_json(d.causes.not_decided, [](const auto& cause) {
     return Json{{"effect", cause.name()}, {"reason", cause.not_decided}};
   });

@@ -62,6 +62,32 @@ TEST(BlindCases, PairsAreOfAllEffectsThatHaveASizeAndAreNotTheContact) {
   EXPECT_EQ(paired, expected);
 }
 
+TEST(BlindCases, LawsTakeTurnsWhereBothHaveTheEffect) {
+  using dynamics::Law;
+  std::map<BlindKind, std::map<Law, int>> count;
+  const BlindSize both{2, 10, 0, 18, 0, {Law::published, Law::settled}};
+  for (const BlindPlan& p : blind_plan(both, 5)) {
+    ++count[p.kind][p.law];
+    for (const std::string& id : p.effects) EXPECT_TRUE(can_be_had(id, p.law)) << id;
+  }
+  EXPECT_EQ(count[BlindKind::none][Law::settled], 5);
+  EXPECT_EQ(count[BlindKind::effect][Law::settled], 19 * 6 / 2);  // of 23 effects four are published's
+  EXPECT_EQ(count[BlindKind::outside][Law::settled], 8);
+  EXPECT_EQ(blind_plan({1, 0, 0, 18, 0, {Law::settled}}, 5).size(), 19U * 3 + 16);
+  EXPECT_THROW(blind_plan({.laws = {Law::coulomb}}, 1), std::invalid_argument);
+}
+
+// The folder of a case of the second laboratory states the law that its wheel obeys.
+TEST(BlindCases, ARigidBodysCaseIsReadUnderItsLaw) {
+  const BlindCase made =
+      blind_case({BlindKind::effect, {"friction_patch"}, 2, dynamics::Law::settled}, 4, 9, square_power);
+  EXPECT_EQ(made.truth.law, dynamics::Law::settled);
+  const Experiment experiment = read(made);
+  EXPECT_EQ(experiment.contact.law, dynamics::Law::settled);
+  EXPECT_GE(experiment.trials.size(), 50U);
+  EXPECT_GT(experiment.collisions(), 4 * experiment.trials.size());
+}
+
 TEST(BlindCases, APlanOfFewerThanNoCasesIsRefused) {
   try {
     blind_plan({.pairs = -1}, 1);

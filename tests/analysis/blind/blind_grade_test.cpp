@@ -117,6 +117,30 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
   expect(g, "left-out effect unexplained, or of its ambiguity group", 2, 3);
 }
 
+TEST(BlindGrade, StepwiseSelectionIsSetBesideTheDiagnosis) {
+  const auto with = [](BlindAnswer a, std::vector<std::string> aicc, std::vector<std::string> bic) {
+    a.stepwise = {{"AICc", std::move(aicc)}, {"BIC", std::move(bic)}};
+    return a;
+  };
+  const BlindGrades g =
+      grade({truth(BlindKind::none, {}, 0), truth(BlindKind::effect, {"bounce"}, 2),
+             truth(BlindKind::pair, {"bounce", "inertia"}, 2), truth(BlindKind::outside, {}, 2)},
+            {with(said(Verdict::no_gap), {"air_drag"}, {}),
+             with(said(Verdict::explained, {"inertia", "bounce"}), {"bounce", "air_drag"}, {"bounce"}),
+             with(said(Verdict::explained, {"bounce+inertia"}), {"air_drag", "inertia"}, {"inertia"}),
+             with(said(Verdict::unexplained), {"bounce"}, {"bounce"})});
+  ASSERT_EQ(g.ways.size(), 3U);
+  const WayGrade &own = g.ways[0], &aicc = g.ways[1], &bic = g.ways[2];
+  EXPECT_EQ(aicc.way + bic.way, "AICcBIC");
+  const auto counts = [](const WayGrade& w) {
+    return std::vector<int>{w.alarms.right, w.exact.right, w.in.right,     w.wrong.right,
+                            w.both.right,   w.third.right, w.outside.right};
+  };
+  EXPECT_EQ(counts(own), (std::vector<int>{0, 0, 0, 1, 1, 0, 0}));
+  EXPECT_EQ(counts(aicc), (std::vector<int>{1, 0, 1, 1, 0, 1, 1}));
+  EXPECT_EQ(counts(bic), (std::vector<int>{0, 1, 1, 0, 0, 0, 1}));
+}
+
 TEST(BlindGrade, AnswersMustBeAsManyAsTruths) { EXPECT_THROW(grade({BlindTruth{}}, {}), std::invalid_argument); }
 
 }  // namespace

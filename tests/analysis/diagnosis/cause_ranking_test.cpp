@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/diagnosis/stepwise.h"
 #include "analysis/likelihood/coast_down_transitions.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/line.h"
@@ -50,6 +51,33 @@ TEST(RankCauses, PutsTheTorqueOnARotorFirst) {
   for (std::size_t i = 0; i < candidates.size(); ++i)
     EXPECT_EQ(ranking.singles[i].terms[0].candidate, candidates[i]) << candidates[i]->id;
   for (const RankedCause& pair : ranking.pairs) EXPECT_EQ(pair.terms.size(), 2U);
+  for (const StepwiseChoice& choice : stepwise_selection(*data, recalibrated, ranking))
+    EXPECT_EQ(choice.effects.front(), "rolling_resistance") << choice.criterion;
+}
+
+// By hand: an effect of one parameter comes in where it gains more than log n (BIC), or about 2 (AICc).
+TEST(Stepwise, AnEffectComesInForWhatItsParametersCost) {
+  EXPECT_NEAR(corrected_akaike(-100, 3, 50), 206 + 24.0 / 46, 1e-12);
+  EXPECT_NEAR(schwarz(-100, 3, 50), 200 + 3 * std::log(50.0), 1e-12);
+  const Line model = line(0.1, 1);
+  Fit recalibrated;
+  recalibrated.nuisance = {0, 0};
+  CauseRanking ranking;
+  RankedCause& cause = ranking.singles.emplace_back();
+  cause.terms = {{&model.candidates()[0], {}, {0.1}}};
+  cause.fit.nuisance = {0, 0};
+  cause.fit.terms = cause.terms;
+  const auto named = [&](double gain) {
+    cause.fit.log_likelihood = gain / 2;
+    std::size_t count = 0;
+    for (const StepwiseChoice& choice : stepwise_selection(model, recalibrated, ranking))
+      count += choice.effects.size();
+    return count;
+  };
+  const double size = std::log(static_cast<double>(model.events().size()));
+  EXPECT_EQ(named(1.9), 0U);
+  EXPECT_EQ(named((2 + size) / 2), 1U);
+  EXPECT_EQ(named(size + 0.1), 2U);
 }
 
 // Only an exact effect that was fitted is forgiven nothing.

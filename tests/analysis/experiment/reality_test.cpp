@@ -175,7 +175,9 @@ TEST(Reality, RefusesWhatTheLaboratoryDoesNotHave) {
   conditions[0].setting.correlation = 0;
   EXPECT_THROW(laboratory_setup(conditions, {.collisions = 0}), std::invalid_argument);
   conditions[0].setting.law = dynamics::Law::settled;
-  EXPECT_THROW(laboratory_setup(conditions, {}), std::invalid_argument);
+  FolderOptions filmed;
+  filmed.camera = CameraOptions{};
+  EXPECT_THROW(reality_files(conditions, laboratory_setup(conditions, {}), {}, filmed), std::invalid_argument);
   EXPECT_THROW(angle_csv({{"settled", conditions[0].setting, {}}}, {}), std::invalid_argument);
   conditions[0].setting.law = dynamics::Law::published;
   EXPECT_THROW(laboratory_setup({}, {}), std::invalid_argument);

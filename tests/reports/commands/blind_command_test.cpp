@@ -87,7 +87,8 @@ TEST_F(BlindRun, MakesAnswersAndOpens) {
   EXPECT_TRUE(fs::exists(report / "index.html"));
   EXPECT_NE(read(report / "tables" / "blind-measures.csv").find("false alarms where there is no gap,0,2,0"),
             std::string::npos);
-  for (const char* id : {"blind-measures", "blind-confusion", "blind-calibration", "blind-alike", "blind-cases"})
+  for (const char* id :
+       {"blind-measures", "blind-stepwise", "blind-confusion", "blind-calibration", "blind-alike", "blind-cases"})
     for (const char* form : {".csv", ".md", ".tex"})
       EXPECT_TRUE(fs::exists(report / "tables" / (std::string(id) + form))) << id << form;
   EXPECT_FALSE(fs::exists(report / "figures"));
