@@ -150,6 +150,8 @@ class Diagnosis(Result):
     where_left: Tuple[Record, ...]
     causes: Tuple[Record, ...]
     cause_set: Tuple[str, ...]
+    cause_set_alike: Tuple[str, ...]
+    stepwise: Dict[str, Tuple[str, ...]]
     not_decided: Tuple[Record, ...]
     contact: Record
     shrinkage: Record

@@ -76,7 +76,7 @@ def ask(command, option, given):
     argument, more = argument_of(option), {}
     setting = metastable.WalkerSetting if option in of_walkers else metastable.Setting
     fields = dict(walker if option in of_walkers else wheel)
-    if argument in setting.__dataclass_fields__ and (command, option) != ("sweep", "slope"):
+    if argument in setting.__dataclass_fields__ and (command, option) not in (("sweep", "slope"), ("blind", "law")):
         setting(**{**fields, argument: given})
     else:
         more = {argument: given}
