@@ -151,7 +151,7 @@ class Diagnosis(Result):
     causes: Tuple[Record, ...]
     cause_set: Tuple[str, ...]
     cause_set_alike: Tuple[str, ...]
-    stepwise: Dict[str, Tuple[str, ...]]
+    stepwise: Record
     not_decided: Tuple[Record, ...]
     contact: Record
     shrinkage: Record
