@@ -179,7 +179,7 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   tell(0.96, "summary");
   const std::span<const double> states = fine->space.states();
   summarize(problem, fine->space.cells(), states, fine->chain, fine->solved, options, result);
-  compare_survivors(problem, coarse->space.states(), coarse->chain, coarse->solved, result);
+  if (!options.brief) compare_survivors(problem, coarse->space.states(), coarse->chain, coarse->solved, result);
   add_landing_error(result, landing_error(problem, result.phases, states, fine->chain, fine->solved, options),
                     options.tolerance);
   return result;

@@ -169,8 +169,9 @@ class Study {
       const markov::StateSpace& space = ladder.spaces.back();
       const std::vector<double> states = midpoints(space);
       summarize(problem_, space, states, ladder.pooled.back(), assessed.finest, options_, result);
-      compare_survivors(problem_, midpoints(ladder.spaces[sizes - 2]), ladder.pooled[sizes - 2], assessed.middle,
-                        result);
+      if (!options_.brief)
+        compare_survivors(problem_, midpoints(ladder.spaces[sizes - 2]), ladder.pooled[sizes - 2], assessed.middle,
+                          result);
       add_landing_error(
           result, landing_error(problem_, space.phases(), states, ladder.pooled.back(), assessed.finest, options_),
           options_.tolerance);

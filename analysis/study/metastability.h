@@ -133,7 +133,8 @@ struct Survivors {
   double mean = 0, sd = 0;  ///< of the observable over all phases (equal shares); NaN where hardly any survives a step
   /// These are stationary, with a new launch after each rest; NaN where no launch goes on.
   double restart_mean = 0, restart_sd = 0;
-  /// Say how far mean or sd moved with the last halving of the cells, at most; 0 where there was none.
+  /// Say how far mean or sd moved with the last halving of the cells, at most; 0 where there was none, and
+  /// in brief studies.
   double error = 0, restart_error = 0;
 };
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <random>
 #include <string>
 
 #include "dynamics/laboratory/laboratory.h"
@@ -79,6 +80,35 @@ TEST(RigidRoll, RollsAsTheLawSettledDoes) {
     EXPECT_NEAR(roll.position(), law.position(), 1e-5) << n;
     EXPECT_NEAR(roll.time(), law.time(), 1e-5) << n;
   }
+}
+
+// Random landings: both say rest or not alike, and differ in the next speed only just above the threshold of rest.
+TEST(RigidRoll, LandsWhereTheLawSettledDoes) {
+  std::mt19937 engine(11);
+  std::uniform_real_distribution<double> uniform;
+  const auto between = [&](double low, double high) { return low + (high - low) * uniform(engine); };
+  const RampSurface plane;
+  constexpr int landings = 400;
+  int rested = 0, off = 0;
+  for (const double slope : {7.02, 9.59}) {
+    const RollingBody body = rigid_body(slope);
+    const SettledMotion motion(settled_body(slope));
+    for (int n = 0; n < landings / 2; ++n) {
+      const int leg = static_cast<int>(between(0, 8));
+      const double omega = between(3.5, 7);
+      const Contact contact{between(0, 0.6), between(0.25, 0.55)};
+      RigidRoll roll(body, plane, hub_inertia, leg, omega);
+      SettledRoll law(motion, leg, omega, contact, contact);
+      const bool touched = roll.step(contact);
+      const Step step = law.step();
+      ASSERT_EQ(touched, step.touched) << slope << " leg " << leg << " omega " << omega << " eta "
+                                       << contact.restitution << " mu " << contact.friction;
+      rested += !touched;
+      off += touched && std::abs(roll.spin() - step.omega_minus) > 1e-4;
+    }
+  }
+  EXPECT_GT(rested, landings / 10);
+  EXPECT_LE(off, 2);
 }
 
 LaboratorySetup rigid_setup() {

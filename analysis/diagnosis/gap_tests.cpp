@@ -1,0 +1,83 @@
+#include "analysis/diagnosis/gap_tests.h"
+
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <vector>
+
+#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/left_over.h"
+#include "markov/dense_matrix.h"
+
+namespace metastable::analysis {
+namespace {
+
+// These levels decide whether there is a gap.
+constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes:
+constexpr double share_for_facets = 0.05;   //   in all cells of a facet together, the others in one cell
+constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide one another; hardly ever used up
+constexpr double least_p_value = 1e-12;     // smaller ones are beyond what chance levels can say
+
+// Two effects may hide one another from the scores of each alone: judges the best pair's gain, for all pairs there are.
+double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit& recalibrated) {
+  double least = 1;
+  if (!ranking.scan.trials_suffice) return least;
+  const double pairs = 0.5 * static_cast<double>(effects) * (static_cast<double>(effects) - 1);
+  for (const RankedCause& pair : ranking.pairs) {
+    if (!pair.fit.converged) continue;
+    double parameters = 0, looks = pairs;  // variants among them
+    for (const EffectTerm& term : pair.terms) {
+      parameters += static_cast<double>(term.values.size());
+      looks *= static_cast<double>(term.candidate->variants.size());
+    }
+    const double gain = std::max(0.0, pair.gain - 2 * recalibrated.promised);
+    least =
+        std::min(least, looks * boost::math::cdf(boost::math::complement(boost::math::chi_squared(parameters), gain)));
+  }
+  return least;
+}
+
+// Takes the facet with the least p-value, for as many facets.
+double facets_p_value(const CauseRanking& ranking, const std::vector<LeftInFacet>& facets) {
+  double least = 1;
+  if (!ranking.scan.trials_suffice) return least;
+  for (const LeftInFacet& facet : facets) least = std::min(least, facet.p_value);
+  return std::min(1.0, least * static_cast<double>(facets.size()));
+}
+
+}  // namespace
+
+// Says how likely a quadratic form of the nuisances' scores is as large by chance: the prior shrinks each direction of
+// the information.
+double recalibration_p_value(const TransitionModel& model, const Fit& as_given, double gain) {
+  const Eigen::Index size = as_given.information.rows();
+  Eigen::MatrixXd root_prior = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index p = 0; p < size; ++p) root_prior(p, p) = model.nuisances()[static_cast<std::size_t>(p)].prior_sd;
+  // In units of the prior the information has eigenvalues l; a direction's share of chance gain is l/(1+l) chi^2_1.
+  const Eigen::VectorXd eigenvalues = markov::symmetric_eigen(root_prior * as_given.information * root_prior).values;
+  double mean = 0, variance = 0;
+  for (const double one : eigenvalues) {
+    const double l = std::max(0.0, one - 1);  // the prior is part of the information
+    const double weight = l / (1 + l);
+    mean += weight;
+    variance += 2 * weight * weight;
+  }
+  if (!(mean > 0)) return 1;
+  // By Satterthwaite it is a chi-squared of the same mean and variance.
+  const double scale = variance / (2 * mean), degrees = mean / scale;
+  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), std::max(0.0, gain) / scale));
+}
+
+// Puts the tests for a gap together.
+void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated) {
+  d.gap.p_effects = std::max(least_p_value, ranking.p_value);
+  d.gap.p_where = std::max(least_p_value, d.gap.recalibrated.p_value);
+  d.gap.p_facets = std::max(least_p_value, facets_p_value(ranking, d.causes.unnamed.front().facets));
+  d.gap.p_recalibration = std::max(least_p_value, d.gap.p_recalibration);
+  const double pairs = std::max(least_p_value, pairs_p_value(ranking, candidates, recalibrated));
+  d.gap.p_value =
+      std::min({1.0, d.gap.p_effects / share_for_effects, d.gap.p_where / (1 - share_for_effects - share_for_facets),
+                d.gap.p_facets / share_for_facets, pairs / share_for_pairs});
+  d.gap.p_as_given = std::min(1.0, 2 * std::min(d.gap.p_recalibration, d.gap.p_value));
+}
+
+}  // namespace metastable::analysis

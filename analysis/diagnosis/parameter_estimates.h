@@ -1,0 +1,21 @@
+#pragma once
+// Tells fitted parameters in the numbers that a catalogue reports, with their 90 % intervals.
+
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+
+namespace metastable::analysis {
+
+struct Fit;
+struct RankedCause;
+
+/// Returns a ranked hypothesis as the diagnosis tells it, all but its probability. Without information the parameters
+/// of its effects are left out.
+Cause described_cause(const TransitionModel& model, const RankedCause& ranked);
+
+/// Returns the recalibrated contact. Intervals follow the slopes of the reported numbers, unless those take a positive
+/// one below zero.
+std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,194 @@
+#include "analysis/diagnosis/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/gap_map.h"
+#include "analysis/diagnosis/left_over.h"
+#include "analysis/diagnosis/parameter_estimates.h"
+#include "dynamics/wheel/effect_catalogue.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double recalibration_level = 0.02;
+
+// These levels say what the best hypothesis may leave before none of all is believed.
+constexpr double left_over_level = 0.003;  // of the map's p-value
+constexpr double left_over_square = 15;    // of a cell's statistic, beyond the model error
+constexpr double least_left_over = 0.05;   // held-out gap that counts as one [nats a collision]
+constexpr double least_left_in_all = 6;    //   or that no draw of the trials takes away [nats, all collisions]
+constexpr double left_over_errors = 6;     // squared model errors of the gap as given that count as none, held out
+constexpr double facet_errors = 3;         // squared model errors that may be spread over the cells of a facet
+constexpr double largest_log_odds = 300;   // of none: their exponential stays finite
+// Prior odds of something without a name: to one effect of the catalogue; beside a hypothesis to the hypothesis alone.
+constexpr double unnamed_alone = 4, unnamed_beside = 0.03;
+constexpr std::size_t most_beside = 3;  // hypotheses beside which it is supposed, the recalibrated model not counted,
+constexpr double beside_margin = 12;    //   whose evidence is no further behind the best
+
+// These numbers are of odds and sets.
+constexpr double none_prior = 0.01;      // odds of none to a gap where nothing is left over
+constexpr double set_share = 0.95;       // of what the effects share that the set holds
+constexpr double least_of_first = 0.05;  // one less likely than this share of the first is not named for completeness
+constexpr double told_apart = 6;         // 2 Delta log likelihood that makes odds of 20 to 1
+
+// Says whether a hypothesis adds an effect to a likelier one: what it leaves is then the likelier one's to leave.
+bool extends_likelier(const RankedCause& cause, const std::vector<const RankedCause*>& ordered) {
+  const auto holds = [&](const EffectTerm& wanted) {
+    return std::any_of(cause.terms.begin(), cause.terms.end(),
+                       [&](const EffectTerm& term) { return term.candidate == wanted.candidate; });
+  };
+  for (const RankedCause* likelier : ordered) {
+    if (likelier == &cause) return false;
+    if (std::all_of(likelier->terms.begin(), likelier->terms.end(), holds)) return true;
+  }
+  return false;
+}
+
+// Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds to all hypotheses; few
+// trials cannot show that events scatter as they would by themselves, and facets are then not judged.
+double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
+                       const std::vector<const RankedCause*>& ordered, const Fit& recalibrated) {
+  if (!ranking.scan.trials_suffice) return 0;
+  const double top = ordered.front()->evidence;
+  double all = 0, joined = 0, beside = 0;  // hypotheses, those of them that are joined, and those joined
+  for (const RankedCause* cause : ordered) {
+    all += std::exp(cause->evidence - top);
+    if (d.causes.unnamed.size() > most_beside || cause->evidence < top - beside_margin) continue;
+    if (cause->fit.nuisance.empty() || extends_likelier(*cause, ordered)) continue;
+    const PhaseGain gained = phase_gain(model, cause->fit, exact_part(ranking.singles, cause->terms, recalibrated));
+    constexpr double tolerated = facet_errors * model_error * model_error;
+    Unnamed one{{},
+                cause->evidence,
+                left_by_facet(model, cause->fit, tolerated * gained.collisions, tolerated * gained.stances)};
+    for (const EffectTerm& term : cause->terms) one.beside.push_back(term.candidate->id);
+    one.evidence += evidence_of_more(one.facets);
+    joined += std::exp(cause->evidence - top);
+    beside += std::exp(std::min(largest_log_odds, one.evidence - top));
+    d.causes.unnamed.push_back(std::move(one));
+  }
+  Unnamed& alone = d.causes.unnamed.front();
+  alone.evidence = evidence_of_more(alone.facets);
+  return unnamed_alone * std::exp(std::min(largest_log_odds, alone.evidence - top)) / all +
+         (joined > 0 ? unnamed_beside * beside / joined : 0);
+}
+
+// Lists what the design itself cannot tell from the first of the set.
+void list_alike(Diagnosis& d) {
+  const Cause& first = d.causes.ranked.front();
+  const auto seen = std::ranges::find(d.limits.visible, first.name(), &Visibility::effect);
+  if (seen == d.limits.visible.end()) return;  // a pair
+  std::vector<std::string> alike;
+  for (const std::string& name : d.causes.set) {
+    const auto share = std::ranges::find(seen->alike, name, &std::pair<std::string, double>::first);
+    if (name == first.name() || (share != seen->alike.end() && (1 - share->second) * first.gain < told_apart))
+      alike.push_back(name);
+  }
+  if (alike.size() > 1) d.causes.alike = std::move(alike);
+}
+
+}  // namespace
+
+std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking) {
+  std::vector<const RankedCause*> ordered;
+  for (const RankedCause& cause : ranking.singles) {
+    if (cause.not_decided.empty())
+      ordered.push_back(&cause);
+    else
+      d.causes.not_decided.push_back(described_cause(model, cause));
+  }
+  for (const RankedCause& pair : ranking.pairs) {
+    if (std::isfinite(pair.evidence))
+      ordered.push_back(&pair);
+    else
+      d.causes.not_decided.push_back(described_cause(model, pair));
+  }
+  std::stable_sort(ordered.begin(), ordered.end(),
+                   [](const RankedCause* a, const RankedCause* b) { return a->evidence > b->evidence; });
+  return ordered;
+}
+
+Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
+              const std::vector<const RankedCause*>& ordered, const Fit& recalibrated,
+              const DiagnosisOptions& options) {
+  const RankedCause& best = *ordered.front();
+  Chosen chosen{&best.fit};
+  d.gap.left = gap_map(model, best.fit, options.draws, options.seed + 1);
+  const Fit& exact = exact_part(ranking.singles, best.terms, recalibrated);
+  PhaseGain gained = phase_gain(model, best.fit, exact);
+  if (model.refits_noise()) {  // how large the effect is beside the noise that it leaves, not beside what swallowed it
+    Fit without;
+    without.evaluation = model.evaluate(best.fit.nuisance, {});
+    gained = phase_gain(model, best.fit, without);
+  }
+  const double all = best.fit.log_likelihood - recalibrated.log_likelihood;
+  if (all > 0) chosen.bent = std::clamp((best.fit.log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
+  const double tolerated = model_error * model_error;
+  const double beyond = d.gap.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
+  if (d.gap.left.p_value < left_over_level && beyond > left_over_square)
+    chosen.none = std::exp(std::min(largest_log_odds, 0.5 * (beyond - left_over_square)));
+  chosen.none = std::max(chosen.none, odds_of_unnamed(d, model, ranking, ordered, recalibrated));
+  d.causes.together = best.together;
+  if (d.causes.together > most_together) chosen.none = std::max(chosen.none, certain_odds);
+  return chosen;
+}
+
+bool leaves_gap_held_out(const Diagnosis& d, double bent) {
+  const Shrinkage& log_score = d.shrinkage.measures.front();
+  const double tolerated = model_error * model_error * left_over_errors * bent * log_score.baseline;
+  if (log_score.with_effect > least_left_over + tolerated) return true;
+  return d.data.trials >= enough_trials && log_score.with_effect_least > tolerated &&
+         log_score.with_effect * static_cast<double>(d.data.collisions) > least_left_in_all;
+}
+
+double share_probabilities(Diagnosis& d, const TransitionModel& model, const std::vector<const RankedCause*>& ordered,
+                           std::size_t candidates, bool gap, double none) {
+  const double top = ordered.empty() ? 0 : std::max(0.0, ordered.front()->evidence);
+  const double effects = std::max<double>(1, static_cast<double>(candidates));
+  const double weight_null = std::exp(-top);
+  double given_gap = 0;
+  for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
+  // The tests decide whether there is a gap, because their levels are calibrated and the evidence's are not: where both
+  // disagree, the odds of a gap go no further than even.
+  none = std::max(none, none_prior);
+  const double even = weight_null / (1 + none);
+  double share = 1;
+  if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
+  const double weight_none = none * (given_gap > 0 ? share * given_gap : even);
+  const double sum = weight_null + share * given_gap + weight_none;
+  d.causes.p_none = weight_none / sum;
+  (d.gap.p_recalibration < recalibration_level ? d.causes.p_recalibrate : d.causes.p_no_gap) = weight_null / sum;
+  for (const RankedCause* cause : ordered) {
+    Cause one = described_cause(model, *cause);
+    one.probability = share * std::exp(cause->evidence - top) / effects / sum;
+    d.causes.ranked.push_back(std::move(one));
+  }
+  return share * given_gap / sum;
+}
+
+void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) {
+  if (!gap) {
+    d.verdict = d.gap.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
+    if (d.verdict == Verdict::recalibrate) d.causes.set = {std::string(dynamics::contact_distribution_id)};
+    return;
+  }
+  if (none >= 1) {
+    d.verdict = Verdict::unexplained;
+    return;
+  }
+  d.verdict = Verdict::explained;
+  double covered = 0;
+  for (const Cause& cause : d.causes.ranked) {
+    if (covered >= set_share * share_of_effects ||
+        cause.probability < least_of_first * d.causes.ranked.front().probability)
+      break;
+    d.causes.set.push_back(cause.name());
+    covered += cause.probability;
+  }
+  list_alike(d);
+}
+
+}  // namespace metastable::analysis
