@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
+
+#include "markov/mesh/score_curve.h"
 
 namespace metastable::markov {
 namespace {
@@ -13,59 +14,11 @@ namespace {
 constexpr double kFarthest = 60;                          // action beyond which failures are not looked for
 constexpr double kBucket = 1;                             // of actions, expanded together
 constexpr double kWorthAgain = 0.05;                      // a row speaks again if its node's action falls by this
-constexpr int kHalvings = 9;                              // of a gap between scores, to find where failures begin
+constexpr double kFarther = 0.5;                          // scores looked at, beyond what the action allows
 constexpr std::size_t kBatch = 32;                        // nodes whose landings are asked for at once
 constexpr std::uint32_t kTaken = MeshGrowth::no_row - 1;  // not a row yet
 constexpr std::size_t kFewestInChunk = std::size_t{1} << 16, kMostInChunk = std::size_t{1} << 23;
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-/// Returns the probability that a normal score lies in (low, high), with relative accuracy in both tails.
-double normal_mass(double low, double high) {
-  const auto tail = [](double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); };
-  return low > 0 ? tail(low) - tail(high) : tail(-high) - tail(-low);
-}
-
-/// Finds, of one score, the probabilities of failing, from where between neighbouring scores failures begin and end.
-/// It bisects all edges of a batch together. `failed` and `score` hold m entries a node, ascending.
-std::vector<double> masses_of_failure(const BatchMap& map, int phase, std::span<const double> states,
-                                      std::span<const double> score, std::span<const std::uint8_t> failed,
-                                      std::size_t m) {
-  struct Edge {
-    std::size_t node;
-    double low, high;
-    bool failed_below;
-  };
-  const std::size_t nodes = failed.size() / m, d = states.size() / failed.size();
-  std::vector<Edge> edges;
-  for (std::size_t n = 0; n < nodes; ++n)
-    for (std::size_t i = n * m; i + 1 < (n + 1) * m; ++i)
-      if (failed[i] != failed[i + 1]) edges.push_back({n, score[i], score[i + 1], failed[i] != 0});
-  std::vector<double> from(edges.size() * d), at(edges.size()), to(from.size());
-  std::vector<std::uint8_t> fails(edges.size());
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    std::copy_n(states.begin() + static_cast<std::ptrdiff_t>(edges[e].node * m * d), d,
-                from.begin() + static_cast<std::ptrdiff_t>(e * d));
-  for (int halving = 0; halving < kHalvings && !edges.empty(); ++halving) {
-    for (std::size_t e = 0; e < edges.size(); ++e) at[e] = 0.5 * (edges[e].low + edges[e].high);
-    std::fill(fails.begin(), fails.end(), 0);
-    checked_step(map, phase, from, at, to, fails);
-    for (std::size_t e = 0; e < edges.size(); ++e)
-      ((fails[e] != 0) == edges[e].failed_below ? edges[e].low : edges[e].high) = at[e];
-  }
-  std::vector<double> mass(nodes, 0.0);
-  std::size_t e = 0;
-  for (std::size_t n = 0; n < nodes; ++n) {
-    double begin = -infinity;
-    bool failing = failed[n * m] != 0;
-    for (; e < edges.size() && edges[e].node == n; ++e, failing = !failing) {
-      const double edge = 0.5 * (edges[e].low + edges[e].high);
-      if (failing) mass[n] += normal_mass(begin, edge);
-      begin = edge;
-    }
-    if (failing) mass[n] += normal_mass(begin, infinity);
-  }
-  return mass;
-}
 
 }  // namespace
 
@@ -214,9 +167,7 @@ void MeshGrowth::store(std::uint32_t node, Parts& parts, double failed, double a
 }
 
 void MeshGrowth::expand(std::span<const std::uint32_t> nodes) {
-  const auto s = static_cast<std::size_t>(map_.scores);
-  const std::size_t m = scores_.size();
-  std::vector<double> states, scores(m * s * nodes.size()), weights(m * nodes.size());
+  std::vector<double> states;
   std::vector<std::uint32_t> inside;
   const int phase = NodeLattice::phase(key_[nodes.front()]);
   Parts none;
@@ -227,58 +178,73 @@ void MeshGrowth::expand(std::span<const std::uint32_t> nodes) {
       store(node, none, 1, 0);
       continue;
     }
-    std::vector<double> offset;
-    for (std::size_t k = 0; k < s; k += 4) {
-      const auto u = uniforms(options_.seed, 1 + k / 4, key_[node], options_.shift);
-      offset.insert(offset.end(), u.begin(), u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, s - k)));
-    }
-    const std::size_t place = inside.size();
-    scores_.place(offset, std::span(scores).subspan(place * m * s, m * s), std::span(weights).subspan(place * m, m));
-    for (std::size_t i = 0; i < m; ++i) states.insert(states.end(), state.begin(), state.end());
+    states.insert(states.end(), state.begin(), state.end());
     inside.push_back(node);
   }
-  if (!inside.empty()) land(inside, scores, weights, states);
+  if (inside.empty()) return;
+  if (map_.scores == 1)
+    land_curves(inside, states);
+  else
+    land_lattice(inside, states);
 }
 
-/// Lands all scores from nodes of one phase that lie in the section.
-void MeshGrowth::land(const std::vector<std::uint32_t>& inside, const std::vector<double>& scores,
-                      const std::vector<double>& weights, const std::vector<double>& states) {
+/// Lands the whole of one score, from nodes of one phase that lie in the section: as far as the action allows.
+void MeshGrowth::land_curves(const std::vector<std::uint32_t>& inside, const std::vector<double>& states) {
+  const int phase = NodeLattice::phase(key_[inside.front()]), to_phase = (phase + 1) % map_.phases;
+  std::vector<double> reach;
+  for (const std::uint32_t node : inside)
+    reach.push_back(
+        std::min(options_.score_reach, kFarther + std::sqrt(2 * std::max(0.0, limit() - action_[node]))));
+  const std::vector<ScoreCurve> curves =
+      follow_curves(map_, lattice_, phase, states, reach, options_.score_spacing, options_.spacing);
+  Parts parts;
+  for (std::size_t n = 0; n < inside.size(); ++n) {
+    parts.clear();
+    const ScoreCurve::Shares shares = curves[n].share(lattice_, to_phase, parts);
+    store(inside[n], parts, shares.fails, shares.leaves);
+  }
+}
+
+/// Lands a lattice of several scores, moved by an offset of each node's own.
+void MeshGrowth::land_lattice(const std::vector<std::uint32_t>& inside, const std::vector<double>& states) {
   const auto d = static_cast<std::size_t>(map_.dimension), s = static_cast<std::size_t>(map_.scores);
   const std::size_t m = scores_.size();
   const int phase = NodeLattice::phase(key_[inside.front()]), to_phase = (phase + 1) % map_.phases;
-  std::vector<double> next(states.size());
+  std::vector<double> from, scores(m * s * inside.size()), weights(m * inside.size());
+  for (std::size_t n = 0; n < inside.size(); ++n) {
+    std::vector<double> offset;
+    for (std::size_t k = 0; k < s; k += 4) {
+      const auto u = uniforms(options_.seed, 1 + k / 4, key_[inside[n]], options_.shift);
+      offset.insert(offset.end(), u.begin(), u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, s - k)));
+    }
+    scores_.place(offset, std::span(scores).subspan(n * m * s, m * s), std::span(weights).subspan(n * m, m));
+    for (std::size_t i = 0; i < m; ++i) from.insert(from.end(), &states[n * d], &states[n * d] + d);
+  }
+  std::vector<double> next(from.size());
   std::vector<std::uint8_t> failed(inside.size() * m, 0);
-  const std::span<const double> used_scores = std::span<const double>(scores).first(inside.size() * m * s);
-  checked_step(map_, phase, states, used_scores, next, failed);
-  const std::vector<double> masses =
-      s == 1 ? masses_of_failure(map_, phase, states, used_scores, failed, m) : std::vector<double>();
+  checked_step(map_, phase, from, scores, next, failed);
   NodeLattice::Point point{};
   NodeSimplex simplex;
   Parts parts;
   for (std::size_t n = 0; n < inside.size(); ++n) {
-    const auto turn = random_words(options_.seed, 0x1000, key_[inside[n]], options_.shift);
-    auto orientation = static_cast<unsigned>(turn[0]);
-    double sum = 0, survive = 0, failing = 0;
-    for (std::size_t i = n * m; i < (n + 1) * m; ++i) {
-      sum += weights[i];
-      (failed[i] ? failing : survive) += weights[i];
-    }
-    const double fails = s == 1 ? masses[n] : failing / sum;
-    double away = 0;
+    auto orientation = static_cast<unsigned>(random_words(options_.seed, 0x1000, key_[inside[n]], options_.shift)[0]);
+    double sum = 0, failing = 0, away = 0;
+    for (std::size_t i = n * m; i < (n + 1) * m; ++i) sum += weights[i];
     parts.clear();
     for (std::size_t i = n * m; i < (n + 1) * m; ++i) {
       orientation = orientation * 5 + 3;  // another one for every score
-      if (failed[i]) continue;
-      const double weight = weights[i] / survive * (1 - fails);
-      if (!lattice_.locate(to_phase, &next[i * d], point)) {
+      const double weight = weights[i] / sum;
+      if (failed[i]) {
+        failing += weight;
+      } else if (!lattice_.locate(to_phase, &next[i * d], point)) {
         away += weight;
-        continue;
+      } else {
+        lattice_.find_simplex(to_phase, point, orientation >> 4, simplex);
+        for (std::size_t c = 0; c <= d; ++c)
+          if (weight * simplex.weight[c] > 0) parts.emplace_back(simplex.key[c], weight * simplex.weight[c]);
       }
-      lattice_.find_simplex(to_phase, point, orientation >> 4, simplex);
-      for (std::size_t c = 0; c <= d; ++c)
-        if (weight * simplex.weight[c] > 0) parts.emplace_back(simplex.key[c], weight * simplex.weight[c]);
     }
-    store(inside[n], parts, survive > 0 ? fails : 1, away);
+    store(inside[n], parts, failing, away);
   }
 }
 

@@ -88,8 +88,8 @@ class MeshGrowth {
   std::uint32_t node_at(std::uint64_t key);
   void expand(std::span<const std::uint32_t> nodes);
   void expand_wave(std::vector<std::uint32_t>& wave);
-  void land(const std::vector<std::uint32_t>& inside, const std::vector<double>& scores,
-            const std::vector<double>& weights, const std::vector<double>& states);
+  void land_curves(const std::vector<std::uint32_t>& inside, const std::vector<double>& states);
+  void land_lattice(const std::vector<std::uint32_t>& inside, const std::vector<double>& states);
   void store(std::uint32_t node, Parts& parts, double failed, double away);
   void follow(std::vector<std::uint32_t> rows);
   void relax(const Row& row);

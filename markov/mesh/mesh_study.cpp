@@ -20,7 +20,10 @@ namespace {
 
 constexpr double kDisagrees = 1.7;     // joint half-widths: 99.9 % of the normal
 constexpr double kSampledWindows = 3;  // of guided samples: within one, failures are still few
+constexpr int kLongestWindow = 200;    // of guided samples [steps]
+constexpr double kEven = 0.5;          // effective samples a sample: below, their own scatter tells too small an error
 constexpr double kSampledFrom = 100;   // expected steps above which guided samples settle before they fail
+constexpr double kLeast = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr std::size_t kFewestTrials = 100;
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
@@ -60,7 +63,11 @@ Extrapolated extrapolate(const std::vector<std::vector<double>>& logs, double sa
   for (const double value : values) spread += (value - e.log_value) * (value - e.log_value);
   const double quantile = boost::math::quantile(boost::math::students_t(n - 1), 0.975);
   e.shift_error = quantile * std::sqrt(spread / (n - 1) / n);
+  // What the last order of the extrapolation moved is the error of the one before; its own is smaller by as much as
+  // that order moved less than the ones before it. No more than to a quarter, and with four times what this says.
+  const double before = std::abs(at_zero(mean, 1, sizes) - mean.back());
   e.discretization_error = std::abs(e.log_value - at_zero(mean, 1, sizes));
+  if (before > 0) e.discretization_error *= std::clamp(4 * e.discretization_error / before, kLeast, 1.0);
   // Where a fourth size was asked for the square is far off; the error is what the extrapolation by three last moved.
   if (sizes > 3)
     e.discretization_error = std::max(e.discretization_error,
@@ -125,9 +132,7 @@ class Run {
     return {.spacing = coarse / std::pow(std::sqrt(2.0), static_cast<double>(size)),
             .seed = options_.seed,
             .shift = static_cast<std::uint32_t>(shift),
-            .margin = options_.margin > 0   ? options_.margin
-                      : map_.dimension == 4 ? 10.0
-                                            : 12.0,
+            .margin = options_.margin > 0 ? options_.margin : 12.0,
             .score_spacing = study_score_spacing(map_),
             .most_bytes = options_.most_bytes / static_cast<std::size_t>(threads_)};
   }
@@ -209,20 +214,27 @@ class Run {
 
   void sample() {
     if (options_.guided_samples == 0 || study_.steps.value <= kSampledFrom) return;
-    // It goes from the start to where failures keep their share: the time to forget the start, some times over.
-    const int forgets = 4 + static_cast<int>(std::ceil(4 * study_.mixing_steps));
-    const int window = std::min(forgets, 200);
-    if (study_.steps.value <= kSampledWindows * window) return;
     const Mesh mesh(map_, frames_, start_, mesh_options(1, 0));
-    const GuidedRate guided = guided_failure_rate(map_, mesh, start_,
-                                                  {.samples = options_.guided_samples,
-                                                   .burn_in = std::min(3 * forgets, 60000),
-                                                   .window = window,
-                                                   .seed = options_.seed,
-                                                   .threads = options_.threads});
+    // It goes from the start to where failures keep their share: the time to forget the start, some times over. A window
+    // too short to reach the failures from an ordinary state leaves the weight to a few rare ones, which few samples
+    // meet: the rate comes out too low. So it is lengthened until the weights are even.
+    const int forgets = 8 + static_cast<int>(std::ceil(8 * study_.mixing_steps));
+    GuidedRate guided;
+    double even = 0;
+    for (int window = std::min(forgets, kLongestWindow); even < kEven; window = std::min(2 * window, kLongestWindow)) {
+      if (study_.steps.value <= kSampledWindows * window) break;
+      guided = guided_failure_rate(map_, mesh, start_,
+                                   {.samples = options_.guided_samples,
+                                    .burn_in = std::min(2 * forgets, 60000),
+                                    .window = window,
+                                    .seed = options_.seed,
+                                    .threads = options_.threads});
+      even = guided.effective_samples / static_cast<double>(options_.guided_samples);
+      if (window == kLongestWindow) break;
+    }
     if (!(guided.rate > 0)) return;
     const double beyond = study_.steps.value - 1 / study_.failure_rate.value;  // what the start is worth
-    const double half = normal_95 * guided.standard_error / guided.rate;
+    const double half = normal_95 * guided.standard_error / guided.rate * std::max(1.0, kEven / even);
     const double sampled = 1 / guided.rate + beyond;
     study_.guided = MeshEstimate{sampled, sampled / (1 + half), half < 1 ? sampled / (1 - half) : sampled / 1e-3};
     study_.guided_samples = options_.guided_samples;
@@ -243,9 +255,8 @@ class Run {
 }  // namespace
 
 double study_score_spacing(const BatchMap& map) {
-  // Few nodes have few offsets over which its error could average.
-  constexpr std::array<double, 4> spacing{0.3, 0.4, 0.6, 0.6};
-  return map.scores == 1 ? spacing[static_cast<std::size_t>(map.dimension - 1)] : 0.6;
+  // Of one score the landing is read as a curve, which takes further places where it needs them.
+  return map.scores == 1 ? 0.8 : 0.6;
 }
 
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options) {

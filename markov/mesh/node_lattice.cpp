@@ -82,6 +82,18 @@ bool NodeLattice::locate(int phase, const double* state, Point& point) const {
   return reachable;
 }
 
+std::uint64_t NodeLattice::axis_key(std::size_t k) { return std::uint64_t{1} << (kBits * (3 - k)); }
+
+std::uint64_t NodeLattice::find_cell(int phase, const Point& point, Point& fraction) const {
+  Place at{};
+  for (std::size_t k = 0; k < dimension(); ++k) {
+    const double below = std::floor(point[k]);
+    fraction[k] = point[k] - below;
+    at[k] = static_cast<std::int32_t>(below);
+  }
+  return pack(phase, at);
+}
+
 void NodeLattice::find_simplex(int phase, const Point& point, unsigned flips, NodeSimplex& out) const {
   const std::size_t d = dimension();
   std::array<double, 4> fraction{};

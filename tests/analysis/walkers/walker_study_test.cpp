@@ -23,7 +23,7 @@ TEST(WalkerStudy, FourDimensionsOnTheCoarsestMeshes) {
   ASSERT_EQ(frames.front().centre.size(), 4u);
   std::vector<double> steps;
   for (const double spacing : {2.0, 1.5}) {
-    const markov::Mesh mesh(batch, frames, start, {.spacing = spacing, .margin = 7, .score_spacing = 0.8});
+    const markov::Mesh mesh(batch, frames, start, {.spacing = spacing, .margin = 9, .score_spacing = 0.8});
     const markov::MeshPassage passage = markov::mesh_passage(mesh, start);
     EXPECT_LT(passage.steps_upper / passage.steps_lower, 1.06);
     steps.push_back(passage.steps);

@@ -1,0 +1,258 @@
+#include "markov/mesh/score_curve.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace metastable::markov {
+namespace {
+
+constexpr double kNarrowest = 1.0 / 512;      // of the spacing: gaps are halved so far, to find where failures begin
+constexpr double kForetold = 1e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
+                                              // afterwards a sixteenth is left
+constexpr double kExtrapolated = 40;          // times that, where a cubic had to look beyond its places
+constexpr double kPerCell = 2, kMost = 1024;  // pairs of Gauss's points a cell of the lattice, and between two places
+
+using Point = NodeLattice::Point;
+
+/// Returns the probability that a normal score lies in (low, high), with relative accuracy in both tails.
+double normal_mass(double low, double high) {
+  const auto tail = [](double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); };
+  return low > 0 ? tail(low) - tail(high) : tail(-high) - tail(-low);
+}
+
+/// Is the polynomial through up to four places, in Newton's form.
+class Cubic {
+ public:
+  template <class Places>
+  explicit Cubic(const Places& places) : count_(places.size()) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      score_[i] = places[i].score;
+      by_[i] = places[i].landing.at;
+    }
+    for (std::size_t order = 1; order < count_; ++order)
+      for (std::size_t i = count_ - 1; i >= order; --i)
+        for (std::size_t k = 0; k < by_[i].size(); ++k)
+          by_[i][k] = (by_[i][k] - by_[i - 1][k]) / (score_[i] - score_[i - order]);
+  }
+  Point operator()(double score) const {
+    Point at = by_[count_ - 1];
+    for (std::size_t i = count_ - 1; i-- > 0;)
+      for (std::size_t k = 0; k < at.size(); ++k) at[k] = at[k] * (score - score_[i]) + by_[i][k];
+    return at;
+  }
+
+ private:
+  std::size_t count_;
+  std::array<double, 4> score_{};
+  std::array<Point, 4> by_{};
+};
+
+double distance(const Point& a, const Point& b) {
+  double squared = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) squared += (a[k] - b[k]) * (a[k] - b[k]);
+  return std::sqrt(squared);
+}
+
+/// Shares landings among the corners of their cells; those that follow one another in one cell are added up first.
+class Sharing {
+ public:
+  Sharing(const NodeLattice& lattice, int phase, std::vector<std::pair<std::uint64_t, double>>& parts)
+      : lattice_(lattice), phase_(phase), dimension_(lattice.dimension()), parts_(parts) {}
+  ~Sharing() { flush(); }
+  Sharing(const Sharing&) = delete;
+  Sharing& operator=(const Sharing&) = delete;
+
+  void add(const Point& at, double weight) {
+    Point fraction{};
+    const std::uint64_t cell = lattice_.find_cell(phase_, at, fraction);
+    if (cell != cell_) {
+      flush();
+      cell_ = cell;
+    }
+    std::array<double, 16> share{weight};
+    for (std::size_t k = 0, corners = 1; k < dimension_; ++k, corners *= 2)
+      for (std::size_t c = 0; c < corners; ++c) {
+        share[c + corners] = share[c] * fraction[k];
+        share[c] -= share[c + corners];
+      }
+    for (std::size_t c = 0; c < std::size_t{1} << dimension_; ++c) sum_[c] += share[c];
+  }
+
+ private:
+  void flush() {
+    for (std::size_t c = 0; c < std::size_t{1} << dimension_; ++c) {
+      if (!(sum_[c] > 0)) continue;
+      std::uint64_t key = cell_;
+      for (std::size_t k = 0; k < dimension_; ++k)
+        if ((c >> k) & 1U) key += NodeLattice::axis_key(k);
+      parts_.emplace_back(key, sum_[c]);
+    }
+    sum_ = {};
+  }
+
+  const NodeLattice& lattice_;
+  int phase_;
+  std::size_t dimension_;
+  std::vector<std::pair<std::uint64_t, double>>& parts_;
+  std::uint64_t cell_ = 0;
+  std::array<double, 16> sum_{};
+};
+
+/// Shares the mass between two scores along a curve that goes through about so many cells.
+void share_along(const Cubic& curve, double low, double high, double cells, Sharing& sharing) {
+  const double mass = normal_mass(low, high);
+  if (!(mass > 0)) return;
+  const double pairs = std::clamp(std::ceil(cells * kPerCell), 1.0, kMost), width = (high - low) / pairs;
+  const double aside = 0.5 / std::numbers::sqrt3;  // Gauss's two points of (-1/2, 1/2)
+  const auto each = [&](const auto& use) {
+    for (double i = 0.5; i < pairs; i += 1)
+      for (const double part : {i - aside, i + aside}) {
+        const double z = low + width * part;
+        use(z, std::exp(0.5 * (low * low - z * z)));
+      }
+  };
+  double sum = 0;
+  each([&](double, double density) { sum += density; });
+  each([&](double z, double density) { sharing.add(curve(z), mass * density / sum); });
+}
+
+}  // namespace
+
+ScoreCurve::ScoreCurve(double spacing, double reach) : narrowest_(spacing * kNarrowest) {
+  // The first places stand twice as far apart: what lies between them shows how far the curve can be trusted.
+  const double gaps = std::max(2.0, std::ceil(reach / spacing));
+  for (double i = 0; i <= gaps; i += 1) asked_.push_back(reach * (2 * i / gaps - 1));
+}
+
+bool ScoreCurve::joined(std::size_t left) const {
+  return place_[left].landing.fate == Fate::lands && place_[left + 1].landing.fate == Fate::lands && !place_[left].torn;
+}
+
+/// Returns the nearest places, four at most, on the piece of the curve that holds the places left .. right.
+std::span<const ScoreCurve::Place> ScoreCurve::stencil(std::size_t left, std::size_t right) const {
+  std::size_t first = left, last = right;
+  while (last - first < 3) {
+    const bool before = first > 0 && joined(first - 1), after = last + 1 < place_.size() && joined(last);
+    if (!before && !after) break;
+    if (!after || (before && left - first <= last - right))
+      --first;
+    else
+      ++last;
+  }
+  return std::span(place_).subspan(first, last - first + 1);
+}
+
+/// Decides which halves of the gap after place `at` are to be halved again.
+void ScoreCurve::halve(Place& left, Place& middle, const Place& right, std::size_t at, double unit) const {
+  const bool more = middle.score - left.score > narrowest_;
+  const auto lands = [](const Place& place) { return place.landing.fate == Fate::lands; };
+  const auto off = [&](std::size_t from, std::size_t to) {
+    return unit * distance(Cubic(stencil(from, to))(middle.score), middle.landing.at);
+  };
+  const bool l = lands(left), m = lands(middle), r = lands(right);
+  left.open = more && left.landing.fate != middle.landing.fate;
+  middle.open = more && middle.landing.fate != right.landing.fate;
+  if (!m) return;
+  if (l && r) {
+    const bool rough = off(at, at + 1) > kForetold;
+    left.open = middle.open = rough && more;
+    left.torn = middle.torn = rough && !more;
+  } else if (l) {
+    left.open = more && off(at, at) > kExtrapolated * kForetold;
+  } else if (r) {
+    middle.open = more && off(at + 1, at + 1) > kExtrapolated * kForetold;
+  }
+}
+
+void ScoreCurve::answer(std::span<const Landing> landings, double unit) {
+  std::vector<Place> next;
+  if (place_.empty()) {
+    for (std::size_t i = 0; i < landings.size(); ++i)
+      next.push_back({asked_[i], landings[i], i + 1 < landings.size(), false});
+  } else {
+    std::size_t answered = 0;
+    for (std::size_t i = 0; i < place_.size(); ++i) {
+      next.push_back(place_[i]);
+      if (!place_[i].open) continue;
+      Place middle{asked_[answered], landings[answered], false, false};
+      ++answered;
+      halve(next.back(), middle, place_[i + 1], i, unit);
+      next.push_back(middle);
+    }
+  }
+  place_ = std::move(next);
+  asked_.clear();
+  for (std::size_t i = 0; i < place_.size(); ++i)
+    if (place_[i].open) asked_.push_back(0.5 * (place_[i].score + place_[i + 1].score));
+}
+
+ScoreCurve::Shares ScoreCurve::share(const NodeLattice& lattice, int phase,
+                                     std::vector<std::pair<std::uint64_t, double>>& parts) const {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Shares shares;
+  Sharing sharing(lattice, phase, parts);
+  const auto give = [&](const Landing& landing, double mass) {
+    if (landing.fate == Fate::lands)
+      sharing.add(landing.at, mass);
+    else
+      (landing.fate == Fate::fails ? shares.fails : shares.leaves) += mass;
+  };
+  const auto beyond = [&](const Place& last) {
+    (last.landing.fate == Fate::fails ? shares.fails : shares.leaves) += normal_mass(std::abs(last.score), infinity);
+  };
+  beyond(place_.front());
+  for (std::size_t i = 0; i + 1 < place_.size(); ++i) {
+    const Place &left = place_[i], &right = place_[i + 1];
+    if (joined(i)) {
+      share_along(Cubic(stencil(i, i + 1)), left.score, right.score, distance(left.landing.at, right.landing.at),
+                  sharing);
+    } else {
+      const double between = 0.5 * (left.score + right.score);
+      give(left.landing, normal_mass(left.score, between));
+      give(right.landing, normal_mass(between, right.score));
+    }
+  }
+  beyond(place_.back());
+  return shares;
+}
+
+std::vector<ScoreCurve> follow_curves(const BatchMap& map, const NodeLattice& lattice, int phase,
+                                      std::span<const double> states, std::span<const double> reach, double spacing,
+                                      double unit) {
+  const auto d = static_cast<std::size_t>(map.dimension);
+  const int to_phase = (phase + 1) % map.phases;
+  std::vector<ScoreCurve> curves;
+  for (const double far : reach) curves.emplace_back(spacing, far);
+  std::vector<double> from, scores, next;
+  std::vector<std::uint8_t> failed;
+  for (;;) {
+    from.clear(), scores.clear();
+    for (std::size_t n = 0; n < curves.size(); ++n)
+      for (const double score : curves[n].asked()) {
+        from.insert(from.end(), &states[n * d], &states[n * d] + d);
+        scores.push_back(score);
+      }
+    if (scores.empty()) return curves;
+    next.resize(from.size());
+    failed.assign(scores.size(), 0);
+    checked_step(map, phase, from, scores, next, failed);
+    std::vector<ScoreCurve::Landing> landings(scores.size());
+    for (std::size_t i = 0; i < landings.size(); ++i) {
+      if (failed[i])
+        landings[i].fate = ScoreCurve::Fate::fails;
+      else if (!lattice.locate(to_phase, &next[i * d], landings[i].at))
+        landings[i].fate = ScoreCurve::Fate::leaves;
+    }
+    std::size_t first = 0;
+    for (ScoreCurve& curve : curves) {
+      const std::size_t count = curve.asked().size();
+      if (count > 0) curve.answer(std::span(landings).subspan(first, count), unit);
+      first += count;
+    }
+  }
+}
+
+}  // namespace metastable::markov

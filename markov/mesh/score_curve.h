@@ -1,0 +1,67 @@
+#pragma once
+// Reads where a state leads as a smooth curve in the one score of its noise: a few steps of the map, interpolated.
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "markov/mesh/batch_map.h"
+#include "markov/mesh/node_lattice.h"
+
+namespace metastable::markov {
+
+/// Holds where one state leads under every score: places that were stepped, ascending, and between neighbours that both
+/// survive the cubic through the nearest four, in coordinates of the lattice that it lands on. A gap that the cubic
+/// through its neighbours does not foretell is halved, and so is one at whose ends different things happen.
+class ScoreCurve {
+ public:
+  enum class Fate : std::uint8_t { lands, fails, leaves };
+  struct Landing {
+    Fate fate = Fate::lands;
+    NodeLattice::Point at{};
+  };
+  struct Shares {
+    double fails = 0, leaves = 0;  ///< probabilities; the rest lands
+  };
+
+  /// @param spacing  > 0: between places where the curve is smooth
+  /// @param reach    > 0: scores beyond, of either sign, are not looked at; they fail where the last place does, or
+  ///                 else leave
+  ScoreCurve(double spacing, double reach);
+
+  /// Returns the scores to be stepped next, ascending; none when the curve is known.
+  const std::vector<double>& asked() const { return asked_; }
+  /// Takes the landings of the scores asked for.
+  /// @param unit  of the lattice's coordinates, in stationary sds
+  void answer(std::span<const Landing> landings, double unit);
+
+  /// Adds to `parts` what each corner of the cells around all landings gets, in proportion to nearness on every axis;
+  /// corners may come again.
+  Shares share(const NodeLattice& lattice, int phase, std::vector<std::pair<std::uint64_t, double>>& parts) const;
+
+ private:
+  struct Place {
+    double score = 0;
+    Landing landing;
+    bool open = false;  ///< the gap from here to the next place is to be halved
+    bool torn = false;  ///< the curve jumps in it
+  };
+  bool joined(std::size_t left) const;
+  std::span<const Place> stencil(std::size_t left, std::size_t right) const;
+  void halve(Place& left, Place& middle, const Place& right, std::size_t at, double unit) const;
+
+  double narrowest_;
+  std::vector<Place> place_;
+  std::vector<double> asked_;
+};
+
+/// Follows the curves of n states of one phase, `d` numbers each, together: the map is asked for many steps at once.
+/// @param reach  of each state's scores
+/// @param unit   as ScoreCurve::answer's
+/// @throws as checked_step does
+std::vector<ScoreCurve> follow_curves(const BatchMap& map, const NodeLattice& lattice, int phase,
+                                      std::span<const double> states, std::span<const double> reach, double spacing,
+                                      double unit);
+
+}  // namespace metastable::markov
