@@ -19,21 +19,20 @@ struct MeshOptions {
   std::uint64_t seed = 1;
   std::uint32_t shift = 0;     ///< which random shift of the lattice of nodes
   double margin = 12;          ///< nodes as far as the action of the cheapest failure and this
-  double score_spacing = 0.6;  ///< of the lattice of scores; of one score, of the places on its curve
+  double score_spacing = 0.6;  ///< of places on a curve in the first score, and of the lattice of the others
   double score_reach = 8.5;
   std::size_t most_bytes = std::size_t{3} << 30;  ///< for rows and nodes; more is refused
 };
 
 /// Rows are interpolated: a landing is shared among the nodes around it in proportion to nearness on every axis, so
 /// entries are never negative and means are exact; the sharing acts as noise of h^2/6 an axis and step, and expected
-/// steps come out low by a smooth error in h^2. With one score the landing is read as a curve in it (ScoreCurve) and
-/// integrated along; several stand on a lattice with an offset of its own for every node, and each landing is shared
-/// among the corners of a simplex (Kuhn's, in random orientation).
+/// steps come out low by a smooth error in h^2. Landings are read as curves in the first score (ScoreCurve) and
+/// integrated along them; further scores stand on a lattice with an offset of its own for every node.
 ///
 /// The mesh grows from the start and the noise-free orbit by least action: the chain's own, -ln of an entry against the
 /// largest of its row, by Dijkstra's algorithm, up to the cheapest failure and `margin` beyond. What leaves the mesh is
-/// kept apart. Cost: nodes times scores evaluations of the map; with one score some twenty a
-/// node, fewer the nearer it is to the limit.
+/// kept apart. Cost: some twenty steps of the map a curve, fewer the nearer a node is to the
+/// limit.
 class Mesh {
  public:
   /// @param start  a state at phase 0

@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
-
-#include "markov/mesh/score_curve.h"
 
 namespace metastable::markov {
 namespace {
@@ -23,11 +22,9 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 MeshGrowth::MeshGrowth(const BatchMap& map, const NodeLattice& lattice, const MeshOptions& options, Exchange* exchange)
-    : map_(map),
-      lattice_(lattice),
-      options_(options),
-      exchange_(exchange),
-      scores_(map.scores, options.score_spacing, options.score_reach) {}
+    : map_(map), lattice_(lattice), options_(options), exchange_(exchange) {
+  if (map.scores > 1) others_.emplace(map.scores - 1, options.score_spacing, options.score_reach);
+}
 
 double MeshGrowth::limit() const { return std::min(kFarthest, cheapest_failure_ + options_.margin); }
 
@@ -181,70 +178,56 @@ void MeshGrowth::expand(std::span<const std::uint32_t> nodes) {
     states.insert(states.end(), state.begin(), state.end());
     inside.push_back(node);
   }
-  if (inside.empty()) return;
-  if (map_.scores == 1)
-    land_curves(inside, states);
-  else
-    land_lattice(inside, states);
+  if (!inside.empty()) land(inside, states);
 }
 
-/// Lands the whole of one score, from nodes of one phase that lie in the section: as far as the action allows.
-void MeshGrowth::land_curves(const std::vector<std::uint32_t>& inside, const std::vector<double>& states) {
+/// Puts lines through the scores that a node is landed from, along the first: of one score there is one, of several a
+/// lattice of the others, moved by an offset of the node's own. As far as the action allows.
+void MeshGrowth::add_lines(std::uint32_t node, std::span<const double> state, Lines& lines) const {
+  const double far = std::min(options_.score_reach, kFarther + std::sqrt(2 * std::max(0.0, limit() - action_[node])));
+  const auto add = [&](std::span<const double> others, double weight, double reach) {
+    lines.along.states.insert(lines.along.states.end(), state.begin(), state.end());
+    lines.along.others.insert(lines.along.others.end(), others.begin(), others.end());
+    lines.along.reach.push_back(reach);
+    lines.weight.push_back(weight);
+  };
+  lines.first.push_back(lines.weight.size());
+  if (!others_) return add({}, 1, far);
+  const std::size_t fixed = static_cast<std::size_t>(map_.scores) - 1, m = others_->size();
+  std::vector<double> offset, score(m * fixed), weight(m);
+  for (std::size_t k = 0; k < fixed; k += 4) {
+    const auto u = uniforms(options_.seed, 1 + k / 4, key_[node], options_.shift);
+    offset.insert(offset.end(), u.begin(), u.end());
+  }
+  others_->place(offset, score, weight);
+  const double sum = std::accumulate(weight.begin(), weight.end(), 0.0);
+  for (std::size_t i = 0; i < m; ++i) {
+    const auto others = std::span(score).subspan(i * fixed, fixed);
+    const double left = far * far - std::inner_product(others.begin(), others.end(), others.begin(), 0.0);
+    if (left > 0) add(others, weight[i] / sum, std::max(kFarther, std::sqrt(left)));
+  }
+}
+
+void MeshGrowth::land(const std::vector<std::uint32_t>& inside, const std::vector<double>& states) {
+  const auto d = static_cast<std::size_t>(map_.dimension);
   const int phase = NodeLattice::phase(key_[inside.front()]), to_phase = (phase + 1) % map_.phases;
-  std::vector<double> reach;
-  for (const std::uint32_t node : inside)
-    reach.push_back(
-        std::min(options_.score_reach, kFarther + std::sqrt(2 * std::max(0.0, limit() - action_[node]))));
+  Lines lines;
+  for (std::size_t n = 0; n < inside.size(); ++n) add_lines(inside[n], std::span(states).subspan(n * d, d), lines);
+  lines.first.push_back(lines.weight.size());
   const std::vector<ScoreCurve> curves =
-      follow_curves(map_, lattice_, phase, states, reach, options_.score_spacing, options_.spacing);
+      follow_curves(map_, lattice_, phase, lines.along, options_.score_spacing, options_.spacing);
   Parts parts;
   for (std::size_t n = 0; n < inside.size(); ++n) {
     parts.clear();
-    const ScoreCurve::Shares shares = curves[n].share(lattice_, to_phase, parts);
-    store(inside[n], parts, shares.fails, shares.leaves);
-  }
-}
-
-/// Lands a lattice of several scores, moved by an offset of each node's own.
-void MeshGrowth::land_lattice(const std::vector<std::uint32_t>& inside, const std::vector<double>& states) {
-  const auto d = static_cast<std::size_t>(map_.dimension), s = static_cast<std::size_t>(map_.scores);
-  const std::size_t m = scores_.size();
-  const int phase = NodeLattice::phase(key_[inside.front()]), to_phase = (phase + 1) % map_.phases;
-  std::vector<double> from, scores(m * s * inside.size()), weights(m * inside.size());
-  for (std::size_t n = 0; n < inside.size(); ++n) {
-    std::vector<double> offset;
-    for (std::size_t k = 0; k < s; k += 4) {
-      const auto u = uniforms(options_.seed, 1 + k / 4, key_[inside[n]], options_.shift);
-      offset.insert(offset.end(), u.begin(), u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, s - k)));
+    double fails = 0, looked_at = 0, away = 0;
+    for (std::size_t line = lines.first[n]; line < lines.first[n + 1]; ++line) {
+      const double weight = lines.weight[line];
+      const ScoreCurve::Shares shares = curves[line].share(lattice_, to_phase, weight, parts);
+      fails += weight * shares.fails;
+      away += weight * shares.leaves;
+      looked_at += weight;
     }
-    scores_.place(offset, std::span(scores).subspan(n * m * s, m * s), std::span(weights).subspan(n * m, m));
-    for (std::size_t i = 0; i < m; ++i) from.insert(from.end(), &states[n * d], &states[n * d] + d);
-  }
-  std::vector<double> next(from.size());
-  std::vector<std::uint8_t> failed(inside.size() * m, 0);
-  checked_step(map_, phase, from, scores, next, failed);
-  NodeLattice::Point point{};
-  NodeSimplex simplex;
-  Parts parts;
-  for (std::size_t n = 0; n < inside.size(); ++n) {
-    auto orientation = static_cast<unsigned>(random_words(options_.seed, 0x1000, key_[inside[n]], options_.shift)[0]);
-    double sum = 0, failing = 0, away = 0;
-    for (std::size_t i = n * m; i < (n + 1) * m; ++i) sum += weights[i];
-    parts.clear();
-    for (std::size_t i = n * m; i < (n + 1) * m; ++i) {
-      orientation = orientation * 5 + 3;  // another one for every score
-      const double weight = weights[i] / sum;
-      if (failed[i]) {
-        failing += weight;
-      } else if (!lattice_.locate(to_phase, &next[i * d], point)) {
-        away += weight;
-      } else {
-        lattice_.find_simplex(to_phase, point, orientation >> 4, simplex);
-        for (std::size_t c = 0; c <= d; ++c)
-          if (weight * simplex.weight[c] > 0) parts.emplace_back(simplex.key[c], weight * simplex.weight[c]);
-      }
-    }
-    store(inside[n], parts, failing, away);
+    store(inside[n], parts, fails, away + std::max(0.0, 1 - looked_at));
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -10,6 +11,7 @@
 
 #include "markov/mesh/mesh.h"
 #include "markov/mesh/node_lattice.h"
+#include "markov/mesh/score_curve.h"
 #include "markov/mesh/score_lattice.h"
 
 namespace metastable::markov {
@@ -80,6 +82,11 @@ class MeshGrowth {
     std::vector<std::uint32_t> column;
     std::vector<double> value;
   };
+  struct Lines {
+    ScoreLines along;
+    std::vector<double> weight;      ///< of each line, in one node's sum of about one
+    std::vector<std::size_t> first;  ///< line of each node
+  };
   using Parts = std::vector<std::pair<std::uint64_t, double>>;
 
   void start_from(int phase, std::span<const double> state);
@@ -88,8 +95,8 @@ class MeshGrowth {
   std::uint32_t node_at(std::uint64_t key);
   void expand(std::span<const std::uint32_t> nodes);
   void expand_wave(std::vector<std::uint32_t>& wave);
-  void land_curves(const std::vector<std::uint32_t>& inside, const std::vector<double>& states);
-  void land_lattice(const std::vector<std::uint32_t>& inside, const std::vector<double>& states);
+  void add_lines(std::uint32_t node, std::span<const double> state, Lines& lines) const;
+  void land(const std::vector<std::uint32_t>& inside, const std::vector<double>& states);
   void store(std::uint32_t node, Parts& parts, double failed, double away);
   void follow(std::vector<std::uint32_t> rows);
   void relax(const Row& row);
@@ -104,7 +111,7 @@ class MeshGrowth {
   const NodeLattice& lattice_;
   const MeshOptions& options_;
   Exchange* exchange_;
-  ScoreLattice scores_;
+  std::optional<ScoreLattice> others_;  ///< of the scores but the first
   NodeTable table_;
   std::vector<std::uint64_t> key_;
   std::vector<double> action_;

@@ -24,11 +24,12 @@ constexpr int kLongestWindow = 200;    // of guided samples [steps]
 constexpr double kEven = 0.5;          // effective samples a sample: below, their own scatter tells too small an error
 constexpr double kSampledFrom = 100;   // expected steps above which guided samples settle before they fail
 constexpr double kLeast = 0.25;        // of what the extrapolation's last order moved: its error
+constexpr double kRows = 5e-4;         // what reading rows off curves may leave, about so much
 constexpr std::size_t kFewestTrials = 100;
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
 double coarsest(int dimension) {
-  constexpr std::array<double, 4> spacing{0.4, 0.5, 0.7, 1.4};
+  constexpr std::array<double, 4> spacing{0.4, 0.5, 0.7, 1.0};
   return spacing[static_cast<std::size_t>(dimension - 1)];
 }
 
@@ -72,7 +73,7 @@ Extrapolated extrapolate(const std::vector<std::vector<double>>& logs, double sa
   if (sizes > 3)
     e.discretization_error = std::max(e.discretization_error,
                                       std::abs(at_zero(mean, sizes - 3, sizes) - at_zero(mean, sizes - 4, sizes - 1)));
-  e.discretization_error *= safety;
+  e.discretization_error = std::hypot(safety * e.discretization_error, kRows);
   return e;
 }
 
@@ -132,16 +133,18 @@ class Run {
     return {.spacing = coarse / std::pow(std::sqrt(2.0), static_cast<double>(size)),
             .seed = options_.seed,
             .shift = static_cast<std::uint32_t>(shift),
-            .margin = options_.margin > 0 ? options_.margin : 12.0,
+            .margin = options_.margin > 0 ? options_.margin
+                      : map_.scores == 1  ? 12.0
+                                          : 16.0,
             .score_spacing = study_score_spacing(map_),
             .most_bytes = options_.most_bytes / static_cast<std::size_t>(threads_)};
   }
 
   void foresee_memory() {
-    // Nodes grow by the spacing's power; entries a row grow by less than its root.
+    // Nodes grow by the spacing's power at most, entries of a row by that of as many dimensions as landings fill.
     const double coarse = static_cast<double>(solve(0, 0));
     const double growth = std::pow(std::sqrt(2.0), static_cast<double>(sizes_ - 1));
-    const double finest = coarse * std::pow(growth, map_.dimension + 0.5);
+    const double finest = coarse * std::pow(growth, map_.dimension + std::min(map_.scores, map_.dimension));
     study_.expected_bytes = finest * threads_;
     if (study_.expected_bytes > static_cast<double>(options_.most_bytes))
       throw std::length_error(fmt::format(
@@ -215,9 +218,9 @@ class Run {
   void sample() {
     if (options_.guided_samples == 0 || study_.steps.value <= kSampledFrom) return;
     const Mesh mesh(map_, frames_, start_, mesh_options(1, 0));
-    // It goes from the start to where failures keep their share: the time to forget the start, some times over. A window
-    // too short to reach the failures from an ordinary state leaves the weight to a few rare ones, which few samples
-    // meet: the rate comes out too low. So it is lengthened until the weights are even.
+    // It goes from the start to where failures keep their share: the time to forget the start, some times over. A
+    // window too short to reach the failures from an ordinary state leaves the weight to a few rare ones, which few
+    // samples meet: the rate comes out too low. So it is lengthened until the weights are even.
     const int forgets = 8 + static_cast<int>(std::ceil(8 * study_.mixing_steps));
     GuidedRate guided;
     double even = 0;

@@ -19,7 +19,7 @@ struct MeshStudyOptions {
   double spacing = 0;  ///< of the coarsest mesh, in stationary sds; the others' fall by sqrt 2 each. 0: by dimension
   int sizes = 0;       ///< 3 or 4; 0: 3, in four dimensions 4
   int shifts = 6;      ///< of each size, >= 6
-  double margin = 0;   ///< MeshOptions::margin; 0: 12
+  double margin = 0;   ///< MeshOptions::margin; 0: 12, of several scores 16
   std::uint64_t seed = 1;
   int threads = 0;                                ///< 0: all cores; the bits do not depend on it
   std::size_t guided_samples = 4000;              ///< 0: none
@@ -68,9 +68,9 @@ double study_score_spacing(const BatchMap& map);
 ///
 /// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
 /// windows of it, and direct simulation where 100 trials or more fit into `simulated_steps`. Windows are lengthened
-/// until the samples' weights are even; where they stay uneven, the interval is widened in proportion. Two ways disagree when
-/// they lie further apart than 1.7 times (99.9 %) their joint 95 % half-width. The coarsest mesh comes first: what the
-/// finest will take, nodes by the spacing's power and entries with them, is foreseen from it.
+/// until the samples' weights are even; where they stay uneven, the interval is widened in proportion. Two ways
+/// disagree when they lie further apart than 1.7 times (99.9 %) their joint 95 % half-width. The coarsest mesh comes
+/// first: what the finest will take, nodes by the spacing's power and entries with them, is foreseen from it.
 /// @param start  a state at phase 0
 /// @throws std::length_error before the other meshes are made if they would take more than most_bytes; as Mesh,
 /// noise_frames and mesh_passage do

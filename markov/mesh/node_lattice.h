@@ -36,8 +36,8 @@ class NodeLattice {
   std::vector<double> state(std::uint64_t key) const;
   /// Returns whether nodes reach as far as this state of a phase.
   bool locate(int phase, const double* state, Point& point) const;
-  /// Finds the cell of 2^dimension nodes around a point: the key of its lowest corner, and how far beyond that the point
-  /// lies on each axis, in [0, 1). A corner one further on axis k has the lowest one's key + axis_key(k).
+  /// Finds the cell of 2^dimension nodes around a point: the key of its lowest corner, and how far beyond that the
+  /// point lies on each axis, in [0, 1). A corner one further on axis k has the lowest one's key + axis_key(k).
   std::uint64_t find_cell(int phase, const Point& point, Point& fraction) const;
   static std::uint64_t axis_key(std::size_t k);
   /// Finds Kuhn's simplex around a point; bit k of `flips` turns axis k around.

@@ -59,8 +59,8 @@ double distance(const Point& a, const Point& b) {
 /// Shares landings among the corners of their cells; those that follow one another in one cell are added up first.
 class Sharing {
  public:
-  Sharing(const NodeLattice& lattice, int phase, std::vector<std::pair<std::uint64_t, double>>& parts)
-      : lattice_(lattice), phase_(phase), dimension_(lattice.dimension()), parts_(parts) {}
+  Sharing(const NodeLattice& lattice, int phase, double weight, std::vector<std::pair<std::uint64_t, double>>& parts)
+      : lattice_(lattice), phase_(phase), weight_(weight), dimension_(lattice.dimension()), parts_(parts) {}
   ~Sharing() { flush(); }
   Sharing(const Sharing&) = delete;
   Sharing& operator=(const Sharing&) = delete;
@@ -72,7 +72,7 @@ class Sharing {
       flush();
       cell_ = cell;
     }
-    std::array<double, 16> share{weight};
+    std::array<double, 16> share{weight * weight_};
     for (std::size_t k = 0, corners = 1; k < dimension_; ++k, corners *= 2)
       for (std::size_t c = 0; c < corners; ++c) {
         share[c + corners] = share[c] * fraction[k];
@@ -95,6 +95,7 @@ class Sharing {
 
   const NodeLattice& lattice_;
   int phase_;
+  double weight_;
   std::size_t dimension_;
   std::vector<std::pair<std::uint64_t, double>>& parts_;
   std::uint64_t cell_ = 0;
@@ -189,11 +190,11 @@ void ScoreCurve::answer(std::span<const Landing> landings, double unit) {
     if (place_[i].open) asked_.push_back(0.5 * (place_[i].score + place_[i + 1].score));
 }
 
-ScoreCurve::Shares ScoreCurve::share(const NodeLattice& lattice, int phase,
+ScoreCurve::Shares ScoreCurve::share(const NodeLattice& lattice, int phase, double weight,
                                      std::vector<std::pair<std::uint64_t, double>>& parts) const {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   Shares shares;
-  Sharing sharing(lattice, phase, parts);
+  Sharing sharing(lattice, phase, weight, parts);
   const auto give = [&](const Landing& landing, double mass) {
     if (landing.fate == Fate::lands)
       sharing.add(landing.at, mass);
@@ -220,26 +221,26 @@ ScoreCurve::Shares ScoreCurve::share(const NodeLattice& lattice, int phase,
 }
 
 std::vector<ScoreCurve> follow_curves(const BatchMap& map, const NodeLattice& lattice, int phase,
-                                      std::span<const double> states, std::span<const double> reach, double spacing,
-                                      double unit) {
-  const auto d = static_cast<std::size_t>(map.dimension);
+                                      const ScoreLines& lines, double spacing, double unit) {
+  const auto d = static_cast<std::size_t>(map.dimension), fixed = static_cast<std::size_t>(map.scores) - 1;
   const int to_phase = (phase + 1) % map.phases;
   std::vector<ScoreCurve> curves;
-  for (const double far : reach) curves.emplace_back(spacing, far);
+  for (const double far : lines.reach) curves.emplace_back(spacing, far);
   std::vector<double> from, scores, next;
   std::vector<std::uint8_t> failed;
   for (;;) {
     from.clear(), scores.clear();
     for (std::size_t n = 0; n < curves.size(); ++n)
       for (const double score : curves[n].asked()) {
-        from.insert(from.end(), &states[n * d], &states[n * d] + d);
+        from.insert(from.end(), lines.states.data() + n * d, lines.states.data() + (n + 1) * d);
         scores.push_back(score);
+        scores.insert(scores.end(), lines.others.data() + n * fixed, lines.others.data() + (n + 1) * fixed);
       }
     if (scores.empty()) return curves;
     next.resize(from.size());
-    failed.assign(scores.size(), 0);
+    failed.assign(from.size() / d, 0);
     checked_step(map, phase, from, scores, next, failed);
-    std::vector<ScoreCurve::Landing> landings(scores.size());
+    std::vector<ScoreCurve::Landing> landings(failed.size());
     for (std::size_t i = 0; i < landings.size(); ++i) {
       if (failed[i])
         landings[i].fate = ScoreCurve::Fate::fails;

@@ -11,9 +11,10 @@
 
 namespace metastable::markov {
 
-/// Holds where one state leads under every score: places that were stepped, ascending, and between neighbours that both
-/// survive the cubic through the nearest four, in coordinates of the lattice that it lands on. A gap that the cubic
-/// through its neighbours does not foretell is halved, and so is one at whose ends different things happen.
+/// Holds where one state leads under every value of one score: places that were stepped, ascending, and between
+/// neighbours that both survive the cubic through the nearest four, in coordinates of the lattice that it lands on. A
+/// gap that the cubic through its neighbours does not foretell is halved, and so is one at whose ends different things
+/// happen.
 class ScoreCurve {
  public:
   enum class Fate : std::uint8_t { lands, fails, leaves };
@@ -36,9 +37,10 @@ class ScoreCurve {
   /// @param unit  of the lattice's coordinates, in stationary sds
   void answer(std::span<const Landing> landings, double unit);
 
-  /// Adds to `parts` what each corner of the cells around all landings gets, in proportion to nearness on every axis;
-  /// corners may come again.
-  Shares share(const NodeLattice& lattice, int phase, std::vector<std::pair<std::uint64_t, double>>& parts) const;
+  /// Adds to `parts` what each corner of the cells around all landings gets, in proportion to nearness on every axis
+  /// and times `weight`; corners may come again. The shares returned are of this curve alone.
+  Shares share(const NodeLattice& lattice, int phase, double weight,
+               std::vector<std::pair<std::uint64_t, double>>& parts) const;
 
  private:
   struct Place {
@@ -56,12 +58,17 @@ class ScoreCurve {
   std::vector<double> asked_;
 };
 
-/// Follows the curves of n states of one phase, `d` numbers each, together: the map is asked for many steps at once.
-/// @param reach  of each state's scores
-/// @param unit   as ScoreCurve::answer's
+/// Holds straight lines through the space of a step's scores, along the first, each from one state.
+struct ScoreLines {
+  std::vector<double> states;  ///< in rows of the map's dimension
+  std::vector<double> others;  ///< the scores but the first, in rows of map.scores - 1
+  std::vector<double> reach;   ///< of the first score
+};
+
+/// Follows the curves along lines of one phase together: the map is asked for many steps at once.
+/// @param unit  as ScoreCurve::answer's
 /// @throws as checked_step does
 std::vector<ScoreCurve> follow_curves(const BatchMap& map, const NodeLattice& lattice, int phase,
-                                      std::span<const double> states, std::span<const double> reach, double spacing,
-                                      double unit);
+                                      const ScoreLines& lines, double spacing, double unit);
 
 }  // namespace metastable::markov
