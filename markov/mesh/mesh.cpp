@@ -12,6 +12,9 @@ namespace metastable::markov {
 NodeLattice mesh_lattice(const BatchMap& map, std::vector<NoiseFrame> frames, const MeshOptions& options) {
   if (!(options.spacing > 0 && options.spacing <= 2))
     throw std::invalid_argument(fmt::format("mesh: spacing {} is outside (0, 2]", options.spacing));
+  if (!(options.score_spacing > 0 && options.score_spacing <= 1) || !(options.score_reach > 0))
+    throw std::invalid_argument(fmt::format("mesh: scores' spacing {} outside (0, 1] or reach {} not positive",
+                                            options.score_spacing, options.score_reach));
   if (frames.size() != static_cast<std::size_t>(map.phases) || frames.size() > 15)
     throw std::invalid_argument(fmt::format("mesh: {} phases, 1 to 15 with a frame each expected", map.phases));
   return {std::move(frames), options.spacing, uniforms(options.seed, 0, options.shift, 0)};

@@ -14,7 +14,8 @@ constexpr double kFarthest = 60;                          // action beyond which
 constexpr double kBucket = 1;                             // of actions, expanded together
 constexpr double kWorthAgain = 0.05;                      // a row speaks again if its node's action falls by this
 constexpr double kFarther = 0.5;                          // scores looked at, beyond what the action allows
-constexpr std::size_t kBatch = 32;                        // nodes whose landings are asked for at once
+constexpr std::size_t kBatch = 32;                        // nodes whose landings are asked for at once,
+constexpr std::size_t kLines = 1024;                      // fewer where that makes more curves
 constexpr std::uint32_t kTaken = MeshGrowth::no_row - 1;  // not a row yet
 constexpr std::size_t kFewestInChunk = std::size_t{1} << 16, kMostInChunk = std::size_t{1} << 23;
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -260,12 +261,13 @@ void MeshGrowth::expand_wave(std::vector<std::uint32_t>& wave) {
   std::stable_sort(wave.begin(), wave.end(), [&](std::uint32_t a, std::uint32_t b) {
     return NodeLattice::phase(key_[a]) < NodeLattice::phase(key_[b]);
   });
+  const std::size_t together = others_ ? std::clamp<std::size_t>(kLines / others_->size(), 1, kBatch) : kBatch;
   std::string broken;
   try {
     for (std::size_t first = 0; first < wave.size();) {
       std::size_t last = first + 1;
       const int phase = NodeLattice::phase(key_[wave[first]]);
-      while (last < wave.size() && last - first < kBatch && NodeLattice::phase(key_[wave[last]]) == phase) ++last;
+      while (last < wave.size() && last - first < together && NodeLattice::phase(key_[wave[last]]) == phase) ++last;
       expand(std::span(wave).subspan(first, last - first));
       first = last;
     }

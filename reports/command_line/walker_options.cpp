@@ -65,7 +65,7 @@ void add_walker(Options& o, const std::string& sd, bool meshes) {
   if (!meshes) return;
   o.add("spacing", "SD", "",
         "With --walker: of the coarsest mesh's nodes, in stationary sds of the noise (default: by dimension, 0.5, 0.7, "
-        "1.4); the two or three finer ones follow by sqrt 2",
+        "1.0); the two or three finer ones follow by sqrt 2",
         spacings);
   o.add("simulated-steps", "N", "",
         "With --walker: about how many steps the direct simulation beside takes, 0..10^12 (default: 2000000)");

@@ -105,6 +105,8 @@ TEST(Mesh, RefusesWhatItCannotHold) {
   const auto frames = noise_frames(map, middle);
   EXPECT_THROW(Mesh(map, frames, middle, {.spacing = 0.05, .most_bytes = 1000}), std::length_error);
   EXPECT_THROW(Mesh(map, frames, middle, {.spacing = 0}), std::invalid_argument);
+  EXPECT_THROW(Mesh(map, frames, middle, {.spacing = 0.5, .score_spacing = 0}), std::invalid_argument);
+  EXPECT_THROW(Mesh(map, frames, middle, {.spacing = 0.5, .score_reach = 0}), std::invalid_argument);
 }
 
 TEST(GuidedSampling, IsRightHoweverCoarseItsMesh) {
