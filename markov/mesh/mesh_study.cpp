@@ -235,12 +235,13 @@ class Run {
       even = guided.effective_samples / static_cast<double>(options_.guided_samples);
       if (window == kLongestWindow) break;
     }
+    study_.guided_samples = guided.samples;
     if (!(guided.rate > 0)) return;
-    const double beyond = study_.steps.value - 1 / study_.failure_rate.value;  // what the start is worth
     const double half = normal_95 * guided.standard_error / guided.rate * std::max(1.0, kEven / even);
+    if (!(half < 1)) return;                                                   // it tells nothing
+    const double beyond = study_.steps.value - 1 / study_.failure_rate.value;  // what the start is worth
     const double sampled = 1 / guided.rate + beyond;
-    study_.guided = MeshEstimate{sampled, sampled / (1 + half), half < 1 ? sampled / (1 - half) : sampled / 1e-3};
-    study_.guided_samples = options_.guided_samples;
+    study_.guided = MeshEstimate{sampled, sampled / (1 + half), sampled / (1 - half)};
   }
 
   const BatchMap& map_;

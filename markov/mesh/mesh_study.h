@@ -50,9 +50,9 @@ struct MeshStudy {
   /// and what leaves the mesh.
   double shift_error = 0, discretization_error = 0, bracket = 0;
   std::vector<MeshSize> sizes;
-  double expected_bytes = 0;                      ///< of all meshes held at once, as foreseen from the coarsest
-  std::optional<MeshEstimate> guided, simulated;  ///< expected steps in the two other ways, where they reach
-  std::size_t guided_samples = 0, simulated_trials = 0;
+  double expected_bytes = 0;                             ///< of all meshes held at once, as foreseen from the coarsest
+  std::optional<MeshEstimate> guided, simulated;         ///< expected steps in the two other ways, where they reach
+  std::size_t guided_samples = 0, simulated_trials = 0;  ///< 0: not asked
   /// Is empty, or says which ways disagree and that `steps` must not be used.
   std::string disagreement;
 };
@@ -68,9 +68,10 @@ double study_score_spacing(const BatchMap& map);
 ///
 /// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
 /// windows of it, and direct simulation where 100 trials or more fit into `simulated_steps`. Windows are lengthened
-/// until the samples' weights are even; where they stay uneven, the interval is widened in proportion. Two ways
-/// disagree when they lie further apart than 1.7 times (99.9 %) their joint 95 % half-width. The coarsest mesh comes
-/// first: what the finest will take, nodes by the spacing's power and entries with them, is foreseen from it.
+/// until the samples' weights are even; where they stay uneven, the interval is widened in proportion, and beyond a
+/// factor of about two not given. Two ways disagree when they lie further apart than 1.7 times (99.9 %) their joint 95
+/// % half-width. The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries
+/// with them, is foreseen from it.
 /// @param start  a state at phase 0
 /// @throws std::length_error before the other meshes are made if they would take more than most_bytes; as Mesh,
 /// noise_frames and mesh_passage do

@@ -83,7 +83,9 @@ std::string with_interval(const MeshEstimate& e) {
 
 Lines head_lines(const markov::MeshStudy& s) {
   return {{"expected steps before failure", with_interval(s.steps)},
-          {"  by guided sampling", s.guided ? with_interval(*s.guided) : "not asked: failures are too frequent"},
+          {"  by guided sampling", s.guided               ? with_interval(*s.guided)
+                                   : s.guided_samples > 0 ? "too few of its samples lead to failure to tell"
+                                                          : "not asked: failures are too frequent"},
           {"  by direct simulation", s.simulated ? with_interval(*s.simulated) : "out of reach"},
           {"status", s.guided || s.simulated ? "agreed: the independent ways lie within their joint intervals"
                                              : "the mesh alone"},
