@@ -9,7 +9,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kNarrowest = 1.0 / 512;      // of the spacing: gaps are halved so far, to find where failures begin
+constexpr double kNarrowestGap = 1.0 / 512;      // of the spacing: gaps are halved so far, to find where failures begin
 constexpr double kForetold = 1e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
                                               // afterwards a sixteenth is left
 constexpr double kExtrapolated = 40;          // times that, where a cubic had to look beyond its places
@@ -122,7 +122,7 @@ void share_along(const Cubic& curve, double low, double high, double cells, Shar
 
 }  // namespace
 
-ScoreCurve::ScoreCurve(double spacing, double reach) : narrowest_(spacing * kNarrowest) {
+ScoreCurve::ScoreCurve(double spacing, double reach) : narrowest_(spacing * kNarrowestGap) {
   // The first places stand twice as far apart: what lies between them shows how far the curve can be trusted.
   const double gaps = std::max(2.0, std::ceil(reach / spacing));
   for (double i = 0; i <= gaps; i += 1) asked_.push_back(reach * (2 * i / gaps - 1));
