@@ -34,12 +34,13 @@ double square(double v) { return v * v; }
 double score_of_probability(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
 
 SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack,
-                         double law_error, double slide_error)
+                         double law_error, double law_scatter, double slide_error)
     : extension_(extension),
       tilt_(tilt),
       noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
       slack2_(slack * slack),
       law2_(law_error * law_error),
+      scatter2_(law_scatter * law_scatter),
       slide_error_(slide_error),
       blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
 
@@ -68,13 +69,12 @@ SpeedFilter::Out SpeedFilter::collision(const ExtendedWheel& wheel, const StepCo
   return out;
 }
 
-SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepContext& context, double reported,
-                                     std::optional<double> slide) {
-  if (wheel.settles()) return settled_step(wheel, context, reported, slide);
-  const double seen = reported - extension_.bias_before;
+SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepContext& context, const Touch& touch) {
+  if (wheel.settles()) return settled_step(wheel, context, touch);
+  const double seen = touch.speed - extension_.bias_before;
   const auto next = wheel.next(context, mean_);
   if (!next) {
-    start(reported);
+    start(touch.speed);
     return {least_log_density, -8, 0.1};
   }
   const double slope = mean_ / *next, predicted = slope * slope * variance_;
@@ -85,13 +85,12 @@ SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepConte
   return {log_normal(z) - std::log(total), z, total};
 }
 
-SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext& context, double reported,
-                                   std::optional<double> slide) {
-  if (wheel.settles()) return settled_step(wheel, context, reported, slide);
-  const double seen = std::max(1e-3, reported - extension_.bias_before);
+SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext& context, const Touch& touch) {
+  if (wheel.settles()) return settled_step(wheel, context, touch);
+  const double seen = std::max(1e-3, touch.speed - extension_.bias_before);
   const auto plus = wheel.back(context, seen);
   if (!plus) {
-    start(reported);
+    start(touch.speed);
     return {least_log_density, -8, 0.1};
   }
   // d omega+ / d next omega- is seen / plus without torques, which change it.
@@ -110,15 +109,15 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
 
 // Takes the landing up to the next touch. Where omega+ was seen its contact is known all but one number, and only what
 // that leaves is weighed here; else the landing is the collision.
-SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const StepContext& context, double reported,
-                                           std::optional<double> slide) {
+SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const StepContext& context, const Touch& touch) {
   constexpr double carried_on = 0.5;  // d next / d omega-, times the ratio of the two
-  const double seen = std::max(1e-3, reported - extension_.bias_before);
+  const double reported = std::max(1e-3, touch.speed - extension_.bias_before);
+  const double seen = std::max(1e-3, reported + touch.law_error);
   const Before before = before_.value_or(Before{mean_, variance_});
   const double rate = carried_on * before.mean / seen;
   const double blur = std::sqrt(noise2_ + law2_ + rate * rate * before.variance);
   const dynamics::NextTouch next = wheel.at_next_touch(
-      context, before.mean, {before_ ? std::optional(mean_) : std::nullopt, slide, slide_error_}, blur, seen);
+      context, before.mean, {before_ ? std::optional(mean_) : std::nullopt, touch.slide, slide_error_}, blur, seen);
   Out out;
   if (before_) {
     const double density = next.speed.density, z = score_of_probability(next.speed.below);
@@ -127,8 +126,11 @@ SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const Ste
   } else {
     out = weighed(next.speed.density * std::exp(tilt_.log_density(next.speed.below)), tilt_.below(next.speed.below), 1);
   }
-  mean_ = seen;
-  variance_ = noise2_;
+  // Of what was missed the known error is not the speed's, and the sensor's part of the rest is taken back: left in, it
+  // would be missed again, with the other sign, at the next touch.
+  const double rest = std::max(out.unit * out.unit - law2_, noise2_) + scatter2_, gain = noise2_ / rest;
+  mean_ = std::max(1e-2, reported - gain * (std::clamp(out.score, -4.0, 4.0) * out.unit - touch.law_error));
+  variance_ = (1 - gain) * noise2_;
   before_.reset();
   out.log_density = std::max(least_log_density, out.log_density + std::log(std::max(1e-300, next.slide_density)));
   return out;

@@ -25,14 +25,22 @@ class SpeedFilter {
     double log_density = 0, score = 0, unit = 1;
   };
 
+  /// Holds what was seen of a next touch.
+  struct Touch {
+    double speed = 0;                  ///< reported omega- [rad/s]
+    double law_error = 0;              ///< to be added to it, of a known draw [rad/s]; `settled` only
+    std::optional<double> slide = {};  ///< of the foot that landed before [m]; `settled` only
+  };
+
   /// Both references must outlive the filter.
   /// @param noise  stated sd of reported speeds [rad/s]
   /// @param slack  sd of the least speed that a next collision can have, where the legs are not known [rad/s]
-  /// @param law_error  sd of what the law does not know of a next omega-, which the reported one of a stance or step
-  ///        was given, too [rad/s]; `settled` only
+  /// @param law_error  sd of the law errors that reported speeds are given [rad/s]; `settled` only
+  /// @param law_scatter  sd of what the law really does not know of a next omega-, as far as known [rad/s]; `settled`
+  ///        only
   /// @param slide_error  sd of what the law does not know of a slide [m]; `settled` only
   SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0,
-              double law_error = 0, double slide_error = 1e-3);
+              double law_error = 0, double law_scatter = 0, double slide_error = 1e-3);
 
   /// The first speed is seen: it is held against the stated launch.
   Out launch(const Condition& condition, double reported);
@@ -41,12 +49,9 @@ class SpeedFilter {
   /// omega+ is seen: this is the collision.
   Out collision(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported);
   /// Then the next omega- is seen: this is the stance.
-  /// @param slide  of the foot, where it was seen [m]; `settled` only
-  Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
-             std::optional<double> slide = {});
+  Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, const Touch& touch);
   /// Only the next omega- is seen: this is collision and stance together.
-  Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
-           std::optional<double> slide = {});
+  Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, const Touch& touch);
   /// After the last measured speed omega+ was below `bound` (or there was none, the foot jammed), or it was not.
   Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound, bool rested);
   /// Says how likely omega+ is to be below `bound` after the last measured speed.
@@ -57,14 +62,13 @@ class SpeedFilter {
   Out transition(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus, double rate,
                  double blur);
   Out weighed(double density, double below, double rate);
-  Out settled_step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double reported,
-                   std::optional<double> slide);
+  Out settled_step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, const Touch& touch);
   void update(const Out& out, double seen);
 
   const dynamics::Extension& extension_;
   const ScoreTilt& tilt_;
   double noise2_;  // variance of a reported speed
-  double slack2_, law2_, slide_error_;
+  double slack2_, law2_, scatter2_, slide_error_;
   bool blurred_;
   double mean_ = 0, variance_ = 0;
   std::optional<double> previous_;  // collision's score

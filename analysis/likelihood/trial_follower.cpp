@@ -33,7 +33,7 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       friction_sd_(hypothesis.extension.trial_friction_sd),
       nodes_(friction_sd_ > 0 ? five_nodes.size() : 1),
       filters_(nodes_, SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
-                                   measured.slack, measured.law_error, measured.slide_error)) {
+                                   measured.slack, measured.law_error, measured.law_scatter, measured.slide_error)) {
   static_assert(five_nodes.size() == most_nodes);
   if (nodes_ > 1)
     for (std::size_t q = 0; q < nodes_; ++q) log_weight_[q] = std::log(five_nodes[q].weight);
@@ -81,11 +81,8 @@ SpeedFilter::Out TrialFollower::seen_by(SpeedFilter& filter, const Event& event,
     case EventKind::stance:
     case EventKind::step: {
       const RunCollision& next = run_.collisions[k + 1];
-      const double reported = next.before + next.law_error;
-      const SpeedFilter::Out out = event.kind == EventKind::stance ? filter.stance(wheel_, here, reported, m.slide)
-                                                                   : filter.step(wheel_, here, reported, m.slide);
-      if (wheel_.settles()) filter.start(next.before);  // the law's error ends here
-      return out;
+      const SpeedFilter::Touch touch{next.before, next.law_error, m.slide};
+      return event.kind == EventKind::stance ? filter.stance(wheel_, here, touch) : filter.step(wheel_, here, touch);
     }
     case EventKind::rest:
     case EventKind::survival:

@@ -38,7 +38,7 @@ TEST(SpeedFilter, NextSpeedAndRestShareAProbabilityOfOne) {
             for (double next = 3; next < 9; next += width) {
               SpeedFilter walking(*extension, tilt, noise);
               walking.start(omega);
-              sum += width * std::exp(walking.step(wheel, context, next).log_density);
+              sum += width * std::exp(walking.step(wheel, context, {next}).log_density);
             }
             EXPECT_NEAR(sum, 1, 4e-3) << omega << ' ' << noise;
           }

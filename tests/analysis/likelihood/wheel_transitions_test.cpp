@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 #include "analysis/diagnosis/model_fit.h"
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/likelihood/experiment_model.h"
+#include "analysis/statistics/random.h"
 #include "tests/analysis/diagnosed.h"
 
 namespace metastable::analysis {
@@ -65,8 +67,9 @@ TEST(WheelTransitions, PatchesHoldTwoFootholdsWhereTheseAreFixed) {
 }
 
 // Makes transitions of trials rolled event by event under `settled`, with feet that hop and slide; next speeds after
-// odd legs are reported so much too fast, those after even ones too slow [rad/s].
-std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off, double form_error = 0) {
+// odd legs are reported so much too fast, those after even ones too slow [rad/s]; sensors have that noise [rad/s].
+std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off, double form_error = 0,
+                                                    double noise = 0) {
   Setting stated;
   stated.law = dynamics::Law::settled;
   stated.slope_deg = 7.02;
@@ -81,8 +84,19 @@ std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off
   auto rolled = simulate_trials(real, {.trials = trials, .collisions = 24, .seed = 3});
   for (dynamics::Trial& trial : rolled)
     for (dynamics::TrialCollision& c : trial.collisions) c.omega_minus += c.leg % 2 == 0 ? form_error : -form_error;
-  return transition_model(
-      parse_experiment(source_of(experiment_files({{"ramp", stated, rolled}}, "rolled", {}), "rolled")));
+  Experiment experiment =
+      parse_experiment(source_of(experiment_files({{"ramp", stated, rolled}}, "rolled", {}), "rolled"));
+  if (noise == 0) return transition_model(experiment);
+  experiment.sensor.noise_sd = noise;
+  std::uint64_t number = 0;
+  for (MeasuredTrial& trial : experiment.trials) {
+    const std::vector<double> error = normal_multipliers(5, number++, DrawStream::blur, 2 * trial.collisions.size());
+    for (std::size_t k = 0; k < trial.collisions.size(); ++k) {
+      trial.collisions[k].omega_minus += noise * error[2 * k];
+      *trial.collisions[k].omega_plus += noise * error[2 * k + 1];
+    }
+  }
+  return transition_model(experiment);
 }
 
 TEST(WheelTransitions, OfSettledHoldForTrialsThatAreFollowed) {
@@ -112,6 +126,24 @@ TEST(WheelTransitions, OfSettledFindASlopeThatIsMisread) {
   const auto at = static_cast<Eigen::Index>(nominal_values(*data).size());
   const Eigen::MatrixXd covariance = found.information.inverse();
   EXPECT_NEAR(found.terms[0].values[0], 0.25, 4 * std::sqrt(covariance(at, at)) + 0.01);
+}
+
+// What the sensor added to one next speed is not missed again, with the other sign, at the next touch.
+TEST(WheelTransitions, OfSettledRememberNoNoise) {
+  const auto data = rolled_transitions(100, 0, 0, 0.015);
+  const Evaluation nominal = data->evaluate(nominal_values(*data), {});
+  double count = 0, squares = 0, products = 0, previous = 0;
+  for (std::size_t i = 0; i < nominal.score.size(); ++i) {
+    const Event& event = data->events()[i];
+    if (event.kind != EventKind::stance) continue;
+    const double score = nominal.score[i];
+    if (event.number > 1) products += previous * score;
+    ++count, squares += score * score;
+    previous = score;
+  }
+  EXPECT_GT(count, 600);
+  EXPECT_NEAR(products / squares, 0, 3 / std::sqrt(count));
+  EXPECT_NEAR(squares / count, 1, 0.15);
 }
 
 // An error of form, as engines have it, is no gap.
