@@ -199,8 +199,13 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
                   measured.law_error, settled_precision));
   std::uint64_t trial = 0;
   for (WheelRun& run : measured.runs) {
-    const std::vector<double> error = normal_multipliers(1, trial++, DrawStream::blur, run.collisions.size());
-    for (std::size_t k = 0; k < run.collisions.size(); ++k) run.collisions[k].law_error = measured.law_error * error[k];
+    const std::size_t count = run.collisions.size();
+    const std::vector<double> error = normal_multipliers(1, trial++, DrawStream::blur, 2 * count);
+    for (std::size_t k = 0; k < count; ++k) {
+      RunCollision& m = run.collisions[k];
+      m.law_error = measured.law_error * error[k];
+      if (m.slide) *m.slide += measured.slide_error * dynamics::slide_score(dynamics::normal_cdf(error[count + k]));
+    }
   }
 }
 

@@ -46,6 +46,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
     omega =
         std::max(0.1, launch->mean + e.launch_shift + std::max(0.01, launch->sd + e.launch_widening) * score(first[1]));
   std::optional<double> eta_score, mu_score;
+  double slid = 0;
   const std::size_t most =
       std::max<std::size_t>(design.outcome == dynamics::Outcome::rest ? 16 : 1, design.collisions.size());
   run.outcome = dynamics::Outcome::max_collisions;
@@ -56,7 +57,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
     if (k > 0) {
       const RunCollision& previous = run.collisions.back();
       m.context.leg = (previous.context.leg + 1) % wheel.legs();
-      m.context.position = previous.context.position + wheel.advance(previous.context.leg) + previous.slide.value_or(0);
+      m.context.position = previous.context.position + wheel.advance(previous.context.leg) + slid;
     } else {
       m.context.since_previous.reset();
     }
@@ -95,7 +96,8 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
     if (like.after && plus) m.after = std::max(1e-3, *plus + e.bias_after + noise * score(error[1]));
     if (like.after && !plus) m.after = 0;
     m.slide.reset();
-    if (all.slides_seen && !rests) m.slide = landed.displacement;
+    slid = all.slides_seen ? landed.displacement : 0;
+    if (all.slides_seen && !rests) m.slide = slid + all.slide_error * dynamics::slide_score(error[3]);
     run.collisions.push_back(m);
     const auto next = rests ? std::nullopt : wheel.settles() ? landed.next : wheel.next(m.context, *plus);
     if (!next) {

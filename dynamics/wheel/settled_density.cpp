@@ -1,6 +1,7 @@
 #include "dynamics/wheel/settled_density.h"
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 
@@ -71,12 +72,11 @@ class FirstImpact {
  public:
   FirstImpact(const SettledLanding& landing, double omega_plus)
       : landing_(landing), lever_sq_(landing.gyration_sq + landing.ahead * landing.ahead) {
-    // This is the energy lost by the law itself, of which loss_ratio times as much was lost.
-    const double share = omega_plus / landing.omega;
-    const double own = 1 - (1 - share * share) / landing.loss_ratio;
-    lost_ = 1 - std::sqrt(std::max(1e-6, own));
-    rate_ = share / (landing.loss_ratio * landing.omega * (1 - lost_));
-    stuck_ = landing.chord * landing.ahead / (lever_sq_ + landing.height * landing.height);
+    // This is the speed lost by the law itself, of which `ratio` times as much was lost.
+    const double ratio = landing.first_loss_ratio();
+    lost_ = (1 - omega_plus / landing.omega) / ratio;
+    rate_ = 1 / (ratio * landing.omega);
+    stuck_ = landing.plastic_loss();
   }
   double sticking_restitution() const { return lost_ / stuck_ - 1; }
   double sticking_rate() const { return rate_ / stuck_; }  // of that restitution with omega+
@@ -240,18 +240,25 @@ void add_landings(TouchSum& sum, const SettledLanding& landing, const SettledCon
 
 }  // namespace
 
+double slide_score(double share) { return boost::math::quantile(boost::math::students_t(3), share); }
+
 double SettledLanding::next(double squared) const {
   const double taken = dragged[0] + squared * (dragged[1] + squared * dragged[2]);
   return next_ratio * std::sqrt(std::max(1e-6, next_rate * squared + next_gain - taken));
+}
+
+double SettledLanding::plastic_loss() const { return chord * ahead / (gyration_sq + ahead * ahead + height * height); }
+
+double SettledLanding::first_loss_ratio() const {
+  const double lost = plastic_loss(), kept = 1 - lost;
+  return (1 - std::sqrt(std::max(0.0, 1 - loss_ratio * (1 - kept * kept)))) / lost;
 }
 
 double SettledLanding::first_impact(const Contact& contact) const {
   const double mu = std::min(contact.friction, sticking());
   const double lost =
       (1 + contact.restitution) * chord * (ahead - mu * height) / (gyration_sq + ahead * ahead - mu * ahead * height);
-  const double kept = 1 - lost;
-  if (!(kept > 0)) return 0;
-  return std::sqrt(std::max(0.0, 1 - loss_ratio * (1 - kept * kept)));
+  return std::max(0.0, 1 - first_loss_ratio() * lost);
 }
 
 LandingShares::Kept SettledLanding::carried(const Contact& contact) const {

@@ -29,6 +29,11 @@ struct SettledLanding {
   double next(double omega_eq_squared) const;
 
   double sticking() const { return ahead * height / (gyration_sq + height * height); }  ///< mu_c
+  /// Returns the part of omega- that the first impact takes at eta = 0 if the foot sticks.
+  double plastic_loss() const;
+  /// Returns what multiplies the speed lost in a first impact: of that plastic one the energy lost is multiplied by
+  /// `loss_ratio`. (A ratio of each impact's energy leaves a gap above omega+ = 0, and beside it ever denser speeds.)
+  double first_loss_ratio() const;
   /// Returns omega+ / omega- of the first impact, which starts without slip.
   double first_impact(const Contact& contact) const;
   /// Returns omega_eq^2 [rad^2/s^2] and the slide [m]: the grid's share at the same distance from mu_c, moved by what a
@@ -47,8 +52,12 @@ struct SettledContact {
 struct SeenOfLanding {
   std::optional<double> omega_plus = {};    ///< after the first impact [rad/s]
   std::optional<double> displacement = {};  ///< slide of the foot [m]
-  double displacement_error = 1e-3;         ///< of what the landing says of it [m], > 0
+  double displacement_error = 1e-3;         ///< scale of slide_score in what the landing says of it [m], > 0
 };
+
+/// Returns the quantile of the error of a slide, in units of its scale: Student's, with three degrees of freedom, as a
+/// foot that slides far does so less surely. @param share  in (0, 1)
+double slide_score(double share);
 
 /// Returns density and distribution function of omega+ of the first impact. Twelve restitutions, mu in closed form.
 SpeedDensity after_first_impact(const SettledLanding& landing, const SettledContact& contact, double omega_plus);

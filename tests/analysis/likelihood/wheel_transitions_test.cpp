@@ -68,8 +68,7 @@ TEST(WheelTransitions, PatchesHoldTwoFootholdsWhereTheseAreFixed) {
 
 // Makes transitions of trials rolled event by event under `settled`, with feet that hop and slide; next speeds after
 // odd legs are reported so much too fast, those after even ones too slow [rad/s]; sensors have that noise [rad/s].
-std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off, double form_error = 0,
-                                                    double noise = 0) {
+Experiment rolled_experiment(int trials, double slope_off, double form_error) {
   Setting stated;
   stated.law = dynamics::Law::settled;
   stated.slope_deg = 7.02;
@@ -84,8 +83,12 @@ std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off
   auto rolled = simulate_trials(real, {.trials = trials, .collisions = 24, .seed = 3});
   for (dynamics::Trial& trial : rolled)
     for (dynamics::TrialCollision& c : trial.collisions) c.omega_minus += c.leg % 2 == 0 ? form_error : -form_error;
-  Experiment experiment =
-      parse_experiment(source_of(experiment_files({{"ramp", stated, rolled}}, "rolled", {}), "rolled"));
+  return parse_experiment(source_of(experiment_files({{"ramp", stated, rolled}}, "rolled", {}), "rolled"));
+}
+
+std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off, double form_error = 0,
+                                                    double noise = 0) {
+  Experiment experiment = rolled_experiment(trials, slope_off, form_error);
   if (noise == 0) return transition_model(experiment);
   experiment.sensor.noise_sd = noise;
   std::uint64_t number = 0;
@@ -126,6 +129,24 @@ TEST(WheelTransitions, OfSettledFindASlopeThatIsMisread) {
   const auto at = static_cast<Eigen::Index>(nominal_values(*data).size());
   const Eigen::MatrixXd covariance = found.information.inverse();
   EXPECT_NEAR(found.terms[0].values[0], 0.25, 4 * std::sqrt(covariance(at, at)) + 0.01);
+}
+
+// A slide is held to be known less well than it is; a step that is judged beside it is not judged harder for that.
+TEST(WheelTransitions, OfSettledHoldWithoutSpeedsAfterCollisions) {
+  Experiment experiment = rolled_experiment(100, 0, 0);
+  ASSERT_EQ(experiment.columns.position, Presence::all);
+  experiment.columns.omega_plus = Presence::none;
+  for (MeasuredTrial& trial : experiment.trials)
+    for (auto& collision : trial.collisions) collision.omega_plus.reset();
+  const auto data = transition_model(experiment);
+  const Evaluation nominal = data->evaluate(nominal_values(*data), {});
+  double count = 0, sum = 0, squares = 0;
+  for (std::size_t i = 0; i < nominal.score.size(); ++i)
+    if (data->events()[i].kind == EventKind::step)
+      ++count, sum += nominal.score[i], squares += nominal.score[i] * nominal.score[i];
+  EXPECT_GT(count, 600);
+  EXPECT_NEAR(sum / count, 0, 3 / std::sqrt(count));
+  EXPECT_NEAR(squares / count, 1, 0.15);
 }
 
 // What the sensor added to one next speed is not missed again, with the other sign, at the next touch.

@@ -105,6 +105,29 @@ TEST(SettledDensity, OfTheFirstImpactIsThatOfDrawnContacts) {
                 2e-3);
 }
 
+// A ramp that rings moves the density a little, also where a foot that slides has left hardly any speed.
+TEST(SettledDensity, OfTheFirstImpactIsSmoothInTheLoss) {
+  constexpr double omega = 4.9;
+  const StepContext context{.leg = 2, .since_previous = 0.0};  // cos(0)
+  const ExtendedWheel plain = extended();
+  for (const double ring : {-0.01, 0.003, 0.01}) {
+    Extension rings;
+    rings.ring_cosine = ring;
+    const ExtendedWheel wheel = extended(rings);
+    Draws draws;
+    std::vector<double> drawn;
+    for (int i = 0; i < 20000; ++i)
+      drawn.push_back(wheel.omega_plus(context, omega, draws.contact(), false).value_or(0));
+    const auto at = [&](double plus) { return wheel.after_collision(context, omega, plus); };
+    EXPECT_LT(kolmogorov(drawn, [&](double plus) { return at(plus).below; }), kolmogorov_999) << ring;
+    for (const double plus : {0.05, 0.2, 0.5, 1.0, 2.5}) {
+      const double density = at(plus).density, without = plain.after_collision(context, omega, plus).density;
+      EXPECT_NEAR(density, (at(plus + 1e-4).below - at(plus - 1e-4).below) / 2e-4, 2e-3) << ring << ' ' << plus;
+      EXPECT_NEAR(density / without, 1, 0.25) << ring << ' ' << plus;
+    }
+  }
+}
+
 TEST(SettledDensity, OfTheNextTouchIsThatOfDrawnContacts) {
   const ExtendedWheel wheel = extended();
   const StepContext context{.leg = 2};
