@@ -188,12 +188,11 @@ EfficientColumns project(const std::vector<MapColumn>& columns, const Transition
   if (fit.derivatives.slope.cols() == 0) return all;
   const Eigen::MatrixXd& held = fit.derivatives.slope;
   Eigen::MatrixXd gram = held.transpose() * held;
-  Eigen::VectorXd left = held.colwise().sum();  // of the gradient at the fit: next to nothing, with the prior's pull
+  Eigen::VectorXd left = fit.gradient;  // next to nothing
   for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
     const Nuisance& n = model.nuisances()[p];
     const auto at = static_cast<Eigen::Index>(p);
     gram(at, at) += 1 / (n.prior_sd * n.prior_sd);
-    left[at] -= (fit.nuisance[p] - n.nominal) / (n.prior_sd * n.prior_sd);
     if (fit.nuisance[p] <= n.lower || fit.nuisance[p] >= n.upper) left[at] = 0;
   }
   gram.diagonal() *= 1 + 1e-9;

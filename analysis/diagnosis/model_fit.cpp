@@ -203,8 +203,8 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   for (int iteration = 0; finite && iteration < options.most_iterations && !slots.empty(); ++iteration) {
     result.derivatives = differences(point, result.evaluation, steps);
     result.information = information(result.derivatives, result.evaluation, weights);
-    const Eigen::VectorXd gradient = penalised_gradient(slots, weights, steps, result);
-    const FreeParts parts = free_parts(slots, gradient, result.information);
+    result.gradient = penalised_gradient(slots, weights, steps, result);
+    const FreeParts parts = free_parts(slots, result.gradient, result.information);
     if (parts.all.empty()) {
       result.converged = true;
       break;
@@ -215,8 +215,8 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     bool better = false;
     for (const auto* part : {&parts.all, &parts.of_terms, &parts.of_nuisances}) {
       if (part->empty()) continue;
-      const Eigen::VectorXd step = gauss_newton(result.information, gradient, *part);
-      const double rise = 0.5 * step.dot(picked(gradient, *part));
+      const Eigen::VectorXd step = gauss_newton(result.information, result.gradient, *part);
+      const double rise = 0.5 * step.dot(picked(result.gradient, *part));
       if (part == &parts.all) {
         promised = rise;
         if (!(promised > worth_a_step)) break;

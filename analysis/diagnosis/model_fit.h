@@ -23,6 +23,7 @@ struct Fit {
   double penalised = 0;         ///< with the nuisances' prior
   Evaluation evaluation;        ///< of all events, counted or not
   Derivatives derivatives;      ///< at the optimum: nuisances first, then the terms' free parameters in order
+  Eigen::VectorXd gradient;     ///< there, of the penalised likelihood: what no step brought to 0
   Eigen::MatrixXd information;  ///< of the counted events, with the prior
   bool converged = true;
   double promised = 0;  ///< rise that the last step could have brought, to first order

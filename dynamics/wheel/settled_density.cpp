@@ -143,12 +143,13 @@ class TouchSum {
   double rest() const { return empty() ? 0 : rest_ / all_; }
   NextTouch result() const {
     if (!(touch_ > 0)) return {{0, 1}, 1};
-    // Given a slide the next foot did touch.
-    const double whole = displacement_ ? touch_ : all_, resting = displacement_ ? 0 : rest_;
+    // A slide is that of a foot whose next one touched: what it says is of those landings, beside the rests of all.
     const double width = std::hypot(blur_, unknown_error), z = (at_ - middle_ / touch_) / width;
+    const double touches = (all_ - rest_) / all_ / touch_, resting = rest_ / all_;
     const double density = (1 - unknown_share) * density_ + unknown_share * touch_ * normal_density(z) / width;
-    const double below = (1 - unknown_share) * below_ + unknown_share * touch_ * normal_cdf(z) + resting;
-    return {{density / whole, std::clamp(below / whole, 0.0, 1.0)}, displacement_ ? touch_ / all_ : 1};
+    const double below = (1 - unknown_share) * below_ + unknown_share * touch_ * normal_cdf(z);
+    return {{touches * density, std::clamp(resting + touches * below, 0.0, 1.0)},
+            displacement_ ? touch_ / (all_ - rest_) : 1};
   }
 
  private:

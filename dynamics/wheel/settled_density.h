@@ -64,12 +64,12 @@ SpeedDensity after_first_impact(const SettledLanding& landing, const SettledCont
 
 /// Says what a landing says of the next touch.
 struct NextTouch {
-  SpeedDensity speed;        ///< of the next omega-, given the slide where that was seen
-  double slide_density = 1;  ///< of the slide, where it was seen [1/m]
+  SpeedDensity speed;        ///< of the next omega-, given the slide where that was seen; no touch counts as below
+  double slide_density = 1;  ///< of the slide given that the next foot touched, where it was seen [1/m]
 };
 
-/// Finds the next omega-, blurred by a normal error; no touch counts as below, but not beside a slide. One landing in
-/// 200 is taken as one that the law knows little of: its next speed is off by 0.2 rad/s. @param blur [rad/s], > 0
+/// Finds the next omega-, blurred by a normal error. One landing in 200 is taken as one that the law knows little of:
+/// its next speed is off by 0.2 rad/s. @param blur [rad/s], > 0
 NextTouch at_next_touch(const SettledLanding& landing, const SettledContact& contact, const SeenOfLanding& seen,
                         double blur, double next);
 /// Returns P(no next touch).
