@@ -11,6 +11,8 @@
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/settled/share_grid.h"
+#include "dynamics/wheel/settled_density.h"
+#include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

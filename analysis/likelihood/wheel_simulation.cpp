@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "analysis/statistics/random.h"
+#include "dynamics/wheel/settled_density.h"
 #include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::analysis {

@@ -67,8 +67,8 @@ TEST(WheelTransitions, PatchesHoldTwoFootholdsWhereTheseAreFixed) {
   EXPECT_GT(narrow().first, 0);
 }
 
-// Makes transitions of trials rolled event by event under `settled`, with feet that hop and slide; next speeds after
-// odd legs are reported so much too fast, those after even ones too slow [rad/s]; sensors have that noise [rad/s].
+// Rolls trials event by event under `settled`, with feet that hop and slide; next speeds after odd legs are reported so
+// much too fast, those after even ones too slow [rad/s].
 Experiment rolled_experiment(int trials, double slope_off, double form_error) {
   Setting stated;
   stated.law = dynamics::Law::settled;
@@ -87,6 +87,7 @@ Experiment rolled_experiment(int trials, double slope_off, double form_error) {
   return parse_experiment(source_of(experiment_files({{"ramp", stated, rolled}}, "rolled", {}), "rolled"));
 }
 
+// Makes transitions of them; sensors have that noise [rad/s].
 std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off, double form_error = 0,
                                                     double noise = 0) {
   Experiment experiment = rolled_experiment(trials, slope_off, form_error);
