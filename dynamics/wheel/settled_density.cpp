@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <boost/math/quadrature/gauss.hpp>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 
 #include "dynamics/wheel/truncated_normal.h"
@@ -159,33 +160,67 @@ class TouchSum {
   double all_ = 0, rest_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0;
 };
 
-// Adds landings whose first impact left omega+: cells around twelve restitutions, and the sticking foot.
+// Are landings in the order of their restitution, each standing for those half the way to its neighbours.
+struct Cells {
+  struct Cell {
+    double eta, mass;
+    LandingShares::Kept kept;
+  };
+  std::array<Cell, nodes_of_restitution> cells;
+  std::size_t count = 0;
+
+  void add_to(TouchSum& sum, std::optional<double> first_edge = {}) const {
+    for (std::size_t k = 0; k < count; ++k) {
+      const double here = cells[k].kept.share;
+      const double before = k > 0 ? (cells[k - 1].kept.share + here) / 2 : first_edge.value_or(here);
+      const double after = k + 1 < count ? (cells[k + 1].kept.share + here) / 2 : here;
+      sum.add(cells[k].mass, before, after, cells[k].kept.displacement);
+    }
+  }
+};
+
+// Adds landings whose first impact left omega+: cells around twelve restitutions, and the sticking foot. Where only
+// some go on, the cells start at the barrier and are finest there: omega_eq rises as a root from where feet rest.
 void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share, double omega_plus) {
   const FirstImpact first(landing, omega_plus);
   const double eta_stuck = first.sticking_restitution(), critical = landing.sticking();
-  struct Node {
-    double mass, carried, slide;
-  };
-  std::array<Node, nodes_of_restitution> nodes{};
-  std::size_t count = 0;
-  const double to = std::min(eta_stuck, weights.most_restitution());
-  restitutions(std::min(weights.least_restitution(), to - 1e-3), to, [&](double eta, double weight) {
+  const auto mass = [&](double eta) {
     const auto [mu, rate] = first.friction(eta);
-    const double mass = share * weight * weights.restitution_density(eta) * weights.friction_density(mu) * rate;
-    if (!(mass > 0)) return;
-    const LandingShares::Kept kept = landing.carried({eta, mu});
-    nodes[count++] = {mass, kept.share, kept.displacement};
-  });
-  for (std::size_t k = 0; k < count; ++k) {
-    const double here = nodes[k].carried;
-    const double before = k > 0 ? (nodes[k - 1].carried + here) / 2 : here;
-    const double after = k + 1 < count ? (nodes[k + 1].carried + here) / 2 : here;
-    sum.add(nodes[k].mass, before, after, nodes[k].slide);
+    return share * weights.restitution_density(eta) * weights.friction_density(mu) * rate;
+  };
+  const auto kept = [&](double eta) { return landing.carried({eta, first.friction(eta).first}); };
+  const auto add = [&](Cells& cells, double eta, double weight) {
+    if (const double here = weight * mass(eta); here > 0) cells.cells[cells.count++] = {eta, here, kept(eta)};
+  };
+  const auto beyond = [&](double eta) { return kept(eta).share - landing.barrier_squared; };
+
+  const double to = std::min(eta_stuck, weights.most_restitution());
+  const double from = std::min(weights.least_restitution(), to - 1e-3);
+  Cells all;
+  restitutions(from, to, [&](double eta, double weight) { add(all, eta, weight); });
+  std::size_t k = 1;
+  const auto goes_on = [&](std::size_t i) { return all.cells[i].kept.share >= landing.barrier_squared; };
+  while (k < all.count && goes_on(k) == goes_on(k - 1)) ++k;
+  if (k < all.count) {
+    std::uintmax_t steps = 40;
+    const auto bracket = boost::math::tools::toms748_solve(beyond, all.cells[k - 1].eta, all.cells[k].eta,
+                                                           boost::math::tools::eps_tolerance<double>(30), steps);
+    const double edge = (bracket.first + bracket.second) / 2;
+    const auto [resting, going] = goes_on(k) ? std::pair(from, to) : std::pair(to, from);
+    restitutions(std::min(resting, edge), std::max(resting, edge),
+                 [&](double eta, double weight) { sum.add_rest(weight * mass(eta)); });
+    Cells beyond_it;
+    restitutions(0, 1, [&](double root, double weight) {
+      add(beyond_it, edge + (going - edge) * root * root, 2 * root * weight * std::abs(going - edge));
+    });
+    beyond_it.add_to(sum, landing.barrier_squared);
+  } else {
+    all.add_to(sum);
   }
   const double stuck = share * weights.friction_above(critical) * first.sticking_rate();
-  if (const double mass = stuck * weights.restitution_density(std::max(0.0, eta_stuck)); mass > 0) {
-    const LandingShares::Kept kept = landing.carried({std::max(0.0, eta_stuck), critical});
-    sum.add(mass, kept.share, kept.share, kept.displacement);
+  if (const double here = stuck * weights.restitution_density(std::max(0.0, eta_stuck)); here > 0) {
+    const LandingShares::Kept at = landing.carried({std::max(0.0, eta_stuck), critical});
+    sum.add(here, at.share, at.share, at.displacement);
   }
 }
 
@@ -193,11 +228,7 @@ void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weig
 void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
   constexpr int cells = 12;
   const double critical = landing.sticking(), off = critical - landing.place.leg().sticking;
-  struct Stuck {
-    double mass, carried, slide;
-  };
-  std::array<Stuck, nodes_of_restitution> stuck{};
-  std::size_t count = 0;
+  Cells stuck;
   restitutions(weights.least_restitution(), weights.most_restitution(), [&](double eta, double weight) {
     const double mass = share * weight * weights.restitution_density(eta);
     const double resting = landing.place.resting_friction(eta) + off, width = critical - resting;
@@ -214,13 +245,9 @@ void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weight
       above = next_above;
       last = here;
     }
-    stuck[count++] = {mass * above, last.share, last.displacement};
+    stuck.cells[stuck.count++] = {eta, mass * above, last};
   });
-  for (std::size_t k = 0; k < count; ++k) {
-    const double here = stuck[k].carried;
-    sum.add(stuck[k].mass, k > 0 ? (stuck[k - 1].carried + here) / 2 : here,
-            k + 1 < count ? (stuck[k + 1].carried + here) / 2 : here, stuck[k].slide);
-  }
+  stuck.add_to(sum);
 }
 
 // Adds usual and rare frictions.
