@@ -114,6 +114,7 @@ class TouchSum {
     rest_ += mass * rests;
     mass *= 1 - rests;
     if (!(mass > 0)) return;
+    gone_ += mass;
     if (displacement_) {
       const double z = (*displacement_ - slide) / slide_error_;
       mass *= slide_density(z) / slide_error_;
@@ -146,18 +147,18 @@ class TouchSum {
     if (!(touch_ > 0)) return {{0, 1}, 1};
     // A slide is that of a foot whose next one touched: what it says is of those landings, beside the rests of all.
     const double width = std::hypot(blur_, unknown_error), z = (at_ - middle_ / touch_) / width;
-    const double touches = (all_ - rest_) / all_ / touch_, resting = rest_ / all_;
-    const double density = (1 - unknown_share) * density_ + unknown_share * touch_ * normal_density(z) / width;
-    const double below = (1 - unknown_share) * below_ + unknown_share * touch_ * normal_cdf(z);
-    return {{touches * density, std::clamp(resting + touches * below, 0.0, 1.0)},
-            displacement_ ? touch_ / (all_ - rest_) : 1};
+    const double density = (1 - unknown_share) * density_ / touch_ + unknown_share * normal_density(z) / width;
+    const double below = (1 - unknown_share) * below_ / touch_ + unknown_share * normal_cdf(z);
+    const double touches = gone_ / all_;
+    return {{touches * density, std::clamp(rest_ / all_ + touches * below, 0.0, 1.0)},
+            displacement_ ? touch_ / gone_ : 1};
   }
 
  private:
   const SettledLanding& landing_;
   std::optional<double> displacement_;
   double slide_error_, blur_, at_;
-  double all_ = 0, rest_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0;
+  double all_ = 0, rest_ = 0, gone_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0;
 };
 
 // Are landings in the order of their restitution, each standing for those half the way to its neighbours.
@@ -179,6 +180,29 @@ struct Cells {
   }
 };
 
+// Is the restitution at which omega_eq^2 crosses the barrier.
+struct Edge {
+  double eta;
+  bool rising;  // those above it go on
+};
+
+// Looks between neighbours, and between the last of them, if it rests, and `to`. @param beyond  omega_eq^2 less `level`
+template <class Beyond>
+std::optional<Edge> barrier(const Cells& along, double level, double to, Beyond beyond) {
+  for (std::size_t k = 1; k <= along.count; ++k) {
+    const bool last = k == along.count;
+    const double from = along.cells[k - 1].eta, here = along.cells[k - 1].kept.share - level;
+    if (last && here >= 0) break;
+    const double next = last ? to : along.cells[k].eta, there = last ? beyond(to) : along.cells[k].kept.share - level;
+    if ((here >= 0) == (there >= 0)) continue;
+    std::uintmax_t steps = 40;
+    const auto [low, high] = boost::math::tools::toms748_solve(beyond, from, next, here, there,
+                                                               boost::math::tools::eps_tolerance<double>(30), steps);
+    return Edge{(low + high) / 2, there >= 0};
+  }
+  return {};
+}
+
 // Adds landings whose first impact left omega+: cells around twelve restitutions, and the sticking foot. Where only
 // some go on, the cells start at the barrier and are finest there: omega_eq rises as a root from where feet rest.
 void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share, double omega_plus) {
@@ -198,22 +222,16 @@ void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weig
   const double from = std::min(weights.least_restitution(), to - 1e-3);
   Cells all;
   restitutions(from, to, [&](double eta, double weight) { add(all, eta, weight); });
-  std::size_t k = 1;
-  const auto goes_on = [&](std::size_t i) { return all.cells[i].kept.share >= landing.barrier_squared; };
-  while (k < all.count && goes_on(k) == goes_on(k - 1)) ++k;
-  if (k < all.count) {
-    std::uintmax_t steps = 40;
-    const auto bracket = boost::math::tools::toms748_solve(beyond, all.cells[k - 1].eta, all.cells[k].eta,
-                                                           boost::math::tools::eps_tolerance<double>(30), steps);
-    const double edge = (bracket.first + bracket.second) / 2;
-    const auto [resting, going] = goes_on(k) ? std::pair(from, to) : std::pair(to, from);
-    restitutions(std::min(resting, edge), std::max(resting, edge),
+  if (const auto edge = barrier(all, landing.barrier_squared, to, beyond)) {
+    const auto [resting, going] = edge->rising ? std::pair(from, to) : std::pair(to, from);
+    restitutions(std::min(resting, edge->eta), std::max(resting, edge->eta),
                  [&](double eta, double weight) { sum.add_rest(weight * mass(eta)); });
-    Cells beyond_it;
+    Cells gone;
+    const double width = going - edge->eta;
     restitutions(0, 1, [&](double root, double weight) {
-      add(beyond_it, edge + (going - edge) * root * root, 2 * root * weight * std::abs(going - edge));
+      add(gone, edge->eta + width * root * root, 2 * root * weight * std::abs(width));
     });
-    beyond_it.add_to(sum, landing.barrier_squared);
+    gone.add_to(sum, landing.barrier_squared);
   } else {
     all.add_to(sum);
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <ostream>
 #include <random>
 #include <vector>
@@ -158,6 +159,40 @@ TEST(SettledDensity, GivenTheFirstImpactAveragesToThatWithout) {
   EXPECT_NEAR(mass, 1, 2e-3);
   EXPECT_NEAR(rests, wheel.rest_share(context, omega, {}), 2e-3);
   EXPECT_NEAR(below, wheel.at_next_touch(context, omega, {}, blur, 4.7).speed.below, 5e-3);
+}
+
+// Where few restitutions carry the wheel on, the chance of rest given omega+ is that of drawn contacts.
+TEST(SettledDensity, BesideTheBarrierIsThatOfDrawnContacts) {
+  const StepContext context{.leg = 2};
+  constexpr double omega = 4.6;
+  const ExtendedWheel wheel = extended();
+  Draws draws;
+  double rests = 0, foretold = 0, count = 0;
+  for (int i = 0; i < 200000; ++i) {
+    const Contact contact = draws.contact();
+    const auto plus = wheel.omega_plus(context, omega, contact, false);
+    if (!plus || std::abs(*plus - 1) > 0.25) continue;
+    ++count;
+    rests += !wheel.land(context, omega, contact, false).next;
+    foretold += wheel.rest_share(context, omega, *plus);
+  }
+  EXPECT_GT(count, 400);
+  EXPECT_NEAR(rests / count, foretold / count, 3.3 * std::sqrt(rests * (count - rests) / count) / count);
+}
+
+// Of omega+ and slides that the law gives next to never, what a landing says stays a number.
+TEST(SettledDensity, IsANumberWhereHardlyAnyGoOn) {
+  const StepContext context{.leg = 2};
+  constexpr double omega = 4.6, blur = 0.02;
+  const ExtendedWheel sure(equal_wheel(), slope, Law::settled, {0.4, 0.004, 0.38, 0.004}, {}, grid());
+  for (double plus = 0.01; plus < 3.6; plus += 0.001)
+    for (const double slide : {0.0, 0.02, 0.2}) {
+      const NextTouch next = sure.at_next_touch(context, omega, {plus, slide, 1e-9}, blur, 4.3);
+      EXPECT_GE(next.speed.density, 0) << plus;
+      EXPECT_GE(next.speed.below, 0) << plus;
+      EXPECT_LE(next.speed.below, 1) << plus;
+      EXPECT_TRUE(std::isfinite(next.slide_density)) << plus;
+    }
 }
 
 // An effect moves the next speed as it does in a wheel that is built so and followed.
