@@ -22,6 +22,17 @@ constexpr std::array<ScoreNode, 5> five_nodes{{{-2.856970013872806, 0.0112574113
 
 std::size_t collision_of(const Event& event) { return static_cast<std::size_t>(event.number) - 1; }
 
+// Returns what a step says given that the wheel went on, which it had to if how its trial ended is not known: of such
+// trials the collision that it came to rest in would be missing, and each step that is seen speak against rest.
+SpeedFilter::Out given_that_it_went_on(SpeedFilter::Out out, double rests) {
+  const double goes_on = std::max(1e-9, 1 - rests), before = out.score;
+  out.score = -score_of_probability(dynamics::normal_cdf(-before) / goes_on);
+  out.log_density -= std::log(goes_on);
+  out.unit *= goes_on * dynamics::normal_density(out.score) / std::max(1e-300, dynamics::normal_density(before));
+  out.unit = std::clamp(out.unit, 1e-4, 2.0);
+  return out;
+}
+
 }  // namespace
 
 TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, const dynamics::ExtendedWheel& wheel,
@@ -82,7 +93,11 @@ SpeedFilter::Out TrialFollower::seen_by(SpeedFilter& filter, const Event& event,
     case EventKind::step: {
       const RunCollision& next = run_.collisions[k + 1];
       const SpeedFilter::Touch touch{next.before, next.law_error, m.slide};
-      return event.kind == EventKind::stance ? filter.stance(wheel_, here, touch) : filter.step(wheel_, here, touch);
+      const bool may_rest = event.kind == EventKind::step || wheel_.settles();
+      const double rests = may_rest && !run_.outcome ? filter.chance_below(wheel_, here, wheel_.barrier(here)) : 0.0;
+      const SpeedFilter::Out out =
+          event.kind == EventKind::stance ? filter.stance(wheel_, here, touch) : filter.step(wheel_, here, touch);
+      return rests > 0 ? given_that_it_went_on(out, rests) : out;
     }
     case EventKind::rest:
     case EventKind::survival:

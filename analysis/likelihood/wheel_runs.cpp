@@ -349,10 +349,8 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
       if (!m.counted) continue;
       const bool last = k + 1 == run.collisions.size();
       const bool after = m.after && *m.after > 0;
-      if (!last)
-        event.rested = false;
-      else if (run.outcome)
-        event.rested = *run.outcome == dynamics::Outcome::rest;
+      // Of a trial whose end is not known only those collisions that went on are, which says nothing of their share.
+      if (run.outcome) event.rested = last && *run.outcome == dynamics::Outcome::rest;
       if (after) add(EventKind::collision);
       if (!last) {
         if (after) event.speed = *m.after;

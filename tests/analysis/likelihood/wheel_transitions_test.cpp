@@ -69,10 +69,10 @@ TEST(WheelTransitions, PatchesHoldTwoFootholdsWhereTheseAreFixed) {
 
 // Rolls trials event by event under `settled`, with feet that hop and slide; next speeds after odd legs are reported so
 // much too fast, those after even ones too slow [rad/s].
-Experiment rolled_experiment(int trials, double slope_off, double form_error) {
+Experiment rolled_experiment(int trials, double slope_off, double form_error, double slope_deg = 7.02) {
   Setting stated;
   stated.law = dynamics::Law::settled;
-  stated.slope_deg = 7.02;
+  stated.slope_deg = slope_deg;
   stated.wheel.leg_length.assign(8, 0.152);
   stated.wheel.radius_of_gyration = 0.0424;
   stated.wheel.tip_radius = 0.0005;
@@ -85,6 +85,13 @@ Experiment rolled_experiment(int trials, double slope_off, double form_error) {
   for (dynamics::Trial& trial : rolled)
     for (dynamics::TrialCollision& c : trial.collisions) c.omega_minus += c.leg % 2 == 0 ? form_error : -form_error;
   return parse_experiment(source_of(experiment_files({{"ramp", stated, rolled}}, "rolled", {}), "rolled"));
+}
+
+Experiment without_speeds_after(Experiment experiment) {
+  experiment.columns.omega_plus = Presence::none;
+  for (MeasuredTrial& trial : experiment.trials)
+    for (MeasuredCollision& collision : trial.collisions) collision.omega_plus.reset();
+  return experiment;
 }
 
 // Makes transitions of them; sensors have that noise [rad/s].
@@ -135,11 +142,8 @@ TEST(WheelTransitions, OfSettledFindASlopeThatIsMisread) {
 
 // A slide is held to be known less well than it is; a step that is judged beside it is not judged harder for that.
 TEST(WheelTransitions, OfSettledHoldWithoutSpeedsAfterCollisions) {
-  Experiment experiment = rolled_experiment(100, 0, 0);
+  const Experiment experiment = without_speeds_after(rolled_experiment(100, 0, 0));
   ASSERT_EQ(experiment.columns.position, Presence::all);
-  experiment.columns.omega_plus = Presence::none;
-  for (MeasuredTrial& trial : experiment.trials)
-    for (auto& collision : trial.collisions) collision.omega_plus.reset();
   const auto data = transition_model(experiment);
   const Evaluation nominal = data->evaluate(nominal_values(*data), {});
   // A rest is the low end of what a next speed might have been: only together are they centred, and as wide as they
@@ -151,6 +155,27 @@ TEST(WheelTransitions, OfSettledHoldWithoutSpeedsAfterCollisions) {
   EXPECT_GT(count, 600);
   EXPECT_NEAR(mean / count, 0, 3 / std::sqrt(count));
   EXPECT_NEAR(spread / count, 0, 0.1);
+}
+
+// Of trials whose end is not known the collisions that they rested in are missing: those that are seen went on.
+TEST(WheelTransitions, StepsOfTrialsWithoutAnEndSayNothingOfRest) {
+  Experiment rolled = without_speeds_after(rolled_experiment(300, 0, 0, 5));
+  Experiment design = test::wheel_design(900, 12, false);
+  design.contact.restitution.mean = 0.1;  // so that many landings are rests
+  for (Experiment* e : {&rolled, &design})
+    for (MeasuredTrial& trial : e->trials) trial.outcome.reset();
+  const auto settled = transition_model(rolled), stated = wheel_transitions(design);
+  const auto published = stated->simulate(nominal_values(*stated), {}, 3);
+  for (const TransitionModel* data : {settled.get(), published.get()}) {
+    double count = 0, sum = 0;
+    const std::vector<EventResidual> left = residuals(*data, data->evaluate(nominal_values(*data), {}));
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      EXPECT_FALSE(data->events()[i].rested);
+      if (data->events()[i].kind == EventKind::step) ++count, sum += left[i].mean;
+    }
+    EXPECT_GT(count, 600);
+    EXPECT_NEAR(sum / count, 0, 3 / std::sqrt(count)) << (data == settled.get() ? "settled" : "published");
+  }
 }
 
 // What the sensor added to one next speed is not missed again, with the other sign, at the next touch.
