@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
@@ -170,6 +173,33 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
   }
 }
 
+// Returns a word that the reported speeds make.
+std::uint64_t word_of(const WheelRuns& measured) {
+  std::uint64_t word = 0;
+  for (const WheelRun& run : measured.runs)
+    for (const RunCollision& m : run.collisions) word = std::rotl(word, 7) * 5 + std::bit_cast<std::uint64_t>(m.before);
+  return word;
+}
+
+// Adds the errors that the law may have. They are drawn evenly over a condition's trials at each collision number, and
+// anew for each experiment: the same draws in all of them would show in each as the same swing of its map.
+void blur(WheelRuns& measured) {
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<RunCollision*>> alike;
+  for (WheelRun& run : measured.runs)
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) alike[{run.condition, k}].push_back(&run.collisions[k]);
+  const std::uint64_t seed = word_of(measured);
+  std::uint64_t draw = 0;
+  for (auto& [where, landings] : alike) {
+    const std::vector<double> speeds = even_normals(seed, draw++, landings.size());
+    const std::vector<double> slides = even_normals(seed, draw++, landings.size());
+    for (std::size_t i = 0; i < landings.size(); ++i) {
+      landings[i]->law_error = measured.law_error * speeds[i];
+      if (std::optional<double>& slide = landings[i]->slide)
+        *slide += measured.slide_error * dynamics::slide_score(dynamics::normal_cdf(slides[i]));
+    }
+  }
+}
+
 // Takes slides from the feet's places; next speeds are blurred to what the law is good for.
 void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
   const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
@@ -199,16 +229,7 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
       fmt::format("`settled` is held to tell a next speed to {:.2g} rad/s: {:.2g} rad/s, as n "
                   "touches of it have an error of form in common, times the root of n",
                   measured.law_error, settled_precision));
-  std::uint64_t trial = 0;
-  for (WheelRun& run : measured.runs) {
-    const std::size_t count = run.collisions.size();
-    const std::vector<double> error = normal_multipliers(1, trial++, DrawStream::blur, 2 * count);
-    for (std::size_t k = 0; k < count; ++k) {
-      RunCollision& m = run.collisions[k];
-      m.law_error = measured.law_error * error[k];
-      if (m.slide) *m.slide += measured.slide_error * dynamics::slide_score(dynamics::normal_cdf(error[count + k]));
-    }
-  }
+  blur(measured);
 }
 
 }  // namespace

@@ -25,6 +25,10 @@ enum class DrawStream : std::uint64_t {
 /// Returns the standard normals by which a bootstrap multiplies scores: those of draw number `draw`.
 std::vector<double> normal_multipliers(std::uint64_t seed, std::uint64_t draw, DrawStream stream, std::size_t count);
 
+/// Returns standard normals, one from each of `count` equally likely cells, in random order: their mean and spread are
+/// next to those of the distribution.
+std::vector<double> even_normals(std::uint64_t seed, std::uint64_t draw, std::size_t count);
+
 /// Returns the weight of a held-out trial in a bootstrap by exponential weights (mean 1): that of draw number `draw`.
 double exponential_weight(std::uint64_t seed, std::uint64_t draw, std::uint64_t trial);
 

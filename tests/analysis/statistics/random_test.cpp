@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <vector>
+
+#include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {
@@ -26,6 +29,21 @@ TEST(Random, MultipliersAreStandardNormalAndEachStreamsOwn) {
                             normal_multipliers(4, 7, DrawStream::chance_on_map, 10)})
     EXPECT_NE(other, first);
   EXPECT_EQ(normal_multipliers(3, 7, DrawStream::chance_on_map, 0).size(), 0u);
+}
+
+TEST(Random, EvenNormalsAreOneFromEachCellAndWithoutOrder) {
+  constexpr std::size_t count = 400;
+  const std::vector<double> even = even_normals(3, 7, count);
+  std::vector<double> sorted = even;
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(std::floor(count * dynamics::normal_cdf(sorted[i])), i);
+  double successive = 0;
+  for (std::size_t i = 1; i < count; ++i) successive += even[i - 1] * even[i] / count;
+  EXPECT_NEAR(successive, 0, 4 / std::sqrt(double{count}));
+  EXPECT_EQ(even_normals(3, 7, count), even);
+  EXPECT_NE(even_normals(3, 8, count), even);
+  EXPECT_NE(even_normals(4, 7, count), even);
+  EXPECT_TRUE(even_normals(3, 7, 0).empty());
 }
 
 TEST(Random, ExponentialWeightsHaveMeanAndVarianceOne) {
