@@ -34,7 +34,7 @@ double square(double v) { return v * v; }
 double score_of_probability(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
 
 SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack,
-                         double law_error, double law_scatter, double slide_error)
+                         double law_error, double law_scatter, double slide_error, const MemoryOfScores& memory)
     : extension_(extension),
       tilt_(tilt),
       noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
@@ -42,6 +42,7 @@ SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, doub
       law2_(law_error * law_error),
       scatter2_(law_scatter * law_scatter),
       slide_error_(slide_error),
+      memory_(memory(extension.memory)),
       blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
 
 SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {
@@ -154,9 +155,9 @@ SpeedFilter::Out SpeedFilter::rest(const ExtendedWheel& wheel, const StepContext
 
 // The chance of a lower score is that given the previous collision's.
 double SpeedFilter::conditional(double below) const {
-  if (extension_.memory == 0 || !previous_) return std::clamp(below, 1e-300, 1.0);
-  const double rho = extension_.memory;
-  return std::max(1e-300, normal_cdf((score_of_probability(below) - rho * *previous_) / std::sqrt(1 - rho * rho)));
+  if (memory_ == 0 || !previous_) return std::clamp(below, 1e-300, 1.0);
+  return std::max(1e-300,
+                  normal_cdf((score_of_probability(below) - memory_ * *previous_) / std::sqrt(1 - memory_ * memory_)));
 }
 
 SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepContext& context, double plus,
@@ -183,9 +184,9 @@ SpeedFilter::Out SpeedFilter::weighed(double density, double below, double rate)
   const double z = score_of_probability(below);
   out.score = z;
   out.unit = density > 0 ? std::clamp(normal_density(z) / (density * rate), 1e-4, 2.0) : 0.3;
-  if (const double rho = extension_.memory; rho != 0 && previous_) {
-    const double left = std::sqrt(1 - rho * rho);
-    out.score = (z - rho * *previous_) / left;
+  if (memory_ != 0 && previous_) {
+    const double left = std::sqrt(1 - memory_ * memory_);
+    out.score = (z - memory_ * *previous_) / left;
     out.log_density += log_normal(out.score) - log_normal(z) - std::log(left);
   }
   previous_ = z;

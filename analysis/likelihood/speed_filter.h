@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "analysis/experiment/experiment.h"
+#include "analysis/likelihood/memory_of_scores.h"
 #include "analysis/likelihood/score_tilt.h"
 #include "dynamics/wheel/extended_wheel.h"
 
@@ -39,8 +40,10 @@ class SpeedFilter {
   /// @param law_scatter  sd of what the law really does not know of a next omega-, as far as known [rad/s]; `settled`
   ///        only
   /// @param slide_error  sd of what the law does not know of a slide [m]; `settled` only
+  /// @param memory  of scores that the extension's memory of contacts is
   SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0,
-              double law_error = 0, double law_scatter = 0, double slide_error = 1e-3);
+              double law_error = 0, double law_scatter = 0, double slide_error = 1e-3,
+              const MemoryOfScores& memory = {});
 
   /// The first speed is seen: it is held against the stated launch.
   Out launch(const Condition& condition, double reported);
@@ -69,6 +72,7 @@ class SpeedFilter {
   const ScoreTilt& tilt_;
   double noise2_;  // variance of a reported speed
   double slack2_, law2_, scatter2_, slide_error_;
+  double memory_;  // of scores
   bool blurred_;
   double mean_ = 0, variance_ = 0;
   std::optional<double> previous_;  // collision's score

@@ -44,7 +44,8 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       friction_sd_(hypothesis.extension.trial_friction_sd),
       nodes_(friction_sd_ > 0 ? five_nodes.size() : 1),
       filters_(nodes_, SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
-                                   measured.slack, measured.law_error, measured.law_scatter, measured.slide_error)) {
+                                   measured.slack, measured.law_error, measured.law_scatter, measured.slide_error,
+                                   measured.memory)) {
   static_assert(five_nodes.size() == most_nodes);
   if (nodes_ > 1)
     for (std::size_t q = 0; q < nodes_; ++q) log_weight_[q] = std::log(five_nodes[q].weight);

@@ -229,6 +229,13 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
       fmt::format("`settled` is held to tell a next speed to {:.2g} rad/s: {:.2g} rad/s, as n "
                   "touches of it have an error of form in common, times the root of n",
                   measured.law_error, settled_precision));
+  std::vector<double> speeds;
+  for (const WheelRun& run : measured.runs)
+    for (const RunCollision& m : run.collisions) speeds.push_back(m.before);
+  if (!speeds.empty())
+    measured.memory =
+        memory_of_scores(wheels_on_ramps(measured, measured.contact, {}).front(), measured.contact, median(speeds),
+                         measured.speeds_after ? std::nullopt : std::optional(measured.law_error));
   blur(measured);
 }
 

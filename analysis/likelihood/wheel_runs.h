@@ -9,6 +9,7 @@
 
 #include "analysis/diagnosis/transition_model.h"
 #include "analysis/experiment/experiment.h"
+#include "analysis/likelihood/memory_of_scores.h"
 #include "dynamics/wheel/extended_wheel.h"
 #include "dynamics/wheel/landing_shares.h"
 
@@ -45,6 +46,7 @@ struct WheelRuns {
   double law_error = 0;            ///< sd of what the law does not know of a next omega- [rad/s]; `settled` only
   double law_scatter = 0;          ///< of it what stances show beyond the noise [rad/s]; `settled` only
   double slide_error = 1e-3;       ///< sd of what the law does not know of a slide [m]; `settled` only
+  MemoryOfScores memory;           ///< of the speeds that tell of landings; under other laws that of the contacts
   bool noise_stated = true;        ///< noise is the experiment's own
   bool legs_known = true;          ///< by the column, or found
   bool speeds_after = false;       ///< omega+ is there
