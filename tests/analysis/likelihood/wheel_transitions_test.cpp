@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <utility>
 
 #include "analysis/diagnosis/map_columns.h"
@@ -94,12 +95,12 @@ Experiment without_speeds_after(Experiment experiment) {
   return experiment;
 }
 
-// Makes transitions of them; sensors have that noise [rad/s].
+// Makes transitions of them; sensors have that noise [rad/s], which is stated unless another is.
 std::unique_ptr<TransitionModel> rolled_transitions(int trials, double slope_off, double form_error = 0,
-                                                    double noise = 0) {
+                                                    double noise = 0, std::optional<double> stated = {}) {
   Experiment experiment = rolled_experiment(trials, slope_off, form_error);
   if (noise == 0) return transition_model(experiment);
-  experiment.sensor.noise_sd = noise;
+  experiment.sensor.noise_sd = stated.value_or(noise);
   std::uint64_t number = 0;
   for (MeasuredTrial& trial : experiment.trials) {
     const std::vector<double> error = normal_multipliers(5, number++, DrawStream::blur, 2 * trial.collisions.size());
@@ -194,6 +195,19 @@ TEST(WheelTransitions, OfSettledRememberNoNoise) {
   EXPECT_GT(count, 600);
   EXPECT_NEAR(products / squares, 0, 3 / std::sqrt(count));
   EXPECT_NEAR(squares / count, 1, 0.15);
+}
+
+// Noise that is not stated is found by its size, and leaves the scatter of stances as it should be.
+TEST(WheelTransitions, OfSettledFindNoiseThatIsNotStated) {
+  constexpr double noise = 0.025, stated = 0.012;
+  const auto data = rolled_transitions(100, 0, 0, noise, stated);
+  const Fit found = fit(*data, nominal_values(*data), {term(*data, "sensor_noise", {}, {1e-4})});
+  EXPECT_TRUE(found.converged) << found.reason;
+  EXPECT_NEAR(std::hypot(stated, std::sqrt(found.terms[0].values[0])), noise, 0.0015);
+  double count = 0, squares = 0;
+  for (std::size_t i = 0; i < found.evaluation.score.size(); ++i)
+    if (data->events()[i].kind == EventKind::stance) ++count, squares += std::pow(found.evaluation.score[i], 2);
+  EXPECT_NEAR(squares / count, 1, 3 * std::sqrt(2 / count));
 }
 
 // An error of form, as engines have it, is no gap.
