@@ -22,8 +22,8 @@ constexpr std::array<ScoreNode, 5> five_nodes{{{-2.856970013872806, 0.0112574113
 
 std::size_t collision_of(const Event& event) { return static_cast<std::size_t>(event.number) - 1; }
 
-// Returns what a step says given that the wheel went on, which it had to if how its trial ended is not known: of such
-// trials the collision that it came to rest in would be missing, and each step that is seen speak against rest.
+// Returns what a step says given that the wheel went on. Where it is not known how a trial ended, the collision that it
+// may have come to rest in is missing, and the steps that are seen must not count against rests.
 SpeedFilter::Out given_that_it_went_on(SpeedFilter::Out out, double rests) {
   const double goes_on = std::max(1e-9, 1 - rests), before = out.score;
   out.score = -score_of_probability(dynamics::normal_cdf(-before) / goes_on);

@@ -9,7 +9,8 @@ std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::option
   const Spread &eta = nominal.restitution, &mu = nominal.friction;
   using Slot = WheelSlot;
   const bool settled = nominal.law == dynamics::Law::settled;
-  std::vector<Nuisance> all(settled ? Slot::log_next_ratio + 1 : noise ? Slot::log_noise_sd + 1 : Slot::tails + 1);
+  const std::size_t at_noise = settled ? Slot::log_settled_noise_sd : Slot::log_noise_sd;
+  std::vector<Nuisance> all(noise ? at_noise + 1 : at_noise);
   all[Slot::restitution_mean] = {"restitution_mean", eta.mean, 0.08, 1e-4, 0.02, 0.98};
   all[Slot::log_restitution_sd] = {"log restitution_sd", std::log(std::max(0.01, eta.sd)), 0.4, 1e-3, std::log(0.005),
                                    std::log(0.4)};
@@ -18,13 +19,13 @@ std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::option
                                 std::log(0.5)};
   all[Slot::skew] = {"skew", 0, 0.06, 1e-3, -0.5, 0.5};
   all[Slot::tails] = {"tails", 0, 0.06, 1e-3, -0.4, 0.4};
-  if (noise) all[Slot::log_noise_sd] = {"log noise_sd", std::log(*noise), 0.5, 1e-3, std::log(5e-6), 0};
   if (settled) {
     all[Slot::log_hub_inertia_ratio] = {"log hub_inertia_ratio", 0, 0.1, 1e-3, -0.7, 0.7};
     all[Slot::log_sticking_ratio] = {"log sticking_ratio", 0, 0.003, 1e-4, -0.03, 0.03};
     all[Slot::log_plus_ratio] = {"log plus_ratio", 0, 0.003, 1e-4, -0.03, 0.03};
     all[Slot::log_next_ratio] = {"log next_ratio", 0, 5e-4, 1e-5, -0.005, 0.005};
   }
+  if (noise) all[at_noise] = {"log noise_sd", std::log(*noise), 0.5, 1e-3, std::log(5e-6), 0};
   return all;
 }
 
@@ -41,6 +42,7 @@ WheelHypothesis hypothesis_at(std::span<const double> nuisance) {
     hypothesis.extension.plus_ratio = std::exp(nuisance[Slot::log_plus_ratio]);
     hypothesis.extension.next_ratio = std::exp(nuisance[Slot::log_next_ratio]);
   }
+  if (nuisance.size() > Slot::log_settled_noise_sd) hypothesis.noise = std::exp(nuisance[Slot::log_settled_noise_sd]);
   return hypothesis;
 }
 

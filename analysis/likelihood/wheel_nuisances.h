@@ -14,7 +14,8 @@
 namespace metastable::analysis {
 
 /// Says where each nuisance stands in the list. Spreads and ratios are refitted by their logarithms; log_noise_sd is
-/// there only where the noise is refitted, the last four only under `settled`, where it never is.
+/// there only where the noise is refitted, the last five only under `settled`, of which the noise has its slot behind
+/// the others.
 struct WheelSlot {
   enum : std::size_t {
     restitution_mean,
@@ -27,7 +28,8 @@ struct WheelSlot {
     log_hub_inertia_ratio = log_noise_sd,
     log_sticking_ratio,
     log_plus_ratio,
-    log_next_ratio
+    log_next_ratio,
+    log_settled_noise_sd
   };
 };
 

@@ -202,7 +202,7 @@ void blur(WheelRuns& measured) {
 
 // Takes slides from the feet's places; next speeds are blurred to what the law is good for.
 void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
-  const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
+  const std::vector<ExtendedWheel> wheels = wheels_on_ramps(measured, measured.contact, {});
   std::size_t all = 0, left_out = 0;
   measured.slides_seen = experiment.columns.position == Presence::all && measured.legs_known;
   for (WheelRun& run : measured.runs)
@@ -233,9 +233,8 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
   for (const WheelRun& run : measured.runs)
     for (const RunCollision& m : run.collisions) speeds.push_back(m.before);
   if (!speeds.empty())
-    measured.memory =
-        memory_of_scores(wheels_on_ramps(measured, measured.contact, {}).front(), measured.contact, median(speeds),
-                         measured.speeds_after ? std::nullopt : std::optional(measured.law_error));
+    measured.memory = memory_of_scores(wheels.front(), measured.contact, median(speeds),
+                                       measured.speeds_after ? std::nullopt : std::optional(measured.law_error));
   blur(measured);
 }
 

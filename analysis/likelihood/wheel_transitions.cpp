@@ -112,9 +112,10 @@ WheelTransitions::WheelTransitions(const Experiment& experiment)
 
 void WheelTransitions::set_up_parameters() {
   // Where nobody stated the noise, the stances say it only together with the effects that act in them.
-  // Under `settled` they say what the law does not know.
+  // Under `settled` they say what the law does not know; but steps of feet whose places are seen tell a noise that was
+  // only assumed.
   const bool settled = measured_.law == dynamics::Law::settled;
-  const bool refits_noise = !settled && !measured_.noise_stated && measured_.speeds_after && !measured_.exact_stances;
+  const bool refits_noise = !measured_.noise_stated && measured_.speeds_after != settled && !measured_.exact_stances;
   nuisances_ =
       wheel_nuisances(experiment_.contact, refits_noise ? std::optional<double>(measured_.noise) : std::nullopt);
   set_up_days();
