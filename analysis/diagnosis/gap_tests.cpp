@@ -36,10 +36,10 @@ double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit
   return least;
 }
 
-// Takes the facet with the least p-value, for as many facets.
+// Takes the facet with the least p-value, for as many facets; of a fit that did not settle there are none.
 double facets_p_value(const CauseRanking& ranking, const std::vector<LeftInFacet>& facets) {
   double least = 1;
-  if (!ranking.scan.trials_suffice) return least;
+  if (!ranking.scan.trials_suffice || facets.empty()) return least;
   for (const LeftInFacet& facet : facets) least = std::min(least, facet.p_value);
   return std::min(1.0, least * static_cast<double>(facets.size()));
 }

@@ -1,0 +1,42 @@
+#include "analysis/diagnosis/gap_tests.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/left_over.h"
+#include "analysis/diagnosis/model_fit.h"
+
+namespace metastable::analysis {
+namespace {
+
+// Returns the tests where effects and cells show nothing, and so much is left by facet.
+Diagnosis::Gap tests_of(const std::vector<LeftInFacet>& facets) {
+  Diagnosis d;
+  d.gap.recalibrated.p_value = 0.5;
+  d.causes.unnamed.push_back({{}, 0, facets});
+  CauseRanking ranking;
+  ranking.scan.trials_suffice = true;
+  ranking.p_value = 0.5;
+  test_for_gap(d, ranking, 20, {});
+  return d.gap;
+}
+
+TEST(GapTests, AFitThatDidNotSettleLeavesNoFacetToJudge) {
+  const Diagnosis::Gap gap = tests_of({});
+  EXPECT_EQ(gap.p_facets, 1);
+  EXPECT_GT(gap.p_value, 0.1);
+}
+
+TEST(GapTests, TheLeastOfTheFacetsCountsForAllOfThem) {
+  LeftInFacet usual, far;
+  usual.p_value = 0.3;
+  far.p_value = 1e-6;
+  EXPECT_DOUBLE_EQ(tests_of({usual, far, usual}).p_facets, 3e-6);
+  EXPECT_LT(tests_of({usual, far, usual}).p_value, 1e-4);
+  EXPECT_EQ(tests_of({usual}).p_facets, 0.3);
+}
+
+}  // namespace
+}  // namespace metastable::analysis
