@@ -55,6 +55,17 @@ TEST(LeftOver, LevelsAreHonest) {
   EXPECT_NEAR(below / facets, 0.05, 0.02);  // facets share events: some four standard deviations
 }
 
+// How many collisions are far ones is how their distribution is shaped; the spread of all of them is judged.
+TEST(LeftOver, TheFormOfTheContactIsNoFacet) {
+  int spreads = 0;
+  for (const LeftInFacet& facet : left_of_line(31, 0))
+    if (facet.facet == "phase" && !facet.stance) {
+      EXPECT_NE(facet.aspect, "tail");
+      spreads += facet.aspect == "spread";
+    }
+  EXPECT_EQ(spreads, 1);
+}
+
 TEST(LeftOver, IsNotJudgedWhereTheFitDidNotSettle) {
   const test::Line model = test::line(0, 7);
   Fit plain = fit(model, {3, -0.7}, {});
