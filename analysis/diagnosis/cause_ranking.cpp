@@ -28,6 +28,7 @@ constexpr double refined_share = 0.7;       // of the best evidence, less
 constexpr double refined_margin = 10;       //   this much, for an effect worth refining
 constexpr double refit_margin = 60;         // evidence below the best, for a fit that did not settle to be tried again
 constexpr double least_pair_evidence = -4;  // promised beyond the first effect's, for a pair worth fitting
+constexpr double alike_margin = 4;          // evidence promised below the best second effect's, for one worth fitting
 
 // These numbers say how fits are run.
 constexpr double furthest_start = 0.25;  // share of a parameter's range
@@ -183,6 +184,7 @@ class Ranker {
   void scan_pairs();
   void scan_asked_pairs();
   void fit_pairs();
+  void complete_pairs();
   void reach(double share) {
     share_ = share;
     heartbeat();
@@ -458,6 +460,38 @@ void Ranker::fit_pairs() {
   }
 }
 
+// Beside one effect of the best pair others may act like its second one, as torques do: all that promise about as much
+// are fitted, so that a set names them.
+void Ranker::complete_pairs() {
+  const auto best = std::max_element(
+      pairs_.begin(), pairs_.end(), [](const RankedCause& a, const RankedCause& b) { return a.evidence < b.evidence; });
+  if (best == pairs_.end() || best->evidence < top_ - alike_margin) return;
+  const auto known = [&](const Candidate* one, const Candidate* other) {
+    return std::any_of(pairs_.begin(), pairs_.end(), [&](const RankedCause& pair) {
+      const Candidate *a = pair.terms[0].candidate, *b = pair.terms[1].candidate;
+      return (a == one && b == other) || (a == other && b == one);
+    });
+  };
+  tries_.clear();
+  for (const EffectTerm& term : best->terms) {
+    const auto place = std::find(candidates_.begin(), candidates_.end(), term.candidate);
+    const auto leader = static_cast<std::size_t>(place - candidates_.begin());
+    if (!fitted(singles_[leader])) continue;
+    std::vector<const Candidate*> others;
+    for (const Candidate* other : candidates_)
+      if (other != term.candidate && other->undecidable.empty()) others.push_back(other);
+    const EffectScan scan = scan_effects(model_, singles_[leader].fit, others, threads_);
+    std::vector<double> promised;
+    for (const ScannedEffect& effect : scan.effects) promised.push_back(log_evidence(effect, effect.gain[effect.best]));
+    if (promised.empty()) continue;
+    const double most = *std::max_element(promised.begin(), promised.end());
+    for (std::size_t k = 0; k < promised.size(); ++k)
+      if (promised[k] > most - alike_margin && !known(term.candidate, scan.effects[k].candidate))
+        tries_.push_back({leader, scan.effects[k]});
+  }
+  fit_pairs();
+}
+
 }  // namespace
 
 double evidence_of_gain(double gain, double parameters) {
@@ -505,6 +539,7 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   ranker.scan_asked_pairs();
   ranker.reach(0.8);
   ranker.fit_pairs();
+  ranker.complete_pairs();
   ranker.reach(1);
   return ranker.result();
 }

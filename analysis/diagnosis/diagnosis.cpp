@@ -108,7 +108,11 @@ Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
   Fit given;
   given.nuisance = nominal;
   given.evaluation = model.evaluate(nominal, {});
-  given.log_likelihood = given.evaluation.total();
+  given.log_likelihood = given.penalised = given.evaluation.total();
+  for (std::size_t p = 0; p < nominal.size(); ++p) {
+    const Nuisance& n = model.nuisances()[p];
+    given.penalised -= 0.5 * std::pow((nominal[p] - n.nominal) / n.prior_sd, 2);
+  }
   return given;
 }
 
@@ -195,13 +199,13 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   describe_data(d, model);
 
   progress(0, "the model as given");
-  const std::vector<double> nominal = nominal_values(model);
+  const std::vector<double> nominal = given_values(model);
   const Fit as_given = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
   const Fit given = unfitted(model, nominal);
   d.gap.as_given = gap_map(model, given, options.draws / 2, options.seed);
   const Fit recalibrated = best_fit(model, nominal, {});
   d.gap.contact = contact_estimates(model, recalibrated);
-  const double recalibration_gain = 2 * (recalibrated.penalised - given.log_likelihood);
+  const double recalibration_gain = 2 * (recalibrated.penalised - given.penalised);
   d.gap.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
 
   progress(0.1, "where the gap lies");
@@ -234,12 +238,12 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   if (named) d.causes.size = model.size_in_words(chosen.fit->terms);
   if (d.data.trials >= trials_for_folds(options.folds))
     d.shrinkage.measures =
-        gap_shrinkage(model, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
+        gap_shrinkage(model, given, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
                       options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
   // Even a cause that closes nearly all of a huge gap may leave a large one.
   if (named && !d.shrinkage.measures.empty() && leaves_gap_held_out(d, chosen.bent))
     chosen.none = std::max(chosen.none, certain_odds);
-  const double share_of_effects = share_probabilities(d, model, ordered, candidates.size(), gap, chosen.none);
+  const double share_of_effects = share_probabilities(d, model, ranking, ordered, candidates.size(), gap, chosen.none);
   give_verdict(d, gap, chosen.none, share_of_effects);
 
   progress(0.88, "steps before failure");

@@ -24,7 +24,7 @@ struct DiagnosisOptions {
   /// case, not only where the scores promise something.
   std::vector<std::string> catalogue = {};
   int draws = 2000;     ///< bootstrap draws of each chance level, >= 200; the map as given takes half
-  double level = 0.03;  ///< of the test for a gap after recalibration, in (0, 0.5)
+  double level = 0.02;  ///< of the test for a gap after recalibration, in (0, 0.5)
   int folds = 5;        ///< of the cross-validation by trial, >= 2
   /// It is called now and then with the share done, 0..1, and what is being done, and may throw to stop.
   std::function<void(double, const std::string&)> progress = {};
@@ -96,7 +96,8 @@ struct MissingColumn {
 struct Shrinkage {
   std::string measure, unit;
   double baseline = 0, recalibrated = 0, with_effect = 0, floor = 0;
-  /// Is (baseline - with_effect) / (baseline - floor); nothing where the denominator's interval covers zero.
+  /// Is (baseline - with_effect) / (baseline - floor), at most 1, as no model leaves less than nothing; no value where
+  /// the denominator's interval covers zero.
   std::optional<double> closed, closed_lower, closed_upper;  ///< 90 % interval over trials
   double baseline_lower = 0, baseline_upper = 0;             ///< 90 %
   double with_effect_least = 0;  ///< of with_effect when trials are drawn anew, some hundred times

@@ -95,6 +95,14 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
                         left, left == 1 ? "cell" : "cells", 100 * model_error));
       break;
     case Verdict::unexplained:
+      if (!d.causes.ranked.empty() && d.causes.ranked.front().probability > d.causes.p_none) {
+        s.push_back(fmt::format(
+            "There is a gap that recalibration does not remove. The nearest of the catalogue is {}; that it is "
+            "none of the catalogue has probability {:.2f}, too much for a name.",
+            with_parameters(d.causes.ranked.front()), d.causes.p_none));
+        say_unnamed(s, d);
+        break;
+      }
       s.push_back("There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
       if (d.causes.together > most_together)
         s.push_back(fmt::format(
@@ -127,7 +135,9 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
   if (d.shrinkage.measures.empty() || !d.shrinkage.measures[0].closed || d.verdict == Verdict::no_gap) return;
   const Shrinkage& log_score = d.shrinkage.measures[0];
   const std::string change =
-      fmt::format("from {:.2g} to {:.2g} nats a collision", log_score.baseline, log_score.with_effect);
+      log_score.with_effect > 0
+          ? fmt::format("from {:.2g} to {:.2g} nats a collision", log_score.baseline, log_score.with_effect)
+          : fmt::format("from {:.2g} nats a collision to none", log_score.baseline);
   if (closed_is_known(log_score)) {
     const DecimalEstimate percent = to_decimal(closed_percent(log_score), NumberFormat::general, 3);
     s.push_back(fmt::format("Held out, {} % of the gap closes (90 %: {} to {} %), {}.", plain_text(percent.value),

@@ -13,6 +13,7 @@
 
 #include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/gap_map.h"
+#include "analysis/statistics/bounded_interval.h"
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/wheel/truncated_normal.h"
@@ -77,25 +78,31 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
   s.recalibrated = here[1];
   s.with_effect = here[2];
   s.floor = here[3];
-  std::vector<double> gaps, closed;
-  std::vector<double> baselines;
+  std::vector<double> gaps, left, baselines;  // left: shares of the gap
   s.with_effect_least = s.with_effect;
   for (std::uint64_t draw = 0; draw < interval_draws; ++draw) {  // trials drawn anew, by exponential weights
     const auto mean = average([&](std::size_t t) { return exponential_weight(seed, draw, t); });
     baselines.push_back(mean[0]);
     gaps.push_back(mean[0] - mean[3]);
     s.with_effect_least = std::min(s.with_effect_least, mean[2]);
-    if (gaps.back() > 0) closed.push_back((mean[0] - mean[2]) / gaps.back());
+    if (gaps.back() > 0) left.push_back((mean[2] - mean[3]) / gaps.back());
   }
   std::sort(baselines.begin(), baselines.end());
   std::sort(gaps.begin(), gaps.end());
-  std::sort(closed.begin(), closed.end());
+  std::sort(left.begin(), left.end());
   s.baseline_lower = baselines[interval_draws * 5 / 100];
   s.baseline_upper = baselines[interval_draws * 95 / 100];
-  if (gaps[interval_draws * 5 / 100] > 0 && closed.size() > interval_draws / 2) {
-    s.closed = (s.baseline - s.with_effect) / (s.baseline - s.floor);
-    s.closed_lower = closed[closed.size() * 5 / 100];
-    s.closed_upper = closed[closed.size() * 95 / 100];
+  if (gaps[interval_draws * 5 / 100] > 0 && left.size() > interval_draws / 2) {
+    // No model leaves less than nothing.
+    const double share = (s.with_effect - s.floor) / (s.baseline - s.floor);
+    const auto at = [&](double score) {
+      return left[static_cast<std::size_t>(dynamics::normal_cdf(score) * static_cast<double>(left.size() - 1))];
+    };
+    const double error = std::max(1e-12, (at(1) - at(-1)) / 2), estimate = share / error;
+    const auto [lower, upper] = bounded_interval(estimate);
+    s.closed = std::min(1.0, 1 - share);
+    s.closed_lower = 1 - std::max(0.0, at(upper - estimate));
+    s.closed_upper = lower > 0 ? 1 - std::max(0.0, at(lower - estimate)) : 1;
   }
   return s;
 }
@@ -132,37 +139,60 @@ Fit best_rival(const TransitionModel& model, const std::vector<const Fit*>& riva
 
 // The flexible model shifts the scores in every cell by a ridge fit to the trials counted.
 struct Flexible {
-  Eigen::VectorXd bounded;    // [events] scores of the chosen model
+  Eigen::VectorXd bounded;    // [events] scores of the chosen model, less what is known of them
   Eigen::VectorXd predicted;  // [events] their shifts
   Eigen::VectorXd variance;   // [events] of the shifts, without a gap
 };
 
-Flexible flexible_model(const Fit& chosen, const Eigen::MatrixXd& cells, const Eigen::VectorXd& training) {
+// Returns [cells x cells] what the cells' sums of scores scatter by chance: trials are independent, events of a trial
+// need not be, and fitted parameters take part of it up.
+// @param left  [events] what the shifts leave of the scores  @param known  [events] the part of scores that is known
+Eigen::MatrixXd chance_of_sums(const TransitionModel& model, const Fit& chosen, const Eigen::MatrixXd& cells,
+                               const Eigen::VectorXd& training, const Eigen::VectorXd& left,
+                               const Eigen::VectorXd& known) {
+  const auto trials = static_cast<Eigen::Index>(model.trials());
+  const Derivatives& by = chosen.derivatives;
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(trials, cells.cols());
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(trials, by.slope.cols());
+  for (Eigen::Index i = 0; i < training.size(); ++i) {
+    const auto trial = static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(i)].trial);
+    sums.row(trial) += training[i] * left[i] * cells.row(i);
+    slopes.row(trial) += training[i] * (by.slope.row(i) + known[i] * by.change.row(i));
+  }
+  const Eigen::MatrixXd taken = by.change.transpose() * (training.asDiagonal() * cells);
+  sums += slopes * markov::solve_columns(chosen.information, taken);
+  return sums.transpose() * sums;
+}
+
+Flexible flexible_model(const TransitionModel& model, const Fit& chosen, const Eigen::MatrixXd& cells,
+                        const Eigen::VectorXd& training) {
   Flexible f;
   const Eigen::Map<const Eigen::VectorXd> z(chosen.evaluation.score.data(), training.size());
-  f.bounded = z.cwiseMax(-bounded_score).cwiseMin(bounded_score);
+  Eigen::VectorXd known(training.size());
+  for (Eigen::Index i = 0; i < known.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    known[i] = model.events()[at].added / chosen.evaluation.unit[at];
+  }
+  f.bounded = (z - known).cwiseMax(-bounded_score).cwiseMin(bounded_score);
   const Eigen::MatrixXd gram = cells.transpose() * training.asDiagonal() * cells;
   Eigen::MatrixXd ridge = gram;
   ridge.diagonal().array() += 1 / (cell_shift_sd * cell_shift_sd);
   const Eigen::VectorXd shift = markov::solve_symmetric(ridge, cells.transpose() * (training.asDiagonal() * f.bounded));
   f.predicted = cells * shift;
-  // Without a gap the shifts are noise, less what the fitted parameters took up: their expected loss on a new event
-  // is half its predicted variance.
-  const Eigen::MatrixXd taken = chosen.derivatives.change.transpose() * (training.asDiagonal() * cells);
-  const Eigen::MatrixXd left = gram - taken.transpose() * markov::solve_columns(chosen.information, taken);
-  const Eigen::MatrixXd noise = markov::solve_columns(ridge, markov::solve_columns(ridge, left).transpose());
-  f.variance = (cells * noise).cwiseProduct(cells).rowwise().sum();
+  // Without a gap the shifts are noise: their expected loss on a new event is half its predicted variance.
+  const Eigen::MatrixXd noise = chance_of_sums(model, chosen, cells, training, f.bounded - f.predicted, known);
+  const Eigen::MatrixXd inverse = markov::solve_columns(ridge, Eigen::MatrixXd::Identity(ridge.rows(), ridge.cols()));
+  f.variance = (cells * (inverse * noise * inverse)).cwiseProduct(cells).rowwise().sum();
   return f;
 }
 
 }  // namespace
 
-std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& recalibrated,
+std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& given, const Fit& recalibrated,
                                      const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
                                      const std::function<void()>& heartbeat) {
   if (folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", folds));
   const std::size_t trials = model.trials();
-  const Evaluation as_given = model.evaluate(nominal_values(model), {});
   const Eigen::MatrixXd cells = mean_columns(model);
   const std::vector<int> fold = folds_of_trials(trials, folds, seed);
   std::vector<HeldOut> held(trials);
@@ -180,8 +210,8 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& re
     const Fit plain = fit(model, recalibrated.nuisance, {}, options);
     const Fit chosen = best_rival(model, rivals, plain, options, speak);
     const Eigen::VectorXd training = event_weights(model, options.count);
-    const Flexible flexible = flexible_model(chosen, cells, training);
-    const std::array<const Evaluation*, 3> models{&as_given, &plain.evaluation, &chosen.evaluation};
+    const Flexible flexible = flexible_model(model, chosen, cells, training);
+    const std::array<const Evaluation*, 3> models{&given.evaluation, &plain.evaluation, &chosen.evaluation};
     std::array<std::vector<double>, 3> units;
     for (std::size_t m = 0; m < 3; ++m) units[m] = typical_units(model, *models[m]);
     for (std::size_t i = 0; i < model.events().size(); ++i) {
@@ -235,7 +265,7 @@ Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure&
   if (s.baseline_lower <= s.floor) return s;
   const auto closed = [&](double share) {
     const double gap = std::abs(given - share);
-    return (gap - std::abs(with - share)) / (gap - s.floor);
+    return std::min(1.0, (gap - std::abs(with - share)) / (gap - s.floor));
   };
   const double at_peak = closed(std::clamp(with, low, high));
   s.closed = closed(observed);

@@ -15,11 +15,12 @@ struct Fit;
 /// with the best penalised likelihood there is used on the held-out ones (an empty list of terms: none). Measures:
 /// log score per collision below that of a flexible model (the chosen one plus a ridge-fitted shift in every cell of
 /// the gap map, cross-fitted), and CRPS of the next speed. The floor is the same measure on data of the chosen model
-/// itself. Intervals are 90 % over trials, by a bootstrap of 400 draws.
+/// itself. Intervals are 90 % over trials, by a bootstrap of 400 draws; that of the share closed ends at 1.
+/// @param given  its evaluation is that of the model as given
 /// @param rivals  fits of the same model; none: the recalibrated model stands for the chosen one
 /// @param folds  >= 2 @throws std::invalid_argument for fewer
 /// @param heartbeat  called before every fit, from any thread, one at a time; may throw to stop
-std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& recalibrated,
+std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& given, const Fit& recalibrated,
                                      const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
                                      const std::function<void()>& heartbeat = {});
 

@@ -150,6 +150,14 @@ std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& 
   return all;
 }
 
+void bound_evidence(std::vector<LeftInFacet>& alone, double gain, const std::vector<LeftInFacet>& beside) {
+  for (LeftInFacet& facet : alone)
+    for (const LeftInFacet& left : beside)
+      if (left.facet == facet.facet && left.aspect == facet.aspect && left.stance == facet.stance)
+        facet.evidence = std::min(facet.evidence,
+                                  evidence_of_gain(std::max(0.0, gain) + left.quadratic, std::max(1.0, facet.degrees)));
+}
+
 double evidence_of_more(const std::vector<LeftInFacet>& facets) {
   if (facets.empty()) return -std::numeric_limits<double>::infinity();
   double most = -std::numeric_limits<double>::infinity(), sum = 0;

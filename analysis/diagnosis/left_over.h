@@ -25,6 +25,11 @@ struct LeftInFacet {
 /// @param collisions, stances  2 Delta log likelihood that an error of form may leave in a facet, see PhaseGain
 std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, double collisions, double stances);
 
+/// Bounds the evidence of facets by a hypothesis that was fitted: a facet beside it, which includes the facet alone,
+/// gains no more than it and what it leaves in the facet. Far from the fit scores promise more than that.
+/// @param gain  2 Delta log likelihood of the hypothesis over the fit of `alone`  @param beside  what it leaves
+void bound_evidence(std::vector<LeftInFacet>& alone, double gain, const std::vector<LeftInFacet>& beside);
+
 /// Returns the log of the mean of the facets' Bayes factors: something without a name, in a facet that nobody told.
 /// -infinity where there are none.
 double evidence_of_more(const std::vector<LeftInFacet>& facets);

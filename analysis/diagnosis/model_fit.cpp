@@ -1,6 +1,7 @@
 #include "analysis/diagnosis/model_fit.h"
 
 #include <algorithm>
+#include <boost/math/tools/minima.hpp>
 #include <cmath>
 
 #include "markov/dense_matrix.h"
@@ -248,6 +249,25 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   result.log_likelihood = counted(result.evaluation, weights);
   result.penalised = best;
   return result;
+}
+
+std::vector<double> given_values(const TransitionModel& model) {
+  constexpr int bits = 10;  // of the best value
+  std::vector<double> values = nominal_values(model);
+  for (std::size_t p = 0; p < values.size(); ++p) {
+    const Nuisance& n = model.nuisances()[p];
+    if (!n.assumed) continue;
+    const auto cost = [&](double value) {
+      values[p] = value;
+      const double off = (value - n.nominal) / n.prior_sd;
+      return 0.5 * off * off - model.evaluate(values, {}).total();
+    };
+    const double reach = 3 * n.prior_sd;
+    values[p] = boost::math::tools::brent_find_minima(cost, std::max(n.lower, n.nominal - reach),
+                                                      std::min(n.upper, n.nominal + reach), bits)
+                    .first;
+  }
+  return values;
 }
 
 Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,

@@ -5,33 +5,48 @@
 #include <tuple>
 
 #include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/effect_scan.h"
+#include "dynamics/wheel/truncated_normal.h"
 #include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 namespace {
 
 constexpr double score_90 = 1.6448536269514722;  // half-width of a two-sided interval
+constexpr double surely_there = 6;               // gain of an effect whose interval does not hold none of it
+constexpr double least_weight = 1e-3;            // of a variant, to widen an interval
+
+std::vector<EstimatedParameter> as_reported(const EffectTerm& term) {
+  std::vector<EstimatedParameter> all;
+  for (const NamedValue& one : term.candidate->report(term.variant, term.values))
+    all.push_back({one.first, one.second, one.second, one.second, false});
+  return all;
+}
+
+// Of an effect of one value reported numbers are monotone in it: its ends are theirs.
+std::vector<EstimatedParameter> between(const EffectTerm& term, double low, double high) {
+  std::vector<EstimatedParameter> all = as_reported(term);
+  const FreeParameter& p = term.candidate->parameters[0];
+  for (const double end : {low, high}) {
+    const auto there = term.candidate->report(term.variant, {std::clamp(end, p.lower, p.upper)});
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      all[k].fitted = all[k].fitted || there[k].second != all[k].value;
+      all[k].lower = std::min(all[k].lower, there[k].second);
+      all[k].upper = std::max(all[k].upper, there[k].second);
+    }
+  }
+  return all;
+}
 
 std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::MatrixXd& covariance,
-                                          Eigen::Index first) {
-  const std::vector<double>& variant = term.variant;
-  const std::vector<NamedValue> here = term.candidate->report(variant, term.values);
-  std::vector<EstimatedParameter> all;
-  for (const NamedValue& one : here) all.push_back({one.first, one.second, one.second, one.second, false});
+                                          Eigen::Index first = 0) {
   const auto count = term.values.size();
-  if (count == 1) {  // reported numbers are monotone in the one value: its ends are theirs
-    const FreeParameter& p = term.candidate->parameters[0];
+  if (count == 1) {
     const double half = score_90 * std::sqrt(std::max(0.0, covariance(first, first)));
-    for (const double end : {-half, half}) {
-      const auto there = term.candidate->report(variant, {std::clamp(term.values[0] + end, p.lower, p.upper)});
-      for (std::size_t k = 0; k < all.size(); ++k) {
-        all[k].lower = std::min(all[k].lower, there[k].second);
-        all[k].upper = std::max(all[k].upper, there[k].second);
-        all[k].fitted = all[k].fitted || there[k].second != here[k].second;
-      }
-    }
-    return all;
+    return between(term, term.values[0] - half, term.values[0] + half);
   }
+  const std::vector<NamedValue> here = term.candidate->report(term.variant, term.values);
+  std::vector<EstimatedParameter> all = as_reported(term);
   // The slopes of the reported numbers carry the covariance over.
   for (std::size_t k = 0; k < all.size(); ++k) {
     Eigen::VectorXd slope(static_cast<Eigen::Index>(count));
@@ -39,7 +54,8 @@ std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::M
       std::vector<double> moved = term.values;
       const double step = term.candidate->parameters[p].step;
       moved[p] += step;
-      slope[static_cast<Eigen::Index>(p)] = (term.candidate->report(variant, moved)[k].second - here[k].second) / step;
+      slope[static_cast<Eigen::Index>(p)] =
+          (term.candidate->report(term.variant, moved)[k].second - here[k].second) / step;
     }
     const auto block = covariance.block(first, first, slope.size(), slope.size());
     const double half = score_90 * std::sqrt(std::max(0.0, slope.dot(block * slope)));
@@ -48,6 +64,80 @@ std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::M
     all[k].fitted = half > 0;
   }
   return all;
+}
+
+// Where the likelihood is flat at an effect's value (a foot that always sticks) its curvature there says nothing, and
+// an interval would hold the neutral value that the gain excludes: towards it the likelihood itself is followed.
+std::vector<EstimatedParameter> off_neutral(const TransitionModel& model, const RankedCause& ranked, double half) {
+  const EffectTerm& term = ranked.terms[0];
+  const double neutral = term.candidate->parameters[0].neutral;
+  const double allowed = score_90 * score_90 / 2;  // fall of the log likelihood
+  double out = neutral, in = term.values[0];
+  for (int halving = 0; halving < 12; ++halving) {
+    EffectTerm tried = term;
+    tried.values[0] = (out + in) / 2;
+    const double fall = ranked.fit.log_likelihood - model.evaluate(ranked.fit.nuisance, {&tried, 1}).total();
+    (fall > allowed ? out : in) = tried.values[0];
+  }
+  return neutral < term.values[0] ? between(term, in, term.values[0] + half) : between(term, term.values[0] - half, in);
+}
+
+// Holds what one of an effect's variants says of its numbers.
+struct VariantSays {
+  std::vector<EstimatedParameter> numbers;
+  double weight = 1;
+};
+
+// Returns the value below which the variants put this share of a number.
+double quantile(const std::vector<VariantSays>& all, std::size_t number, double share) {
+  double low = all[0].numbers[number].lower, high = all[0].numbers[number].upper, weights = 0;
+  for (const VariantSays& one : all) {
+    const EstimatedParameter& e = one.numbers[number];
+    low = std::min(low, e.lower);
+    high = std::max(high, e.upper);
+    weights += one.weight;
+  }
+  const auto below = [&](double x) {
+    double sum = 0;
+    for (const VariantSays& one : all) {
+      const EstimatedParameter& e = one.numbers[number];
+      const double half = x < e.value ? e.value - e.lower : e.upper - e.value;
+      sum += one.weight * (half > 0 ? dynamics::normal_cdf(score_90 * (x - e.value) / half) : x >= e.value);
+    }
+    return sum / weights;
+  };
+  for (int halving = 0; halving < 60; ++halving) (below((low + high) / 2) < share ? low : high) = (low + high) / 2;
+  return high;
+}
+
+// Widens the intervals of an effect of one value by what its other variants say, as the scores at the recalibrated
+// model have them, scaled to what the fit made of its own.
+void cover_variants(const RankedCause& ranked, const EffectScan& scan, std::vector<EstimatedParameter>& fitted) {
+  const EffectTerm& term = ranked.terms[0];
+  const auto scanned = std::ranges::find(scan.effects, term.candidate, &ScannedEffect::candidate);
+  if (scanned == scan.effects.end() || term.values.size() != 1) return;
+  const std::vector<std::vector<double>>& variants = term.candidate->variants;
+  const auto listed = std::ranges::find(variants, term.variant);
+  const std::size_t own =
+      listed == variants.end() ? scanned->best : static_cast<std::size_t>(listed - variants.begin());
+  const FreeParameter& p = term.candidate->parameters[0];
+  const double promised = scanned->start[own][0];
+  const double factor = promised != 0 ? std::clamp((term.values[0] - p.neutral) / promised, 0.5, 2.0) : 1;
+  std::vector<VariantSays> all{{fitted}};
+  for (std::size_t v = 0; v < variants.size(); ++v) {
+    const double weight = std::exp(std::min(0.0, scanned->gain[v] - scanned->gain[own]) / 2);
+    const double information = scan.information(scanned->first[v], scanned->first[v]);
+    if (v == own || weight < least_weight || !(information > 0)) continue;
+    const EffectTerm other{
+        term.candidate, variants[v], {std::clamp(p.neutral + factor * scanned->start[v][0], p.lower, p.upper)}};
+    all.push_back({estimates(other, Eigen::MatrixXd::Constant(1, 1, factor * factor / information)), weight});
+  }
+  if (all.size() == 1) return;
+  for (std::size_t k = 0; k < fitted.size(); ++k)
+    if (fitted[k].fitted) {
+      fitted[k].lower = std::min(fitted[k].lower, quantile(all, k, 0.05));
+      fitted[k].upper = std::max(fitted[k].upper, quantile(all, k, 0.95));
+    }
 }
 
 // A number that one nuisance alone moves lies between its values at that one's ends, inside its bounds.
@@ -69,7 +159,7 @@ void keep_positive(const TransitionModel& model, const Fit& fit, const Eigen::Ma
 
 }  // namespace
 
-Cause described_cause(const TransitionModel& model, const RankedCause& ranked) {
+Cause described_cause(const TransitionModel& model, const RankedCause& ranked, const EffectScan& scan) {
   Cause cause;
   for (const EffectTerm& term : ranked.terms) cause.effects.push_back(term.candidate->id);
   cause.gain = ranked.gain;
@@ -89,6 +179,13 @@ Cause described_cause(const TransitionModel& model, const RankedCause& ranked) {
     cause.parameters.push_back(estimates(term, covariance, first));
     first += static_cast<Eigen::Index>(term.values.size());
   }
+  if (ranked.terms.size() == 1 && ranked.terms[0].values.size() == 1) {
+    const EffectTerm& term = ranked.terms[0];
+    const double half = score_90 * std::sqrt(std::max(0.0, covariance(first - 1, first - 1)));
+    if (std::abs(term.values[0] - term.candidate->parameters[0].neutral) < half && ranked.gain > surely_there)
+      cause.parameters[0] = off_neutral(model, ranked, half);
+  }
+  if (ranked.terms.size() == 1) cover_variants(ranked, scan, cause.parameters[0]);
   return cause;
 }
 

@@ -38,6 +38,7 @@ struct Event {
   std::optional<double> since_previous = {};  ///< collision [s]
   double speed = 0;                           ///< given, the condition of the density [rad/s]
   std::optional<bool> rested = {};            ///< after this collision; none: not known, or no collision
+  double added = 0;                           ///< known error that a score judges with the speed observed [rad/s]
 };
 
 /// Holds the logarithm of each event's density [events] and the normal score of its probability integral transform,
@@ -56,6 +57,7 @@ struct Nuisance {
   double prior_sd = 1;
   double step = 1e-4;  ///< for differences
   double lower = 0, upper = 0;
+  bool assumed = false;  ///< nobody stated it: the model as given has it refitted
 };
 
 /// Is a parameter of an effect that is fitted.

@@ -30,8 +30,9 @@ constexpr std::size_t most_beside = 3;  // hypotheses beside which it is suppose
 constexpr double beside_margin = 12;    //   whose evidence is no further behind the best
 
 // These numbers are of odds and sets.
-constexpr double none_prior = 0.01;      // odds of none to a gap where nothing is left over
-constexpr double set_share = 0.95;       // of what the effects share that the set holds
+constexpr double most_odds_of_none = 0.25;  // to all effects, for a name to be given
+constexpr double none_prior = 0.01;         // odds of none to a gap where nothing is left over
+constexpr double set_share = 0.95;          // of what the effects share that the set holds
 constexpr double least_of_first = 0.05;  // one less likely than this share of the first is not named for completeness
 constexpr double told_apart = 6;         // 2 Delta log likelihood that makes odds of 20 to 1
 
@@ -65,6 +66,7 @@ double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRa
                 cause->evidence,
                 left_by_facet(model, cause->fit, tolerated * gained.collisions, tolerated * gained.stances)};
     for (const EffectTerm& term : cause->terms) one.beside.push_back(term.candidate->id);
+    bound_evidence(d.causes.unnamed.front().facets, cause->gain, one.facets);
     one.evidence += evidence_of_more(one.facets);
     joined += std::exp(cause->evidence - top);
     beside += std::exp(std::min(largest_log_odds, one.evidence - top));
@@ -98,13 +100,13 @@ std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& 
     if (cause.not_decided.empty())
       ordered.push_back(&cause);
     else
-      d.causes.not_decided.push_back(described_cause(model, cause));
+      d.causes.not_decided.push_back(described_cause(model, cause, ranking.scan));
   }
   for (const RankedCause& pair : ranking.pairs) {
     if (std::isfinite(pair.evidence))
       ordered.push_back(&pair);
     else
-      d.causes.not_decided.push_back(described_cause(model, pair));
+      d.causes.not_decided.push_back(described_cause(model, pair, ranking.scan));
   }
   std::stable_sort(ordered.begin(), ordered.end(),
                    [](const RankedCause* a, const RankedCause* b) { return a->evidence > b->evidence; });
@@ -144,8 +146,9 @@ bool leaves_gap_held_out(const Diagnosis& d, double bent) {
          log_score.with_effect * static_cast<double>(d.data.collisions) > least_left_in_all;
 }
 
-double share_probabilities(Diagnosis& d, const TransitionModel& model, const std::vector<const RankedCause*>& ordered,
-                           std::size_t candidates, bool gap, double none) {
+double share_probabilities(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
+                           const std::vector<const RankedCause*>& ordered, std::size_t candidates, bool gap,
+                           double none) {
   const double top = ordered.empty() ? 0 : std::max(0.0, ordered.front()->evidence);
   const double effects = std::max<double>(1, static_cast<double>(candidates));
   const double weight_null = std::exp(-top);
@@ -162,7 +165,7 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const std
   d.causes.p_none = weight_none / sum;
   (d.gap.p_recalibration < recalibration_level ? d.causes.p_recalibrate : d.causes.p_no_gap) = weight_null / sum;
   for (const RankedCause* cause : ordered) {
-    Cause one = described_cause(model, *cause);
+    Cause one = described_cause(model, *cause, ranking.scan);
     one.probability = share * std::exp(cause->evidence - top) / effects / sum;
     d.causes.ranked.push_back(std::move(one));
   }
@@ -175,7 +178,7 @@ void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) 
     if (d.verdict == Verdict::recalibrate) d.causes.set = {std::string(dynamics::contact_distribution_id)};
     return;
   }
-  if (none >= 1) {
+  if (none >= most_odds_of_none) {
     d.verdict = Verdict::unexplained;
     return;
   }

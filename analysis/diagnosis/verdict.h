@@ -34,10 +34,12 @@ bool leaves_gap_held_out(const Diagnosis& d, double bent);
 
 /// Shares probabilities over everything; the prior gives a gap even odds, shared by the effects. Returns the share of
 /// the effects together.
-double share_probabilities(Diagnosis& d, const TransitionModel& model, const std::vector<const RankedCause*>& ordered,
-                           std::size_t candidates, bool gap, double none);
+double share_probabilities(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
+                           const std::vector<const RankedCause*>& ordered, std::size_t candidates, bool gap,
+                           double none);
 
-/// Sets verdict, set, and what of it acts alike.
+/// Sets verdict, set, and what of it acts alike. A name is given only where the effects together are four times as
+/// likely as none of them. @param none  odds of none of the effects to all of them
 void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects);
 
 }  // namespace metastable::analysis

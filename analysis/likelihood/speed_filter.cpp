@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "dynamics/wheel/truncated_normal.h"
 
@@ -40,9 +41,10 @@ SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, doub
       noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
       slack2_(slack * slack),
       law2_(law_error * law_error),
-      scatter2_(law_scatter * law_scatter),
+      scatter2_(std::max(0.0, law_scatter * law_scatter - extension.noise_sd * extension.noise_sd)),
       slide_error_(slide_error),
-      memory_(memory(extension.memory)),
+      memory_(extension.memory),
+      told_(memory_ == 0 ? 0 : memory(memory_) / memory_),
       blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
 
 SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {
@@ -153,11 +155,25 @@ SpeedFilter::Out SpeedFilter::rest(const ExtendedWheel& wheel, const StepContext
   return out;
 }
 
-// The chance of a lower score is that given the previous collision's.
+// Returns mean and standard deviation of the next score, given those before.
+std::pair<double, double> SpeedFilter::foreseen() const {
+  return {std::sqrt(told_) * memory_ * recalled_, std::sqrt(1 - told_ * memory_ * memory_ * (1 - doubt_))};
+}
+
+// What contacts remember is a state of its own, of which a score tells a part: it outlasts what the last score says.
+void SpeedFilter::remember(double score) {
+  const double part = std::sqrt(told_), before = memory_ * recalled_;
+  const double variance = 1 - memory_ * memory_ * (1 - doubt_);
+  const double gain = part * variance / (told_ * variance + 1 - told_);
+  recalled_ = before + gain * (score - part * before);
+  doubt_ = (1 - gain * part) * variance;
+}
+
+// The chance of a lower score is that given the collisions before.
 double SpeedFilter::conditional(double below) const {
-  if (memory_ == 0 || !previous_) return std::clamp(below, 1e-300, 1.0);
-  return std::max(1e-300,
-                  normal_cdf((score_of_probability(below) - memory_ * *previous_) / std::sqrt(1 - memory_ * memory_)));
+  if (memory_ == 0) return std::clamp(below, 1e-300, 1.0);
+  const auto [mean, sd] = foreseen();
+  return std::max(1e-300, normal_cdf((score_of_probability(below) - mean) / sd));
 }
 
 SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepContext& context, double plus,
@@ -177,19 +193,19 @@ SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepC
   return weighed(density, below, rate);
 }
 
-// Returns what a transition's density and distribution function say, given the collision before.
+// Returns what a transition's density and distribution function say, given the collisions before.
 SpeedFilter::Out SpeedFilter::weighed(double density, double below, double rate) {
   Out out;
   out.log_density = density > 0 ? std::max(least_log_density, std::log(density * rate)) : least_log_density;
   const double z = score_of_probability(below);
   out.score = z;
   out.unit = density > 0 ? std::clamp(normal_density(z) / (density * rate), 1e-4, 2.0) : 0.3;
-  if (memory_ != 0 && previous_) {
-    const double left = std::sqrt(1 - memory_ * memory_);
-    out.score = (z - memory_ * *previous_) / left;
-    out.log_density += log_normal(out.score) - log_normal(z) - std::log(left);
+  if (memory_ != 0) {
+    const auto [mean, sd] = foreseen();
+    out.score = (z - mean) / sd;
+    out.log_density += log_normal(out.score) - log_normal(z) - std::log(sd);
+    remember(z);
   }
-  previous_ = z;
   return out;
 }
 

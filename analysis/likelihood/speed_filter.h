@@ -2,6 +2,7 @@
 // A filter follows the speed of one trial through its noisy measurements.
 
 #include <optional>
+#include <utility>
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/likelihood/memory_of_scores.h"
@@ -61,6 +62,8 @@ class SpeedFilter {
   double chance_below(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound) const;
 
  private:
+  std::pair<double, double> foreseen() const;
+  void remember(double score);
   double conditional(double below) const;
   Out transition(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus, double rate,
                  double blur);
@@ -72,10 +75,11 @@ class SpeedFilter {
   const ScoreTilt& tilt_;
   double noise2_;  // variance of a reported speed
   double slack2_, law2_, scatter2_, slide_error_;
-  double memory_;  // of scores
+  double memory_;  // of contacts
+  double told_;    // share of it that a score tells
   bool blurred_;
   double mean_ = 0, variance_ = 0;
-  std::optional<double> previous_;  // collision's score
+  double recalled_ = 0, doubt_ = 1;  // mean and variance of what contacts remember, after the last score
   // Tells, under `settled`, the speed before the collision whose omega+ the mean now is; nothing: it is that speed's.
   struct Before {
     double mean, variance;

@@ -25,7 +25,7 @@ std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::option
     all[Slot::log_plus_ratio] = {"log plus_ratio", 0, 0.003, 1e-4, -0.03, 0.03};
     all[Slot::log_next_ratio] = {"log next_ratio", 0, 5e-4, 1e-5, -0.005, 0.005};
   }
-  if (noise) all[at_noise] = {"log noise_sd", std::log(*noise), 0.5, 1e-3, std::log(5e-6), 0};
+  if (noise) all[at_noise] = {"log noise_sd", std::log(*noise), 0.5, 1e-3, std::log(5e-6), 0, true};
   return all;
 }
 

@@ -118,18 +118,26 @@ void complete_contexts(WheelRuns& measured) {
   }
 }
 
-// Says by how much each stance misses the model's next speed [rad/s].
-std::vector<double> stance_residuals(const WheelRuns& measured) {
-  std::vector<double> residual;
+// Says by how much each stance misses the model's next speed [rad/s], by condition and leg.
+std::vector<std::vector<double>> stance_residuals(const WheelRuns& measured) {
+  const std::size_t legs = measured.wheel.leg_length.size();
+  std::vector<std::vector<double>> residual(measured.conditions.size() * legs);
   const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
   for (const WheelRun& run : measured.runs) {
     const ExtendedWheel& stated = wheels[run.condition];
     for (std::size_t k = 0; k + 1 < run.collisions.size(); ++k)
       if (run.collisions[k].after)
         if (const auto next = expected_next(stated, run.collisions[k].context, run.collisions[k]))
-          residual.push_back(run.collisions[k + 1].before - *next);
+          residual[run.condition * legs + static_cast<std::size_t>(run.collisions[k].context.leg)].push_back(
+              run.collisions[k + 1].before - *next);
   }
   return residual;
+}
+
+// Returns the median distance of values from `middle`.
+double median_deviation(std::vector<double> values, double middle) {
+  for (double& value : values) value = std::abs(value - middle);
+  return median(values);
 }
 
 // A stated noise is that of the sensor, the digits' comes to it, and a stated 0 means as good as the digits. Where
@@ -143,8 +151,10 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
     measured.notes.push_back(
         fmt::format("sensor noise of {:.2g} rad/s is stated: {:.2g} rad/s taken, that of the digits printed", *stated,
                     measured.noise));
+  std::vector<std::vector<double>> groups;
+  if (measured.speeds_after) groups = stance_residuals(measured);
   std::vector<double> residual;
-  if (measured.speeds_after) residual = stance_residuals(measured);
+  for (const std::vector<double>& group : groups) residual.insert(residual.end(), group.begin(), group.end());
   if (residual.size() < least_stances) {
     if (stated) return;
     measured.noise = assumed_noise;
@@ -152,12 +162,19 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
     return;
   }
   const double middle = median(residual), size = std::sqrt(static_cast<double>(residual.size()));
-  for (double& r : residual) r = std::abs(r - middle);
-  const double deviation = median(residual);
+  const double overall = median_deviation(residual, middle);
+  // What legs and ramps do to all their stances is no noise.
+  constexpr std::size_t fewest = 8;  // of one leg on one ramp
+  auto own = residual.begin();
+  for (const std::vector<double>& group : groups) {
+    const double its_middle = group.size() < fewest ? middle : median(group);
+    own = std::transform(group.begin(), group.end(), own, [&](double value) { return value - its_middle; });
+  }
+  const double deviation = median_deviation(residual, 0);
   double seen = std::max(least, median_deviation_to_sd * deviation / two_speeds);
   measured.noise_seen = seen;
   if (seen < least * (1 + chance_of_deviation / size)) seen = least;
-  measured.exact_stances = stated.value_or(0) < rounding && std::abs(middle) < rounding && deviation < rounding;
+  measured.exact_stances = stated.value_or(0) < rounding && std::abs(middle) < rounding && overall < rounding;
   if (measured.exact_stances) {
     measured.noise = seen;
     measured.notes.push_back("the stances repeat the model to rounding, as simulated ones do: they are left out");
@@ -382,6 +399,7 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
       if (!last) {
         if (after) event.speed = *m.after;
         if (after) event.rested.reset();
+        event.added = run.collisions[k + 1].law_error;
         if (!after || !measured.exact_stances) add(after ? EventKind::stance : EventKind::step);
       } else if ((!after || !measured.landings.empty()) && run.outcome) {
         if (after) event.rested.reset();  // its collision said so

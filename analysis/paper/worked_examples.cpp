@@ -1,5 +1,6 @@
 #include "analysis/paper/worked_examples.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "analysis/experiment/reality.h"
@@ -74,9 +75,11 @@ Experiment believed_half_as_wide(Experiment e, VariabilitySource source) {
   return e;
 }
 
-std::vector<UnderLaw> under_both_laws(const Experiment& experiment) {
+std::vector<UnderLaw> under_each_law(const Experiment& experiment) {
+  std::vector<dynamics::Law> laws{dynamics::Law::published, dynamics::Law::coulomb};
+  if (std::find(laws.begin(), laws.end(), experiment.contact.law) == laws.end()) laws.push_back(experiment.contact.law);
   std::vector<UnderLaw> all;
-  for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb}) {
+  for (const dynamics::Law law : laws) {
     UnderLaw one{law, false, experiment};
     one.experiment.contact.law = law;
     all.push_back(one);

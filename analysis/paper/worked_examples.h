@@ -43,7 +43,7 @@ struct UnderLaw {
   bool whole_steps = false;  ///< omega_plus is left out, so that steps count and not collisions
   Experiment experiment;
 };
-/// Puts it under `published` and `coulomb`, each with omega_plus and, where it was measured, without.
-std::vector<UnderLaw> under_both_laws(const Experiment& experiment);
+/// Puts it under `published`, `coulomb` and its own law, each with omega_plus and, where it was measured, without.
+std::vector<UnderLaw> under_each_law(const Experiment& experiment);
 
 }  // namespace metastable::analysis

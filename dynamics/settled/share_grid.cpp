@@ -11,6 +11,11 @@ namespace {
 constexpr int speeds = 15, restitutions = 13, places = 20;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
 constexpr double just_above = 1e-7;           // mu_r, of the first place
+// Are the places at which a wheel of so much more J is followed, for the changes with J: every so many speeds and
+// restitutions.
+constexpr double more_inertia = 1.1;
+constexpr int speed_stride = 2, restitution_stride = 2;
+constexpr double most_rate = 0.03;  // of the share kept with ln J, beside what a plastic landing keeps
 
 // Fills all places of one leg at one restitution.
 void fill(LandingShares& grid, const SettledMap& map, int leg, int row) {
@@ -72,6 +77,57 @@ LandingShares::Drag drag_of(const SettledMotion& motion, int leg, double omega, 
   return drag;
 }
 
+// Says what a leg's landings are at the axes that `grid` has.
+LandingShares::Leg plain_leg(const SettledMap& map, int leg) {
+  const SettledWheel& wheel = map.motion().wheel();
+  const Triangle both = triangle(wheel.length(leg - 1), wheel.length(leg), wheel.leg_angle());
+  LandingShares::Leg one;
+  one.sticking = map.sticking_friction(leg);
+  one.gyration_sq = wheel.gyration_sq();
+  one.chord = both.chord;
+  one.ahead = both.contact_x;
+  one.height = both.hub_height + wheel.tip_radius;
+  one.plastic = plastic_share(one.chord, one.ahead, one.height, one.gyration_sq);
+  const StandingFoot& foot = map.motion().foot(leg);
+  one.barrier_squared = foot.barrier_squared();
+  one.next_gain = foot.next_squared(0);
+  one.next_rate = foot.next_squared(1) - one.next_gain;
+  one.pace = foot.pace();
+  return one;
+}
+
+// Fills the changes with ln J of one leg from those of a heavier wheel on a coarse grid, by straight lines.
+void fill_rates(LandingShares& grid, const LandingShares& heavier, int leg) {
+  const auto values_at = [&](std::vector<float>& rates, const std::vector<float>& own, const std::vector<float>& its,
+                             std::size_t stride) {
+    const auto coarse = [&](int i, int j, std::size_t k) {
+      return (its[heavier.cell(leg, i, j) * stride + k] -
+              own[grid.cell(leg, i * speed_stride, j * restitution_stride) * stride + k]) /
+             std::log(more_inertia);
+    };
+    for (int i = 0; i < grid.speed.count; ++i)
+      for (int j = 0; j < grid.restitution.count; ++j) {
+        const int slow = std::min(i / speed_stride, heavier.speed.count - 2),
+                  low = std::min(j / restitution_stride, heavier.restitution.count - 2);
+        const double fast = static_cast<double>(i) / speed_stride - slow,
+                     high = static_cast<double>(j) / restitution_stride - low;
+        for (std::size_t k = 0; k < stride; ++k)
+          rates[grid.cell(leg, i, j) * stride + k] =
+              static_cast<float>((1 - fast) * ((1 - high) * coarse(slow, low, k) + high * coarse(slow, low + 1, k)) +
+                                 fast * ((1 - high) * coarse(slow + 1, low, k) + high * coarse(slow + 1, low + 1, k)));
+      }
+  };
+  const auto parts = static_cast<std::size_t>(grid.parts);
+  values_at(grid.resting_rate, grid.resting, heavier.resting, 1);
+  values_at(grid.kept_rate, grid.kept, heavier.kept, parts);
+  // Where feet are unsettled a kink has passed between the two: that is no rate.
+  const auto of_leg = static_cast<std::size_t>(leg);
+  const double plastic = (heavier.legs[of_leg].plastic - grid.legs[of_leg].plastic) / std::log(more_inertia);
+  const std::size_t count = grid.kept_rate.size() / grid.legs.size();
+  for (std::size_t i = of_leg * count; i < (of_leg + 1) * count; ++i)
+    if (std::abs(grid.kept_rate[i] - plastic) > most_rate) grid.kept_rate[i] = static_cast<float>(plastic);
+}
+
 }  // namespace
 
 std::shared_ptr<const LandingShares> share_grid(
@@ -88,16 +144,7 @@ std::shared_ptr<const LandingShares> share_grid(
   grid->parts = places;
   double settles = slowest;
   for (int leg = 0; leg < wheel.legs(); ++leg) {
-    const StandingFoot& foot = map->motion().foot(leg);
-    LandingShares::Leg one;
-    one.sticking = map->sticking_friction(leg);
-    const Triangle both = triangle(wheel.length(leg - 1), wheel.length(leg), wheel.leg_angle());
-    const double height = both.hub_height + wheel.tip_radius;
-    one.plastic = plastic_share(both.chord, both.contact_x, height, wheel.gyration_sq());
-    one.barrier_squared = foot.barrier_squared();
-    one.next_gain = foot.next_squared(0);
-    one.next_rate = foot.next_squared(1) - one.next_gain;
-    one.pace = foot.pace();
+    LandingShares::Leg one = plain_leg(*map, leg);
     one.settles_below = settles_below(*map, leg, std::min(mean + sd, most_settled_restitution), slowest, fastest);
     settles = std::max(settles, one.settles_below);
     one.drag =
@@ -106,16 +153,38 @@ std::shared_ptr<const LandingShares> share_grid(
   }
   grid->speed = {slowest, std::max(settles, slowest + (fastest - slowest) / 10), speeds};
   grid->resize();
-  const auto rows = static_cast<std::size_t>(restitutions);
+  SettledWheel more = wheel;
+  more.radius_of_gyration *= std::sqrt(more_inertia);
+  const std::shared_ptr<const SettledMap> map_of_more = SettledMap::of(more, options);
+  LandingShares heavier = *grid;
+  heavier.speed.count = (speeds - 1) / speed_stride + 1;
+  heavier.restitution.count = (restitutions - 1) / restitution_stride + 1;
+  for (int leg = 0; leg < wheel.legs(); ++leg)
+    heavier.legs[static_cast<std::size_t>(leg)] = plain_leg(*map_of_more, leg);
+  heavier.resize();
+  const auto rows = static_cast<std::size_t>(restitutions),
+             coarse = static_cast<std::size_t>(heavier.restitution.count);
   const bool alike = std::all_of(wheel.leg_length.begin(), wheel.leg_length.end(),
                                  [&](double length) { return length == wheel.leg_length.front(); });
   const std::size_t followed = alike ? 1 : grid->legs.size();
-  const auto work = [&](std::size_t i) { fill(*grid, *map, static_cast<int>(i / rows), static_cast<int>(i % rows)); };
+  const auto work = [&](std::size_t i) {
+    const auto leg = static_cast<int>(i / (rows + coarse)), row = static_cast<int>(i % (rows + coarse));
+    if (row < restitutions)
+      fill(*grid, *map, leg, row);
+    else
+      fill(heavier, *map_of_more, leg, row - restitutions);
+  };
+  const std::size_t all = followed * (rows + coarse);
   if (executor)
-    executor(followed * rows, work);
+    executor(all, work);
   else
-    for (std::size_t i = 0; i < followed * rows; ++i) work(i);
-  for (std::vector<float>* values : {&grid->resting, &grid->kept, &grid->displacement}) {
+    for (std::size_t i = 0; i < all; ++i) work(i);
+  grid->resting_rate.resize(grid->resting.size());
+  grid->kept_rate.resize(grid->kept.size());
+  grid->displacement_rate.resize(grid->displacement.size());
+  for (std::size_t leg = 0; leg < followed; ++leg) fill_rates(*grid, heavier, static_cast<int>(leg));
+  for (std::vector<float>* values : {&grid->resting, &grid->kept, &grid->displacement, &grid->resting_rate,
+                                     &grid->kept_rate, &grid->displacement_rate}) {
     const auto of_leg = static_cast<std::ptrdiff_t>(values->size() / grid->legs.size());
     for (std::size_t leg = followed; leg < grid->legs.size(); ++leg)
       std::copy_n(values->begin(), of_leg, values->begin() + static_cast<std::ptrdiff_t>(leg) * of_leg);

@@ -5,6 +5,7 @@
 #include <boost/math/quadrature/gauss.hpp>
 #include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
@@ -20,6 +21,7 @@ namespace {
 constexpr double farthest_score = 4.6;  // scores beyond it weigh 4e-6
 
 constexpr double finest = 0.05, widest = 0.8;  // spacing of nodes
+constexpr double far_from_zero = 4;            // a mean of mu, in sds: that mu ends at 0 shows no more
 
 // Adds nodes in the standard score between `from` and `to`, with the normal's probabilities: equally spaced where it
 // fades out at both ends (then the rule converges exponentially), panels of Gauss-Legendre nodes where it is cut.
@@ -139,6 +141,33 @@ class PublishedCollision {
     return one;
   }
 
+  // Returns the restitution that loses as much without friction; below 0: there is none. A root passes mu = 0 there,
+  // and with it the density that friction has at 0 comes or goes.
+  double without_friction() const {
+    const double squared = (1 - loss_.loss * loss_.a) / loss_.kept;
+    return squared > 0 ? std::sqrt(squared) / change_.restitution_ratio : -1.0;
+  }
+  // Returns the score of the larger friction that loses as much.
+  double friction_score(const FrictionRoots& roots, std::size_t at) const {
+    return (roots.upper[at] - friction_.mean()) / friction_.sd();
+  }
+  double friction_score(double restitution) const { return friction_score(alone(restitution), 0); }
+  bool reaches_no_friction() const { return friction_.mean() < far_from_zero * friction_.sd(); }
+
+  // Returns the least restitution that can lose so little, between one that cannot and one that can. Roots are found
+  // from the friction that loses least from then on: where they meet they must do so at that restitution.
+  double least_restitution(double edge, double next) {
+    double least = next;
+    for (int i = 0; i < 2 && alone(edge).discriminant[0] <= 0 && alone(next).discriminant[0] > 0; ++i) {
+      std::uintmax_t iterations = 40;
+      least = boost::math::tools::toms748_solve([&](double eta) { return alone(eta).discriminant[0]; }, edge, next,
+                                                boost::math::tools::eps_tolerance<double>(40), iterations)
+                  .second;
+      loss_.usual_friction = alone(least).upper[0];
+    }
+    return least;
+  }
+
   // Solves for one restitution alone.
   FrictionRoots alone(double restitution) const {
     FrictionRoots roots;
@@ -167,37 +196,44 @@ class PublishedCollision {
   double loss_rate_ = 0;  // -d loss/d omega+
 };
 
-// Sums over eta from the least restitution that can lose so little: near it the density grows like an inverse square
-// root, and t with eta = least + t^2 is the variable.
-// @param edge, next  restitutions on either side of the least one
-SpeedDensity sum_from_least_restitution(const PublishedCollision& collision, const ContactSpread& contact, double mass,
-                                        double edge, double next) {
-  std::uintmax_t iterations = 40;
-  const double low =
-      boost::math::tools::toms748_solve([&](double eta) { return collision.alone(eta).discriminant[0]; }, edge, next,
-                                        boost::math::tools::eps_tolerance<double>(40), iterations)
-          .second;
-  const double high = std::max(next, std::min(1.0, contact.restitution_mean + farthest_score * contact.restitution_sd));
-  using Rule = boost::math::quadrature::gauss<double, 30>;
+// Sums over eta from `low` on. Where that is the least restitution that can lose so little the density grows like an
+// inverse square root, and t with eta = low + t^2 is the variable.
+// @param pieces  ends of the pieces in which the density is smooth, rising from low
+SpeedDensity sum_over_restitution(const PublishedCollision& collision, const ContactSpread& contact, double mass,
+                                  double low, std::initializer_list<double> pieces) {
+  using Rule = boost::math::quadrature::gauss<double, 10>;
+  constexpr double panel_width = 4;  // in sds of either variable
+  constexpr int most_panels = 40;
   const auto score = [&](double eta) { return (eta - contact.restitution_mean) / contact.restitution_sd; };
-  const double half = std::sqrt(high - low) / 2;
-  const double scale = 2 * half / (contact.restitution_sd * mass);
   SpeedDensity result{0, (normal_cdf(score(low)) - normal_cdf(score(0))) / mass};
   FrictionRoots roots;
   std::array<double, FrictionRoots::most> weight;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < Rule::abscissa().size(); ++i)
-    for (const double side : {1.0, -1.0}) {
-      const double t = half * (1 + side * Rule::abscissa()[i]), eta = low + t * t;
-      weight[count] = Rule::weights()[i] * t * scale * normal_density(score(eta));
-      collision.add(roots, count++, eta, contact_duration(eta));
+  double from = low, friction_from = collision.friction_score(low), friction = friction_from;
+  for (const double to : pieces) {
+    const double friction_to = collision.friction_score(to);  // it runs nearly evenly along t
+    const double width = std::max(friction_to - friction_from, 2 * (to - from) / contact.restitution_sd);
+    const int panels = width < most_panels * panel_width ? static_cast<int>(width / panel_width) + 1 : most_panels;
+    const double start = std::sqrt(from - low), half = (std::sqrt(to - low) - start) / (2 * panels);
+    for (int panel = 0; panel < panels && friction < farthest_score; ++panel) {
+      const double middle = start + half * (2 * panel + 1), scale = 2 * half / (contact.restitution_sd * mass);
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < Rule::abscissa().size(); ++i)
+        for (const double side : {1.0, -1.0}) {
+          const double t = middle + side * half * Rule::abscissa()[i], eta = low + t * t;
+          weight[count] = Rule::weights()[i] * t * scale * normal_density(score(eta));
+          collision.add(roots, count++, eta, contact_duration(eta));
+        }
+      collision.solve(roots, count);
+      for (std::size_t i = 0; i < count; ++i) {
+        if (!(roots.discriminant[i] > 0)) continue;
+        const SpeedDensity one = collision.of(roots, i);
+        result.below += weight[i] * one.below;
+        result.density += weight[i] * one.density;
+      }
+      friction = collision.friction_score(roots, count - 1);
     }
-  collision.solve(roots, count);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!(roots.discriminant[i] > 0)) continue;
-    const SpeedDensity one = collision.of(roots, i);
-    result.below += weight[i] * one.below;
-    result.density += weight[i] * one.density;
+    from = to;
+    friction_from = friction_to;
   }
   result.below = std::clamp(result.below, 0.0, 1.0);
   return result;
@@ -263,7 +299,15 @@ SpeedDensity CollisionDensity::at(const Collision& collision, double before, dou
 
 SpeedDensity CollisionDensity::published(const Collision& c, double before, double after, const CollisionChange& change,
                                          double speed) const {
-  const PublishedCollision collision(model_, contact_, c, before, after, change, speed);
+  PublishedCollision collision(model_, contact_, c, before, after, change, speed);
+  const double lowest = std::max(0.0, contact_.restitution_mean - farthest_score * contact_.restitution_sd);
+  const double highest = std::min(1.0, contact_.restitution_mean + farthest_score * contact_.restitution_sd);
+  const double cut = collision.reaches_no_friction() ? collision.without_friction() : -1.0;
+  if (cut > lowest && cut < highest) {
+    const bool all = collision.alone(lowest).discriminant[0] > 0;
+    const double low = all ? lowest : collision.least_restitution(lowest, cut);
+    return sum_over_restitution(collision, contact_, restitution_mass_, low, {cut, highest});
+  }
   const double spacing = collision.spacing();
   std::size_t level = 0;
   for (double s = widest; level + 1 < nodes_.size() && s > 1.01 * spacing; s /= 2) ++level;
@@ -296,7 +340,9 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
     if (node.restitution > edge && (!next || node.restitution < next->restitution)) next = &node;
   if (!next || next->weight * collision.of(collision.alone(next->restitution), 0).density < 1e-4 * result.density)
     return result;
-  return sum_from_least_restitution(collision, contact_, restitution_mass_, edge, next->restitution);
+  return sum_over_restitution(collision, contact_, restitution_mass_,
+                              collision.least_restitution(edge, next->restitution),
+                              {std::max(next->restitution, highest)});
 }
 
 SpeedDensity CollisionDensity::coulomb(const Collision& c, double before, double after, const CollisionChange& change,

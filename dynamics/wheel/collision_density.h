@@ -34,10 +34,10 @@ struct SpeedDensity {
 /// Gives the density of omega+ just after a collision of a rolling wheel (u0 = 0) with random (eta, mu): under
 /// `published` a sum over eta with mu in closed form (the root of (18)-(34) in mu), under `coulomb` a sum over mu with
 /// eta in closed form, the sticking collisions (mu >= mu_c) being one term. The sum is trapezoidal in the normal score,
-/// Gauss-Legendre where truncation, or the least restitution that can lose so little, cuts inside 4.6 sds. Error below
-/// 4e-4 of the peak while mu's mean is four sds above 0 (6e-3 of the probability is lost where it is two): smooth
-/// enough in every parameter for a likelihood of thousands of collisions to be climbed. LandingDensity is the exact,
-/// slower way. One value costs about a microsecond.
+/// Gauss-Legendre where truncation, the least restitution that can lose so little, or the one that does without
+/// friction cuts inside 4.6 sds. Error below 4e-4 of the peak while mu's mean is four sds above 0, below 2e-3 where it
+/// is nearer: smooth enough in every parameter for a likelihood of thousands of collisions to be climbed.
+/// LandingDensity is the exact, slower way. One value costs about a microsecond, some where friction reaches 0.
 class CollisionDensity {
  public:
   /// @throws std::invalid_argument for `plastic`, which has neither eta nor mu, and for sds <= 0

@@ -77,6 +77,16 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
         extension.rolling * drag.lost[0] + extension.viscous * drag.lost[1] + extension.air * drag.lost[2];
     if (std::abs(standing) > 0) geometry_[k].drag_ratio = landing / standing;
   }
+  std::vector<double> gyration_sq;
+  bool same = true;
+  for (std::size_t k = 0; k < legs; ++k) {
+    const Collision c = collision({.leg = static_cast<int>(k)}, 1);
+    gyration_sq.push_back(geometry_[k].inertia / model_.mass - c.contact_x * c.contact_x - c.contact_y * c.contact_y);
+    geometry_[k].gyration_sq = gyration_sq.back();
+    const double of_grid = landings_->legs[k].gyration_sq;
+    same = same && std::abs(gyration_sq.back() - of_grid) <= 1e-9 * of_grid;
+  }
+  if (!same) landings_ = std::make_shared<const LandingShares>(landings_->of_gyration(gyration_sq));
 }
 
 double ExtendedWheel::local_slope(double position) const {
@@ -279,7 +289,7 @@ SettledLanding ExtendedWheel::landing(const StepContext& context, double omega) 
   at.ahead = c.contact_x;
   at.height = c.contact_y;
   at.chord = c.chord;
-  at.gyration_sq = leg.inertia / model_.mass - at.ahead * at.ahead - at.height * at.height;
+  at.gyration_sq = leg.gyration_sq;
   at.barrier_squared = stated.barrier_squared + climb * climb - leg.stated_barrier * leg.stated_barrier;
   at.loss_ratio = change(context, omega).loss_ratio;
   const Path way = path(context);

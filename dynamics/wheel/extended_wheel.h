@@ -114,6 +114,7 @@ class ExtendedWheel {
   struct Leg {
     Triangle triangle;  // of the collision in which it lands
     double length = 0, before = 0, inertia = 0;
+    double gyration_sq = 0;  // of its landing; `settled`
     double eccentric_phase = 0;
     double stated_gain = 0, stated_barrier = 0;  // of the stated wheel's stance, of omega^2
     double drag_ratio = 1;  // what resisting torques take off beside what they take off a foot that stands

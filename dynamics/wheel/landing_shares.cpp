@@ -8,6 +8,8 @@
 namespace metastable::dynamics {
 namespace {
 
+constexpr double farthest = 4;  // ratio of two J that straight lines in ln J are followed to
+
 // Returns the index of the node below a value and the weight of the one above.
 std::pair<int, double> between_nodes(const LandingShares::GridAxis& axis, double value) {
   const double at = std::clamp((value - axis.low) / (axis.high - axis.low), 0.0, 1.0) * (axis.count - 1);
@@ -33,6 +35,10 @@ double plastic_share(double chord, double ahead, double height, double gyration_
   return kept * kept;
 }
 
+double sticking_friction(double ahead, double height, double gyration_sq) {
+  return ahead * height / (gyration_sq + height * height);
+}
+
 void LandingShares::resize() {
   resting.resize(legs.size() * static_cast<std::size_t>(speed.count * restitution.count));
   kept.resize(resting.size() * static_cast<std::size_t>(parts));
@@ -41,6 +47,25 @@ void LandingShares::resize() {
 
 std::size_t LandingShares::cell(int leg, int at_speed, int at_restitution) const {
   return static_cast<std::size_t>((leg * speed.count + at_speed) * restitution.count + at_restitution);
+}
+
+LandingShares LandingShares::of_gyration(const std::vector<double>& gyration_sq) const {
+  LandingShares other = *this;
+  for (std::size_t leg = 0; leg < legs.size(); ++leg) {
+    Leg& one = other.legs[leg];
+    const double change = std::log(std::clamp(gyration_sq[leg] / one.gyration_sq, 1 / farthest, farthest));
+    one.gyration_sq = gyration_sq[leg];
+    one.sticking = sticking_friction(one.ahead, one.height, one.gyration_sq);
+    one.plastic = plastic_share(one.chord, one.ahead, one.height, one.gyration_sq);
+    const auto move = [&](std::vector<float>& values, const std::vector<float>& rate) {
+      const std::size_t count = values.size() / legs.size();
+      for (std::size_t i = leg * count; i < (leg + 1) * count; ++i) values[i] += static_cast<float>(change) * rate[i];
+    };
+    move(other.resting, resting_rate);
+    move(other.kept, kept_rate);
+    move(other.displacement, displacement_rate);
+  }
+  return other;
 }
 
 LandingShares::SharesAtSpeed::SharesAtSpeed(const LandingShares& grid, int leg, double omega)

@@ -25,6 +25,10 @@ struct LandingShares {
   struct Leg {
     Drag drag;
     double sticking = 0;         ///< mu_c
+    double gyration_sq = 0;      ///< J / M about the centre of mass [m^2]
+    double chord = 0;            ///< between the feet [m]
+    double ahead = 0;            ///< of the landing foot, ahead of the centre of mass [m]
+    double height = 0;           ///< below it [m]
     double plastic = 0;          ///< share of omega^2 that a foot keeps which sticks and does not spring
     double barrier_squared = 0;  ///< least omega_eq^2 that passes [rad^2/s^2]
     double next_rate = 1;        ///< omega-^2 of the next touch is next_rate omega_eq^2 + next_gain
@@ -38,9 +42,14 @@ struct LandingShares {
   std::vector<float> resting;             ///< by leg, speed, restitution: mu_r; mu_c where even a sticking foot rests
   std::vector<float> kept, displacement;  ///< ... and place: carried omega^2 / omega-^2, slide of the foot [m]
 
-  /// Sizes the lists for `legs`.
+  /// Are the changes of these with ln J, by straight lines; a grid without them is not read at another J.
+  std::vector<float> resting_rate, kept_rate, displacement_rate;
+
+  /// Sizes the lists for `legs`, but for the changes.
   void resize();
   std::size_t cell(int leg, int speed, int restitution) const;
+  /// Returns the landings of a wheel of other J. @param gyration_sq  J / M by leg [m^2]
+  LandingShares of_gyration(const std::vector<double>& gyration_sq) const;
   double part(int place) const { return static_cast<double>(place) * place / ((parts - 1.0) * (parts - 1.0)); }
 
   /// Holds a landing's omega_eq^2 / omega-^2 and the slide of its foot [m].
@@ -67,6 +76,8 @@ struct LandingShares {
   SharesAtSpeed place(int leg, double omega) const { return {*this, leg, omega}; }
 };
 
+/// Returns mu_c.
+double sticking_friction(double ahead, double height, double gyration_sq);
 /// Returns the share of omega^2 that a foot keeps which sticks and does not spring. @param chord between the feet [m]
 /// @param ahead, height of the landing foot: ahead of the centre of mass, below it [m]; @param gyration_sq J / M [m^2]
 double plastic_share(double chord, double ahead, double height, double gyration_sq);

@@ -28,7 +28,7 @@ struct SettledLanding {
   /// Returns omega- at the next touch from omega_eq^2 [rad/s]; rising.
   double next(double omega_eq_squared) const;
 
-  double sticking() const { return ahead * height / (gyration_sq + height * height); }  ///< mu_c
+  double sticking() const { return sticking_friction(ahead, height, gyration_sq); }  ///< mu_c
   /// Returns the part of omega- that the first impact takes at eta = 0 if the foot sticks.
   double plastic_loss() const;
   /// Returns what multiplies the speed lost in a first impact: of that plastic one the energy lost is multiplied by

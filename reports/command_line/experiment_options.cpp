@@ -189,7 +189,8 @@ Command lessons() {
   return {"lessons",
           "Worked examples of the diagnosis: the published law on a coulomb wheel, the paper's hypotheses, data",
           [](Options& o) {
-            o.add("data", "DIR", "", "Repeatable: an experiment folder, diagnosed under published and coulomb");
+            o.add("data", "DIR", "",
+                  "Repeatable: an experiment folder, diagnosed under published, coulomb and its own law");
             o.add_seed();
             o.add_threads();
             o.add("out", "DIR", "lessons", "Folder for tables, figures and index.html");

@@ -225,7 +225,7 @@ class Lessons {
     const std::string id = fmt::format("data-{}", number);
     Table table = answers(id + "-answers", experiment.title, "nominal law");
     std::vector<Table> in_words;
-    for (const analysis::UnderLaw& one : analysis::under_both_laws(experiment)) {
+    for (const analysis::UnderLaw& one : analysis::under_each_law(experiment)) {
       const std::string_view law = dynamics::law_name(one.law);
       const std::string what = fmt::format("{}{}", law, one.whole_steps ? ", whole steps (omega_plus left out)" : "");
       const Diagnosis d = diagnosed(one.experiment, what, request_);

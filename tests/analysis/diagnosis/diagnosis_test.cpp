@@ -161,7 +161,7 @@ TEST(Diagnosis, TriesThePairsAskedFor) {
 TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   auto conditions = stand_in_conditions(stand_in_setting());
   const dynamics::LaboratorySetup setup =
-      laboratory_setup(conditions, {.outside = {{"speed_spread", 0.45}}, .sensor_noise = 0.008, .seed = 27});
+      laboratory_setup(conditions, {.outside = {{"speed_spread", 0.45}}, .sensor_noise = 0.008, .seed = 31});
   const ExperimentFiles files = reality_files(conditions, setup, run_laboratory(setup, 0), {}).files;
   const Experiment experiment =
       parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});

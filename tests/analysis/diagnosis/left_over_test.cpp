@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/model_fit.h"
 #include "tests/analysis/line.h"
 
@@ -53,6 +54,21 @@ TEST(LeftOver, LevelsAreHonest) {
   }
   EXPECT_LE(believed, sets / 20);
   EXPECT_NEAR(below / facets, 0.05, 0.02);  // facets share events: some four standard deviations
+}
+
+// A hypothesis that leaves nothing in a facet explains all of it, whatever the scores had promised.
+TEST(LeftOver, AFacetExplainsNoMoreThanWhatRemovesIt) {
+  const LeftInFacet leg{.facet = "leg", .aspect = "mean", .quadratic = 40, .degrees = 2, .evidence = 15};
+  LeftInFacet stance = leg;
+  stance.stance = true;
+  LeftInFacet left = leg;
+  left.quadratic = 3;
+  std::vector<LeftInFacet> alone{leg, stance};
+  bound_evidence(alone, 20, {left});
+  EXPECT_EQ(alone[0].evidence, evidence_of_gain(20 + 3, 2));
+  EXPECT_EQ(alone[1].evidence, 15);  // nobody judged it
+  bound_evidence(alone, 1000, {left});
+  EXPECT_EQ(alone[0].evidence, evidence_of_gain(20 + 3, 2));
 }
 
 // How many collisions are far ones is how their distribution is shaped; the spread of all of them is judged.

@@ -65,5 +65,23 @@ TEST(ModelFit, StaysInsideItsBounds) {
   EXPECT_EQ(held.terms[0].values[0], 0);
 }
 
+// Nobody stated how much the line scatters: about the mean that is stated, 0, by the root of the mean square.
+class OfUnstatedNoise : public test::Line {
+ public:
+  OfUnstatedNoise(std::vector<double> y, std::vector<double> w) : Line(std::move(y), std::move(w)) {
+    nuisances_[1].assumed = true;
+  }
+};
+
+TEST(GivenValues, RefitWhatWasOnlyAssumed) {
+  const std::vector<double> y{1, -2, 2, 4, -1, 3, 0.5, -2.5};
+  double squares = 0;
+  for (const double value : y) squares += value * value / static_cast<double>(y.size());
+  const std::vector<double> values = given_values(OfUnstatedNoise(y, std::vector<double>(y.size(), 0.0)));
+  EXPECT_EQ(values[0], 0);
+  EXPECT_NEAR(values[1], 0.5 * std::log(squares), 1e-2);
+  EXPECT_EQ(given_values(test::Line(y, std::vector<double>(y.size(), 0.0)))[1], 0);
+}
+
 }  // namespace
 }  // namespace metastable::analysis

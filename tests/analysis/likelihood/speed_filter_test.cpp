@@ -2,8 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <numbers>
+#include <random>
+#include <vector>
+
+#include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {
@@ -43,6 +49,37 @@ TEST(SpeedFilter, NextSpeedAndRestShareAProbabilityOfOne) {
             EXPECT_NEAR(sum, 1, 4e-3) << omega << ' ' << noise;
           }
         }
+}
+
+// Where a score tells only part of what contacts remember, that outlasts the last score: what is left of the scores
+// remembers nothing.
+TEST(SpeedFilter, WhatContactsRememberOutlastsTheLastScore) {
+  constexpr double rho = 0.8, told = 0.7, omega = 4.9;
+  constexpr int collisions = 3000;
+  const dynamics::ContactSpread contact{0.487, 0.034, 0.435, 0.037};
+  dynamics::Extension extension;
+  extension.memory = rho;
+  const dynamics::ExtendedWheel wheel(dynamics::Wheel{}, 7.02 * degree, dynamics::Law::published, contact, extension);
+  const ScoreTilt tilt(0, 0);
+  SpeedFilter filter(extension, tilt, 1e-4, 0, 0, 0, 1e-3, {.linear = told});
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal;
+  double remembered = normal(generator);
+  std::vector<double> left;
+  for (int k = 0; k < collisions; ++k) {
+    const double z = std::clamp(std::sqrt(told) * remembered + std::sqrt(1 - told) * normal(generator), -2.5, 2.5);
+    const auto [low, high] = boost::math::tools::bisect(
+        [&](double plus) { return wheel.after_collision({}, omega, plus).below - dynamics::normal_cdf(z); }, 0.5, 4.8,
+        boost::math::tools::eps_tolerance<double>(30));
+    filter.start(omega);
+    left.push_back(filter.collision(wheel, {}, (low + high) / 2).score);
+    remembered = rho * remembered + std::sqrt(1 - rho * rho) * normal(generator);
+  }
+  for (const std::size_t lag : {std::size_t{0}, std::size_t{1}, std::size_t{2}}) {
+    double sum = 0;
+    for (std::size_t k = lag; k < left.size(); ++k) sum += left[k] * left[k - lag] / collisions;
+    EXPECT_NEAR(sum, lag == 0 ? 1 : 0, lag == 0 ? 0.1 : 3 / std::sqrt(collisions)) << lag;
+  }
 }
 
 }  // namespace

@@ -59,8 +59,9 @@ TEST(WorkedExamples, ALaunchThatIsNotStatedHasNoWidth) {
   EXPECT_THROW(believed_half_as_wide(e, VariabilitySource::launch), std::invalid_argument);
 }
 
-TEST(WorkedExamples, BothLawsWithAndWithoutTheSpeedAfter) {
-  const std::vector<UnderLaw> all = under_both_laws(test::wheel_design(2, 3));
+TEST(WorkedExamples, EachLawWithAndWithoutTheSpeedAfter) {
+  Experiment settled = test::wheel_design(2, 3);
+  const std::vector<UnderLaw> all = under_each_law(settled);
   ASSERT_EQ(all.size(), 4u);
   EXPECT_EQ(all[0].experiment.contact.law, dynamics::Law::published);
   EXPECT_EQ(all[2].experiment.contact.law, dynamics::Law::coulomb);
@@ -68,7 +69,10 @@ TEST(WorkedExamples, BothLawsWithAndWithoutTheSpeedAfter) {
   EXPECT_TRUE(all[1].whole_steps);
   EXPECT_EQ(all[1].experiment.columns.omega_plus, Presence::none);
   EXPECT_FALSE(all[1].experiment.trials[0].collisions[0].omega_plus);
-  EXPECT_EQ(under_both_laws(test::wheel_design(2, 3, false)).size(), 2u);
+  EXPECT_EQ(under_each_law(test::wheel_design(2, 3, false)).size(), 2u);
+  settled.contact.law = dynamics::Law::settled;
+  ASSERT_EQ(under_each_law(settled).size(), 6u);
+  EXPECT_EQ(under_each_law(settled)[4].experiment.contact.law, dynamics::Law::settled);
 }
 
 }  // namespace

@@ -238,7 +238,7 @@ std::vector<BuiltEffect> built_effects() {
       {"slope_offset", with([](Extension& e) { e.slope_offset_rad = 0.25 * degree; }),
        [] { return SettledMotion(rigid(equal_wheel(), slope + 0.25 * degree)); }, 0.05},
       {"hub_inertia", with([](Extension& e) { e.hub_inertia_ratio = 1.2; }),
-       [heavier] { return heavier(rigid(equal_wheel()), 1.2); }, 0.35},
+       [heavier] { return heavier(rigid(equal_wheel()), 1.2); }, 0.02},
       {"axle_drag_viscous", with([](Extension& e) { e.viscous = 0.002; }),
        [dragged] { return dragged([](SettledWheel& w) { w.linear_drag = 0.002; }); }, 0.1},
       {"rolling_resistance", with([](Extension& e) { e.rolling = 0.01; }),
