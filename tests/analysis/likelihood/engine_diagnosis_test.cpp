@@ -5,7 +5,7 @@
 
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/likelihood/diagnose.h"
-#include "tests/engine/engine_wheel.h"
+#include "tests/analysis/likelihood/engine_wheel.h"
 
 namespace metastable::analysis {
 namespace {
@@ -14,21 +14,21 @@ const EstimatedParameter& parameter(const std::vector<EstimatedParameter>& all, 
   return *std::ranges::find(all, name, &EstimatedParameter::name);
 }
 
-TEST(Engine, ARigidBodyIsNoGapOrARecalibrationOfAFewPerCent) {
+TEST(EngineDiagnosis, ARigidBodyIsNoGapOrARecalibrationOfAFewPerCent) {
   const Diagnosis d = diagnose(test::engine_experiment({.seed = 11}));
   EXPECT_TRUE(d.verdict == Verdict::no_gap || d.verdict == Verdict::recalibrate) << verdict_name(d.verdict);
   EXPECT_NEAR(parameter(d.gap.contact, "restitution_mean").value, 0.4, 0.015);
   EXPECT_NEAR(parameter(d.gap.contact, "friction_mean").value, 0.4, 0.01);
 }
 
-TEST(Engine, AnOddLegIsNamedWithItsFriction) {
+TEST(EngineDiagnosis, AnOddLegIsNamedWithItsFriction) {
   const Diagnosis d = diagnose(test::engine_experiment({.seed = 12, .odd_leg = 5, .friction_ratio = 0.88}));
   ASSERT_EQ(d.causes.set, std::vector<std::string>{"leg_contact"});
   EXPECT_NEAR(parameter(d.causes.ranked.front().parameters.front(), "friction_ratio").value, 0.88, 0.03);
   EXPECT_EQ(parameter(d.causes.ranked.front().parameters.front(), "leg").value, 5);
 }
 
-TEST(Engine, ADragAtTheAxleIsInTheSetWithItsSize) {
+TEST(EngineDiagnosis, ADragAtTheAxleIsInTheSetWithItsSize) {
   const Diagnosis d = diagnose(test::engine_experiment({.seed = 13, .viscous_drag = 0.004}));
   ASSERT_EQ(d.verdict, Verdict::explained);
   EXPECT_LE(d.causes.set.size(), 3u);

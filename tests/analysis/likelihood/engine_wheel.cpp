@@ -1,4 +1,4 @@
-#include "tests/engine/engine_wheel.h"
+#include "tests/analysis/likelihood/engine_wheel.h"
 
 #include <fmt/format.h>
 #include <ode/ode.h>
