@@ -77,7 +77,7 @@ struct Tally {
   std::map<int, std::pair<double, int>> set_size;  // sum, sets
   double beyond_alike = 0, most_beyond_alike = 0;  // names of sets at 2x, sum and most
   Proportion absorbed, interval, shrinkage;
-  Proportion both, both_findable, no_third, no_third_first;
+  Proportion both, both_findable, no_third, no_third_first, no_third_alike;
   Proportion misnamed, unexplained;
   Proportion left_misnamed, left_right;
   std::vector<std::pair<double, bool>> forecasts;  // probability of the first cause, and whether it is right
@@ -154,6 +154,7 @@ void count_pair(Tally& tally, const BlindTruth& truth, const Answer& answer) {
   };
   tally.no_third.count(std::any_of(answer->cause_set.begin(), answer->cause_set.end(), of_the_two));
   tally.no_third_first.count(of_the_two(answer->cause_set.front()));
+  tally.no_third_alike.count(of_the_two(answer->cause_set.front()) || std::ranges::any_of(answer->alike, of_the_two));
 }
 
 void count_outside(Tally& tally, const Answer& answer) {
@@ -262,6 +263,7 @@ std::vector<Grade> measures(Tally tally) {
   add("  each with power left beside the other", tally.both_findable, 0.7, 1);
   add("two effects: no false third, up to stated ambiguity", tally.no_third, 0.9, 1);
   add("  in the first of the set", tally.no_third_first, 0.9, 1);
+  add("  in the first of the set, or what is alike to it", tally.no_third_alike, 0.9, 1);
   add("where: claims in cases without a gap", tally.place_alarms, 0, 0.1);
   for (const int strength : {2, 4})
     add(fmt::format("where: right facet, {}x", strength), tally.facet[strength], 0.9, 1);

@@ -156,7 +156,8 @@ struct Diagnosis {
     std::vector<Unnamed> unnamed;  ///< supposed beside the likeliest hypotheses
     std::vector<std::string> set;  ///< names; empty if unexplained or no gap
     /// Lists those of the set that no data like these could tell from its first, that one included: the design's
-    /// information leaves less than 2 Delta log likelihood 6 between them at the size found. Empty where there is none.
+    /// information leaves less than 2 Delta log likelihood 6 between them at the size found. Pairs are alike where they
+    /// share one effect and the others are, at what the first's gains beside it. Empty where there is none.
     std::vector<std::string> alike;
     std::vector<StepwiseChoice> stepwise;  ///< what the field's usual selection names, for comparison
     std::string size;                      ///< of the likeliest beside the nominal model, a sentence; or empty

@@ -42,10 +42,27 @@ std::string common_name(const std::vector<std::string>& alike) {
   return "one and the same here";
 }
 
+// Returns what all causes of a group have in common, if they are pairs that do; else nothing.
+std::string common_effect(const Diagnosis& d) {
+  for (const std::string& effect : d.causes.ranked.front().effects)
+    if (std::ranges::all_of(d.causes.alike, [&](const std::string& name) {
+          return name.starts_with(effect + "+") || name.ends_with("+" + effect);
+        }))
+      return effect;
+  return "";
+}
+
 // Lists the set, what acts alike as one group.
 std::string grouped_set(const Diagnosis& d) {
   if (d.causes.alike.empty()) return fmt::format("{}", fmt::join(d.causes.set, ", "));
-  std::string text = fmt::format("{} ({})", common_name(d.causes.alike), fmt::join(d.causes.alike, ", "));
+  std::vector<std::string> group = d.causes.alike;
+  const std::string common = common_effect(d);
+  if (!common.empty())
+    for (std::string& name : group)
+      name = name.starts_with(common + "+") ? name.substr(common.size() + 1)
+                                            : name.substr(0, name.size() - common.size() - 1);
+  std::string text =
+      fmt::format("{}{} ({})", common_name(group), common.empty() ? "" : " beside " + common, fmt::join(group, ", "));
   for (const std::string& name : d.causes.set)
     if (std::ranges::find(d.causes.alike, name) == d.causes.alike.end()) text += ", " + name;
   return text;

@@ -78,17 +78,37 @@ double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRa
          (joined > 0 ? unnamed_beside * beside / joined : 0);
 }
 
-// Lists what the design itself cannot tell from the first of the set.
+// Says whether the design itself cannot tell two effects apart where the first of them gains that much.
+bool acts_alike(const Diagnosis& d, const std::string& effect, const std::string& other, double gain) {
+  const auto seen = std::ranges::find(d.limits.visible, effect, &Visibility::effect);
+  if (seen == d.limits.visible.end()) return false;
+  const auto share = std::ranges::find(seen->alike, other, &std::pair<std::string, double>::first);
+  return share != seen->alike.end() && (1 - share->second) * gain < told_apart;
+}
+
+// Lists what the design itself cannot tell from the first of the set. Of a pair one effect may be another one, with
+// what it gains beside its partner.
 void list_alike(Diagnosis& d) {
-  const Cause& first = d.causes.ranked.front();
-  const auto seen = std::ranges::find(d.limits.visible, first.name(), &Visibility::effect);
-  if (seen == d.limits.visible.end()) return;  // a pair
+  const std::vector<Cause>& ranked = d.causes.ranked;
+  const Cause& first = ranked.front();
+  const auto gain_of = [&](const std::string& name) {
+    const auto cause = std::ranges::find(ranked, name, &Cause::name);
+    return cause == ranked.end() ? 0 : cause->gain;
+  };
+  const auto alike_to_first = [&](const std::string& name) {
+    if (first.effects.size() == 1) return acts_alike(d, first.name(), name, first.gain);
+    const auto other = std::ranges::find(ranked, name, &Cause::name);
+    if (other == ranked.end() || other->effects.size() != 2) return false;
+    for (const std::size_t own : {0, 1})
+      for (const std::size_t theirs : {0, 1})
+        if (first.effects[1 - own] == other->effects[1 - theirs] &&
+            acts_alike(d, first.effects[own], other->effects[theirs], first.gain - gain_of(first.effects[1 - own])))
+          return true;
+    return false;
+  };
   std::vector<std::string> alike;
-  for (const std::string& name : d.causes.set) {
-    const auto share = std::ranges::find(seen->alike, name, &std::pair<std::string, double>::first);
-    if (name == first.name() || (share != seen->alike.end() && (1 - share->second) * first.gain < told_apart))
-      alike.push_back(name);
-  }
+  for (const std::string& name : d.causes.set)
+    if (name == first.name() || alike_to_first(name)) alike.push_back(name);
   if (alike.size() > 1) d.causes.alike = std::move(alike);
 }
 

@@ -110,11 +110,22 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
   expect(g, "  each with power left beside the other", 2, 3);
   expect(g, "two effects: no false third, up to stated ambiguity", 3, 4);
   expect(g, "  in the first of the set", 2, 4);
+  expect(g, "  in the first of the set, or what is alike to it", 2, 4);
   expect(g, "effect outside the catalogue confidently misnamed", 1, 3);
   expect(g, "effect outside the catalogue called unexplained", 1, 3);
   // leg_lengths shares the sets of leg_contact in this run: it is its own ambiguity group.
   expect(g, "left-out effect confidently misnamed", 1, 3);
   expect(g, "left-out effect unexplained, or of its ambiguity group", 2, 3);
+}
+
+TEST(BlindGrade, WhatIsAlikeToTheFirstIsNoFalseThird) {
+  const BlindTruth pair = truth(BlindKind::pair, {"inertia", "trial_drift"}, 2);
+  BlindAnswer grouped = said(Verdict::explained, {"slope_offset+trial_drift", "inertia+trial_drift"});
+  const BlindAnswer plain = grouped;
+  grouped.alike = grouped.cause_set;
+  const BlindGrades g = grade({pair, pair}, {grouped, plain});
+  expect(g, "  in the first of the set", 0, 2);
+  expect(g, "  in the first of the set, or what is alike to it", 1, 2);
 }
 
 TEST(BlindGrade, StepwiseSelectionIsSetBesideTheDiagnosis) {

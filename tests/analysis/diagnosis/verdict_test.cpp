@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
+#include <vector>
 
 #include "analysis/diagnosis/diagnosis_sentences.h"
 
@@ -38,6 +40,40 @@ TEST(Verdict, SaysThatTheNearestIsTooUnsureForAName) {
       "is none of the catalogue has probability 0.30, too much for a name.");
   EXPECT_EQ(first_sentence(4),
             "There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
+}
+
+// A drift beside one of three, two of which the design hardly tells apart.
+Diagnosis with_pairs(double share) {
+  Diagnosis d;
+  for (const auto& [effects, gain, probability] :
+       {std::tuple{std::vector<std::string>{"trial_drift", "inertia"}, 100.0, 0.5},
+        {std::vector<std::string>{"slope_offset", "trial_drift"}, 99.0, 0.3},
+        {std::vector<std::string>{"trial_drift", "bounce"}, 97.0, 0.15},
+        {std::vector<std::string>{"trial_drift"}, 60.0, 0.0}}) {
+    Cause cause;
+    cause.effects = effects;
+    cause.parameters.resize(effects.size());
+    cause.gain = gain;
+    cause.probability = probability;
+    d.causes.ranked.push_back(cause);
+  }
+  Visibility seen;
+  seen.effect = "inertia";
+  seen.alike = {{"slope_offset", share}, {"bounce", 0.6}};
+  d.limits.visible = {seen};
+  give_verdict(d, true, 0, 0.95);
+  return d;
+}
+
+TEST(Verdict, PairsAreAlikeWhereWhatTheyDoNotShareIs) {
+  // What inertia gains beside the drift is 40: a hundredth of it tells nothing apart, four tenths of it do.
+  EXPECT_EQ(with_pairs(0.99).causes.alike,
+            (std::vector<std::string>{"trial_drift+inertia", "slope_offset+trial_drift"}));
+  EXPECT_TRUE(with_pairs(0.8).causes.alike.empty());
+  EXPECT_EQ(
+      sentences(with_pairs(0.99)).front(),
+      "There is a gap that recalibration does not remove. These data cannot tell 3 causes apart: one and the same "
+      "here beside trial_drift (inertia, slope_offset), trial_drift+bounce.");
 }
 
 }  // namespace
