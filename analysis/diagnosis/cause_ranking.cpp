@@ -36,6 +36,7 @@ constexpr double small_start = 0.1;      // share of a size worth starting from,
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
 constexpr int law_steps = 12;            // of another law's fit, from either start
 constexpr int more_law_steps = 60;       // where it may still come near
+constexpr int more_steps = 4;            // times as many for a fit near the top that did not settle
 constexpr double law_hopeless = -100;    // log likelihood below the recalibrated model's that no more steps make good
 
 // These numbers say when a fit that did not settle is decided all the same.
@@ -343,19 +344,25 @@ void Ranker::refine_leaders() {
   });
 }
 
-// Fits once more where a fit did not settle near the top, from the nuisances that suit the leader.
+// Fits once more where a fit did not settle near the top: further along its own way, and from the nuisances that suit
+// the leader.
 void Ranker::refit_unsettled() {
   const auto best = std::max_element(singles_.begin(), singles_.end(), [](const RankedCause& a, const RankedCause& b) {
     return a.evidence < b.evidence;
   });
+  const std::vector<double> leaders_nuisance = best->fit.nuisance;
   markov::parallel_for(singles_.size(), threads_, [&](std::size_t i) {
     heartbeat();
     RankedCause& cause = singles_[i];
-    if (&cause == &*best || cause.fit.converged || !fitted(cause) || !fitted(*best) ||
-        cause.evidence < top_ - refit_margin)
+    if (cause.fit.converged || !fitted(cause) || leaders_nuisance.empty() || cause.evidence < top_ - refit_margin)
       return;
-    Fit again = fit(model_, best->fit.nuisance, cause.terms,
-                    {.count = {}, .refit_nuisances = true, .most_iterations = effort_.most_iterations});
+    const auto fit_from = [&](const std::vector<double>& nuisance, int times) {
+      return fit(model_, nuisance, cause.terms,
+                 {.count = {}, .refit_nuisances = true, .most_iterations = times * effort_.most_iterations});
+    };
+    Fit again = fit_from(cause.fit.nuisance, more_steps);
+    if (!again.converged && &cause != &*best)
+      if (Fit other = fit_from(leaders_nuisance, 1); other.penalised > again.penalised) again = std::move(other);
     if (!(again.penalised > cause.fit.penalised)) return;
     take(cause, std::move(again));
     cause.p_value = p_value(cause.terms[0].candidate, cause.gain);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
+#include <iterator>
 
 #include "markov/dense_matrix.h"
 
@@ -13,6 +14,9 @@ constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is t
 // Where no step rises, a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
 // what differences do not resolve.
 constexpr double unresolved = 0.5, unresolved_share = 1e-4;
+// Are added to the information's diagonal, as shares of it. Where a step rises by less than this share of what it
+// promised, the next one is damped more.
+constexpr double dampings[] = {1e-9, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
 constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
 
 // Holds all parameters of a hypothesis in one vector.
@@ -90,19 +94,20 @@ Eigen::VectorXd picked(const Eigen::VectorXd& all, const std::vector<Eigen::Inde
   return some;
 }
 
+// Solves with a diagonal that is so much larger: where a ridge bends, undamped steps along it leave it.
 Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::VectorXd& gradient,
-                             const std::vector<Eigen::Index>& part) {
+                             const std::vector<Eigen::Index>& part, double damping) {
   const auto size = static_cast<Eigen::Index>(part.size());
   Eigen::MatrixXd block(size, size);
   for (Eigen::Index a = 0; a < size; ++a)
     for (Eigen::Index b = 0; b < size; ++b)
       block(a, b) = information(part[static_cast<std::size_t>(a)], part[static_cast<std::size_t>(b)]);
-  block.diagonal() *= 1 + 1e-9;
+  block.diagonal() *= 1 + damping;
   return markov::solve_symmetric(block, picked(gradient, part));
 }
 
 // Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does.
-bool search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::VectorXd& step,
+void search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::VectorXd& step,
             const Eigen::VectorXd& weights, double& best, Evaluation& evaluation) {
   auto& slots = point.slots();
   std::vector<double> before;
@@ -118,11 +123,10 @@ bool search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::Ve
     if (value > best) {
       best = value;
       evaluation = std::move(tried);
-      return true;
+      return;
     }
   }
   for (std::size_t a = 0; a < part.size(); ++a) *slots[static_cast<std::size_t>(part[a])].value = before[a];
-  return false;
 }
 
 // Returns the gradient of the penalised likelihood at the point where result.derivatives were taken over `steps`. The
@@ -198,6 +202,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   result.evaluation = point.evaluate();
   double best = counted(result.evaluation, weights) + point.log_prior();
   const double start = best;
+  std::size_t level = 0;  // of damping
   const bool finite = std::isfinite(best);
   result.converged = slots.empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
@@ -210,21 +215,30 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       result.converged = true;
       break;
     }
-    // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves.
+    // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves, and all of them
+    // by steps that are damped more.
     const double before = best;
-    double promised = 0;
-    bool better = false;
-    for (const auto* part : {&parts.all, &parts.of_terms, &parts.of_nuisances}) {
-      if (part->empty()) continue;
-      const Eigen::VectorXd step = gauss_newton(result.information, result.gradient, *part);
-      const double rise = 0.5 * step.dot(picked(result.gradient, *part));
-      if (part == &parts.all) {
-        promised = rise;
-        if (!(promised > worth_a_step)) break;
-      }
-      if (rise > worth_a_step) better = search(point, *part, step, weights, best, result.evaluation);
-      if (better) break;
-    }
+    double foretold = 0;  // rise by the last step
+    const auto step_of = [&](const std::vector<Eigen::Index>& part, std::size_t damped) {
+      const Eigen::VectorXd step = gauss_newton(result.information, result.gradient, part, dampings[damped]);
+      foretold = 0.5 * step.dot(picked(result.gradient, part));
+      return step;
+    };
+    const auto rises = [&](const std::vector<Eigen::Index>& part, std::size_t damped) {
+      if (part.empty()) return false;
+      const Eigen::VectorXd step = step_of(part, damped);
+      if (foretold > worth_a_step) search(point, part, step, weights, best, result.evaluation);
+      return best - before >= worth_a_step;
+    };
+    step_of(parts.all, 0);
+    const double promised = foretold;
+    bool better = !(promised > worth_a_step) || rises(parts.all, level) || rises(parts.of_terms, 0) ||
+                  rises(parts.of_nuisances, 0);
+    while (!better && promised > unresolved && level + 1 < std::size(dampings)) better = rises(parts.all, ++level);
+    if (best - before < least_kept * foretold)
+      level = std::min(level + 1, std::size(dampings) - 1);
+    else if (level > 0)
+      --level;
     result.promised = promised;
     if (!(promised > worth_a_step)) {
       result.converged = std::isfinite(promised);
@@ -235,10 +249,6 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       // This is the optimum, up to what the differences resolve.
       result.converged = promised < unresolved + unresolved_share * (best - start);
       if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
-      break;
-    }
-    if (best - before < worth_a_step) {
-      result.converged = true;
       break;
     }
   }

@@ -11,14 +11,10 @@ namespace {
 
 using dynamics::StepContext;
 
-struct ScoreNode {  // of Gauss-Hermite's rules for the standard normal
-  double score, weight;
-};
-constexpr std::array<ScoreNode, 5> five_nodes{{{-2.856970013872806, 0.01125741132772069},
-                                               {-1.355626179974266, 0.2220759220056126},
-                                               {0, 0.5333333333333333},
-                                               {1.355626179974266, 0.2220759220056126},
-                                               {2.856970013872806, 0.01125741132772069}}};
+// Gauss-Hermite's rule serves where a trial tells less of its friction than was known before. Else its posterior is
+// narrow beside the prior: trapezoids of this width in its sds are right to 1e-3 of a likelihood.
+constexpr double wide_posterior = 0.5, width = 1.6, widest = 0.8, narrowest = 0.1, farthest = 4.2;
+constexpr double negligible = 12;  // log weight below the largest
 
 std::size_t collision_of(const Event& event) { return static_cast<std::size_t>(event.number) - 1; }
 
@@ -35,6 +31,23 @@ SpeedFilter::Out given_that_it_went_on(SpeedFilter::Out out, double rests) {
 
 }  // namespace
 
+// @param told  root of what a trial may tell of its friction, in sds of the prior
+std::vector<TrialFollower::ScoreNode> TrialFollower::nodes_for(double told) {
+  if (told == 0) return {{0, 1}};
+  if (told < wide_posterior)
+    return {{-2.856970013872806, 0.01125741132772069},
+            {-1.355626179974266, 0.2220759220056126},
+            {0, 0.5333333333333333},
+            {1.355626179974266, 0.2220759220056126},
+            {2.856970013872806, 0.01125741132772069}};
+  const double spacing = std::clamp(width / told, narrowest, widest);
+  std::vector<ScoreNode> nodes;
+  const int most = static_cast<int>(farthest / spacing);
+  for (int k = -most; k <= most; ++k)
+    nodes.push_back({k * spacing, spacing * dynamics::normal_density(k * spacing)});
+  return nodes;
+}
+
 TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, const dynamics::ExtendedWheel& wheel,
                              const WheelHypothesis& hypothesis)
     : measured_(measured),
@@ -42,13 +55,12 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       wheel_(wheel),
       day_shift_(hypothesis.shift_of(run.condition)),
       friction_sd_(hypothesis.extension.trial_friction_sd),
-      nodes_(friction_sd_ > 0 ? five_nodes.size() : 1),
-      filters_(nodes_, SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
+      nodes_(nodes_for(friction_sd_ * std::sqrt(static_cast<double>(run.collisions.size())) /
+                       hypothesis.contact.friction_sd)),
+      filters_(nodes_.size(), SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
                                    measured.slack, measured.law_error, measured.law_scatter, measured.slide_error,
                                    measured.memory)) {
-  static_assert(five_nodes.size() == most_nodes);
-  if (nodes_ > 1)
-    for (std::size_t q = 0; q < nodes_; ++q) log_weight_[q] = std::log(five_nodes[q].weight);
+  for (const ScoreNode& node : nodes_) log_weight_.push_back(std::log(node.weight));
 }
 
 void TrialFollower::come_to(const Event& event) {
@@ -59,21 +71,23 @@ void TrialFollower::come_to(const Event& event) {
 }
 
 double TrialFollower::friction_shift(std::size_t node) const {
-  return day_shift_ + (nodes_ == 1 ? 0 : five_nodes[node].score * friction_sd_);
+  return day_shift_ + nodes_[node].score * friction_sd_;
 }
 
 double TrialFollower::largest_log_weight() const {
-  return *std::max_element(log_weight_.begin(), log_weight_.begin() + nodes_);
+  return *std::max_element(log_weight_.begin(), log_weight_.end());
 }
 
 double TrialFollower::chance_of_rest(const Event& event) {
   if (!is_contact(event.kind)) return 0;
   come_to(event);
+  const double largest = largest_log_weight();
   double sum = 0, weights = 0;
-  for (std::size_t q = 0; q < nodes_; ++q) {
+  for (std::size_t q = 0; q < nodes_.size(); ++q) {
+    if (log_weight_[q] < largest - negligible) continue;
     StepContext here = run_.collisions[collision_of(event)].context;
     here.friction_shift = friction_shift(q);
-    const double w = std::exp(log_weight_[q] - largest_log_weight());
+    const double w = std::exp(log_weight_[q] - largest);
     sum += w * filters_[q].chance_below(wheel_, here, wheel_.barrier(here));
     weights += w;
   }
@@ -114,11 +128,12 @@ SpeedFilter::Out TrialFollower::see(const Event& event) {
   if (event.kind == EventKind::launch) next_ = 0;
   if (event.kind == EventKind::collision) next_ = collision_of(event);  // whether it rested may follow
   if (event.kind == EventKind::stance || event.kind == EventKind::step) next_ = collision_of(event) + 1;
-  if (nodes_ == 1) return seen_by(filters_[0], event, day_shift_);
+  if (nodes_.size() == 1) return seen_by(filters_[0], event, day_shift_);
   // The density is averaged over the nodes, which are weighed anew by it.
   const double largest = largest_log_weight();
   double before = 0, now = 0, below = 0, unit = 0;
-  for (std::size_t q = 0; q < nodes_; ++q) {
+  for (std::size_t q = 0; q < nodes_.size(); ++q) {
+    if (log_weight_[q] < largest - negligible) continue;  // it cannot come back, and its filter stays behind
     const SpeedFilter::Out out = seen_by(filters_[q], event, friction_shift(q));
     const double w = std::exp(log_weight_[q] - largest);
     before += w;

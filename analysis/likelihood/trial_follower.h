@@ -1,7 +1,6 @@
 #pragma once
 // Follows one trial through its events, as wheel_events() lists them.
 
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -13,7 +12,7 @@
 namespace metastable::analysis {
 
 /// Says what each event of one trial says, given those before it. A friction of the trial's own is integrated over by
-/// five Gauss-Hermite nodes: every node follows the trial, weighted by what it has explained. Where no event leads up
+/// nodes: every node follows the trial, weighted by what it has explained. Where no event leads up
 /// to a collision (no launch is stated, or the stances are left out), its reported speed is where the trial goes on
 /// from.
 class TrialFollower {
@@ -29,7 +28,10 @@ class TrialFollower {
   SpeedFilter::Out see(const Event& event);
 
  private:
-  static constexpr std::size_t most_nodes = 5;
+  struct ScoreNode {  // of a rule for the standard normal
+    double score, weight;
+  };
+  static std::vector<ScoreNode> nodes_for(double told);
 
   void come_to(const Event& event);
   SpeedFilter::Out seen_by(SpeedFilter& filter, const Event& event, double friction_shift) const;
@@ -41,9 +43,9 @@ class TrialFollower {
   const dynamics::ExtendedWheel& wheel_;
   double day_shift_;    // of mu
   double friction_sd_;  // of the trial's own; 0: one node, without a shift
-  std::size_t nodes_;
-  std::vector<SpeedFilter> filters_;             // by node
-  std::array<double, most_nodes> log_weight_{};  // of the nodes
+  std::vector<ScoreNode> nodes_;
+  std::vector<SpeedFilter> filters_;  // by node
+  std::vector<double> log_weight_;    // of the nodes
   std::optional<std::size_t> next_;              // the collision that the filters have come to
 };
 

@@ -140,6 +140,45 @@ double median_deviation(std::vector<double> values, double middle) {
   return median(values);
 }
 
+// Returns a word that the reported speeds make.
+std::uint64_t word_of(const WheelRuns& measured) {
+  std::uint64_t word = 0;
+  for (const WheelRun& run : measured.runs)
+    for (const RunCollision& m : run.collisions) word = std::rotl(word, 7) * 5 + std::bit_cast<std::uint64_t>(m.before);
+  return word;
+}
+
+using Landings = std::map<std::pair<std::size_t, std::size_t>, std::vector<RunCollision*>>;
+
+// Gathers collisions by condition and number.
+Landings landings_by_number(WheelRuns& measured) {
+  Landings alike;
+  for (WheelRun& run : measured.runs)
+    for (std::size_t k = 0; k < run.collisions.size(); ++k) alike[{run.condition, k}].push_back(&run.collisions[k]);
+  return alike;
+}
+
+// Digits round evenly: where they are most of the noise, the stances' errors have no tails, which no model of noise
+// foretells. A normal error of some digits is added, beside which that does not show; the noise knows of it.
+void blur_digits(WheelRuns& measured, double digits) {
+  constexpr double least_normal = 2;  // noise beside the digits', in those
+  const double rest = std::sqrt(std::max(0.0, measured.noise * measured.noise - digits * digits));
+  if (!(digits > 0) || rest >= least_normal * digits || !measured.speeds_after || measured.exact_stances) return;
+  const double added = std::sqrt(least_normal * least_normal * digits * digits - rest * rest);
+  const std::uint64_t seed = word_of(measured);
+  std::uint64_t draw = 0;
+  for (auto& [where, landings] : landings_by_number(measured)) {
+    const std::vector<double> before = even_normals(seed, draw++, landings.size());
+    const std::vector<double> after = even_normals(seed, draw++, landings.size());
+    for (std::size_t i = 0; i < landings.size(); ++i) {
+      RunCollision& m = *landings[i];
+      m.before += added * before[i];
+      if (m.after && *m.after > 0) m.after = std::max(1e-3 * *m.after, *m.after + added * after[i]);
+    }
+  }
+  measured.noise = std::hypot(measured.noise, added);
+}
+
 // A stated noise is that of the sensor, the digits' comes to it, and a stated 0 means as good as the digits. Where
 // nobody stated it, or the stances are more exact than was said, they tell it.
 void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
@@ -190,23 +229,12 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
   }
 }
 
-// Returns a word that the reported speeds make.
-std::uint64_t word_of(const WheelRuns& measured) {
-  std::uint64_t word = 0;
-  for (const WheelRun& run : measured.runs)
-    for (const RunCollision& m : run.collisions) word = std::rotl(word, 7) * 5 + std::bit_cast<std::uint64_t>(m.before);
-  return word;
-}
-
 // Adds the errors that the law may have. They are drawn evenly over a condition's trials at each collision number, and
 // anew for each experiment: the same draws in all of them would show in each as the same swing of its map.
 void blur(WheelRuns& measured) {
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<RunCollision*>> alike;
-  for (WheelRun& run : measured.runs)
-    for (std::size_t k = 0; k < run.collisions.size(); ++k) alike[{run.condition, k}].push_back(&run.collisions[k]);
   const std::uint64_t seed = word_of(measured);
   std::uint64_t draw = 0;
-  for (auto& [where, landings] : alike) {
+  for (auto& [where, landings] : landings_by_number(measured)) {
     const std::vector<double> speeds = even_normals(seed, draw++, landings.size());
     const std::vector<double> slides = even_normals(seed, draw++, landings.size());
     for (std::size_t i = 0; i < landings.size(); ++i) {
@@ -347,7 +375,10 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   complete_contexts(measured);
   for (WheelRun& run : measured.runs) mark_counted(measured, run);
   estimate_noise(measured, experiment.sensor);
-  if (measured.law == dynamics::Law::settled) prepare_settled(measured, experiment);
+  if (measured.law == dynamics::Law::settled)
+    prepare_settled(measured, experiment);
+  else
+    blur_digits(measured, experiment.sensor.last_digit.value_or(0) / std::sqrt(12.0));
   for (WheelRun& run : measured.runs) mark_jam(measured, run);
   if (experiment.columns.time == Presence::none)
     measured.notes.push_back(

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t nodes_of_restitution = 12;
 constexpr double far_score = 4.2;
-constexpr double unknown_share = 0.005, unknown_error = 0.2;  // of landings; [rad/s]
+constexpr double unknown_share = 0.002, unknown_error = 0.2;  // of landings; [rad/s]
 constexpr double thin = 0.05;                                 // a cell that counts as a point, in blurs
 
 // Weighs restitutions and frictions of one landing.

@@ -68,7 +68,7 @@ struct NextTouch {
   double slide_density = 1;  ///< of the slide given that the next foot touched, where it was seen [1/m]
 };
 
-/// Finds the next omega-, blurred by a normal error. One landing in 200 is taken as one that the law knows little of:
+/// Finds the next omega-, blurred by a normal error. One landing in 500 is taken as one that the law knows little of:
 /// its next speed is off by 0.2 rad/s. @param blur [rad/s], > 0
 NextTouch at_next_touch(const SettledLanding& landing, const SettledContact& contact, const SeenOfLanding& seen,
                         double blur, double next);

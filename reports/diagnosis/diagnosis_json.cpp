@@ -94,6 +94,19 @@ Json causes_json(const analysis::Diagnosis& d) {
   return all;
 }
 
+Json unnamed_json(const analysis::Unnamed& one) {
+  Json facets = Json::array();
+  for (const analysis::LeftInFacet& left : one.facets)
+    facets.push_back({{"facet", left.facet},
+                      {"aspect", left.aspect},
+                      {"of", left.stance ? "stances" : "collisions"},
+                      {"chi_squared", number(left.quadratic)},
+                      {"degrees", number(left.degrees)},
+                      {"p_value", number(left.p_value)},
+                      {"log_bayes_factor", number(left.evidence)}});
+  return {{"beside", one.beside}, {"log_bayes_factor", number(one.evidence)}, {"facets", facets}};
+}
+
 Json where_json(const std::vector<analysis::GapCell>& cells) {
   Json list = Json::array();
   for (const analysis::GapCell& cell : cells)
@@ -180,6 +193,7 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   json["causes"] = causes_json(d);
   json["cause_set"] = d.causes.set;
   json["cause_set_alike"] = d.causes.alike;
+  json["unnamed"] = list_json(d.causes.unnamed, unnamed_json);
   json["stepwise"] = Json::object();
   for (const auto& choice : d.causes.stepwise) json["stepwise"][choice.criterion] = choice.effects;
   json["not_decided"] = list_json(d.causes.not_decided, [](const auto& cause) {
