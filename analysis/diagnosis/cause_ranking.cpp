@@ -34,6 +34,7 @@ constexpr double alike_margin = 4;          // evidence promised below the best 
 constexpr double furthest_start = 0.25;  // share of a parameter's range
 constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
+constexpr double most_hidden = 0.3;  // logarithm of what one effect of a pair may hide of the other
 constexpr int law_steps = 12;            // of another law's fit, from either start
 constexpr int more_law_steps = 60;       // where it may still come near
 constexpr int more_steps = 4;            // times as many for a fit near the top that did not settle
@@ -175,7 +176,8 @@ class Ranker {
         effort_(effort_for(model, recalibrated)),
         scan_(scan_effects(model, recalibrated, candidates, options.threads)),
         chance_(scan_, options.draws, options.seed),
-        singles_(candidates.size()) {}
+        singles_(candidates.size()),
+        refined_(candidates.size()) {}
 
   void fit_singles();
   void fit_overlooked();
@@ -185,6 +187,7 @@ class Ranker {
   void scan_pairs();
   void scan_asked_pairs();
   void fit_pairs();
+  void refine_paired();
   void complete_pairs();
   void reach(double share) {
     share_ = share;
@@ -205,10 +208,13 @@ class Ranker {
     const std::lock_guard lock(speaking_);
     if (options_.progress) options_.progress(share_);
   }
+  void scan_beside(std::size_t leader);
+  std::size_t index_of(const Candidate* candidate) const;
+  void refine_single(std::size_t i);
   void fit_law(RankedCause& cause) const;
   void fit_effect(RankedCause& cause, const ScannedEffect& scanned) const;
   void take(RankedCause& cause, Fit better) const;
-  double gain_alone(const RankedCause& pair) const;
+  double gain_apart(const RankedCause& pair) const;
   double gain(const Fit& fit) const { return 2 * (fit.penalised - recalibrated_.penalised); }
   double p_value(const Candidate* candidate, double gain) const;
   std::vector<std::size_t> leaders(bool to_refine) const;
@@ -222,6 +228,7 @@ class Ranker {
   EffectScan scan_;
   ChanceGains chance_;
   std::vector<RankedCause> singles_, pairs_;
+  std::vector<char> refined_;  // by single effect: its variant, between the listed ones
   std::vector<Try> tries_;
   double least_p_ = 1;  // of the single effects as listed: chance is drawn for those
   double share_ = 0;
@@ -336,12 +343,15 @@ void Ranker::refine_leaders() {
   const std::vector<std::size_t> strongest = leaders(true);
   markov::parallel_for(strongest.size(), threads_, [&](std::size_t k) {
     heartbeat();
-    RankedCause& cause = singles_[strongest[k]];
-    if (cause.evidence < refined_share * top_ - refined_margin) return;
-    Fit refined = cause.fit;
-    refine_variant(model_, effort_, refined);
-    take(cause, std::move(refined));
+    if (singles_[strongest[k]].evidence >= refined_share * top_ - refined_margin) refine_single(strongest[k]);
   });
+}
+
+void Ranker::refine_single(std::size_t i) {
+  Fit refined = singles_[i].fit;
+  refine_variant(model_, effort_, refined);
+  take(singles_[i], std::move(refined));
+  refined_[i] = true;
 }
 
 // Fits once more where a fit did not settle near the top: further along its own way, and from the nuisances that suit
@@ -390,37 +400,38 @@ bool knows_start(const TransitionModel& model, const std::vector<EffectTerm>& te
                      [&](const FitStart& start) { return start.values.back() != terms.back().values; });
 }
 
-// Scans again what the leaders leave. Where the model knows better starts than the scores, the scores do not decide.
-void Ranker::scan_pairs() {
+// Scans again what a leader leaves. Where the model knows better starts than the scores, the scores do not decide.
+void Ranker::scan_beside(std::size_t leader) {
   const double prior = pair_log_prior(candidates_.size());
-  for (const std::size_t leader : leaders(false)) {
-    const RankedCause& first = singles_[leader];
-    std::vector<const Candidate*> others;
-    for (const Candidate* other : candidates_)
-      if (other != first.terms[0].candidate) others.push_back(other);
-    const EffectScan scan = scan_effects(model_, first.fit, others, threads_);
-    std::vector<std::pair<double, const ScannedEffect*>> promising;
-    for (const ScannedEffect& effect : scan.effects) {
-      const double promised = log_evidence(effect, effect.gain[effect.best]);
-      std::vector<EffectTerm> both = first.terms;
-      both.push_back(term_at(effect, effect.best));
-      if (knows_start(model_, both))
-        tries_.push_back({leader, effect});
-      else if (promised + prior > least_pair_evidence)
-        promising.emplace_back(promised, &effect);
-    }
-    std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-    for (std::size_t k = 0; k < std::min(effort_.most_partners, promising.size()); ++k)
-      tries_.push_back({leader, *promising[k].second});
+  const RankedCause& first = singles_[leader];
+  std::vector<const Candidate*> others;
+  for (const Candidate* other : candidates_)
+    if (other != first.terms[0].candidate) others.push_back(other);
+  const EffectScan scan = scan_effects(model_, first.fit, others, threads_);
+  std::vector<std::pair<double, const ScannedEffect*>> promising;
+  for (const ScannedEffect& effect : scan.effects) {
+    const double promised = log_evidence(effect, effect.gain[effect.best]);
+    std::vector<EffectTerm> both = first.terms;
+    both.push_back(term_at(effect, effect.best));
+    if (knows_start(model_, both))
+      tries_.push_back({leader, effect});
+    else if (promised + prior > least_pair_evidence)
+      promising.emplace_back(promised, &effect);
   }
+  std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  for (std::size_t k = 0; k < std::min(effort_.most_partners, promising.size()); ++k)
+    tries_.push_back({leader, *promising[k].second});
+}
+
+void Ranker::scan_pairs() {
+  for (const std::size_t leader : leaders(false)) scan_beside(leader);
 }
 
 // Scans the pairs asked for, whatever the scores promise.
 void Ranker::scan_asked_pairs() {
   for (auto [one, other] : options_.pairs) {
     if (other->parameters.empty()) std::swap(one, other);  // another law has nothing to scan
-    const auto place = std::find(candidates_.begin(), candidates_.end(), one);
-    const auto leader = static_cast<std::size_t>(place - candidates_.begin());
+    const std::size_t leader = index_of(one);
     RankedCause& first = singles_[leader];
     if (first.candidate_undecided() || !other->undecidable.empty() || other->parameters.empty()) continue;
     const bool tried = std::any_of(tries_.begin(), tries_.end(),
@@ -431,13 +442,22 @@ void Ranker::scan_asked_pairs() {
   }
 }
 
-// Sums what the two effects of a pair gain each by itself.
-double Ranker::gain_alone(const RankedCause& pair) const {
-  double alone = 0;
-  for (const RankedCause& cause : singles_)
-    for (const EffectTerm& term : pair.terms)
-      if (cause.terms[0].candidate == term.candidate) alone += std::max(0.0, cause.gain);
-  return alone;
+std::size_t Ranker::index_of(const Candidate* candidate) const {
+  return static_cast<std::size_t>(std::find(candidates_.begin(), candidates_.end(), candidate) - candidates_.begin());
+}
+
+// Sums what the two effects of a pair gain each by itself. What one scatters hides part of the other: of n normal
+// errors a gain of g says that their variance falls by exp(-g / n), by which the other's gain rises.
+double Ranker::gain_apart(const RankedCause& pair) const {
+  const auto gain_of = [&](const EffectTerm& term) { return std::max(0.0, singles_[index_of(term.candidate)].gain); };
+  const auto collisions = static_cast<double>(std::ranges::count_if(model_.events(), [](const Event& event) {
+    return event.kind == EventKind::collision || event.kind == EventKind::step;
+  }));
+  const auto beside = [&](double one, double other) {
+    return one + other * std::exp(std::min(most_hidden, one / std::max(1.0, collisions)));
+  };
+  const double one = gain_of(pair.terms[0]), other = gain_of(pair.terms[1]);
+  return std::max(beside(one, other), beside(other, one));
 }
 
 void Ranker::fit_pairs() {
@@ -453,7 +473,7 @@ void Ranker::fit_pairs() {
     const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
     pair.evidence = first.evidence + log_evidence(tries_[i].second, second) + prior;
     pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
-    pair.together = pair.gain / std::max(1.0, gain_alone(pair));
+    pair.together = pair.gain / std::max(1.0, gain_apart(pair));
   });
   // The same pair from either side counts once, the better fit.
   for (RankedCause& pair : tried) {
@@ -465,6 +485,21 @@ void Ranker::fit_pairs() {
     else if (pair.evidence > same->evidence)
       *same = std::move(pair);
   }
+}
+
+// An effect of the best pair that was not worth refining by itself is refined now, and paired anew.
+void Ranker::refine_paired() {
+  const auto best = std::max_element(
+      pairs_.begin(), pairs_.end(), [](const RankedCause& a, const RankedCause& b) { return a.evidence < b.evidence; });
+  if (best == pairs_.end() || best->evidence < top_ - alike_margin) return;
+  tries_.clear();
+  for (const EffectTerm& term : best->terms) {
+    const std::size_t i = index_of(term.candidate);
+    if (refined_[i] || term.candidate->refine.empty() || !fitted(singles_[i])) continue;
+    refine_single(i);
+    scan_beside(i);
+  }
+  fit_pairs();
 }
 
 // Beside one effect of the best pair others may act like its second one, as torques do: all that promise about as much
@@ -481,8 +516,7 @@ void Ranker::complete_pairs() {
   };
   tries_.clear();
   for (const EffectTerm& term : best->terms) {
-    const auto place = std::find(candidates_.begin(), candidates_.end(), term.candidate);
-    const auto leader = static_cast<std::size_t>(place - candidates_.begin());
+    const std::size_t leader = index_of(term.candidate);
     if (!fitted(singles_[leader])) continue;
     std::vector<const Candidate*> others;
     for (const Candidate* other : candidates_)
@@ -546,6 +580,7 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   ranker.scan_asked_pairs();
   ranker.reach(0.8);
   ranker.fit_pairs();
+  ranker.refine_paired();
   ranker.complete_pairs();
   ranker.reach(1);
   return ranker.result();

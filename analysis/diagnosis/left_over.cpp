@@ -42,7 +42,9 @@ class Gatherer {
     MapColumn column{Measure::shift, {}, 0, {}};
     for (const std::size_t i : members_) {
       const double w = weight(model_.events()[i]);
-      if (w != 0) column.terms.emplace_back(i, w * left_[i].mean);
+      if (w == 0) continue;
+      column.terms.emplace_back(i, w * left_[i].mean);
+      column.variance += w * w;
     }
     if (column.terms.size() >= least_events) facets[{facet, "mean", stance_}].push_back(std::move(column));
   }
@@ -53,6 +55,7 @@ class Gatherer {
     for (std::size_t k = lag; k < members_.size(); ++k)
       if (trial(k - lag) == trial(k))
         column.terms.emplace_back(members_[k], left_[members_[k]].mean * left_[members_[k - lag]].mean);
+    column.variance = static_cast<double>(column.terms.size());
     if (column.terms.size() >= least_events) facets[{facet, "memory", stance_}].push_back(std::move(column));
   }
 
@@ -106,11 +109,18 @@ bool is_form_of_contact(const GapCell& cell) { return cell.facet == "phase" && c
 
 // Weighs the columns' sums by what they scatter without a gap, in the directions that the fitted parameters leave.
 LeftInFacet judge(const Key& key, const Eigen::MatrixXd& dense, const Eigen::VectorXd& sums,
-                  const Eigen::VectorXd& whole, double forgiven) {
+                  const Eigen::VectorXd& whole, const std::vector<MapColumn>& columns, double forgiven) {
   LeftInFacet left{.facet = std::get<0>(key), .aspect = std::get<1>(key), .stance = std::get<2>(key)};
   const Eigen::ArrayXd root = whole.array().max(1e-300).sqrt();
   const Eigen::MatrixXd scaled = dense * root.inverse().matrix().asDiagonal();
-  const markov::SymmetricEigen split = markov::symmetric_eigen(scaled.transpose() * scaled);
+  Eigen::MatrixXd scatter = scaled.transpose() * scaled;
+  // Events that scatter less than the model's are no surer of it: scores close together have close squares, too.
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const auto c = static_cast<Eigen::Index>(k);
+    const double of_model = columns[k].variance / std::max(1e-300, whole[c]);
+    scatter(c, c) *= std::max(1.0, of_model);
+  }
+  const markov::SymmetricEigen split = markov::symmetric_eigen(scatter);
   const Eigen::VectorXd along = split.vectors.transpose() * (sums.array() / root).matrix();
   for (Eigen::Index d = 0; d < along.size(); ++d)
     if (split.values[d] > least_own) {
@@ -144,7 +154,7 @@ std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& 
   for (const auto& [key, columns] : facets) {
     const EfficientColumns efficient = project(columns, model, fit);
     if (!efficient.sums.allFinite()) continue;  // a fit far off may have no slopes to project on
-    all.push_back(judge(key, efficient.dense, efficient.sums.transpose(), efficient.whole_norm.transpose(),
+    all.push_back(judge(key, efficient.dense, efficient.sums.transpose(), efficient.whole_norm.transpose(), columns,
                         std::get<2>(key) ? stances : collisions));
   }
   return all;
