@@ -191,8 +191,12 @@ Cause described_cause(const TransitionModel& model, const RankedCause& ranked, c
 
 // Intervals follow the slopes of the reported numbers, unless those take a positive one below zero.
 std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit) {
-  const Eigen::MatrixXd covariance =
+  Eigen::MatrixXd covariance =
       markov::solve_columns(fit.information, Eigen::MatrixXd::Identity(fit.information.rows(), fit.information.cols()));
+  for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
+    const auto at = static_cast<Eigen::Index>(p);
+    covariance(at, at) += model.nuisances()[p].form_sd * model.nuisances()[p].form_sd;
+  }
   std::vector<EstimatedParameter> all;
   const std::vector<NamedValue> here = model.report_nuisances(fit.nuisance);
   for (std::size_t k = 0; k < here.size(); ++k) {

@@ -58,6 +58,7 @@ struct Nuisance {
   double step = 1e-4;  ///< for differences
   double lower = 0, upper = 0;
   bool assumed = false;  ///< nobody stated it: the model as given has it refitted
+  double form_sd = 0;    ///< what errors of the model's form move a fitted one by; its reported interval knows of it
 };
 
 /// Is a parameter of an effect that is fitted.

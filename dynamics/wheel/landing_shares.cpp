@@ -90,13 +90,18 @@ LandingShares::Kept LandingShares::SharesAtSpeed::at(double eta, double friction
   const double resting = corners.of(grid_->resting, 1, 0);
   const double part = std::min(1.0, (friction - resting) / std::max(1e-6, leg_->sticking - resting));
   const auto stride = static_cast<std::size_t>(grid_->parts);
+  // From mu_r on the share rises as a root and near mu_c evenly: in the root of the part both are smooth, and parabolas
+  // through three places hold them. Below mu_r it falls on by a straight line.
   const double along = part > 0 ? std::sqrt(part) * (grid_->parts - 1) : 0;
-  const auto below = std::min(static_cast<std::size_t>(along), stride - 2);
-  const double first = grid_->part(static_cast<int>(below)), second = grid_->part(static_cast<int>(below) + 1);
-  const double weight = (part - first) / (second - first);
+  const std::size_t below = std::min(static_cast<std::size_t>(along), stride - 2), first = below > 0 ? below - 1 : 0;
+  const double t = along - static_cast<double>(first);
+  const std::array<double, 3> weights =
+      part > 0 ? std::array{(t - 1) * (t - 2) / 2, t * (2 - t), t * (t - 1) / 2}
+               : std::array{1 - part / grid_->part(1), part / grid_->part(1), 0.0};
   const auto read = [&](const std::vector<float>& values) {
-    const double low = corners.of(values, stride, below);
-    return low + weight * (corners.of(values, stride, below + 1) - low);
+    double sum = 0;
+    for (std::size_t k = 0; k < weights.size(); ++k) sum += weights[k] * corners.of(values, stride, first + k);
+    return sum;
   };
   return {read(grid_->kept), part > 0 ? read(grid_->displacement) : corners.of(grid_->displacement, stride, 0)};
 }

@@ -9,7 +9,8 @@
 namespace metastable::dynamics {
 
 /// Says what landings on one slope keep, leg by leg. Along the axes of speed and restitution values are read by
-/// straight lines, along friction at places as the squares of even numbers between mu_r, where it is steep, and mu_c.
+/// straight lines, along friction by parabolas through places as the squares of even numbers between mu_r, where it is
+/// steep, and mu_c.
 struct LandingShares {
   struct GridAxis {
     double low = 0, high = 1;

@@ -56,6 +56,25 @@ TEST(LeftOver, LevelsAreHonest) {
   EXPECT_NEAR(below / facets, 0.05, 0.02);  // facets share events: some four standard deviations
 }
 
+// Where scores happen to lie closer together than the model says, their squares do so, too, and by the events' own
+// scatter the statistic would be 90 for the 47 that it is: n (1 - 0.75^2)^2 / 2, of which the fitted sd takes a part.
+TEST(LeftOver, EventsThatScatterLittleAreNoSurer) {
+  std::mt19937_64 generator(77);
+  std::normal_distribution<double> normal;
+  std::vector<double> y, w;
+  for (std::size_t i = 0; i < events; ++i) {
+    w.push_back(normal(generator));
+    y.push_back(3 + (i % 4 == 1 ? 0.375 : 0.5) * normal(generator));
+  }
+  const test::Line model(y, w);
+  const std::vector<LeftInFacet> left = left_by_facet(model, fit(model, {3, -0.7}, {}), 0, 0);
+  const auto by_number = std::ranges::find_if(
+      left, [](const LeftInFacet& one) { return one.facet == "collision" && one.aspect == "spread"; });
+  ASSERT_NE(by_number, left.end());
+  EXPECT_GT(by_number->quadratic, 20);
+  EXPECT_LT(by_number->quadratic, 50);
+}
+
 // A hypothesis that leaves nothing in a facet explains all of it, whatever the scores had promised.
 TEST(LeftOver, AFacetExplainsNoMoreThanWhatRemovesIt) {
   const LeftInFacet leg{.facet = "leg", .aspect = "mean", .quadratic = 40, .degrees = 2, .evidence = 15};

@@ -75,5 +75,18 @@ TEST(ParameterEstimates, OfALargeEffectDoNotHoldNoneOfIt) {
   EXPECT_NEAR(ranked.fit.log_likelihood - model.evaluate(ranked.fit.nuisance, end).total(), 1.353, 0.1);
 }
 
+// What errors of form move is added to what chance does.
+TEST(ParameterEstimates, KnowWhatTheFormOfTheModelMoves) {
+  class Rough : public test::Line {
+   public:
+    explicit Rough(double form_sd) : Line(test::line(0, 3)) { nuisances_[0].form_sd = form_sd; }
+  };
+  const auto half = [](const Rough& model) {
+    const EstimatedParameter mean = contact_estimates(model, fit(model, {3, -0.7}, {})).at(0);
+    return (mean.upper - mean.lower) / 2;
+  };
+  EXPECT_NEAR(half(Rough(0.1)), std::hypot(half(Rough(0)), 1.6449 * 0.1), 1e-3);
+}
+
 }  // namespace
 }  // namespace metastable::analysis

@@ -73,11 +73,15 @@ TEST(TrialFollower, SeesExactSpeedsAsTheModelsOwnDensities) {
   EXPECT_EQ(collisions, 3);
 }
 
+class OwnFriction : public testing::TestWithParam<double> {};
+
 // Takes the trial's own friction by a fine trapezoidal sum over all of its collisions at once, where the follower takes
-// five nodes and weighs them anew at each.
-TEST(TrialFollower, IntegratesTheTrialsOwnFriction) {
-  const double sd = 0.02;
-  const WheelRuns measured = exact_runs({3.5, 3.2, 3.3, 3.1});
+// nodes and weighs them anew at each. Of twelve collisions and a wide spread the trial tells its friction to a fifth of
+// an sd, between which five nodes see next to nothing: spreads of 0.035 were fitted as 0.027.
+TEST_P(OwnFriction, IsIntegratedOver) {
+  const double sd = GetParam();
+  const WheelRuns measured = sd > 0.03 ? exact_runs({3.5, 3.2, 3.3, 3.1, 3.2, 3.4, 3.1, 3.3, 3.2, 3.5, 3.1, 3.3})
+                                       : exact_runs({3.5, 3.2, 3.3, 3.1});
   const WheelHypothesis h = hypothesis(sd);
   const dynamics::ExtendedWheel wheel = wheels_on_ramps(measured, contact, {}).front();
   constexpr int points = 400;
@@ -103,8 +107,11 @@ TEST(TrialFollower, IntegratesTheTrialsOwnFriction) {
   double without = 0;
   for (const RunCollision& m : measured.runs[0].collisions)
     without += std::log(wheel.after_collision(m.context, m.before, *m.after).density);
-  EXPECT_GT(std::abs(followed - without), 0.1);
+  if (sd > 0.01) {
+    EXPECT_GT(std::abs(followed - without), 0.1);
+  }
 }
+INSTANTIATE_TEST_SUITE_P(Spreads, OwnFriction, testing::Values(0.005, 0.02, 0.04, 0.08));
 
 // Stances that repeat the model say nothing and are left out: every collision then goes on from its own reported speed,
 // and so does a first one without a stated launch.

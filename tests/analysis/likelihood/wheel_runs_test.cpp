@@ -15,11 +15,12 @@
 namespace metastable::analysis {
 namespace {
 
-// Reads trials simulated under the nominal model, with this noise on every speed, printed with so many digits; before
+// Makes trials simulated under the nominal model, with this noise on every speed, printed with so many digits; before
 // legs of odd number there comes some speed to it.
-WheelRuns printed(double noise, int digits, std::optional<double> stated, double odd = 0) {
+Experiment printed_experiment(double noise, int digits, std::optional<double> stated, double odd = 0,
+                              int trials = 60) {
   Setting setting = paper_setting(7.02, false);
-  ExperimentFiles files = experiment_files(setting, simulate_trials(setting, {.trials = 60, .seed = 5}), "printed", {});
+  ExperimentFiles files = experiment_files(setting, simulate_trials(setting, {.trials = trials, .seed = 5}), "printed", {});
   Experiment e = parse_experiment(source_of(files, "printed"));
   std::mt19937_64 bits(7);
   std::normal_distribution<double> error(0, noise);
@@ -31,14 +32,35 @@ WheelRuns printed(double noise, int digits, std::optional<double> stated, double
       if (*c.omega_plus > 0) c.omega_plus = print(*c.omega_plus);
     }
   e.sensor = {.rate = {}, .noise_sd = stated, .last_digit = 1 / in_one};
-  return wheel_runs(e);
+  return e;
+}
+WheelRuns printed(double noise, int digits, std::optional<double> stated, double odd = 0) {
+  return wheel_runs(printed_experiment(noise, digits, stated, odd));
 }
 
+// A normal error of twice their own is added, see the next test.
 TEST(WheelRuns, DigitsAreNoise) {
   for (const std::optional<double> stated : {std::optional<double>(), std::optional(0.0)})
     for (const int digits : {2, 3, 4})
-      EXPECT_NEAR(printed(0, digits, stated).noise * std::pow(10, digits), 1 / std::sqrt(12.0), 0.02) << digits;
+      EXPECT_NEAR(printed(0, digits, stated).noise * std::pow(10, digits), std::sqrt(5 / 12.0), 0.04) << digits;
   EXPECT_TRUE(printed(0, 6, 0.0).exact_stances);
+}
+
+// Errors that are spread evenly have no tails: of the sum of two 0.9 % are beyond 2.2, of normal ones 2.8 %. Trials of
+// another simulator, rounded to 1e-4 and without any gap, were called unexplained for it, ten of ten.
+TEST(WheelRuns, StancesBetweenRoundedSpeedsHaveTheTailsOfNormalErrors) {
+  const auto model = wheel_transitions(printed_experiment(0, 4, 0.0, 0, 900));
+  const Evaluation seen = model->evaluate(nominal_values(*model), {});
+  double stances = 0, squares = 0, beyond = 0;
+  for (std::size_t i = 0; i < seen.score.size(); ++i)
+    if (model->events()[i].kind == EventKind::stance) {
+      ++stances;
+      squares += seen.score[i] * seen.score[i];
+      beyond += std::abs(seen.score[i]) > 2.2;
+    }
+  ASSERT_GT(stances, 2500);
+  EXPECT_NEAR(squares / stances, 1, 4 * std::sqrt(2 / stances));
+  EXPECT_NEAR(beyond / stances, 0.0278, 2.5 * std::sqrt(0.0278 / stances));
 }
 
 TEST(WheelRuns, NoiseIsWhatIsStatedUnlessTheStancesAreMoreExact) {
@@ -47,7 +69,7 @@ TEST(WheelRuns, NoiseIsWhatIsStatedUnlessTheStancesAreMoreExact) {
   EXPECT_NEAR(printed(0.1, 4, 0.02).noise_seen, 0.1, 0.02);
   EXPECT_NEAR(printed(0.003, 4, 0.02).noise, 0.003, 0.001);
   EXPECT_FALSE(printed(0.003, 4, 0.02).noise_stated);
-  EXPECT_NEAR(printed(0.1, 4, 0.0).noise, 3e-5, 1e-5);
+  EXPECT_NEAR(printed(0.1, 4, 0.0).noise, 6.5e-5, 1e-5);
   EXPECT_NEAR(printed(0.1, 4, {}).noise, 0.1, 0.02);
 }
 

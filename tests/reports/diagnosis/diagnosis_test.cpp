@@ -62,6 +62,7 @@ analysis::Diagnosis sample() {
   bounce.not_decided = "the fit did not converge";
   d.causes.not_decided = {bounce};
   d.causes.set = {"leg_contact", "leg_lengths+slope_offset"};
+  d.causes.unnamed = {{{"leg_contact"}, 31, {{"order", "mean", false, 12, 8, 0.15, -3}}}};
   d.causes.p_none = 0.08;
   d.causes.p_recalibrate = 0.02;
   d.gap.contact = {{"friction_mean", 0.35, 0.34, 0.36, true}};
@@ -109,6 +110,9 @@ TEST(DiagnosisJson, HasTheKeysOfTheSchema) {
     EXPECT_TRUE(json.at("shrinkage").contains(key)) << key;
   EXPECT_EQ(json.at("shrinkage").at("closed_interval_90"), (std::vector<double>{0.88, 1.0}));
   EXPECT_EQ(json.at("not_decided").at(0).at("reason"), "the fit did not converge");
+  EXPECT_EQ(json.at("unnamed").at(0).at("beside"), std::vector<std::string>{"leg_contact"});
+  EXPECT_EQ(json.at("unnamed").at(0).at("facets").at(0).at("chi_squared"), 12);
+  EXPECT_EQ(json.at("unnamed").at(0).at("facets").at(0).at("of"), "collisions");
   EXPECT_TRUE(json.at("missing_columns").at(0).at("effects").at(0).at("smallest").is_null());
   EXPECT_EQ(json.at("missing_columns").at(0).at("effects").at(0).at("not_told_from").at(0), "friction_patch");
   EXPECT_EQ(json.at("not_possible").at(0).at("trials"), 3);
