@@ -15,6 +15,7 @@ namespace {
 // These numbers are the prior.
 constexpr double expected_gain = 36;  // of an effect before its size is known
 constexpr double pair_prior = 0.05;   // odds of two effects to one
+constexpr double most_hidden = 0.3;   // logarithm of what one effect of a pair may hide of the other's gain
 
 // They say which hypotheses are fitted; the others are weighed by what their scores promise. These save time, and
 // decide only where scores promise far too little. Gains are 2 Delta log likelihood, evidence is a log Bayes factor.
@@ -34,10 +35,9 @@ constexpr double alike_margin = 4;          // evidence promised below the best 
 constexpr double furthest_start = 0.25;  // share of a parameter's range
 constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
 constexpr double worth_moving = 0.2;     // rise of the log likelihood
-constexpr double most_hidden = 0.3;  // logarithm of what one effect of a pair may hide of the other
 constexpr int law_steps = 12;            // of another law's fit, from either start
 constexpr int more_law_steps = 60;       // where it may still come near
-constexpr int more_steps = 4;            // times as many for a fit near the top that did not settle
+constexpr int more_steps = 4;            // times as many, where a fit near the top did not settle
 constexpr double law_hopeless = -100;    // log likelihood below the recalibrated model's that no more steps make good
 
 // These numbers say when a fit that did not settle is decided all the same.
@@ -357,6 +357,7 @@ void Ranker::refine_single(std::size_t i) {
 // Fits once more where a fit did not settle near the top: further along its own way, and from the nuisances that suit
 // the leader.
 void Ranker::refit_unsettled() {
+  if (singles_.empty()) return;
   const auto best = std::max_element(singles_.begin(), singles_.end(), [](const RankedCause& a, const RankedCause& b) {
     return a.evidence < b.evidence;
   });
@@ -375,9 +376,11 @@ void Ranker::refit_unsettled() {
       if (Fit other = fit_from(leaders_nuisance, 1); other.penalised > again.penalised) again = std::move(other);
     if (!(again.penalised > cause.fit.penalised)) return;
     take(cause, std::move(again));
-    cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
+    if (!refined_[i]) cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
     if (cause.fit.converged) cause.not_decided.clear();
   });
+  for (const RankedCause& cause : singles_)
+    if (!cause.candidate_undecided()) top_ = std::max(top_, cause.evidence);
 }
 
 // A fit that did not settle is decided where all it could still rise leaves it far behind, or is next to nothing.
@@ -475,10 +478,12 @@ void Ranker::fit_pairs() {
     pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
     pair.together = pair.gain / std::max(1.0, gain_apart(pair));
   });
-  // The same pair from either side counts once, the better fit.
+  // The same pair, from either side or once more, counts once, the better fit.
   for (RankedCause& pair : tried) {
     const auto same = std::find_if(pairs_.begin(), pairs_.end(), [&](const RankedCause& other) {
-      return other.terms[0].candidate == pair.terms[1].candidate && other.terms[1].candidate == pair.terms[0].candidate;
+      const Candidate *a = other.terms[0].candidate, *b = other.terms[1].candidate;
+      const Candidate *one = pair.terms[0].candidate, *two = pair.terms[1].candidate;
+      return (a == one && b == two) || (a == two && b == one);
     });
     if (same == pairs_.end())
       pairs_.push_back(std::move(pair));
@@ -496,9 +501,15 @@ void Ranker::refine_paired() {
   for (const EffectTerm& term : best->terms) {
     const std::size_t i = index_of(term.candidate);
     if (refined_[i] || term.candidate->refine.empty() || !fitted(singles_[i])) continue;
+    const Candidate* partner = best->terms[&term == &best->terms[0] ? 1 : 0].candidate;
+    heartbeat();
     refine_single(i);
     scan_beside(i);
+    if (std::ranges::none_of(tries_, [&](const Try& t) { return t.leader == i && t.second.candidate == partner; }))
+      tries_.push_back({i, scan_effects(model_, singles_[i].fit, {partner}, threads_).effects.front()});
   }
+  if (tries_.empty()) return;
+  for (RankedCause& pair : pairs_) pair.together = pair.gain / std::max(1.0, gain_apart(pair));
   fit_pairs();
 }
 

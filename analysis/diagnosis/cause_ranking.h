@@ -18,8 +18,9 @@ struct RankedCause {
   /// Is of the gain by chance: of a single effect by the variants listed, before one between them was sought; of a
   /// pair that of what the second effect earned beyond the first.
   double p_value = 1;
-  double evidence = 0;      ///< log Bayes factor against the recalibrated model, prior odds of pairs included
-  double together = 1;      ///< of a pair: its gain over what its two effects gain alone, beside what each hides of the other
+  double evidence = 0;  ///< log Bayes factor against the recalibrated model, prior odds of pairs included
+  double together =
+      1;  ///< of a pair: its gain over what its two effects gain alone, beside what each hides of the other
   std::string not_decided;  ///< why, where the data cannot tell or the fit did not settle
   bool candidate_undecided() const { return !terms[0].candidate->undecidable.empty(); }
 };

@@ -218,7 +218,9 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
                                       .pairs = wanted_pairs(candidates, options.catalogue),
                                       .progress = [&](double share) { progress(0.15 + 0.5 * share, "which effect"); }});
   d.causes.stepwise = stepwise_selection(model, recalibrated, ranking);
-  d.causes.unnamed.push_back({{}, 0, left_by_facet(model, recalibrated, 0, 0)});
+  std::vector<LeftInFacet> left = left_by_facet(model, recalibrated, 0, 0);
+  const double of_left = evidence_of_more(left);
+  d.causes.unnamed.push_back({{}, of_left, std::move(left)});
   test_for_gap(d, ranking, candidates.size(), recalibrated);
   note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
   leave_undecided(d, ranking, candidates);

@@ -62,8 +62,11 @@ class Gatherer {
   void change_of_speed(Facets& facets) const {
     MapColumn column{Measure::shift, {}, 0, {}};
     for (std::size_t k = 1; k < members_.size(); ++k)
-      if (trial(k - 1) == trial(k))
-        column.terms.emplace_back(members_[k], (speed(k - 1) - speed(k)) * left_[members_[k]].mean);
+      if (trial(k - 1) == trial(k)) {
+        const double change = speed(k - 1) - speed(k);
+        column.terms.emplace_back(members_[k], change * left_[members_[k]].mean);
+        column.variance += change * change;
+      }
     if (column.terms.size() >= least_events) facets[{"step before", "mean", stance_}].push_back(std::move(column));
   }
 
@@ -113,15 +116,14 @@ LeftInFacet judge(const Key& key, const Eigen::MatrixXd& dense, const Eigen::Vec
   LeftInFacet left{.facet = std::get<0>(key), .aspect = std::get<1>(key), .stance = std::get<2>(key)};
   const Eigen::ArrayXd root = whole.array().max(1e-300).sqrt();
   const Eigen::MatrixXd scaled = dense * root.inverse().matrix().asDiagonal();
-  Eigen::MatrixXd scatter = scaled.transpose() * scaled;
+  const markov::SymmetricEigen split = markov::symmetric_eigen(scaled.transpose() * scaled);
   // Events that scatter less than the model's are no surer of it: scores close together have close squares, too.
+  Eigen::ArrayXd unit = root;
   for (std::size_t k = 0; k < columns.size(); ++k) {
-    const auto c = static_cast<Eigen::Index>(k);
-    const double of_model = columns[k].variance / std::max(1e-300, whole[c]);
-    scatter(c, c) *= std::max(1.0, of_model);
+    double& of_column = unit[static_cast<Eigen::Index>(k)];
+    of_column = std::max(of_column, std::sqrt(columns[k].variance));
   }
-  const markov::SymmetricEigen split = markov::symmetric_eigen(scatter);
-  const Eigen::VectorXd along = split.vectors.transpose() * (sums.array() / root).matrix();
+  const Eigen::VectorXd along = split.vectors.transpose() * (sums.array() / unit).matrix();
   for (Eigen::Index d = 0; d < along.size(); ++d)
     if (split.values[d] > least_own) {
       left.quadratic += along[d] * along[d] / split.values[d];

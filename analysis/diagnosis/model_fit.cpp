@@ -232,9 +232,15 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     };
     step_of(parts.all, 0);
     const double promised = foretold;
+    // What is promised below this differences do not resolve.
+    const double settled = unresolved + unresolved_share * (best - start);
     bool better = !(promised > worth_a_step) || rises(parts.all, level) || rises(parts.of_terms, 0) ||
                   rises(parts.of_nuisances, 0);
-    while (!better && promised > unresolved && level + 1 < std::size(dampings)) better = rises(parts.all, ++level);
+    for (std::size_t damped = 0; !better && damped < std::size(dampings); ++damped)
+      if (damped != level && (damped == 0 || promised > settled) && rises(parts.all, damped)) {
+        better = true;
+        level = damped;
+      }
     if (best - before < least_kept * foretold)
       level = std::min(level + 1, std::size(dampings) - 1);
     else if (level > 0)
@@ -247,7 +253,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     }
     if (!better) {
       // This is the optimum, up to what the differences resolve.
-      result.converged = promised < unresolved + unresolved_share * (best - start);
+      result.converged = promised < settled;
       if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
       break;
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "dynamics/wheel/truncated_normal.h"
@@ -12,8 +13,9 @@ namespace {
 using dynamics::StepContext;
 
 // Gauss-Hermite's rule serves where a trial tells less of its friction than was known before. Else its posterior is
-// narrow beside the prior: trapezoids of this width in its sds are right to 1e-3 of a likelihood.
-constexpr double wide_posterior = 0.5, width = 1.6, widest = 0.8, narrowest = 0.1, farthest = 4.2;
+// narrow beside the prior: trapezoids of this width in its sds are right to 1e-3 of a likelihood. The others are in sds
+// of the prior.
+constexpr double wide_posterior = 0.5, width = 1.6, widest = 0.8, narrowest = 0.05, farthest = 4.2;
 constexpr double negligible = 12;  // log weight below the largest
 
 std::size_t collision_of(const Event& event) { return static_cast<std::size_t>(event.number) - 1; }
@@ -43,8 +45,7 @@ std::vector<TrialFollower::ScoreNode> TrialFollower::nodes_for(double told) {
   const double spacing = std::clamp(width / told, narrowest, widest);
   std::vector<ScoreNode> nodes;
   const int most = static_cast<int>(farthest / spacing);
-  for (int k = -most; k <= most; ++k)
-    nodes.push_back({k * spacing, spacing * dynamics::normal_density(k * spacing)});
+  for (int k = -most; k <= most; ++k) nodes.push_back({k * spacing, spacing * dynamics::normal_density(k * spacing)});
   return nodes;
 }
 
@@ -57,9 +58,9 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       friction_sd_(hypothesis.extension.trial_friction_sd),
       nodes_(nodes_for(friction_sd_ * std::sqrt(static_cast<double>(run.collisions.size())) /
                        hypothesis.contact.friction_sd)),
-      filters_(nodes_.size(), SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
-                                   measured.slack, measured.law_error, measured.law_scatter, measured.slide_error,
-                                   measured.memory)) {
+      filters_(nodes_.size(), SpeedFilter(hypothesis.extension, hypothesis.tilt,
+                                          hypothesis.noise.value_or(measured.noise), measured.slack, measured.law_error,
+                                          measured.law_scatter, measured.slide_error, measured.memory)) {
   for (const ScoreNode& node : nodes_) log_weight_.push_back(std::log(node.weight));
 }
 
@@ -70,13 +71,9 @@ void TrialFollower::come_to(const Event& event) {
   next_ = k;
 }
 
-double TrialFollower::friction_shift(std::size_t node) const {
-  return day_shift_ + nodes_[node].score * friction_sd_;
-}
+double TrialFollower::friction_shift(std::size_t node) const { return day_shift_ + nodes_[node].score * friction_sd_; }
 
-double TrialFollower::largest_log_weight() const {
-  return *std::max_element(log_weight_.begin(), log_weight_.end());
-}
+double TrialFollower::largest_log_weight() const { return *std::max_element(log_weight_.begin(), log_weight_.end()); }
 
 double TrialFollower::chance_of_rest(const Event& event) {
   if (!is_contact(event.kind)) return 0;
@@ -133,7 +130,10 @@ SpeedFilter::Out TrialFollower::see(const Event& event) {
   const double largest = largest_log_weight();
   double before = 0, now = 0, below = 0, unit = 0;
   for (std::size_t q = 0; q < nodes_.size(); ++q) {
-    if (log_weight_[q] < largest - negligible) continue;  // it cannot come back, and its filter stays behind
+    if (log_weight_[q] < largest - negligible) {  // its filter is left behind, and it does not come back
+      log_weight_[q] = -std::numeric_limits<double>::infinity();
+      continue;
+    }
     const SpeedFilter::Out out = seen_by(filters_[q], event, friction_shift(q));
     const double w = std::exp(log_weight_[q] - largest);
     before += w;

@@ -46,7 +46,7 @@ class TrialFollower {
   std::vector<ScoreNode> nodes_;
   std::vector<SpeedFilter> filters_;  // by node
   std::vector<double> log_weight_;    // of the nodes
-  std::optional<std::size_t> next_;              // the collision that the filters have come to
+  std::optional<std::size_t> next_;   // the collision that the filters have come to
 };
 
 }  // namespace metastable::analysis

@@ -95,9 +95,8 @@ LandingShares::Kept LandingShares::SharesAtSpeed::at(double eta, double friction
   const double along = part > 0 ? std::sqrt(part) * (grid_->parts - 1) : 0;
   const std::size_t below = std::min(static_cast<std::size_t>(along), stride - 2), first = below > 0 ? below - 1 : 0;
   const double t = along - static_cast<double>(first);
-  const std::array<double, 3> weights =
-      part > 0 ? std::array{(t - 1) * (t - 2) / 2, t * (2 - t), t * (t - 1) / 2}
-               : std::array{1 - part / grid_->part(1), part / grid_->part(1), 0.0};
+  const std::array<double, 3> weights = part > 0 ? std::array{(t - 1) * (t - 2) / 2, t * (2 - t), t * (t - 1) / 2}
+                                                 : std::array{1 - part / grid_->part(1), part / grid_->part(1), 0.0};
   const auto read = [&](const std::vector<float>& values) {
     double sum = 0;
     for (std::size_t k = 0; k < weights.size(); ++k) sum += weights[k] * corners.of(values, stride, first + k);

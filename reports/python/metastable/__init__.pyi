@@ -150,6 +150,7 @@ class Diagnosis(Result):
     where_left: Tuple[Record, ...]
     causes: Tuple[Record, ...]
     cause_set: Tuple[str, ...]
+    unnamed: Tuple[Record, ...]
     cause_set_alike: Tuple[str, ...]
     stepwise: Record
     not_decided: Tuple[Record, ...]

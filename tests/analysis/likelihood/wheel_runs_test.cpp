@@ -17,10 +17,10 @@ namespace {
 
 // Makes trials simulated under the nominal model, with this noise on every speed, printed with so many digits; before
 // legs of odd number there comes some speed to it.
-Experiment printed_experiment(double noise, int digits, std::optional<double> stated, double odd = 0,
-                              int trials = 60) {
+Experiment printed_experiment(double noise, int digits, std::optional<double> stated, double odd = 0, int trials = 60) {
   Setting setting = paper_setting(7.02, false);
-  ExperimentFiles files = experiment_files(setting, simulate_trials(setting, {.trials = trials, .seed = 5}), "printed", {});
+  ExperimentFiles files =
+      experiment_files(setting, simulate_trials(setting, {.trials = trials, .seed = 5}), "printed", {});
   Experiment e = parse_experiment(source_of(files, "printed"));
   std::mt19937_64 bits(7);
   std::normal_distribution<double> error(0, noise);
