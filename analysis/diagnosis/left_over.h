@@ -13,7 +13,7 @@ struct Fit;
 struct LeftInFacet {
   std::string facet, aspect;  ///< as GapCell's, or of a facet that the map lacks
   bool stance = false;
-  double quadratic = 0;  ///< chi-squared of that many degrees where nothing is left
+  double quadratic = 0;  ///< chi-squared of that many degrees where nothing is left, by the model's scatter at least
   double degrees = 0;
   double p_value = 1;   ///< of it
   double evidence = 0;  ///< log Bayes factor of shifts of all its cells, see rank_causes() for their prior

@@ -38,8 +38,8 @@ struct FitOptions {
 
 /// Finds the maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
 /// dz/d(speed), log density = log phi(z) + log J, and the information is the sum of z' z'^T + (log J)' (log J)'^T,
-/// which no outlying observation inflates. Starts from the given values; parameters stay inside their bounds. A
-/// likelihood that is not finite there has not converged, with that reason.
+/// which no outlying observation inflates; damped where they gain far less than promised. Starts from the given values;
+/// parameters stay inside their bounds. A likelihood that is not finite there has not converged, with that reason.
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options = {});
 

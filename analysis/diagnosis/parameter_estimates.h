@@ -17,8 +17,8 @@ struct RankedCause;
 /// @param scan  at the recalibrated model
 Cause described_cause(const TransitionModel& model, const RankedCause& ranked, const EffectScan& scan);
 
-/// Returns the recalibrated contact. Intervals follow the slopes of the reported numbers, unless those take a positive
-/// one below zero.
+/// Returns the recalibrated contact. Intervals hold chance and Nuisance::form_sd, and follow the slopes of the reported
+/// numbers, unless those take a positive one below zero.
 std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit);
 
 }  // namespace metastable::analysis

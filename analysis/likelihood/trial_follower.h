@@ -12,9 +12,9 @@
 namespace metastable::analysis {
 
 /// Says what each event of one trial says, given those before it. A friction of the trial's own is integrated over by
-/// nodes: every node follows the trial, weighted by what it has explained. Where no event leads up
-/// to a collision (no launch is stated, or the stances are left out), its reported speed is where the trial goes on
-/// from.
+/// nodes: every node follows the trial, weighted by what it has explained, and is left behind where that is next to
+/// nothing. Where no event leads up to a collision (no launch is stated, or the stances are left out), its reported
+/// speed is where the trial goes on from.
 class TrialFollower {
  public:
   /// All references must outlive the follower.

@@ -76,7 +76,8 @@ void tabulate_landings(WheelRuns& measured);
 void mark_counted(const WheelRuns& measured, WheelRun& run);
 
 /// Reads an experiment. A missing leg is found from the stances where omega_plus is there, else legs of mean length are
-/// taken; missing positions and times follow from the geometry.
+/// taken; missing positions and times follow from the geometry. Where digits are most of the noise a normal error is
+/// added to the reported speeds, as the notes say.
 /// @throws std::invalid_argument for a coast-down and for `plastic`
 WheelRuns wheel_runs(const Experiment& experiment);
 

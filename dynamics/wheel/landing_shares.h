@@ -63,7 +63,7 @@ struct LandingShares {
     SharesAtSpeed(const LandingShares& grid, int leg, double omega);
     const Leg& leg() const { return *leg_; }
     double resting_friction(double eta) const;
-    /// Friction above mu_c is read as mu_c; below mu_r the share falls on as it does just above.
+    /// Friction above mu_c is read as mu_c; below mu_r the share falls on by the straight line through the first two places.
     Kept at(double eta, double friction) const;
 
    private:

@@ -97,5 +97,14 @@ TEST(RankCauses, TheExactPartIsTheFitOfTheExactEffect) {
   EXPECT_EQ(&exact_part(singles, singles[0].terms, recalibrated), &recalibrated);
 }
 
+// A catalogue may name nothing that the model knows.
+TEST(RankCauses, OfNoCandidateThereIsNoCause) {
+  const test::Line model = test::line(0.1, 1);
+  const Fit recalibrated = fit(model, {3, -0.7}, {});
+  const CauseRanking ranking = rank_causes(model, recalibrated, {}, RankingOptions{});
+  EXPECT_TRUE(ranking.singles.empty());
+  EXPECT_TRUE(ranking.pairs.empty());
+}
+
 }  // namespace
 }  // namespace metastable::analysis
