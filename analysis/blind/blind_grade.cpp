@@ -297,7 +297,8 @@ std::pair<double, double> wilson(const Proportion& proportion) {
   const double n = proportion.of, p = proportion.right / n;
   const double middle = (p + z * z / (2 * n)) / (1 + z * z / n);
   const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
-  return {std::max(0.0, middle - half), std::min(1.0, middle + half)};
+  return {proportion.right == 0 ? 0 : std::max(0.0, middle - half),
+          proportion.right == proportion.of ? 1 : std::min(1.0, middle + half)};
 }
 
 BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::optional<BlindAnswer>>& answers) {
