@@ -30,7 +30,7 @@ constexpr std::size_t most_beside = 3;  // hypotheses beside which it is suppose
 constexpr double beside_margin = 12;    //   whose evidence is no further behind the best
 
 // These numbers are of odds and sets.
-constexpr double most_odds_of_none = 0.05;  // to all effects, for a name to be given
+constexpr double most_odds_of_none = 0.25;  // to all effects, for a name to be given
 constexpr double none_prior = 0.01;         // odds of none to a gap where nothing is left over
 constexpr double set_share = 0.95;          // of what the effects share that the set holds
 constexpr double least_of_first = 0.05;  // one less likely than this share of the first is not named for completeness

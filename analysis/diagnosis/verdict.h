@@ -38,7 +38,7 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const Cau
                            const std::vector<const RankedCause*>& ordered, std::size_t candidates, bool gap,
                            double none);
 
-/// Sets verdict, set, and what of it acts alike. A name is given only where the effects together are 20 times as
+/// Sets verdict, set, and what of it acts alike. A name is given only where the effects together are four times as
 /// likely as none of them. @param none  odds of none of the effects to all of them
 void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects);
 

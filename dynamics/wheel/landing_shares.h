@@ -63,7 +63,8 @@ struct LandingShares {
     SharesAtSpeed(const LandingShares& grid, int leg, double omega);
     const Leg& leg() const { return *leg_; }
     double resting_friction(double eta) const;
-    /// Friction above mu_c is read as mu_c; below mu_r the share falls on by the straight line through the first two places.
+    /// Friction above mu_c is read as mu_c; below mu_r the share falls on by the straight line through the first two
+    /// places.
     Kept at(double eta, double friction) const;
 
    private:

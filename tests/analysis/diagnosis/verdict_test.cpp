@@ -25,11 +25,11 @@ Diagnosis with_odds_of_none(double none) {
   return d;
 }
 
-TEST(Verdict, ANameIsGivenWhereItIsTwentyTimesAsLikelyAsNone) {
-  EXPECT_EQ(with_odds_of_none(0.045).verdict, Verdict::explained);
-  EXPECT_EQ(with_odds_of_none(0.045).causes.set, std::vector<std::string>{"friction_patch"});
-  EXPECT_EQ(with_odds_of_none(0.055).verdict, Verdict::unexplained);
-  EXPECT_TRUE(with_odds_of_none(0.055).causes.set.empty());
+TEST(Verdict, ANameIsGivenWhereItIsFourTimesAsLikelyAsNone) {
+  EXPECT_EQ(with_odds_of_none(0.2).verdict, Verdict::explained);
+  EXPECT_EQ(with_odds_of_none(0.2).causes.set, std::vector<std::string>{"friction_patch"});
+  EXPECT_EQ(with_odds_of_none(0.3).verdict, Verdict::unexplained);
+  EXPECT_TRUE(with_odds_of_none(0.3).causes.set.empty());
 }
 
 TEST(Verdict, SaysThatTheNearestIsTooUnsureForAName) {
