@@ -28,6 +28,8 @@ constexpr double leader_evidence = 2;       // of an effect that is refined, and
 constexpr double refined_share = 0.7;       // of the best evidence, less
 constexpr double refined_margin = 10;       //   this much, for an effect worth refining
 constexpr double refit_margin = 60;         // evidence below the best, for a fit that did not settle to be tried again
+constexpr double pair_share = 2.8;          // of the gain of its stronger effect, most that a pair gains, more or less,
+constexpr double pair_margin = 12;          //   this much: below the best gain, none is built on it
 constexpr double least_pair_evidence = -4;  // promised beyond the first effect's, for a pair worth fitting
 constexpr double alike_margin = 4;          // evidence promised below the best second effect's, for one worth fitting
 
@@ -141,8 +143,8 @@ RankedCause fit_cause(const TransitionModel& model, const Effort& effort, const 
 double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact) {
   const PhaseGain before = phase_gain(model, first, exact), now = phase_gain(model, pair, first);
   const double tolerated = model_error * model_error;
-  // What the second effect gained by itself counts alone: one phase may have paid for the other.
-  const double all = now.collisions + now.stances;
+  // What the second effect gained by itself counts alone: one phase may have paid for the other, or for a prior.
+  const double all = 2 * (pair.penalised - first.penalised);
   const double beyond = std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +
                         std::max(0.0, now.stances - tolerated * std::max(0.0, before.stances));
   return std::max(0.0, std::min(all, beyond));
@@ -326,6 +328,10 @@ std::vector<std::size_t> Ranker::leaders(bool to_refine) const {
   std::sort(all.begin(), all.end(),
             [&](std::size_t a, std::size_t b) { return singles_[a].evidence > singles_[b].evidence; });
   if (all.size() > effort_.most_leaders) all.resize(effort_.most_leaders);
+  if (to_refine || all.empty()) return all;
+  double best = 0;
+  for (const std::size_t i : all) best = std::max(best, singles_[i].gain);
+  std::erase_if(all, [&](std::size_t i) { return pair_share * singles_[i].gain + pair_margin < best; });
   return all;
 }
 

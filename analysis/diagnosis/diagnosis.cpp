@@ -27,8 +27,9 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::size_t most_rivals = 3;  // hypotheses that compete in each fold of the cross-validation:
-constexpr double rival_evidence = 4;    //   those no further behind the best. Saves time
+constexpr std::size_t most_rivals = 3;   // hypotheses that compete in each fold of the cross-validation:
+constexpr double rival_evidence = 4;     //   those no further behind the best. Saves time
+constexpr double another_optimum = 0.5;  // rise of the recalibrated log likelihood that says that there is one
 // A recalibration that did not settle is mentioned beyond this rise that its slope still promises.
 constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likelihood; of the largest gain found
 
@@ -153,6 +154,17 @@ void note_what_is_rough(Diagnosis& d, const CauseRanking& ranking, const Fit& re
         enough_trials, enough_transitions));
 }
 
+// Fits without effects from the nuisances of the effect that gains most.
+Fit recalibrated_from_leader(const TransitionModel& model, const CauseRanking& ranking) {
+  const RankedCause* leader = nullptr;
+  for (const RankedCause& cause : ranking.singles)
+    if (!cause.fit.nuisance.empty() && (!leader || cause.gain > leader->gain)) leader = &cause;
+  if (leader) return fit(model, leader->fit.nuisance, {});
+  Fit none;
+  none.penalised = -std::numeric_limits<double>::infinity();
+  return none;
+}
+
 // Lists those that compete on the trials held out.
 std::vector<const Fit*> rivals(const std::vector<const RankedCause*>& ordered) {
   std::vector<const Fit*> all;
@@ -203,20 +215,29 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const Fit as_given = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
   const Fit given = unfitted(model, nominal);
   d.gap.as_given = gap_map(model, given, options.draws / 2, options.seed);
-  const Fit recalibrated = best_fit(model, nominal, {});
+  Fit recalibrated = best_fit(model, nominal, {});
+  const auto rank = [&] {
+    return rank_causes(model, recalibrated, candidates,
+                       {.threads = options.threads,
+                        .draws = options.draws,
+                        .seed = options.seed,
+                        .pairs = wanted_pairs(candidates, options.catalogue),
+                        .progress = [&](double share) { progress(0.1 + 0.5 * share, "which effect"); }});
+  };
+  CauseRanking ranking = rank();
+  // What an effect seems to gain may be a better optimum that its fit came upon.
+  if (Fit other = recalibrated_from_leader(model, ranking);
+      other.penalised > recalibrated.penalised + another_optimum) {
+    recalibrated = std::move(other);
+    ranking = rank();
+  }
   d.gap.contact = contact_estimates(model, recalibrated);
   const double recalibration_gain = 2 * (recalibrated.penalised - given.penalised);
   d.gap.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
 
-  progress(0.1, "where the gap lies");
+  progress(0.6, "where the gap lies");
   d.gap.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
 
-  CauseRanking ranking = rank_causes(model, recalibrated, candidates,
-                                     {.threads = options.threads,
-                                      .draws = options.draws,
-                                      .seed = options.seed,
-                                      .pairs = wanted_pairs(candidates, options.catalogue),
-                                      .progress = [&](double share) { progress(0.15 + 0.5 * share, "which effect"); }});
   d.causes.stepwise = stepwise_selection(model, recalibrated, ranking);
   std::vector<LeftInFacet> left = left_by_facet(model, recalibrated, 0, 0);
   const double of_left = evidence_of_more(left);

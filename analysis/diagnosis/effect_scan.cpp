@@ -98,6 +98,12 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   Eigen::MatrixXd weights = cross;
   if (columns > 0) weights = markov::solve_columns(fit.information, cross);  // Eigen's solve refers to a first element
   scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch - cross.transpose() * weights;
+  for (const Work& one : work)
+    for (std::size_t p = 0; p < one.terms.back().values.size(); ++p)
+      if (const double sd = one.terms.back().candidate->parameters[p].prior_sd; sd > 0) {
+        const auto at = one.first + static_cast<Eigen::Index>(p);
+        scan.information(at, at) += 1 / (sd * sd);
+      }
   const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
   for (Eigen::Index k = 0; k < events; ++k)

@@ -26,6 +26,7 @@ namespace {
 constexpr double cell_shift_sd = 0.15;   // prior of a cell's shift, in scores
 constexpr double parameter_price = 1.5;  // log likelihood that a rival pays for each of its effects' parameters
 constexpr int interval_draws = 400;      // of the bootstrap over trials
+constexpr int fold_steps = 3;            // of a fit that starts from the optimum of all trials
 constexpr double bounded_score = 6;      // scores further out count as this one to the flexible model
 constexpr double farthest_score = 12;    // and as this one to the CRPS
 
@@ -204,7 +205,7 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& gi
   markov::parallel_for(static_cast<std::size_t>(folds), threads, [&](std::size_t f) {
     speak();
     FitOptions options;
-    options.most_iterations = effort_for(model, recalibrated).most_iterations;
+    options.most_iterations = fold_steps;
     options.count.resize(trials);
     for (std::size_t t = 0; t < trials; ++t) options.count[t] = fold[t] != static_cast<int>(f);
     const Fit plain = fit(model, recalibrated.nuisance, {}, options);

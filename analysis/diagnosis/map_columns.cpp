@@ -176,7 +176,7 @@ MapColumns map_columns(const TransitionModel& model, const Fit& fit) {
   return all;
 }
 
-// Nuisances move no further than their prior lets them.
+// Parameters move no further than their priors let them.
 EfficientColumns project(const std::vector<MapColumn>& columns, const TransitionModel& model, const Fit& fit) {
   const auto count = static_cast<Eigen::Index>(model.events().size());
   EfficientColumns all{Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(columns.size())), {}, {}};
@@ -195,6 +195,12 @@ EfficientColumns project(const std::vector<MapColumn>& columns, const Transition
     gram(at, at) += 1 / (n.prior_sd * n.prior_sd);
     if (fit.nuisance[p] <= n.lower || fit.nuisance[p] >= n.upper) left[at] = 0;
   }
+  auto at = static_cast<Eigen::Index>(fit.nuisance.size());
+  for (const EffectTerm& term : fit.terms)
+    for (const FreeParameter& p : term.candidate->parameters) {
+      if (p.prior_sd > 0) gram(at, at) += 1 / (p.prior_sd * p.prior_sd);
+      ++at;
+    }
   gram.diagonal() *= 1 + 1e-9;
   gram.diagonal().array() += 1e-12;
   const Eigen::MatrixXd weights = markov::solve_columns(gram, held.transpose() * all.dense);

@@ -27,12 +27,12 @@ class Point {
     if (with_nuisances)
       for (std::size_t i = 0; i < nuisance_.size(); ++i) {
         const Nuisance& n = model.nuisances()[i];
-        slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n.nominal, n.prior_sd});
+        slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n.nominal, n.prior_sd, true});
       }
     for (EffectTerm& term : terms_)
       for (std::size_t i = 0; i < term.values.size(); ++i) {
         const FreeParameter& p = term.candidate->parameters[i];
-        slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, 0, 0});
+        slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, p.neutral, p.prior_sd, false});
       }
   }
   Point(const Point&) = delete;
@@ -41,6 +41,7 @@ class Point {
   struct Slot {
     double* value;
     double step, largest_step, lower, upper, nominal, prior_sd;  // prior_sd 0: none
+    bool of_nuisance;
   };
   std::vector<Slot>& slots() { return slots_; }
   const std::vector<double>& nuisance() const { return nuisance_; }
@@ -60,25 +61,37 @@ class Point {
   std::vector<Slot> slots_;
 };
 
-// `steps` holds what was gone in each parameter.
-Derivatives differences(Point& point, const Evaluation& here, std::vector<double>& steps) {
+// `steps` is filled with where each parameter's difference lies: half of that away, 0 for one to `both_sides`.
+Derivatives differences(Point& point, const Evaluation& here, std::vector<double>& steps, bool both_sides = false) {
   const auto events = static_cast<Eigen::Index>(here.score.size());
   auto& slots = point.slots();
   Derivatives d{Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())),
                 Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size()))};
   for (std::size_t p = 0; p < slots.size(); ++p) {
     const double value = *slots[p].value;
-    const double step = value + slots[p].step <= slots[p].upper ? slots[p].step : -slots[p].step;
-    *slots[p].value = value + step;
+    const auto moved_to = [&](double there) {
+      *slots[p].value = there;
+      Evaluation moved = point.evaluate();
+      *slots[p].value = value;
+      return moved;
+    };
+    const bool above = value + slots[p].step <= slots[p].upper, below = value - slots[p].step >= slots[p].lower;
+    double step = above ? slots[p].step : -slots[p].step;
+    const Evaluation moved = moved_to(value + step);
     steps[p] = step;
-    const Evaluation moved = point.evaluate();
-    *slots[p].value = value;
+    Evaluation other;
+    if (both_sides && above && below) {
+      other = moved_to(value - step);
+      step *= 2;
+      steps[p] = 0;
+    }
+    const Evaluation& from = steps[p] == 0 ? other : here;
     for (Eigen::Index i = 0; i < events; ++i) {
       const auto k = static_cast<std::size_t>(i);
       // Events at the floor of the density have no slope there.
       d.slope(i, static_cast<Eigen::Index>(p)) =
-          std::clamp((moved.log_density[k] - here.log_density[k]) / step, -1e9, 1e9);
-      d.change(i, static_cast<Eigen::Index>(p)) = std::clamp((moved.score[k] - here.score[k]) / step, -1e9, 1e9);
+          std::clamp((moved.log_density[k] - from.log_density[k]) / step, -1e9, 1e9);
+      d.change(i, static_cast<Eigen::Index>(p)) = std::clamp((moved.score[k] - from.score[k]) / step, -1e9, 1e9);
     }
   }
   return d;
@@ -163,7 +176,7 @@ FreeParts free_parts(const std::vector<Point::Slot>& slots, const Eigen::VectorX
     const bool held = (*s.value <= s.lower && gradient[p] <= 0) || (*s.value >= s.upper && gradient[p] >= 0);
     if (held || !(information(p, p) > 0)) continue;
     parts.all.push_back(p);
-    (s.prior_sd > 0 ? parts.of_nuisances : parts.of_terms).push_back(p);
+    (s.of_nuisance ? parts.of_nuisances : parts.of_terms).push_back(p);
   }
   return parts;
 }
@@ -202,12 +215,13 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   result.evaluation = point.evaluate();
   double best = counted(result.evaluation, weights) + point.log_prior();
   const double start = best;
-  std::size_t level = 0;  // of damping
+  std::size_t level = 0;    // of damping
+  bool both_sides = false;  // are differenced: at a kink of some event's density one side promises what is not there
   const bool finite = std::isfinite(best);
   result.converged = slots.empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
   for (int iteration = 0; finite && iteration < options.most_iterations && !slots.empty(); ++iteration) {
-    result.derivatives = differences(point, result.evaluation, steps);
+    result.derivatives = differences(point, result.evaluation, steps, both_sides);
     result.information = information(result.derivatives, result.evaluation, weights);
     result.gradient = penalised_gradient(slots, weights, steps, result);
     const FreeParts parts = free_parts(slots, result.gradient, result.information);
@@ -241,6 +255,10 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
         better = true;
         level = damped;
       }
+    if (!better && promised >= settled && !both_sides) {
+      both_sides = true;
+      continue;
+    }
     if (best - before < least_kept * foretold)
       level = std::min(level + 1, std::size(dampings) - 1);
     else if (level > 0)

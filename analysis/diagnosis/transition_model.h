@@ -65,9 +65,10 @@ struct Nuisance {
 struct FreeParameter {
   double neutral = 0;
   double lower = 0, upper = 0;
-  double step = 1e-4;  ///< for differences
-  double try_at = 0;   ///< a size worth starting from where the neutral value says nothing; 0: start at neutral
-  double likely = 0;   ///< a size that the data show by themselves, from which fits start as well; 0: there is none
+  double step = 1e-4;   ///< for differences
+  double try_at = 0;    ///< a size worth starting from where the neutral value says nothing; 0: start at neutral
+  double likely = 0;    ///< a size that the data show by themselves, from which fits start as well; 0: there is none
+  double prior_sd = 0;  ///< of a normal prior about neutral, where more is known than the bounds say; 0: there is none
 };
 
 /// Is a number as it is reported: by its name.

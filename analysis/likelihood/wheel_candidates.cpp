@@ -66,7 +66,9 @@ WheelCandidate initial_speed(const WheelDesign& design) {
 WheelCandidate leg_lengths(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "leg_lengths";
-  c.candidate.parameters.assign(design.leg_lengths.size(), {0, -0.02, 0.02, 1e-6});
+  FreeParameter change{0, -0.02, 0.02, 1e-6};
+  change.prior_sd = 0.002;  // whoever stated the lengths had a ruler: all of them are not 3 mm off the same way
+  c.candidate.parameters.assign(design.leg_lengths.size(), change);
   c.candidate.report = [stated = design.leg_lengths](const Values&, const Values& v) {
     std::vector<NamedValue> named;
     for (std::size_t i = 0; i < v.size(); ++i) named.emplace_back("leg_lengths_m", stated[i] + v[i]);

@@ -14,7 +14,7 @@
 namespace metastable::analysis {
 
 /// Says where each nuisance stands in the list. Spreads and ratios are refitted by their logarithms; log_noise_sd is
-/// there only where the noise is refitted, the last five only under `settled`, of which the noise has its slot behind
+/// there only where the noise is refitted, the last six only under `settled`, of which the noise has its slot behind
 /// the others.
 struct WheelSlot {
   enum : std::size_t {
@@ -29,6 +29,7 @@ struct WheelSlot {
     log_sticking_ratio,
     log_plus_ratio,
     log_next_ratio,
+    next_by_slope,
     log_settled_noise_sd
   };
 };

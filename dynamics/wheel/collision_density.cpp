@@ -22,6 +22,7 @@ constexpr double farthest_score = 4.6;  // scores beyond it weigh 4e-6
 
 constexpr double finest = 0.05, widest = 0.8;  // spacing of nodes
 constexpr double far_from_zero = 4;            // a mean of mu, in sds: that mu ends at 0 shows no more
+constexpr double shortest_contact = 0.01;  // a restitution: with less, contacts last long enough to lose little again
 
 // Adds nodes in the standard score between `from` and `to`, with the normal's probabilities: equally spaced where it
 // fades out at both ends (then the rule converges exponentially), panels of Gauss-Legendre nodes where it is cut.
@@ -304,8 +305,9 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
   const double highest = std::min(1.0, contact_.restitution_mean + farthest_score * contact_.restitution_sd);
   const double cut = collision.reaches_no_friction() ? collision.without_friction() : -1.0;
   if (cut > lowest && cut < highest) {
-    const bool all = collision.alone(lowest).discriminant[0] > 0;
-    const double low = all ? lowest : collision.least_restitution(lowest, cut);
+    const double edge = std::max(lowest, shortest_contact);
+    const bool all = edge >= cut || collision.alone(edge).discriminant[0] > 0;
+    const double low = all ? lowest : collision.least_restitution(edge, cut);
     return sum_over_restitution(collision, contact_, restitution_mass_, low, {cut, highest});
   }
   const double spacing = collision.spacing();

@@ -9,7 +9,8 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double reference_speed = 5;  // [rad/s], of speed_dependent_restitution
+constexpr double reference_speed = 5;         // [rad/s], of speed_dependent_restitution
+constexpr double usual_slope = 8 * pi / 180;  // [rad], about which the error of `settled` may tilt
 
 Wheel changed(Wheel wheel, const Extension& extension) {
   for (std::size_t i = 0; i < wheel.leg_length.size() && i < extension.leg_change.size(); ++i)
@@ -295,7 +296,7 @@ SettledLanding ExtendedWheel::landing(const StepContext& context, double omega) 
   const Path way = path(context);
   at.next_rate = stated.next_rate;
   at.next_gain = stated.next_gain + way.gain - leg.stated_gain;
-  at.next_ratio = extension_.next_ratio;
+  at.next_ratio = extension_.next_ratio * std::exp(extension_.next_by_slope * (slope_ - usual_slope));
   if (drag_) {  // the parabola through three places between the barrier and a foot that sticks
     const double low = at.barrier_squared, half = std::max(1.0, stated.plastic * omega * omega - low) / 2;
     const double first = leg.drag_ratio * work(way, low), middle = leg.drag_ratio * work(way, low + half),

@@ -50,6 +50,7 @@ struct Extension {
   double sticking_ratio = 1;  ///< of every mu_c, a little off in engines that move by time steps; `settled`
   double plus_ratio = 1;      ///< of every omega+, which is seen a little after the impact; `settled`
   double next_ratio = 1;      ///< of every next omega-: how good the law is; `settled`
+  double next_by_slope = 0;   ///< what the logarithm of that gains by slope beyond 8 deg [1/rad]; `settled`
 };
 
 /// Holds what one collision's place in the experiment tells.

@@ -10,6 +10,7 @@
 #include "analysis/likelihood/coast_down_transitions.h"
 #include "analysis/likelihood/wheel_nuisances.h"
 #include "tests/analysis/diagnosed.h"
+#include "tests/analysis/line.h"
 #include "tests/analysis/rotor.h"
 
 namespace metastable::analysis {
@@ -208,6 +209,46 @@ TEST(Diagnosis, RefusesOptionsOutOfRange) {
   options = {};
   options.level = 0;
   EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
+}
+
+// Has a slope and a bend that its first nuisance makes, in two places: near 0 too little of them, near 5 what the data
+// hold. Only the effect knows of that place.
+class TwoOptima : public test::Line {
+ public:
+  using Line::Line;
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    const double near = std::exp(-n[0] * n[0]), far = std::exp(-(n[0] - 5) * (n[0] - 5));
+    const double added = terms.empty() ? 0 : terms.front().values.front();
+    Evaluation e;
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      const double w = w_[i], mean = 3 + (0.2 * near + 0.8 * far + added) * w + 0.4 * far * w * w;
+      const double z = (y_[i] - mean) / std::exp(n[1]);
+      e.score.push_back(z);
+      e.log_density.push_back(-0.5 * z * z - 0.91893853320467274 - n[1]);
+      e.unit.push_back(std::exp(n[1]));
+    }
+    return e;
+  }
+  std::vector<FitStart> starts(std::span<const EffectTerm> terms) const override {
+    if (terms.empty()) return {};
+    return {{{5, -0.7}, {{0.0}}}};
+  }
+};
+
+// What an effect gains by another optimum of the nuisances is not its own. (Two free runs of a drum differed by a
+// sensor's bias for it.)
+TEST(Diagnosis, AnEffectGainsNothingByAnotherOptimum) {
+  const test::Line straight = test::line(0.8, 5);
+  const Evaluation here = straight.evaluate(std::vector<double>{0, 0}, {});
+  std::vector<double> y, w;
+  for (std::size_t i = 0; i < here.score.size(); ++i) {
+    w.push_back(straight.events()[i].speed);
+    y.push_back(here.score[i] + 0.4 * w.back() * w.back());
+  }
+  const Diagnosis d = diagnose(TwoOptima(y, w), quick());
+  EXPECT_EQ(d.verdict, Verdict::recalibrate);
+  EXPECT_GT(d.gap.p_value, 0.05);
+  for (const Cause& cause : d.causes.ranked) EXPECT_LT(cause.gain, 8) << cause.name();
 }
 
 // The second system is a rotor with a torque that its nominal losses lack.

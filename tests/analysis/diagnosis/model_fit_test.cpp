@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "tests/analysis/line.h"
@@ -74,6 +75,57 @@ TEST(ModelFit, FollowsARidgeThatBends) {
   EXPECT_TRUE(found.converged) << found.reason;
   EXPECT_NEAR(found.nuisance[0], 1, 0.02);
   EXPECT_NEAR(found.log_likelihood, 0, 0.02);
+}
+
+// Has ten events whose densities have a cusp where the mean is `at`, as those have beyond the end of what a landing can
+// do.
+class Cusped : public test::Line {
+ public:
+  Cusped(std::vector<double> y, std::vector<double> w, double at) : Line(std::move(y), std::move(w)), at_(at) {
+    nuisances_[0].step = 0.01;  // no bound of a difference: what the data resolve is one
+  }
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    Evaluation e = Line::evaluate(n, terms);
+    for (std::size_t i = 0; i < 10; ++i) {
+      e.score[i] = 0;
+      e.log_density[i] = -8 * std::abs(n[0] - at_);
+    }
+    return e;
+  }
+
+ private:
+  double at_;
+};
+
+// Seen from one side a cusp promises a rise that is not there: such fits did not settle, and their effects were not
+// decided.
+TEST(ModelFit, SettlesOnACusp) {
+  const Line straight = line(0, 1);
+  std::vector<double> y, w;
+  const Evaluation here = straight.evaluate(std::vector<double>{0, 0}, {});
+  for (std::size_t i = 0; i < here.score.size(); ++i) {
+    y.push_back(here.score[i]);
+    w.push_back(straight.events()[i].speed);
+  }
+  const double at = least_squares(straight).mean + 0.02;
+  const Fit found = fit(Cusped(y, w, at), {2.9, -0.7}, {});
+  EXPECT_TRUE(found.converged) << found.reason << ", promised " << found.promised;
+  EXPECT_NEAR(found.nuisance[0], at, 0.005);
+}
+
+// An effect of known size is held near nothing as a ridge does: sxy / (sxx + variance / prior's) on a line.
+TEST(ModelFit, AnEffectsPriorIsARidge) {
+  class Held : public Line {
+   public:
+    explicit Held(const Line& line) : Line(line) { candidates_[0].parameters[0].prior_sd = 0.02; }
+  };
+  const Held model(line(0.1, 1));
+  const Squares s = least_squares(model);
+  const Fit with = fit(model, {0, 0}, {{&model.candidates()[0], {}, {0.0}}});
+  const double variance = std::exp(2 * with.nuisance[1]), price = variance / (0.02 * 0.02);
+  const double slope = with.terms[0].values[0];
+  EXPECT_NEAR(slope, s.slope * s.sww / (s.sww + price), 1e-3);
+  EXPECT_NEAR(with.penalised, with.log_likelihood - 0.5 * slope * slope / (0.02 * 0.02), 1e-3);
 }
 
 TEST(ModelFit, LeavesOutTrialsThatDoNotCount) {

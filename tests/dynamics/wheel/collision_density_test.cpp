@@ -111,10 +111,12 @@ TEST(CollisionDensity, IsTheDerivativeOfItsDistribution) {
 }
 
 // Collisions are drawn with the change applied by hand.
-// These spreads reach the fastest speeds possible, where the density of a single friction is singular.
+// The first two spreads reach the fastest speeds possible, where the density of a single friction is singular, the
+// others contacts without rebound and without friction, of which the first last long enough to lose little.
 TEST(CollisionDensity, HoldsAllProbabilityUpToTheFastestSpeed) {
   for (const ContactSpread& contact :
-       {ContactSpread{0.466, 0.187, 0.44, 0.044}, ContactSpread{0.36, 0.079, 0.29, 0.069}}) {
+       {ContactSpread{0.466, 0.187, 0.44, 0.044}, ContactSpread{0.36, 0.079, 0.29, 0.069},
+        ContactSpread{0.4, 0.1, 0.2, 0.1}, ContactSpread{0.26, 0.25, 0.02, 0.19}}) {
     const WheelMap map = uneven(Law::published, 7.02, contact);
     const CollisionDensity fast(map.contact_model(), contact);
     for (const double exponent : {0.0, 0.4}) {
