@@ -17,7 +17,8 @@ constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 // Are added to the information's diagonal, as shares of it. Where a step rises by less than this share of what it
 // promised, the next one is damped more.
 constexpr double dampings[] = {1e-9, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
-constexpr double difference_share = 0.05;  // step of a difference, of what the data resolve
+constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one tried where another failed
+constexpr double difference_share = 0.05;           // step of a difference, of what the data resolve
 
 // Holds all parameters of a hypothesis in one vector.
 class Point {
@@ -121,12 +122,12 @@ Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::Ve
 
 // Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does.
 void search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::VectorXd& step,
-            const Eigen::VectorXd& weights, double& best, Evaluation& evaluation) {
+            const Eigen::VectorXd& weights, int halvings, double& best, Evaluation& evaluation) {
   auto& slots = point.slots();
   std::vector<double> before;
   for (const Eigen::Index p : part) before.push_back(*slots[static_cast<std::size_t>(p)].value);
   double share = 1;
-  for (int halving = 0; halving < 7; ++halving, share /= 2) {
+  for (int halving = 0; halving < halvings; ++halving, share /= 2) {
     for (std::size_t a = 0; a < part.size(); ++a) {
       const Point::Slot& s = slots[static_cast<std::size_t>(part[a])];
       *s.value = std::clamp(before[a] + share * step[static_cast<Eigen::Index>(a)], s.lower, s.upper);
@@ -241,16 +242,18 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     const auto rises = [&](const std::vector<Eigen::Index>& part, std::size_t damped) {
       if (part.empty()) return false;
       const Eigen::VectorXd step = step_of(part, damped);
-      if (foretold > worth_a_step) search(point, part, step, weights, best, result.evaluation);
+      if (foretold > worth_a_step)
+        search(point, part, step, weights, damped == level ? most_halvings : few_halvings, best, result.evaluation);
       return best - before >= worth_a_step;
     };
     step_of(parts.all, 0);
     const double promised = foretold;
     // What is promised below this differences do not resolve.
     const double settled = unresolved + unresolved_share * (best - start);
-    bool better = !(promised > worth_a_step) || rises(parts.all, level) || rises(parts.of_terms, 0) ||
-                  rises(parts.of_nuisances, 0);
-    for (std::size_t damped = 0; !better && damped < std::size(dampings); ++damped)
+    bool better = !(promised > worth_a_step) || rises(parts.all, level);
+    const bool at_the_top = both_sides && promised <= settled;
+    if (!better && !at_the_top) better = rises(parts.of_terms, 0) || rises(parts.of_nuisances, 0);
+    for (std::size_t damped = 0; !better && !at_the_top && damped < std::size(dampings); ++damped)
       if (damped != level && (damped == 0 || promised > settled) && rises(parts.all, damped)) {
         better = true;
         level = damped;
