@@ -330,7 +330,8 @@ std::vector<std::size_t> Ranker::leaders(bool to_refine) const {
   if (all.size() > effort_.most_leaders) all.resize(effort_.most_leaders);
   if (to_refine || all.empty()) return all;
   double best = 0;
-  for (const std::size_t i : all) best = std::max(best, singles_[i].gain);
+  for (const std::size_t i : all)
+    if (singles_[i].not_decided.empty()) best = std::max(best, singles_[i].gain);
   std::erase_if(all, [&](std::size_t i) { return pair_share * singles_[i].gain + pair_margin < best; });
   return all;
 }

@@ -36,7 +36,7 @@ struct CauseRanking {
 struct Effort {
   double least_promise = 2;       ///< gain by the scores, for a fit
   std::size_t most_variants = 3;  ///< of one effect that are fitted
-  std::size_t most_leaders = 3;   ///< single effects that are refined, and that pairs are built on
+  std::size_t most_leaders = 3;   ///< single effects that are refined, and that pairs are built on if not far behind
   std::size_t most_partners = 3;  ///< of one leader that are fitted
   int refinements = 3;            ///< of a variant, each with half the moves
   int refining_steps = 4;         ///< of the fit at each move
@@ -57,7 +57,8 @@ struct RankingOptions {
 /// log mean_v exp(gain_v g/(1+g)/2) - p/2 log(1+g), g = 36/p.
 /// A second effect must earn beyond `model_error`^2 of what the first one gained in the same phase (collisions,
 /// stances): no catalogue entry has exactly the form of what nature did, and a misfit of 6 % of a large effect is none
-/// of its own. (An `exact` effect is forgiven nothing.) Candidates whose scores promise less than a fifth of a large
+/// of its own. (An `exact` effect is forgiven nothing.) Where an effect has a prior of its own the gain pays for it
+/// besides. Candidates whose scores promise less than a fifth of a large
 /// best gain are not fitted.
 /// @param candidates  to be considered
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,

@@ -6,6 +6,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -27,10 +28,10 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::size_t most_rivals = 3;   // hypotheses that compete in each fold of the cross-validation:
-constexpr double rival_evidence = 4;     //   those no further behind the best. Saves time
-constexpr double another_optimum = 0.5;  // rise of the recalibrated log likelihood that says that there is one
-// A recalibration that did not settle is mentioned beyond this rise that its slope still promises.
+constexpr std::size_t most_rivals = 3;  // hypotheses that compete in each fold of the cross-validation:
+constexpr double rival_evidence = 4;    //   those no further behind the best. Saves time
+// Beyond this rise another optimum of the recalibration is taken for one, and a recalibration that did not settle is
+// mentioned if its slope still promises it.
 constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likelihood; of the largest gain found
 
 StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std::vector<double>& nominal,
@@ -154,15 +155,17 @@ void note_what_is_rough(Diagnosis& d, const CauseRanking& ranking, const Fit& re
         enough_trials, enough_transitions));
 }
 
-// Fits without effects from the nuisances of the effect that gains most.
-Fit recalibrated_from_leader(const TransitionModel& model, const CauseRanking& ranking) {
+// Returns the fit without effects from the nuisances of the effect that gains most, where that is another optimum.
+std::optional<Fit> other_recalibration(const TransitionModel& model, const Fit& recalibrated,
+                                       const CauseRanking& ranking) {
   const RankedCause* leader = nullptr;
   for (const RankedCause& cause : ranking.singles)
     if (!cause.fit.nuisance.empty() && (!leader || cause.gain > leader->gain)) leader = &cause;
-  if (leader) return fit(model, leader->fit.nuisance, {});
-  Fit none;
-  none.penalised = -std::numeric_limits<double>::infinity();
-  return none;
+  if (!leader) return {};
+  Fit other = fit(model, leader->fit.nuisance, {});
+  if (other.penalised > recalibrated.penalised + settled_rise + settled_share * std::max(0.0, leader->gain))
+    return other;
+  return {};
 }
 
 // Lists those that compete on the trials held out.
@@ -226,9 +229,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   };
   CauseRanking ranking = rank();
   // What an effect seems to gain may be a better optimum that its fit came upon.
-  if (Fit other = recalibrated_from_leader(model, ranking);
-      other.penalised > recalibrated.penalised + another_optimum) {
-    recalibrated = std::move(other);
+  if (std::optional<Fit> other = other_recalibration(model, recalibrated, ranking)) {
+    recalibrated = *std::move(other);
     ranking = rank();
   }
   d.gap.contact = contact_estimates(model, recalibrated);

@@ -17,9 +17,13 @@ namespace {
 constexpr double largest_step = 0.1;  // of a difference, in standard errors
 constexpr double far_out = 0.03;      // share of the draws beyond which a tail follows its law instead of their count
 
-// Returns what the score `u` gains with information `info`; one parameter at its lower bound gains only upwards.
-double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& info,
+// Returns what the score `u` gains with information `info` of the data, beside the prior; one parameter at its lower
+// bound gains only upwards.
+double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, Eigen::MatrixXd info,
                      Eigen::VectorXd* start) {
+  for (Eigen::Index p = 0; p < u.size(); ++p)
+    if (const double sd = candidate.parameters[static_cast<std::size_t>(p)].prior_sd; sd > 0)
+      info(p, p) += 1 / (sd * sd);
   if (u.size() == 1) {
     if (!(info(0, 0) > 0)) return 0;
     const FreeParameter& p = candidate.parameters[0];
@@ -28,9 +32,8 @@ double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const
     const bool blocked = (p.lower >= p.neutral && u[0] < 0) || (p.upper <= p.neutral && u[0] > 0);
     return blocked ? 0 : u[0] * step;
   }
-  Eigen::MatrixXd steadied = info;
-  steadied.diagonal() *= 1 + 1e-8;
-  const Eigen::VectorXd step = markov::solve_symmetric(steadied, u);
+  info.diagonal() *= 1 + 1e-8;
+  const Eigen::VectorXd step = markov::solve_symmetric(info, u);
   if (start) *start = step;
   const double gain = u.dot(step);
   return std::isfinite(gain) && gain > 0 ? gain : 0;
@@ -98,12 +101,6 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   Eigen::MatrixXd weights = cross;
   if (columns > 0) weights = markov::solve_columns(fit.information, cross);  // Eigen's solve refers to a first element
   scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch - cross.transpose() * weights;
-  for (const Work& one : work)
-    for (std::size_t p = 0; p < one.terms.back().values.size(); ++p)
-      if (const double sd = one.terms.back().candidate->parameters[p].prior_sd; sd > 0) {
-        const auto at = one.first + static_cast<Eigen::Index>(p);
-        scan.information(at, at) += 1 / (sd * sd);
-      }
   const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
   for (Eigen::Index k = 0; k < events; ++k)

@@ -119,13 +119,19 @@ std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t se
   return fold;
 }
 
+// Says how many steps a fold's fit takes that starts from one of all trials.
+int steps_from(const TransitionModel& model, const Fit& recalibrated, const Fit& start) {
+  return start.converged ? fold_steps : effort_for(model, recalibrated).most_iterations;
+}
+
 // Returns the rival that does best on the trials counted; without any, `plain`.
-Fit best_rival(const TransitionModel& model, const std::vector<const Fit*>& rivals, const Fit& plain,
-               const FitOptions& options, const std::function<void()>& heartbeat) {
+Fit best_rival(const TransitionModel& model, const Fit& recalibrated, const std::vector<const Fit*>& rivals,
+               const Fit& plain, FitOptions options, const std::function<void()>& heartbeat) {
   Fit chosen = plain;
   double best = -1e300;
   for (const Fit* rival : rivals) {
     heartbeat();
+    options.most_iterations = steps_from(model, recalibrated, *rival);
     Fit tried = fit(model, rival->nuisance, rival->terms, options);
     std::size_t parameters = 0;
     for (const EffectTerm& term : rival->terms) parameters += term.values.size();
@@ -205,11 +211,11 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& gi
   markov::parallel_for(static_cast<std::size_t>(folds), threads, [&](std::size_t f) {
     speak();
     FitOptions options;
-    options.most_iterations = fold_steps;
     options.count.resize(trials);
     for (std::size_t t = 0; t < trials; ++t) options.count[t] = fold[t] != static_cast<int>(f);
+    options.most_iterations = steps_from(model, recalibrated, recalibrated);
     const Fit plain = fit(model, recalibrated.nuisance, {}, options);
-    const Fit chosen = best_rival(model, rivals, plain, options, speak);
+    const Fit chosen = best_rival(model, recalibrated, rivals, plain, options, speak);
     const Eigen::VectorXd training = event_weights(model, options.count);
     const Flexible flexible = flexible_model(model, chosen, cells, training);
     const std::array<const Evaluation*, 3> models{&given.evaluation, &plain.evaluation, &chosen.evaluation};

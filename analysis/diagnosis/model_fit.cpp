@@ -17,7 +17,7 @@ constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 // Are added to the information's diagonal, as shares of it. Where a step rises by less than this share of what it
 // promised, the next one is damped more.
 constexpr double dampings[] = {1e-9, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
-constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one tried where another failed
+constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is damped more where another failed
 constexpr double difference_share = 0.05;           // step of a difference, of what the data resolve
 
 // Holds all parameters of a hypothesis in one vector.
@@ -221,7 +221,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   const bool finite = std::isfinite(best);
   result.converged = slots.empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
-  for (int iteration = 0; finite && iteration < options.most_iterations && !slots.empty(); ++iteration) {
+  for (int iteration = 0; finite && iteration < options.most_iterations + both_sides && !slots.empty(); ++iteration) {
     result.derivatives = differences(point, result.evaluation, steps, both_sides);
     result.information = information(result.derivatives, result.evaluation, weights);
     result.gradient = penalised_gradient(slots, weights, steps, result);
@@ -239,25 +239,26 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       foretold = 0.5 * step.dot(picked(result.gradient, part));
       return step;
     };
-    const auto rises = [&](const std::vector<Eigen::Index>& part, std::size_t damped) {
+    const auto rises = [&](const std::vector<Eigen::Index>& part, std::size_t damped, int halvings) {
       if (part.empty()) return false;
       const Eigen::VectorXd step = step_of(part, damped);
-      if (foretold > worth_a_step)
-        search(point, part, step, weights, damped == level ? most_halvings : few_halvings, best, result.evaluation);
+      if (foretold > worth_a_step) search(point, part, step, weights, halvings, best, result.evaluation);
       return best - before >= worth_a_step;
     };
     step_of(parts.all, 0);
     const double promised = foretold;
     // What is promised below this differences do not resolve.
     const double settled = unresolved + unresolved_share * (best - start);
-    bool better = !(promised > worth_a_step) || rises(parts.all, level);
-    const bool at_the_top = both_sides && promised <= settled;
-    if (!better && !at_the_top) better = rises(parts.of_terms, 0) || rises(parts.of_nuisances, 0);
+    bool better = !(promised > worth_a_step) || rises(parts.all, level, most_halvings);
+    const bool at_the_top = both_sides && promised < settled;
+    if (!better && !at_the_top)
+      better = rises(parts.of_terms, 0, most_halvings) || rises(parts.of_nuisances, 0, most_halvings);
     for (std::size_t damped = 0; !better && !at_the_top && damped < std::size(dampings); ++damped)
-      if (damped != level && (damped == 0 || promised > settled) && rises(parts.all, damped)) {
+      if (damped != level && (damped == 0 || promised > settled) && rises(parts.all, damped, few_halvings)) {
         better = true;
         level = damped;
       }
+    result.promised = promised;
     if (!better && promised >= settled && !both_sides) {
       both_sides = true;
       continue;
@@ -266,7 +267,6 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       level = std::min(level + 1, std::size(dampings) - 1);
     else if (level > 0)
       --level;
-    result.promised = promised;
     if (!(promised > worth_a_step)) {
       result.converged = std::isfinite(promised);
       if (!result.converged) result.reason = "its information matrix is singular";

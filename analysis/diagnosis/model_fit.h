@@ -20,7 +20,7 @@ struct Fit {
   std::vector<double> nuisance;
   std::vector<EffectTerm> terms;
   double log_likelihood = 0;    ///< of the events counted, without the prior
-  double penalised = 0;         ///< with the nuisances' prior
+  double penalised = 0;         ///< with the priors of nuisances and effects
   Evaluation evaluation;        ///< of all events, counted or not
   Derivatives derivatives;      ///< at the optimum: nuisances first, then the terms' free parameters in order
   Eigen::VectorXd gradient;     ///< there, of the penalised likelihood: what no step brought to 0
@@ -38,8 +38,9 @@ struct FitOptions {
 
 /// Finds the maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =
 /// dz/d(speed), log density = log phi(z) + log J, and the information is the sum of z' z'^T + (log J)' (log J)'^T,
-/// which no outlying observation inflates; damped where they gain far less than promised. Starts from the given values;
-/// parameters stay inside their bounds. A likelihood that is not finite there has not converged, with that reason.
+/// which no outlying observation inflates; damped where they gain far less than promised. Slopes are differences to one
+/// side, from where no step rises on to both. Starts from the given values; parameters stay inside their bounds. A
+/// likelihood that is not finite there has not converged, with that reason.
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options = {});
 

@@ -20,9 +20,6 @@ constexpr double log_sqrt_two_pi = 0.91893853320467274178;
 // Is the noise that a collision's density is blurred by [rad/s]; less than this is half a per cent of its variance.
 constexpr double least_blur = 0.012;
 
-// Scores further out say no more of those to come: their densities are floors, which a memory would make good again.
-constexpr double farthest_told = 4;
-
 struct Node {  // of Gauss-Hermite's rule for the standard normal
   double score, weight;
 };
@@ -205,10 +202,9 @@ SpeedFilter::Out SpeedFilter::weighed(double density, double below, double rate)
   out.unit = density > 0 ? std::clamp(normal_density(z) / (density * rate), 1e-4, 2.0) : 0.3;
   if (memory_ != 0) {
     const auto [mean, sd] = foreseen();
-    const double told = std::clamp(z, -farthest_told, farthest_told), given = (told - mean) / sd;
-    out.score = given + (z - told);
-    out.log_density += log_normal(given) - log_normal(told) - std::log(sd);
-    remember(told);
+    out.score = (z - mean) / sd;
+    out.log_density += log_normal(out.score) - log_normal(z) - std::log(sd);
+    remember(z);
   }
   return out;
 }

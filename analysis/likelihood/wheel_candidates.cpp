@@ -67,7 +67,7 @@ WheelCandidate leg_lengths(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "leg_lengths";
   FreeParameter change{0, -0.02, 0.02, 1e-6};
-  change.prior_sd = 0.002;  // whoever stated the lengths had a ruler: all of them are not 3 mm off the same way
+  change.prior_sd = 0.002;  // of each: whoever stated the lengths had a ruler
   c.candidate.parameters.assign(design.leg_lengths.size(), change);
   c.candidate.report = [stated = design.leg_lengths](const Values&, const Values& v) {
     std::vector<NamedValue> named;

@@ -24,7 +24,7 @@ std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::option
     all[Slot::log_sticking_ratio] = {"log sticking_ratio", 0, 0.003, 1e-4, -0.03, 0.03};
     all[Slot::log_plus_ratio] = {"log plus_ratio", 0, 0.003, 1e-4, -0.03, 0.03};
     all[Slot::log_next_ratio] = {"log next_ratio", 0, 5e-4, 1e-5, -0.005, 0.005};
-    // In Chipmunk next omega- is off by -0.0016 rad/s at 9.59 deg and by 0.0004 at 7.02: 2e-4 of it a degree.
+    // In Chipmunk next omega- is off by -0.0016 rad/s at 9.59 deg and by 0.0004 at 7.02, 1.4e-4 of it a degree: 2e-4.
     all[Slot::next_by_slope] = {"next_by_slope", 0, 0.012, 1e-3, -0.12, 0.12};
     // Of two engines (five runs without an effect in ODE and Chipmunk) eta comes out 0.006 to 0.014 and J 0 to 8 % low,
     // most in the one whose steps part most from the law.

@@ -226,7 +226,10 @@ SpeedDensity sum_over_restitution(const PublishedCollision& collision, const Con
         }
       collision.solve(roots, count);
       for (std::size_t i = 0; i < count; ++i) {
-        if (!(roots.discriminant[i] > 0)) continue;
+        if (!(roots.discriminant[i] > 0)) {  // every friction loses more
+          result.below += weight[i];
+          continue;
+        }
         const SpeedDensity one = collision.of(roots, i);
         result.below += weight[i] * one.below;
         result.density += weight[i] * one.density;
@@ -305,7 +308,7 @@ SpeedDensity CollisionDensity::published(const Collision& c, double before, doub
   const double highest = std::min(1.0, contact_.restitution_mean + farthest_score * contact_.restitution_sd);
   const double cut = collision.reaches_no_friction() ? collision.without_friction() : -1.0;
   if (cut > lowest && cut < highest) {
-    const double edge = std::max(lowest, shortest_contact);
+    const double edge = std::max(lowest, shortest_contact / change.restitution_ratio);
     const bool all = edge >= cut || collision.alone(edge).discriminant[0] > 0;
     const double low = all ? lowest : collision.least_restitution(edge, cut);
     return sum_over_restitution(collision, contact_, restitution_mass_, low, {cut, highest});

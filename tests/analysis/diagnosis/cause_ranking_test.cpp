@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "analysis/diagnosis/stepwise.h"
 #include "analysis/likelihood/coast_down_transitions.h"
@@ -32,6 +35,51 @@ TEST(RankCauses, OnALineGainAndEvidenceAreThoseOfLeastSquares) {
   EXPECT_NEAR(std::log(cause.p_value), std::log(std::erfc(std::sqrt(0.5 * cause.gain))), 1.5);  // by 300 draws
   EXPECT_TRUE(cause.not_decided.empty());
   EXPECT_TRUE(ranking.pairs.empty());
+}
+
+// Has a strong effect, a weak one (a shift by every other event) and one without any.
+class StrongAndWeak : public Line {
+ public:
+  explicit StrongAndWeak(const Line& from) : Line(from) {
+    candidates_[0].id = "strong";
+    candidates_[1] = candidates_[0];
+    candidates_[1].id = "weak";
+    candidates_.push_back(candidates_[0]);
+    candidates_[2].id = "none";
+    for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += 0.33 * parity(i);
+  }
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    Evaluation e = Line::evaluate(n, {});
+    for (std::size_t i = 0; i < e.score.size(); ++i) {
+      for (const EffectTerm& term : terms) {
+        const std::string& id = term.candidate->id;
+        e.score[i] -= term.values[0] / std::exp(n[1]) *
+                      (id == "strong" ? w_[i]
+                       : id == "weak" ? parity(i)
+                                      : std::sin(3.0 * static_cast<double>(i)));
+      }
+      e.log_density[i] = -0.5 * e.score[i] * e.score[i] - 0.91893853320467274 - n[1];
+    }
+    return e;
+  }
+
+ private:
+  static double parity(std::size_t i) { return i % 2 == 0 ? 1 : -1; }
+};
+
+// A pair whose stronger effect gains that little cannot come near, so none is built on it: beside the strong one it
+// still stands, as the second.
+TEST(RankCauses, BuildsNoPairOnWhatIsFarBehind) {
+  const StrongAndWeak model(line(0.6, 1, 1200));
+  std::vector<const Candidate*> candidates;
+  for (const Candidate& candidate : model.candidates()) candidates.push_back(&candidate);
+  const CauseRanking ranking = rank_causes(model, fit(model, {0, 0}, {}), candidates, few_draws());
+  ASSERT_FALSE(ranking.singles[1].fit.nuisance.empty()) << "the weak effect is no leader";
+  ASSERT_LT(2.8 * ranking.singles[1].gain + 12, ranking.singles[0].gain);
+  const bool paired = std::any_of(ranking.pairs.begin(), ranking.pairs.end(), [](const RankedCause& pair) {
+    return pair.terms[0].candidate->id == "strong" && pair.terms[1].candidate->id == "weak";
+  });
+  EXPECT_TRUE(paired);
 }
 
 TEST(RankCauses, PutsTheTorqueOnARotorFirst) {

@@ -163,6 +163,18 @@ TEST(SettledDensity, OfTheNextTouchIsThatOfDrawnContacts) {
   EXPECT_LT(kolmogorov(drawn, below), kolmogorov_999);
 }
 
+// The error of the law's form is of every next speed, and may tilt about 8 deg.
+TEST(SettledDensity, TheErrorOfItsFormTiltsWithTheSlope) {
+  const StepContext context{.leg = 2};
+  const Contact sticks{0.4, 10};
+  const double stated = extended().land(context, 4.9, sticks, false).next.value();
+  Extension tilted;
+  tilted.next_ratio = 1.002;
+  tilted.next_by_slope = 0.1;
+  const double off = extended(tilted).land(context, 4.9, sticks, false).next.value();
+  EXPECT_NEAR(off / stated, 1.002 * std::exp(0.1 * (7.02 - 8) * degree), 1e-12);
+}
+
 // What a landing says given omega+, averaged over omega+, is what it says without.
 TEST(SettledDensity, GivenTheFirstImpactAveragesToThatWithout) {
   const ExtendedWheel wheel = extended();
