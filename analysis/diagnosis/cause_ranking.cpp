@@ -4,26 +4,24 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <numeric>
+#include <utility>
 
+#include "analysis/diagnosis/evidence.h"
 #include "dynamics/wheel/truncated_normal.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
 namespace {
 
-// These numbers are the prior.
-constexpr double expected_gain = 36;  // of an effect before its size is known
-constexpr double pair_prior = 0.05;   // odds of two effects to one
-constexpr double most_hidden = 0.3;   // logarithm of what one effect of a pair may hide of the other's gain
+// These numbers are the prior of pairs.
+constexpr double pair_prior = 0.05;  // odds of two effects to one
+constexpr double most_hidden = 0.3;  // logarithm of what one effect of a pair may hide of the other's gain
 
 // They say which hypotheses are fitted; the others are weighed by what their scores promise. These save time, and
 // decide only where scores promise far too little. Gains are 2 Delta log likelihood, evidence is a log Bayes factor.
 constexpr double promise_share = 0.2;       // of the largest promised gain, less
 constexpr double promise_margin = 40;       //   this much
 constexpr double overlooked_margin = 12;    // evidence by the scores below the best fitted one, for a fit after all
-constexpr double variant_gain = 8;          // promised by one more variant of an effect that is fitted,
-constexpr double variant_share = 0.8;       //   and this share of the best variant's gain
 constexpr double leader_evidence = 2;       // of an effect that is refined, and that pairs are built on
 constexpr double refined_share = 0.7;       // of the best evidence, less
 constexpr double refined_margin = 10;       //   this much, for an effect worth refining
@@ -34,13 +32,10 @@ constexpr double least_pair_evidence = -4;  // promised beyond the first effect'
 constexpr double alike_margin = 4;          // evidence promised below the best second effect's, for one worth fitting
 
 // These numbers say how fits are run.
-constexpr double furthest_start = 0.25;  // share of a parameter's range
-constexpr double small_start = 0.1;      // share of a size worth starting from, where the scores' start was a bad one
-constexpr double worth_moving = 0.2;     // rise of the log likelihood
-constexpr int law_steps = 12;            // of another law's fit, from either start
-constexpr int more_law_steps = 60;       // where it may still come near
-constexpr int more_steps = 4;            // times as many, where a fit near the top did not settle
-constexpr double law_hopeless = -100;    // log likelihood below the recalibrated model's that no more steps make good
+constexpr int law_steps = 12;          // of another law's fit, from either start
+constexpr int more_law_steps = 60;     // where it may still come near
+constexpr int more_steps = 4;          // times as many, where a fit near the top did not settle
+constexpr double law_hopeless = -100;  // log likelihood below the recalibrated model's that no more steps make good
 
 // These numbers say when a fit that did not settle is decided all the same.
 constexpr double law_refuted = -30;     // gain of another law: so far below that what it could still rise is nothing
@@ -50,104 +45,12 @@ constexpr double far_behind = 12;       //   evidence below the best that it lea
 constexpr double next_to_nothing = 2;   // promised rise of the log likelihood, plus
 constexpr double share_of_gain = 1e-3;  //   this share of the gain
 
-// Returns the log of the mean likelihood ratio over variants and sizes. `gain` is the fitted one of the best variant.
-double log_evidence(const ScannedEffect& scanned, double gain) {
-  const auto parameters = static_cast<double>(scanned.candidate->parameters.size());
-  const double g = expected_gain / std::max(1.0, parameters), shrink = g / (1 + g);
-  const double best = scanned.gain[scanned.best];
-  double sum = 0;
-  for (std::size_t v = 0; v < scanned.gain.size(); ++v) {
-    const double share = v == scanned.best || !(best > 0) ? 1 : scanned.gain[v] / best;
-    sum += std::exp(0.5 * shrink * gain * (std::min(1.0, share) - 1));
-  }
-  return evidence_of_gain(gain, parameters) + std::log(sum / static_cast<double>(scanned.gain.size()));
-}
-
-EffectTerm term_at(const ScannedEffect& scanned, std::size_t variant) {
-  EffectTerm term{scanned.candidate, scanned.candidate->variants[variant], {}};
-  for (std::size_t p = 0; p < scanned.candidate->parameters.size(); ++p) {
-    const FreeParameter& parameter = scanned.candidate->parameters[p];
-    // Far from the neutral value the scores say little.
-    const double reach = furthest_start * (parameter.upper - parameter.lower);
-    const double step = std::clamp(scanned.start[variant][static_cast<Eigen::Index>(p)], -reach, reach);
-    term.values.push_back(std::clamp(parameter.neutral + step, parameter.lower, parameter.upper));
-  }
-  return term;
-}
-
-// These variants are worth a full fit.
-std::vector<std::size_t> leading_variants(const ScannedEffect& scanned, std::size_t most) {
-  std::vector<std::size_t> order(scanned.gain.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return scanned.gain[a] > scanned.gain[b]; });
-  std::vector<std::size_t> leading;
-  for (const std::size_t v : order)
-    if (leading.empty() || (leading.size() < most && scanned.gain[v] > variant_gain &&
-                            scanned.gain[v] > variant_share * scanned.gain[order[0]]))
-      leading.push_back(v);
-  return leading;
-}
-
-// Moves the last term's variant between the list's values as long as the likelihood rises, halving the moves.
-void refine_variant(const TransitionModel& model, const Effort& effort, Fit& best) {
-  const std::vector<double> spacing = best.terms.back().candidate->refine;
-  double share = 0.5;
-  for (int round = 0; round < effort.refinements; ++round, share /= 2)
-    for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
-      if (spacing[entry] == 0) continue;
-      for (const double sign : {1.0, -1.0}) {
-        std::vector<EffectTerm> terms = best.terms;
-        terms.back().variant[entry] += sign * share * spacing[entry];
-        Fit tried = fit(model, best.nuisance, terms,
-                        {.count = {}, .refit_nuisances = true, .most_iterations = effort.refining_steps});
-        if (!(tried.penalised > best.penalised + worth_moving)) continue;
-        const bool was_converged = best.converged;
-        best = std::move(tried);
-        best.converged = best.converged || was_converged;
-        break;
-      }
-    }
-}
-
-// Finds the best fit of `base` with one more effect.
-RankedCause fit_cause(const TransitionModel& model, const Effort& effort, const Fit& base,
-                      const ScannedEffect& scanned) {
-  const FitOptions options{.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations};
+RankedCause as_cause(Fit fit) {
   RankedCause cause;
-  bool first = true;
-  for (const std::size_t variant : leading_variants(scanned, effort.most_variants)) {
-    std::vector<EffectTerm> terms = base.terms;
-    terms.push_back(term_at(scanned, variant));
-    Fit tried = best_fit(model, base.nuisance, terms, options);
-    const auto try_from = [&](auto value_of) {
-      for (std::size_t p = 0; p < terms.back().values.size(); ++p)
-        terms.back().values[p] = value_of(scanned.candidate->parameters[p]);
-      Fit again = fit(model, base.nuisance, terms, options);
-      if (again.penalised > tried.penalised) tried = std::move(again);
-    };
-    if (tried.penalised < base.penalised)  // a bad start: from nothing instead
-      try_from([](const FreeParameter& p) { return p.try_at != 0 ? p.try_at * small_start : p.neutral; });
-    if (scanned.candidate->parameters.size() == 1 && scanned.candidate->parameters[0].likely != 0)
-      try_from([](const FreeParameter& p) { return p.likely; });
-    if (first || tried.penalised > cause.fit.penalised) cause.fit = std::move(tried);
-    first = false;
-  }
-  cause.terms = cause.fit.terms;
-  if (!cause.fit.converged) cause.not_decided = cause.fit.reason;
+  cause.terms = fit.terms;
+  if (!fit.converged) cause.not_decided = fit.reason;
+  cause.fit = std::move(fit);
   return cause;
-}
-
-// Counts a second effect for what it gained beyond the model error of the first. `exact`: the part of the first that
-// has none.
-double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact) {
-  const PhaseGain before = phase_gain(model, first, exact), now = phase_gain(model, pair, first);
-  const double tolerated = model_error * model_error;
-  // What the second effect gained by itself counts alone: one phase may have paid for the other, or for a prior.
-  const double all = 2 * (pair.penalised - first.penalised);
-  const double beyond = std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +
-                        std::max(0.0, now.stances - tolerated * std::max(0.0, before.stances));
-  return std::max(0.0, std::min(all, beyond));
 }
 
 // Gives up a hypothesis whose likelihood is not finite anywhere the fit began.
@@ -263,13 +166,13 @@ void Ranker::fit_law(RankedCause& cause) const {
 }
 
 void Ranker::fit_effect(RankedCause& cause, const ScannedEffect& scanned) const {
-  cause = fit_cause(model_, effort_, recalibrated_, scanned);
+  cause = as_cause(fit_one_more(model_, effort_, recalibrated_, scanned));
   cause.gain = gain(cause.fit);
   if (!std::isfinite(cause.gain)) return give_up(cause);
   // These are at the optimum up to what the differences resolve: small gains that the scores confirm are decided.
   if (cause.gain < small_gain && scanned.gain[scanned.best] < small_gain) cause.not_decided.clear();
   cause.p_value = p_value(scanned.candidate, cause.gain);
-  cause.evidence = log_evidence(scanned, std::max(0.0, cause.gain));
+  cause.evidence = evidence_of(scanned, std::max(0.0, cause.gain));
 }
 
 void Ranker::fit_singles() {
@@ -293,7 +196,7 @@ void Ranker::fit_singles() {
         (promised >= effort_.least_promise && promised >= promise_share * largest - promise_margin))
       return fit_effect(cause, scanned);
     cause.gain = promised;
-    cause.evidence = log_evidence(scanned, promised);
+    cause.evidence = evidence_of(scanned, promised);
     cause.terms = {term_at(scanned, scanned.best)};
     cause.p_value = p_value(candidate, promised);
   });
@@ -420,7 +323,7 @@ void Ranker::scan_beside(std::size_t leader) {
   const EffectScan scan = scan_effects(model_, first.fit, others, threads_);
   std::vector<std::pair<double, const ScannedEffect*>> promising;
   for (const ScannedEffect& effect : scan.effects) {
-    const double promised = log_evidence(effect, effect.gain[effect.best]);
+    const double promised = evidence_of(effect, effect.gain[effect.best]);
     std::vector<EffectTerm> both = first.terms;
     both.push_back(term_at(effect, effect.best));
     if (knows_start(model_, both))
@@ -477,11 +380,11 @@ void Ranker::fit_pairs() {
     heartbeat();
     const RankedCause& first = singles_[tries_[i].leader];
     RankedCause& pair = tried[i];
-    pair = fit_cause(model_, effort_, first.fit, tries_[i].second);
+    pair = as_cause(fit_one_more(model_, effort_, first.fit, tries_[i].second));
     pair.gain = gain(pair.fit);
     if (!std::isfinite(pair.gain)) return give_up(pair);
     const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
-    pair.evidence = first.evidence + log_evidence(tries_[i].second, second) + prior;
+    pair.evidence = first.evidence + evidence_of(tries_[i].second, second) + prior;
     pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
     pair.together = pair.gain / std::max(1.0, gain_apart(pair));
   });
@@ -541,7 +444,7 @@ void Ranker::complete_pairs() {
       if (other != term.candidate && other->undecidable.empty()) others.push_back(other);
     const EffectScan scan = scan_effects(model_, singles_[leader].fit, others, threads_);
     std::vector<double> promised;
-    for (const ScannedEffect& effect : scan.effects) promised.push_back(log_evidence(effect, effect.gain[effect.best]));
+    for (const ScannedEffect& effect : scan.effects) promised.push_back(evidence_of(effect, effect.gain[effect.best]));
     if (promised.empty()) continue;
     const double most = *std::max_element(promised.begin(), promised.end());
     for (std::size_t k = 0; k < promised.size(); ++k)
@@ -553,19 +456,6 @@ void Ranker::complete_pairs() {
 
 }  // namespace
 
-double evidence_of_gain(double gain, double parameters) {
-  const double g = expected_gain / std::max(1.0, parameters);
-  return 0.5 * g / (1 + g) * gain - 0.5 * parameters * std::log1p(g);
-}
-
-PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse) {
-  PhaseGain gain;
-  for (std::size_t i = 0; i < model.events().size(); ++i)
-    (model.events()[i].kind == EventKind::stance ? gain.stances : gain.collisions) +=
-        2 * (better.evaluation.log_density[i] - worse.evaluation.log_density[i]);
-  return gain;
-}
-
 const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<EffectTerm>& terms,
                       const Fit& recalibrated) {
   for (const EffectTerm& term : terms)
@@ -573,14 +463,6 @@ const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector
       if (term.candidate->exact && cause.terms[0].candidate == term.candidate && !cause.fit.nuisance.empty())
         return cause.fit;
   return recalibrated;
-}
-
-Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
-  constexpr std::size_t many_events = 6000;
-  constexpr double far_off = 50;  // rise of the log likelihood that a recalibration has left
-  if (!recalibrated.converged && recalibrated.promised > far_off) return {20, 1, 1, 1, 1, 2, 6};
-  if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 2, 12};
-  return {};
 }
 
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/evidence.h"
 #include "analysis/statistics/number_text.h"
 
 namespace metastable::analysis {

@@ -11,7 +11,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/effect_fit.h"
 #include "analysis/diagnosis/gap_map.h"
 #include "analysis/statistics/bounded_interval.h"
 #include "analysis/statistics/median.h"

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <tuple>
 
-#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/evidence.h"
 #include "analysis/diagnosis/map_columns.h"
 #include "analysis/diagnosis/model_fit.h"
 #include "analysis/diagnosis/transition_model.h"

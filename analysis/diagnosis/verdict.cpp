@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/evidence.h"
 #include "analysis/diagnosis/gap_map.h"
 #include "analysis/diagnosis/left_over.h"
 #include "analysis/diagnosis/parameter_estimates.h"

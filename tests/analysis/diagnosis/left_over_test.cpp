@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "analysis/diagnosis/cause_ranking.h"
+#include "analysis/diagnosis/evidence.h"
 #include "analysis/diagnosis/model_fit.h"
 #include "tests/analysis/line.h"
 
