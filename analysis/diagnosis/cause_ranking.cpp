@@ -24,7 +24,7 @@ constexpr double promise_margin = 40;       //   this much
 constexpr double overlooked_margin = 12;    // evidence by the scores below the best fitted one, for a fit after all
 constexpr double leader_evidence = 2;       // of an effect that is refined, and that pairs are built on
 constexpr double refined_share = 0.7;       // of the best evidence, less
-constexpr double refined_margin = 10;       //   this much, for an effect worth refining
+constexpr double refined_margin = 10;       //   this much, for an effect worth refining and another start
 constexpr double refit_margin = 60;         // evidence below the best, for a fit that did not settle to be tried again
 constexpr double pair_share = 2.8;          // of the gain of its stronger effect, most that a pair gains, more or less,
 constexpr double pair_margin = 12;          //   this much: below the best gain, none is built on it
@@ -36,6 +36,8 @@ constexpr int law_steps = 12;          // of another law's fit, from either star
 constexpr int more_law_steps = 60;     // where it may still come near
 constexpr int more_steps = 4;          // times as many, where a fit near the top did not settle
 constexpr double law_hopeless = -100;  // log likelihood below the recalibrated model's that no more steps make good
+
+constexpr double strained = 2;  // cost of its priors [log likelihood], for a fit to be tried from what is stated
 
 // These numbers say when a fit that did not settle is decided all the same.
 constexpr double law_refuted = -30;     // gain of another law: so far below that what it could still rise is nothing
@@ -86,6 +88,7 @@ class Ranker {
 
   void fit_singles();
   void fit_overlooked();
+  void refit_from_stated();
   void refine_leaders();
   void refit_unsettled();
   void decide_unsettled();
@@ -119,6 +122,7 @@ class Ranker {
   void fit_law(RankedCause& cause) const;
   void fit_effect(RankedCause& cause, const ScannedEffect& scanned) const;
   void take(RankedCause& cause, Fit better) const;
+  bool near_the_top(const RankedCause& cause) const;
   double gain_apart(const RankedCause& pair) const;
   double gain(const Fit& fit) const { return 2 * (fit.penalised - recalibrated_.penalised); }
   double p_value(const Candidate* candidate, double gain) const;
@@ -248,12 +252,37 @@ void Ranker::take(RankedCause& cause, Fit better) const {
   cause.terms = cause.fit.terms;
 }
 
+bool Ranker::near_the_top(const RankedCause& cause) const {
+  return cause.evidence >= refined_share * top_ - refined_margin;
+}
+
+// What a recalibration did to take a large effect up may hold the effect's fit off its optimum, which then strains the
+// nuisances: the stated ones are a start, too.
+void Ranker::refit_from_stated() {
+  const std::vector<double> stated = nominal_values(model_);
+  markov::parallel_for(singles_.size(), threads_, [&](std::size_t i) {
+    heartbeat();
+    RankedCause& cause = singles_[i];
+    if (!fitted(cause) || cause.terms[0].candidate->parameters.empty() || !near_the_top(cause) ||
+        cause.fit.log_likelihood - cause.fit.penalised < strained)
+      return;
+    Fit other = fit(model_, stated, cause.terms,
+                    {.count = {}, .refit_nuisances = true, .most_iterations = effort_.most_iterations});
+    if (!(other.penalised > cause.fit.penalised)) return;
+    cause.not_decided = other.converged ? "" : other.reason;
+    take(cause, std::move(other));
+    cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
+  });
+  for (const RankedCause& cause : singles_)
+    if (!cause.candidate_undecided()) top_ = std::max(top_, cause.evidence);
+}
+
 // The p-value stays that of the listed variants: chance has not been drawn between them.
 void Ranker::refine_leaders() {
   const std::vector<std::size_t> strongest = leaders(true);
   markov::parallel_for(strongest.size(), threads_, [&](std::size_t k) {
     heartbeat();
-    if (singles_[strongest[k]].evidence >= refined_share * top_ - refined_margin) refine_single(strongest[k]);
+    if (near_the_top(singles_[strongest[k]])) refine_single(strongest[k]);
   });
 }
 
@@ -472,6 +501,7 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   ranker.fit_singles();
   ranker.fit_overlooked();
   ranker.reach(0.5);
+  ranker.refit_from_stated();
   ranker.refine_leaders();
   ranker.refit_unsettled();
   ranker.decide_unsettled();
