@@ -13,6 +13,7 @@
 #include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/collision_profile.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
+#include "analysis/diagnosis/fitted_variations.h"
 #include "analysis/diagnosis/gap_map.h"
 #include "analysis/diagnosis/gap_shrinkage.h"
 #include "analysis/diagnosis/gap_tests.h"
@@ -250,6 +251,14 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const std::vector<const RankedCause*> ordered = hypotheses(d, model, ranking);
   const bool gap = d.gap.p_value < options.level;
 
+  if (gap && ranking.scan.trials_suffice) {
+    progress(0.66, "what has no name");
+    Unnamed& alone = d.causes.unnamed.front();
+    for (LeftInFacet& varied :
+         fitted_variations(model, recalibrated, options.threads, [&] { progress(0.66, "what has no name"); }))
+      alone.facets.push_back(std::move(varied));
+    alone.evidence = evidence_of_more(alone.facets);
+  }
   Chosen chosen{&recalibrated};
   if (gap && !ordered.empty() && ordered.front()->evidence > 0 && !ordered.front()->fit.nuisance.empty()) {
     progress(0.68, "what is left");

@@ -15,6 +15,11 @@ EffectTerm term_of(const Candidate& candidate, const std::vector<double>& catalo
 
 std::vector<FitStart> TransitionModel::starts(std::span<const EffectTerm>) const { return {}; }
 
+const std::vector<Variation>& TransitionModel::variations() const {
+  static const std::vector<Variation> none;
+  return none;
+}
+
 std::string TransitionModel::size_in_words(std::span<const EffectTerm>) const { return {}; }
 
 std::vector<double> TransitionModel::rest_chances(std::span<const double>, std::span<const EffectTerm>) const {

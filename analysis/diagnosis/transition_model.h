@@ -97,6 +97,12 @@ struct Candidate {
   bool exact = false;
 };
 
+/// Is something that varies in a way that no effect of the catalogue has, as it is fitted.
+struct Variation {
+  std::string facet, aspect;  ///< what it goes by, and what of the contact varies
+  Candidate candidate;
+};
+
 /// A hypothesis adds candidates with values.
 struct EffectTerm {
   const Candidate* candidate = nullptr;
@@ -131,6 +137,8 @@ class TransitionModel {
   virtual std::string recalibrated() const { return "contact parameters"; }
   virtual const std::vector<Nuisance>& nuisances() const = 0;
   virtual const std::vector<Candidate>& candidates() const = 0;
+  /// Lists what may vary without a name: it is fitted as candidates are, held against them, and never a cause.
+  virtual const std::vector<Variation>& variations() const;
   /// Gives the densities with these nuisances and effects. Values outside a model's reach give a very small density,
   /// never a NaN.
   virtual Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const = 0;

@@ -54,6 +54,7 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
     : measured_(measured),
       run_(run),
       wheel_(wheel),
+      hypothesis_(hypothesis),
       day_shift_(hypothesis.shift_of(run.condition)),
       friction_sd_(hypothesis.extension.trial_friction_sd),
       nodes_(nodes_for(friction_sd_ * std::sqrt(static_cast<double>(run.collisions.size())) /
@@ -73,6 +74,15 @@ void TrialFollower::come_to(const Event& event) {
 
 double TrialFollower::friction_shift(std::size_t node) const { return day_shift_ + nodes_[node].score * friction_sd_; }
 
+StepContext TrialFollower::context_of(const Event& event, double friction_shift) const {
+  const std::size_t k = collision_of(event);
+  StepContext here = run_.collisions[k].context;
+  here.friction_shift = friction_shift;
+  if (hypothesis_.varied)
+    hypothesis_.varied(collision_place(run_, event.trial, k, run_.collisions[k], run_.collisions[k].before), here);
+  return here;
+}
+
 double TrialFollower::largest_log_weight() const { return *std::max_element(log_weight_.begin(), log_weight_.end()); }
 
 double TrialFollower::chance_of_rest(const Event& event) {
@@ -82,8 +92,7 @@ double TrialFollower::chance_of_rest(const Event& event) {
   double sum = 0, weights = 0;
   for (std::size_t q = 0; q < nodes_.size(); ++q) {
     if (log_weight_[q] < largest - negligible) continue;
-    StepContext here = run_.collisions[collision_of(event)].context;
-    here.friction_shift = friction_shift(q);
+    const StepContext here = context_of(event, friction_shift(q));
     const double w = std::exp(log_weight_[q] - largest);
     sum += w * filters_[q].chance_below(wheel_, here, wheel_.barrier(here));
     weights += w;
@@ -94,8 +103,7 @@ double TrialFollower::chance_of_rest(const Event& event) {
 SpeedFilter::Out TrialFollower::seen_by(SpeedFilter& filter, const Event& event, double friction_shift) const {
   const std::size_t k = collision_of(event);
   const RunCollision& m = run_.collisions[k];
-  StepContext here = m.context;
-  here.friction_shift = friction_shift;
+  const StepContext here = context_of(event, friction_shift);
   switch (event.kind) {
     case EventKind::launch:
       return filter.launch(measured_.conditions[run_.condition], m.before);

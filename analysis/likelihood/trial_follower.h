@@ -35,12 +35,14 @@ class TrialFollower {
 
   void come_to(const Event& event);
   SpeedFilter::Out seen_by(SpeedFilter& filter, const Event& event, double friction_shift) const;
+  dynamics::StepContext context_of(const Event& event, double friction_shift) const;
   double friction_shift(std::size_t node) const;
   double largest_log_weight() const;
 
   const WheelRuns& measured_;
   const WheelRun& run_;
   const dynamics::ExtendedWheel& wheel_;
+  const WheelHypothesis& hypothesis_;
   double day_shift_;    // of mu
   double friction_sd_;  // of the trial's own; 0: one node, without a shift
   std::vector<ScoreNode> nodes_;

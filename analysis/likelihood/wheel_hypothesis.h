@@ -2,9 +2,11 @@
 // Holds what is supposed of a wheel whose trials were measured: its contact and the effects added to it.
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <vector>
 
+#include "analysis/likelihood/contact_variation.h"
 #include "analysis/likelihood/score_tilt.h"
 #include "dynamics/wheel/collision_density.h"
 #include "dynamics/wheel/extended_wheel.h"
@@ -17,6 +19,9 @@ struct WheelHypothesis {
   dynamics::Extension extension;
   std::optional<double> noise = {};         ///< sd of reported speeds [rad/s]; none: what the runs say
   std::vector<double> friction_shift = {};  ///< by condition: what its day adds to the mean of mu; empty: one day
+
+  /// Changes the friction of a step by where it happens; none: it does not vary by what has no name.
+  std::function<void(const CollisionPlace&, dynamics::StepContext&)> varied = {};
 
   double shift_of(std::size_t condition) const { return friction_shift.empty() ? 0 : friction_shift[condition]; }
 };

@@ -63,6 +63,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
       m.context.since_previous.reset();
     }
     m.context.friction_shift = shift;
+    if (hypothesis.varied) hypothesis.varied(collision_place(run, index % all.runs.size(), k, m, omega), m.context);
     const double rho = e.memory, left = std::sqrt(1 - rho * rho);
     std::optional<double> plus;
     ExtendedWheel::Drawn landed;
@@ -112,7 +113,10 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
     const auto from = previous.after ? previous.after : wheel.back(previous.context, run.collisions[k].before);
     if (from && *from > 0) run.collisions[k].context.since_previous = wheel.duration(previous.context, *from);
   }
-  for (RunCollision& m : run.collisions) m.context.friction_shift = 0;
+  for (RunCollision& m : run.collisions) {  // what was drawn there is not known of the run
+    m.context.friction_shift = 0;
+    m.context.friction_ratio = m.context.friction_scatter = 1;
+  }
   if (!design.outcome) run.outcome.reset();
   if (run.collisions.back().slide && run.outcome != dynamics::Outcome::rest) run.collisions.back().slide.reset();
   mark_counted(all, run);

@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "analysis/likelihood/contact_variation.h"
 #include "analysis/likelihood/wheel_candidates.h"
 #include "analysis/likelihood/wheel_columns.h"
 #include "analysis/likelihood/wheel_hypothesis.h"
@@ -71,6 +72,7 @@ class WheelTransitions : public TransitionModel {
   std::string condition_name(std::size_t condition) const override { return measured_.conditions.at(condition).id; }
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }
+  const std::vector<Variation>& variations() const override { return variations_; }
   const std::vector<std::string>& notes() const override { return measured_.notes; }
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
   std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
@@ -98,6 +100,8 @@ class WheelTransitions : public TransitionModel {
   std::vector<int> days_;      // rising
   std::vector<WheelCandidate> effects_;
   std::vector<Candidate> candidates_;
+  std::vector<ContactVariation> contact_variations_;
+  std::vector<Variation> variations_;
 };
 
 WheelTransitions::WheelTransitions(const Experiment& experiment)
@@ -153,6 +157,8 @@ void WheelTransitions::set_up_parameters() {
   for (const Condition& one : measured_.conditions) design.ramp_length = std::max(design.ramp_length, one.ramp_length);
   effects_ = wheel_candidates(design);
   for (const WheelCandidate& effect : effects_) candidates_.push_back(effect.candidate);
+  contact_variations_ = contact_variations(measured_);
+  for (const ContactVariation& one : contact_variations_) variations_.push_back(one.variation);
 }
 
 // Wheel and ramp are not quite the same from day to day: mu may shift, as far as days are said to differ.
@@ -185,6 +191,14 @@ WheelHypothesis WheelTransitions::hypothesis(std::span<const double> nuisance,
   for (const EffectTerm& term : terms)
     for (const WheelCandidate& effect : effects_)
       if (effect.candidate.id == term.candidate->id) effect.apply(h.extension, term.variant, term.values);
+  for (const EffectTerm& term : terms)
+    for (const ContactVariation& one : contact_variations_)
+      if (one.variation.candidate.id == term.candidate->id)
+        h.varied = [&one, term, others = std::move(h.varied)](const CollisionPlace& place,
+                                                              dynamics::StepContext& step) {
+          if (others) others(place, step);
+          one.apply(place, term, step);
+        };
   return h;
 }
 

@@ -62,7 +62,7 @@ class Friction {
  public:
   Friction(const ContactSpread& contact, const CollisionChange& change)
       : mean_((contact.friction_mean + change.friction_shift) * change.friction_ratio),
-        scale_(1 / (contact.friction_sd * change.friction_ratio)),
+        scale_(1 / (contact.friction_sd * change.friction_scatter * change.friction_ratio)),
         inverse_mass_(1 / normal_cdf(mean_ * scale_)) {}
   double density(double mu) const { return normal_density((mu - mean_) * scale_) * scale_ * inverse_mass_; }
   double above(double mu) const { return mu <= 0 ? 1 : normal_cdf((mean_ - mu) * scale_) * inverse_mass_; }

@@ -20,6 +20,7 @@ struct ContactSpread {
 struct CollisionChange {
   double friction_ratio = 1;     ///< multiplies the mu drawn, > 0
   double friction_shift = 0;     ///< added to the mean of mu
+  double friction_scatter = 1;   ///< multiplies the deviation of mu from its mean, > 0
   double restitution_ratio = 1;  ///< multiplies the eta drawn (held at 1 where it would pass), > 0
   double loss_ratio = 1;         ///< multiplies the energy lost, > 0
   double rebound_lost = 0;       ///< share of the energy given back by restitution that is lost as well, in [0, 1]

@@ -210,8 +210,9 @@ CollisionChange ExtendedWheel::change(const StepContext& context, double omega) 
   const Extension& e = extension_;
   CollisionChange change;
   change.friction_shift = context.friction_shift;
+  change.friction_scatter = context.friction_scatter;
   if (omega >= e.hops_from) change.rebound_lost = e.rebound_lost;
-  change.friction_ratio = (1 + e.drift * context.run_share) / e.sticking_ratio;
+  change.friction_ratio = context.friction_ratio * (1 + e.drift * context.run_share) / e.sticking_ratio;
   if (e.stribeck != 0) change.friction_ratio *= 1 + e.stribeck * std::exp(-omega / e.stribeck_speed);
   if (e.patch_friction != 1 && context.position >= e.patch_from && context.position <= e.patch_to)
     change.friction_ratio *= e.patch_friction;
@@ -252,7 +253,8 @@ SpeedDensity ExtendedWheel::after_collision(const StepContext& context, double o
 Contact ExtendedWheel::changed_contact(const CollisionChange& c, const Contact& drawn, bool outlier) const {
   Contact contact;
   contact.restitution = std::clamp(drawn.restitution * c.restitution_ratio, 0.0, 1.0);
-  contact.friction = std::max(0.0, drawn.friction + c.friction_shift) * c.friction_ratio;
+  const double widened = (c.friction_scatter - 1) * (drawn.friction - contact_.friction_mean);
+  contact.friction = std::max(0.0, drawn.friction + widened + c.friction_shift) * c.friction_ratio;
   if (outlier) contact.friction *= extension_.outlier_friction;
   return contact;
 }
@@ -311,7 +313,7 @@ SettledContact ExtendedWheel::contact(const CollisionChange& c) const {
   return {contact_.restitution_mean * c.restitution_ratio,
           contact_.restitution_sd * c.restitution_ratio,
           (contact_.friction_mean + c.friction_shift) * c.friction_ratio,
-          contact_.friction_sd * c.friction_ratio,
+          contact_.friction_sd * c.friction_scatter * c.friction_ratio,
           extension_.outlier_share,
           extension_.outlier_friction};
 }

@@ -60,6 +60,8 @@ struct StepContext {
   std::optional<double> since_previous = {};  ///< collision [s]
   double run_share = 0;                       ///< of the run's trials that came before, 0..1
   double friction_shift = 0;                  ///< of this trial, added to mu's mean
+  double friction_ratio = 1;                  ///< of this collision's mu
+  double friction_scatter = 1;                ///< ratio of the deviation of its mu from the mean
 };
 
 /// Extends one wheel on one ramp. The stance conserves energy but for the resisting torques, whose work is integrated

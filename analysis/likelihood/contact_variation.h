@@ -1,0 +1,44 @@
+#pragma once
+// Lists ways in which a wheel's friction may vary that no effect of the catalogue has. They are fitted as effects are
+// and never named as causes: they stand for what has no name.
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "analysis/diagnosis/transition_model.h"
+#include "analysis/likelihood/wheel_runs.h"
+#include "dynamics/wheel/extended_wheel.h"
+
+namespace metastable::analysis {
+
+/// Says where a collision stands in its experiment.
+struct CollisionPlace {
+  std::size_t trial = 0, condition = 0;
+  int number = 1;              ///< in its trial, from 1
+  double omega = 0;            ///< before it [rad/s]
+  double gained = 0;           ///< since the collision before, 0 at the first [rad/s]
+  double clock = 0;            ///< since the trial's first collision [s]
+  dynamics::StepContext step;  ///< as measured
+};
+/// @param here  the collision that follows `before` of the trial's collisions  @param omega  of it
+CollisionPlace collision_place(const WheelRun& run, std::size_t trial, std::size_t before, const RunCollision& here,
+                               double omega);
+
+/// Holds a variation, and the change of its logarithm at a collision: of the mean of mu, or of its scatter about it.
+struct ContactVariation {
+  Variation variation;
+  bool of_scatter = false;
+  std::function<double(const CollisionPlace&, const std::vector<double>& variant, const std::vector<double>& values)>
+      log_ratio;
+
+  /// Puts it into a step that happens at that place.
+  void apply(const CollisionPlace& place, const EffectTerm& term, dynamics::StepContext& step) const;
+};
+
+/// Lists them for these runs. Of the mean: smooth changes along a trial by the clock, swings over the trials, every
+/// other trial, every other leg, one condition, one leg over the trials, the first collision, the change of speed since
+/// the collision before, waves along the ramp. Of the scatter: by speed, place, order of trials, leg.
+std::vector<ContactVariation> contact_variations(const WheelRuns& measured);
+
+}  // namespace metastable::analysis
