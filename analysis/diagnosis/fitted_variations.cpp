@@ -34,35 +34,32 @@ std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const F
   if (candidates.empty()) return {};
   const EffectScan scan = scan_effects(model, recalibrated, candidates, threads);
   std::vector<LeftInFacet> all;
-  double most = 0;  // evidence promised
-  for (std::size_t i = 0; i < scan.effects.size(); ++i) {
+  std::vector<std::size_t> order(scan.effects.size());  // by falling evidence promised
+  for (std::size_t i = 0; i < order.size(); ++i) {
     const ScannedEffect& scanned = scan.effects[i];
     all.push_back(as_left(model.variations()[i], scanned, scanned.gain[scanned.best]));
-    most = std::max(most, all.back().evidence);
+    order[i] = i;
   }
-  std::vector<std::size_t> promising;
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (all[i].evidence > std::max(0.0, most - worth_fitting)) promising.push_back(i);
-  std::sort(promising.begin(), promising.end(),
+  std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return all[a].evidence > all[b].evidence; });
   const Effort effort = effort_for(model, recalibrated);
-  if (promising.size() > effort.most_leaders) promising.resize(effort.most_leaders);
-  std::mutex one_at_a_time;
-  double best = 0;  // evidence of those fitted
-  markov::parallel_for(promising.size(), threads, [&](std::size_t k) {
+  const double least = std::max(0.0, all[order[0]].evidence - worth_fitting);
+  std::size_t fitted = 0;
+  while (fitted < std::min(effort.most_leaders, order.size()) && all[order[fitted]].evidence > least) ++fitted;
+  std::mutex speaking;
+  markov::parallel_for(fitted, threads, [&](std::size_t k) {
     {
-      const std::lock_guard lock(one_at_a_time);
+      const std::lock_guard lock(speaking);
       heartbeat();
     }
-    const ScannedEffect& scanned = scan.effects[promising[k]];
-    const Fit fitted = fit_one_more(model, effort, recalibrated, scanned);
-    const double gain = std::max(0.0, 2 * (fitted.penalised - recalibrated.penalised));
-    all[promising[k]] = as_left(model.variations()[promising[k]], scanned, gain);
+    const ScannedEffect& scanned = scan.effects[order[k]];
+    const Fit best = fit_one_more(model, effort, recalibrated, scanned);
+    all[order[k]] =
+        as_left(model.variations()[order[k]], scanned, std::max(0.0, 2 * (best.penalised - recalibrated.penalised)));
   });
-  for (const std::size_t i : promising) best = std::max(best, all[i].evidence);
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (std::find(promising.begin(), promising.end(), i) == promising.end())
-      all[i].evidence = std::min(all[i].evidence, best);
+  double best = 0;
+  for (std::size_t k = 0; k < fitted; ++k) best = std::max(best, all[order[k]].evidence);
+  for (std::size_t k = fitted; k < order.size(); ++k) all[order[k]].evidence = std::min(all[order[k]].evidence, best);
   return all;
 }
 

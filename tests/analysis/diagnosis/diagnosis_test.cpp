@@ -178,6 +178,25 @@ TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   EXPECT_NE(d.sentences[1].find("as much together as alone"), std::string::npos) << d.sentences[1];
 }
 
+// Friction rises and falls over the trials: that trials differ gains a good part of it, the swing fitted gains all.
+TEST(Diagnosis, AnEffectDoesNotPassForWhatVariesWithoutAName) {
+  auto conditions = stand_in_conditions(stand_in_setting());
+  const dynamics::LaboratorySetup setup =
+      laboratory_setup(conditions, {.outside = {{"daily_cycle", 0.03}}, .sensor_noise = 0.008, .seed = 31});
+  const ExperimentFiles files = reality_files(conditions, setup, run_laboratory(setup, 0), {}).files;
+  const Experiment experiment =
+      parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+  DiagnosisOptions options = quick();
+  options.catalogue = {"trial_spread", "trial_drift", "leg_contact"};
+  const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
+  EXPECT_EQ(d.verdict, Verdict::unexplained) << d.sentences[0];
+  ASSERT_FALSE(d.causes.unnamed.empty());
+  const auto& facets = d.causes.unnamed.front().facets;
+  const auto most = std::ranges::max_element(facets, {}, &LeftInFacet::evidence);
+  EXPECT_EQ(most->facet, "order");
+  EXPECT_EQ(most->aspect, "mean friction");
+}
+
 TEST(Diagnosis, IsTheSameOnAnyNumberOfThreads) {
   const auto experiment = data({{"trial_drift", {{}, {0.3}}}}, 26);
   DiagnosisOptions one = quick(), two = quick();
