@@ -178,8 +178,8 @@ TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   EXPECT_NE(d.sentences[1].find("as much together as alone"), std::string::npos) << d.sentences[1];
 }
 
-// Friction rises and falls over the trials: that trials differ gains a good part of it, the swing fitted gains all.
-TEST(Diagnosis, AnEffectDoesNotPassForWhatVariesWithoutAName) {
+// Friction rises and falls over the trials, as no effect does: of all that it may vary by, the swing has most evidence.
+TEST(Diagnosis, WhatVariesWithoutANameSaysByWhat) {
   auto conditions = stand_in_conditions(stand_in_setting());
   const dynamics::LaboratorySetup setup =
       laboratory_setup(conditions, {.outside = {{"daily_cycle", 0.03}}, .sensor_noise = 0.008, .seed = 31});
