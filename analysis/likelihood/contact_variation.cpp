@@ -103,7 +103,7 @@ std::vector<ContactVariation> contact_variations(const WheelRuns& measured) {
   }
   std::vector<ContactVariation> all;
   constexpr bool mean = false, scatter = true;
-  all.push_back(variation("along the trial", mean, 2, {{}}, [longest](const Place& at, const Values&, std::size_t p) {
+  all.push_back(variation("clock", mean, 2, {{}}, [longest](const Place& at, const Values&, std::size_t p) {
     return std::cos(std::numbers::pi * static_cast<double>(p + 1) * std::min(1.0, at.clock / longest));
   }));
   all.push_back(
@@ -122,10 +122,10 @@ std::vector<ContactVariation> contact_variations(const WheelRuns& measured) {
                             [](const Place& at, const Values& v, std::size_t) {
                               return static_cast<double>(at.condition) + 1 == v[0] ? 1.0 : 0.0;
                             }));
-  all.push_back(variation("collision", mean, 1, {{}},
+  all.push_back(variation("first collision", mean, 1, {{}},
                           [](const Place& at, const Values&, std::size_t) { return at.number == 1 ? 1.0 : 0.0; }));
   all.push_back(
-      variation("step before", mean, 1, {{}}, standardised(measured, [](const Place& at) { return at.gained; })));
+      variation("change of speed", mean, 1, {{}}, standardised(measured, [](const Place& at) { return at.gained; })));
   all.push_back(variation("position", mean, 2, from_one_to(most_waves),
                           [furthest](const Place& at, const Values& v, std::size_t p) {
                             return swing(at.step.position / furthest, v, p);
