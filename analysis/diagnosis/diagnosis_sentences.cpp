@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/diagnosis/evidence.h"
+#include "analysis/diagnosis/verdict.h"
 #include "analysis/statistics/number_text.h"
 
 namespace metastable::analysis {
@@ -70,8 +71,10 @@ std::string grouped_set(const Diagnosis& d) {
 
 // Says where something without a name acts, were it at work alone or beside a cause that is.
 void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
-  const auto most = std::max_element(d.causes.unnamed.begin(), d.causes.unnamed.end(),
-                                     [](const Unnamed& a, const Unnamed& b) { return a.evidence < b.evidence; });
+  const auto likelihood = [](const Unnamed& one) {
+    return one.evidence + std::log(one.beside.empty() ? unnamed_alone : unnamed_beside);
+  };
+  const auto most = std::ranges::max_element(d.causes.unnamed, {}, likelihood);
   if (most == d.causes.unnamed.end() || most->facets.empty()) return;
   const auto facet =
       std::max_element(most->facets.begin(), most->facets.end(),

@@ -25,8 +25,6 @@ constexpr double least_left_in_all = 6;    //   or that no draw of the trials ta
 constexpr double left_over_errors = 6;     // squared model errors of the gap as given that count as none, held out
 constexpr double facet_errors = 3;         // squared model errors that may be spread over the cells of a facet
 constexpr double largest_log_odds = 300;   // of none: their exponential stays finite
-// Prior odds of something without a name: to one effect of the catalogue; beside a hypothesis to the hypothesis alone.
-constexpr double unnamed_alone = 4, unnamed_beside = 0.03;
 constexpr std::size_t most_beside = 3;  // hypotheses beside which it is supposed, the recalibrated model not counted,
 constexpr double beside_margin = 12;    //   whose evidence is no further behind the best
 

@@ -13,6 +13,10 @@ struct Fit;
 
 inline constexpr double certain_odds = 1e6;  ///< of none, where a test decides against all that were fitted
 
+/// Says how likely something without a name is at first: odds to one effect where it acts alone; beside a hypothesis,
+/// to the hypothesis alone.
+inline constexpr double unnamed_alone = 4, unnamed_beside = 0.03;
+
 /// Lists all hypotheses by falling evidence; those that are not decided go to the diagnosis.
 std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking);
 

@@ -32,6 +32,20 @@ TEST(Verdict, ANameIsGivenWhereItIsFourTimesAsLikelyAsNone) {
   EXPECT_TRUE(with_odds_of_none(0.3).causes.set.empty());
 }
 
+// Something alone is likelier at first than something beside an effect: a little more evidence does not make up for it.
+TEST(Verdict, SaysWhereTheLikelierOfTheUnnamedActs) {
+  const auto said = [](double beside) {
+    Diagnosis d = with_odds_of_none(2);
+    LeftInFacet clock{.facet = "clock", .aspect = "mean friction"},
+        stances{.facet = "successive stances", .aspect = "memory"};
+    clock.evidence = stances.evidence = 20;
+    d.causes.unnamed = {{{}, 20, {clock}}, {{"friction_patch"}, beside, {stances}}};
+    return sentences(d).at(1);
+  };
+  EXPECT_EQ(said(21), "By itself it acts by clock, on the mean friction of collisions.");
+  EXPECT_EQ(said(26).substr(0, 21), "Beside friction_patch");
+}
+
 TEST(Verdict, SaysThatTheNearestIsTooUnsureForAName) {
   const auto first_sentence = [](double none) { return sentences(with_odds_of_none(none)).front(); };
   EXPECT_EQ(
