@@ -64,12 +64,6 @@ void give_up(RankedCause& cause) {
 
 bool fitted(const RankedCause& cause) { return !cause.fit.nuisance.empty(); }
 
-const ScannedEffect* find(const EffectScan& scan, const Candidate* candidate) {
-  for (const ScannedEffect& effect : scan.effects)
-    if (effect.candidate == candidate) return &effect;
-  return nullptr;
-}
-
 // Ranks in steps, in the order in which they are taken.
 class Ranker {
  public:
@@ -193,7 +187,7 @@ void Ranker::fit_singles() {
       return;
     }
     if (candidate->parameters.empty()) return fit_law(cause);
-    const ScannedEffect& scanned = *find(scan_, candidate);
+    const ScannedEffect& scanned = *scan_.find(candidate);
     const double promised = scanned.gain[scanned.best];
     // Where the model knows better starts than the scores, the scores do not decide.
     if (!model_.starts(std::vector{term_at(scanned, scanned.best)}).empty() ||
@@ -216,7 +210,7 @@ void Ranker::fit_overlooked() {
     RankedCause& cause = singles_[i];
     if (cause.candidate_undecided() || fitted(cause) || cause.evidence < std::max(0.0, best - overlooked_margin))
       return;
-    fit_effect(cause, *find(scan_, candidates_[i]));
+    fit_effect(cause, *scan_.find(candidates_[i]));
   });
   for (const RankedCause& cause : singles_)
     if (!cause.candidate_undecided()) {
@@ -349,7 +343,7 @@ void Ranker::scan_beside(std::size_t leader) {
   std::vector<const Candidate*> others;
   for (const Candidate* other : candidates_)
     if (other != first.terms[0].candidate) others.push_back(other);
-  const EffectScan scan = scan_effects(model_, first.fit, others, threads_);
+  const EffectScan scan = scan_effects(model_, first.fit, others, threads_, {&scan_, first.terms[0].candidate});
   std::vector<std::pair<double, const ScannedEffect*>> promising;
   for (const ScannedEffect& effect : scan.effects) {
     const double promised = evidence_of(effect, effect.gain[effect.best]);
@@ -379,8 +373,8 @@ void Ranker::scan_asked_pairs() {
     const bool tried = std::any_of(tries_.begin(), tries_.end(),
                                    [&](const Try& t) { return t.leader == leader && t.second.candidate == other; });
     if (tried) continue;
-    if (!fitted(first)) fit_effect(first, *find(scan_, one));
-    tries_.push_back({leader, scan_effects(model_, first.fit, {other}, threads_).effects.front()});
+    if (!fitted(first)) fit_effect(first, *scan_.find(one));
+    tries_.push_back({leader, scan_effects(model_, first.fit, {other}, threads_, {&scan_, one}).effects.front()});
   }
 }
 
@@ -445,7 +439,8 @@ void Ranker::refine_paired() {
     refine_single(i);
     scan_beside(i);
     if (std::ranges::none_of(tries_, [&](const Try& t) { return t.leader == i && t.second.candidate == partner; }))
-      tries_.push_back({i, scan_effects(model_, singles_[i].fit, {partner}, threads_).effects.front()});
+      tries_.push_back(
+          {i, scan_effects(model_, singles_[i].fit, {partner}, threads_, {&scan_, term.candidate}).effects.front()});
   }
   if (tries_.empty()) return;
   for (RankedCause& pair : pairs_) pair.together = pair.gain / std::max(1.0, gain_apart(pair));
@@ -471,7 +466,7 @@ void Ranker::complete_pairs() {
     std::vector<const Candidate*> others;
     for (const Candidate* other : candidates_)
       if (other != term.candidate && other->undecidable.empty()) others.push_back(other);
-    const EffectScan scan = scan_effects(model_, singles_[leader].fit, others, threads_);
+    const EffectScan scan = scan_effects(model_, singles_[leader].fit, others, threads_, {&scan_, term.candidate});
     std::vector<double> promised;
     for (const ScannedEffect& effect : scan.effects) promised.push_back(evidence_of(effect, effect.gain[effect.best]));
     if (promised.empty()) continue;

@@ -14,8 +14,9 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double largest_step = 0.1;  // of a difference, in standard errors
-constexpr double far_out = 0.03;      // share of the draws beyond which a tail follows its law instead of their count
+constexpr double largest_step = 0.1;      // of a difference, in standard errors
+constexpr std::size_t most_scanned = 24;  // variants of an effect that are scanned beside another one
+constexpr double far_out = 0.03;  // share of the draws beyond which a tail follows its law instead of their count
 
 // Returns what the score `u` gains with information `info` of the data, beside the prior; one parameter at its lower
 // bound gains only upwards.
@@ -39,14 +40,48 @@ double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, Eigen
   return std::isfinite(gain) && gain > 0 ? gain : 0;
 }
 
+// Returns [variants] what the earlier scan promises of an effect once what the other one takes up is projected out.
+std::vector<double> promised_beside(const ScanBeside& beside, const ScannedEffect& effect, const ScannedEffect& other) {
+  const EffectScan& scan = *beside.earlier;
+  const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
+  const auto held = static_cast<Eigen::Index>(other.candidate->parameters.size());
+  const Eigen::Index at = other.first[other.best];
+  std::vector<double> promised;
+  for (const Eigen::Index first : effect.first) {
+    const Eigen::MatrixXd cross = scan.information.block(at, first, held, count);
+    const Eigen::MatrixXd taken = markov::solve_columns(scan.information.block(at, at, held, held), cross);
+    promised.push_back(promised_gain(
+        *effect.candidate, scan.scores.segment(first, count) - taken.transpose() * scan.scores.segment(at, held),
+        scan.information.block(first, first, count, count) - cross.transpose() * taken, nullptr));
+  }
+  return promised;
+}
+
+// Says by variant of a candidate whether it is scanned.
+std::vector<char> scanned_variants(const Candidate& candidate, const ScanBeside& beside) {
+  std::vector<char> scanned(candidate.variants.size(), true);
+  if (!beside.earlier || scanned.size() <= most_scanned) return scanned;
+  const ScannedEffect *effect = beside.earlier->find(&candidate), *other = beside.earlier->find(beside.effect);
+  if (!effect || !other) return scanned;
+  const std::vector<double> promised = promised_beside(beside, *effect, *other);
+  std::vector<double> falling = promised;
+  std::ranges::nth_element(falling, falling.begin() + most_scanned, std::greater<>());
+  for (std::size_t v = 0; v < scanned.size(); ++v) scanned[v] = promised[v] > falling[most_scanned];
+  return scanned;
+}
+
 }  // namespace
 
+const ScannedEffect* EffectScan::find(const Candidate* candidate) const {
+  const auto found = std::ranges::find(effects, candidate, &ScannedEffect::candidate);
+  return found == effects.end() ? nullptr : &*found;
+}
+
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
-                        int threads) {
+                        int threads, const ScanBeside& beside) {
   EffectScan scan;
   struct Work {
-    std::size_t effect, variant;
-    Eigen::Index first;
+    Eigen::Index first;  // of its columns
     std::vector<EffectTerm> terms;
   };
   std::vector<Work> work;
@@ -55,19 +90,21 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
     if (candidate->parameters.empty() || !candidate->undecidable.empty()) continue;
     ScannedEffect effect;
     effect.candidate = candidate;
+    const std::vector<char> scanned = scanned_variants(*candidate, beside);
     for (std::size_t v = 0; v < candidate->variants.size(); ++v) {
+      effect.first.push_back(columns);
+      columns += static_cast<Eigen::Index>(candidate->parameters.size());
+      if (!scanned[v]) continue;
       EffectTerm term{candidate, candidate->variants[v], {}};
       for (const FreeParameter& p : candidate->parameters) term.values.push_back(p.neutral);
-      effect.first.push_back(columns);
-      Work one{scan.effects.size(), v, columns, fit.terms};
+      Work one{effect.first.back(), fit.terms};
       one.terms.push_back(term);
       work.push_back(one);
-      columns += static_cast<Eigen::Index>(candidate->parameters.size());
     }
     scan.effects.push_back(std::move(effect));
   }
   const auto events = static_cast<Eigen::Index>(model.events().size());
-  Derivatives all{Eigen::MatrixXd(events, columns), Eigen::MatrixXd(events, columns)};
+  Derivatives all{Eigen::MatrixXd::Zero(events, columns), Eigen::MatrixXd::Zero(events, columns)};
   markov::parallel_for(work.size(), threads, [&](std::size_t i) {
     const Work& one = work[i];
     // Only the new term's parameters are moved, by a small share of what the data resolve.
@@ -107,13 +144,13 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
     scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
   scan.trials_suffice = model.trials() >= enough_trials && model.events().size() >= enough_transitions * model.trials();
   // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
-  const Eigen::VectorXd total = all.slope.colwise().sum();
+  scan.scores = all.slope.colwise().sum();
 
   for (ScannedEffect& effect : scan.effects) {
     const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
     for (const Eigen::Index first : effect.first) {
       Eigen::VectorXd start;
-      effect.gain.push_back(promised_gain(*effect.candidate, total.segment(first, count),
+      effect.gain.push_back(promised_gain(*effect.candidate, scan.scores.segment(first, count),
                                           scan.information.block(first, first, count, count), &start));
       effect.start.push_back(start.size() == count ? start : Eigen::VectorXd::Zero(count));
     }

@@ -21,15 +21,26 @@ struct ScannedEffect {
 /// Holds the efficient scores (nuisances projected out) of all candidates at a fit.
 struct EffectScan {
   std::vector<ScannedEffect> effects;
+  Eigen::VectorXd scores;       ///< [columns] sums of the slopes
   Eigen::MatrixXd by_trial;     ///< [trials x columns] efficient scores, summed over a trial's events
   Eigen::MatrixXd information;  ///< [columns x columns] efficient
   bool trials_suffice = true;   ///< to draw chance from them
+  /// Returns what it says of a candidate, null if that was not scanned.
+  const ScannedEffect* find(const Candidate* candidate) const;
+};
+
+/// Says beside which effect of an earlier scan, without terms, candidates are scanned.
+struct ScanBeside {
+  const EffectScan* earlier = nullptr;
+  const Candidate* effect = nullptr;
 };
 
 /// @param fit  of nuisances, and possibly terms, whose derivatives are projected out
 /// @param candidates  those to scan; candidates without parameters are skipped
+/// @param beside  where given, of each effect's variants no more are scanned than a scan is worth: those of which the
+///   earlier one promises most, to first order; the others gain 0
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
-                        int threads);
+                        int threads, const ScanBeside& beside = {});
 
 /// Are the trials, and transitions of each on average, from which their scores tell how large chance is: below, false
 /// alarms soar.

@@ -119,20 +119,21 @@ std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t se
   return fold;
 }
 
-// Says how many steps a fold's fit takes that starts from one of all trials.
-int steps_from(const TransitionModel& model, const Fit& recalibrated, const Fit& start) {
-  return start.converged ? fold_steps : effort_for(model, recalibrated).most_iterations;
+// Fits the trials counted from a fit of all.
+Fit fit_from(const Fit& start, const TransitionModel& model, const Fit& recalibrated, FitOptions options) {
+  options.most_iterations = start.converged ? fold_steps : effort_for(model, recalibrated).most_iterations;
+  if (start.converged) options.from = &start;
+  return fit(model, start.nuisance, start.terms, options);
 }
 
 // Returns the rival that does best on the trials counted; without any, `plain`.
 Fit best_rival(const TransitionModel& model, const Fit& recalibrated, const std::vector<const Fit*>& rivals,
-               const Fit& plain, FitOptions options, const std::function<void()>& heartbeat) {
+               const Fit& plain, const FitOptions& options, const std::function<void()>& heartbeat) {
   Fit chosen = plain;
   double best = -1e300;
   for (const Fit* rival : rivals) {
     heartbeat();
-    options.most_iterations = steps_from(model, recalibrated, *rival);
-    Fit tried = fit(model, rival->nuisance, rival->terms, options);
+    Fit tried = fit_from(*rival, model, recalibrated, options);
     std::size_t parameters = 0;
     for (const EffectTerm& term : rival->terms) parameters += term.values.size();
     const double score = tried.penalised - parameter_price * static_cast<double>(parameters);
@@ -213,8 +214,7 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& gi
     FitOptions options;
     options.count.resize(trials);
     for (std::size_t t = 0; t < trials; ++t) options.count[t] = fold[t] != static_cast<int>(f);
-    options.most_iterations = steps_from(model, recalibrated, recalibrated);
-    const Fit plain = fit(model, recalibrated.nuisance, {}, options);
+    const Fit plain = fit_from(recalibrated, model, recalibrated, options);
     const Fit chosen = best_rival(model, recalibrated, rivals, plain, options, speak);
     const Eigen::VectorXd training = event_weights(model, options.count);
     const Flexible flexible = flexible_model(model, chosen, cells, training);

@@ -17,6 +17,9 @@ constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 // Are added to the information's diagonal, as shares of it. Where a step rises by less than this share of what it
 // promised, the next one is damped more.
 constexpr double dampings[] = {1e-9, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
+// Share of what a step foretold by which its rise may differ, for what it leaves to be next to nothing: of the order of
+// that share squared.
+constexpr double as_foretold = 0.1;
 constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is damped more where another failed
 constexpr double difference_share = 0.05;           // step of a difference, of what the data resolve
 
@@ -62,12 +65,11 @@ class Point {
   std::vector<Slot> slots_;
 };
 
-// `steps` is filled with where each parameter's difference lies: half of that away, 0 for one to `both_sides`.
-Derivatives differences(Point& point, const Evaluation& here, std::vector<double>& steps, bool both_sides = false) {
+Derivatives differences(Point& point, const Evaluation& here, bool both_sides = false) {
   const auto events = static_cast<Eigen::Index>(here.score.size());
   auto& slots = point.slots();
   Derivatives d{Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())),
-                Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size()))};
+                Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())), std::vector<double>(slots.size())};
   for (std::size_t p = 0; p < slots.size(); ++p) {
     const double value = *slots[p].value;
     const auto moved_to = [&](double there) {
@@ -79,14 +81,14 @@ Derivatives differences(Point& point, const Evaluation& here, std::vector<double
     const bool above = value + slots[p].step <= slots[p].upper, below = value - slots[p].step >= slots[p].lower;
     double step = above ? slots[p].step : -slots[p].step;
     const Evaluation moved = moved_to(value + step);
-    steps[p] = step;
+    d.steps[p] = step;
     Evaluation other;
     if (both_sides && above && below) {
       other = moved_to(value - step);
       step *= 2;
-      steps[p] = 0;
+      d.steps[p] = 0;
     }
-    const Evaluation& from = steps[p] == 0 ? other : here;
+    const Evaluation& from = d.steps[p] == 0 ? other : here;
     for (Eigen::Index i = 0; i < events; ++i) {
       const auto k = static_cast<std::size_t>(i);
       // Events at the floor of the density have no slope there.
@@ -143,10 +145,9 @@ void search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::Ve
   for (std::size_t a = 0; a < part.size(); ++a) *slots[static_cast<std::size_t>(part[a])].value = before[a];
 }
 
-// Returns the gradient of the penalised likelihood at the point where result.derivatives were taken over `steps`. The
-// prior goes into the information, too, and the slots get the steps of their next differences.
-Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen::VectorXd& weights,
-                                   const std::vector<double>& steps, Fit& result) {
+// Returns the gradient of the penalised likelihood at the point where result.derivatives were taken. The prior goes
+// into the information, too, and the slots get the steps of their next differences.
+Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen::VectorXd& weights, Fit& result) {
   Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
   for (std::size_t k = 0; k < slots.size(); ++k) {
     const auto p = static_cast<Eigen::Index>(k);
@@ -154,7 +155,7 @@ Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen:
     double& resolved = result.information(p, p);
     if (resolved > 0) s.step = std::min(s.largest_step, difference_share / std::sqrt(resolved));
     // A forward difference is the slope half a step on: taken back by the curvature, which matters along ridges.
-    gradient[p] += 0.5 * steps[k] * resolved;
+    gradient[p] += 0.5 * result.derivatives.steps[k] * resolved;
     if (s.prior_sd > 0) {
       gradient[p] -= (*s.value - s.nominal) / (s.prior_sd * s.prior_sd);
       resolved += 1 / (s.prior_sd * s.prior_sd);
@@ -202,8 +203,7 @@ Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, 
 Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
                         const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances) {
   Point point(model, nuisance, terms, with_nuisances);
-  std::vector<double> steps(point.slots().size());
-  return differences(point, here, steps);
+  return differences(point, here);
 }
 
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
@@ -211,9 +211,8 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   Point point(model, nuisance, terms, options.refit_nuisances);
   auto& slots = point.slots();
   const Eigen::VectorXd weights = event_weights(model, options.count);
-  std::vector<double> steps(slots.size());
   Fit result;
-  result.evaluation = point.evaluate();
+  result.evaluation = options.from ? options.from->evaluation : point.evaluate();
   double best = counted(result.evaluation, weights) + point.log_prior();
   const double start = best;
   std::size_t level = 0;    // of damping
@@ -222,9 +221,10 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   result.converged = slots.empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
   for (int iteration = 0; finite && iteration < options.most_iterations + both_sides && !slots.empty(); ++iteration) {
-    result.derivatives = differences(point, result.evaluation, steps, both_sides);
+    result.derivatives =
+        options.from && iteration == 0 ? options.from->derivatives : differences(point, result.evaluation, both_sides);
     result.information = information(result.derivatives, result.evaluation, weights);
-    result.gradient = penalised_gradient(slots, weights, steps, result);
+    result.gradient = penalised_gradient(slots, weights, result);
     const FreeParts parts = free_parts(slots, result.gradient, result.information);
     if (parts.all.empty()) {
       result.converged = true;
@@ -259,6 +259,10 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
         level = damped;
       }
     result.promised = promised;
+    if (options.from && better && std::abs(best - before - foretold) < as_foretold * foretold) {
+      result.converged = true;
+      break;
+    }
     if (!better && promised >= settled && !both_sides) {
       both_sides = true;
       continue;

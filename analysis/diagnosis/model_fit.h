@@ -11,8 +11,9 @@ namespace metastable::analysis {
 
 /// Holds the change of every event's log density and score with each parameter, by differences.
 struct Derivatives {
-  Eigen::MatrixXd slope;   ///< [events x parameters] of the log density
-  Eigen::MatrixXd change;  ///< [events x parameters] of the normal score
+  Eigen::MatrixXd slope;           ///< [events x parameters] of the log density
+  Eigen::MatrixXd change;          ///< [events x parameters] of the normal score
+  std::vector<double> steps = {};  ///< by parameter: they are those half of it away; 0: differences to both sides
 };
 
 /// Holds what a fit has found of a hypothesis.
@@ -34,6 +35,9 @@ struct FitOptions {
   std::vector<char> count;  ///< by trial: 0 leaves its events out; empty: all
   bool refit_nuisances = true;
   int most_iterations = 25;
+  /// A converged fit of all trials, from which this one of most of them starts: its derivatives serve for the first
+  /// step, and a step that rises about as it foretold is the last.
+  const Fit* from = nullptr;
 };
 
 /// Finds the maximum of the penalised likelihood by Gauss-Newton steps on the scores: with z the normal score and J =

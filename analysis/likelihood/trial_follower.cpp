@@ -16,7 +16,7 @@ using dynamics::StepContext;
 // narrow beside the prior: trapezoids of this width in its sds are right to 1e-3 of a likelihood. The others are in sds
 // of the prior.
 constexpr double wide_posterior = 0.5, width = 1.6, widest = 0.8, narrowest = 0.05, farthest = 4.2;
-constexpr double negligible = 12;  // log weight below the largest
+constexpr double negligible = 8;  // log weight below the largest: four of the posterior's sds away
 
 std::size_t collision_of(const Event& event) { return static_cast<std::size_t>(event.number) - 1; }
 
