@@ -1,5 +1,5 @@
 #pragma once
-// Lists ways in which a wheel's friction may vary that no effect of the catalogue has. They are fitted as effects are
+// Lists ways in which a wheel's contacts may vary that no effect of the catalogue has. They are fitted as effects are
 // and never named as causes: they stand for what has no name.
 
 #include <cstddef>
@@ -17,6 +17,7 @@ struct CollisionPlace {
   std::size_t trial = 0, condition = 0;
   int number = 1;              ///< in its trial, from 1
   double omega = 0;            ///< before it [rad/s]
+  double launch = 0;           ///< first speed of the trial [rad/s]
   double gained = 0;           ///< since the collision before, 0 at the first [rad/s]
   double clock = 0;            ///< since the trial's first collision [s]
   dynamics::StepContext step;  ///< as measured
@@ -25,10 +26,13 @@ struct CollisionPlace {
 CollisionPlace collision_place(const WheelRun& run, std::size_t trial, std::size_t before, const RunCollision& here,
                                double omega);
 
-/// Holds a variation, and the change of its logarithm at a collision: of the mean of mu, or of its scatter about it.
+enum class ContactAspect { mean_friction, mean_restitution, scatter_of_friction };
+
+/// Holds a variation, and the change of its logarithm at a collision: of the mean of mu or of eta, or of the scatter of
+/// mu about its mean.
 struct ContactVariation {
   Variation variation;
-  bool of_scatter = false;
+  ContactAspect aspect = ContactAspect::mean_friction;
   std::function<double(const CollisionPlace&, const std::vector<double>& variant, const std::vector<double>& values)>
       log_ratio;
 
@@ -36,9 +40,10 @@ struct ContactVariation {
   void apply(const CollisionPlace& place, const EffectTerm& term, dynamics::StepContext& step) const;
 };
 
-/// Lists them for these runs. Of the mean: smooth changes along a trial by the clock, swings over the trials, every
-/// other trial, every other leg, one condition, one leg over the trials, the first collision, the change of speed since
-/// the collision before, waves along the ramp. Of the scatter: by speed, place, order of trials, leg.
+/// Lists them for these runs. Of the means: smooth changes along a trial by the clock, swings over the trials, every
+/// other trial, every other leg, one condition, one leg over the trials, the speed of the launch, the first collision,
+/// the change of speed since the collision before and how unusual it was, waves along the ramp. Of the scatter: by
+/// speed, place, order of trials, leg, at the first collision.
 std::vector<ContactVariation> contact_variations(const WheelRuns& measured);
 
 }  // namespace metastable::analysis

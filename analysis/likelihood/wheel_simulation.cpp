@@ -115,7 +115,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
   }
   for (RunCollision& m : run.collisions) {  // what was drawn there is not known of the run
     m.context.friction_shift = 0;
-    m.context.friction_ratio = m.context.friction_scatter = 1;
+    m.context.friction_ratio = m.context.friction_scatter = m.context.restitution_ratio = 1;
   }
   if (!design.outcome) run.outcome.reset();
   if (run.collisions.back().slide && run.outcome != dynamics::Outcome::rest) run.collisions.back().slide.reset();

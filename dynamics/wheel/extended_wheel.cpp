@@ -211,13 +211,14 @@ CollisionChange ExtendedWheel::change(const StepContext& context, double omega) 
   CollisionChange change;
   change.friction_shift = context.friction_shift;
   change.friction_scatter = context.friction_scatter;
+  change.restitution_ratio = context.restitution_ratio;
   if (omega >= e.hops_from) change.rebound_lost = e.rebound_lost;
   change.friction_ratio = context.friction_ratio * (1 + e.drift * context.run_share) / e.sticking_ratio;
   if (e.stribeck != 0) change.friction_ratio *= 1 + e.stribeck * std::exp(-omega / e.stribeck_speed);
   if (e.patch_friction != 1 && context.position >= e.patch_from && context.position <= e.patch_to)
     change.friction_ratio *= e.patch_friction;
   if (e.restitution_exponent != 0)
-    change.restitution_ratio = std::pow(omega / reference_speed, -e.restitution_exponent);
+    change.restitution_ratio *= std::pow(omega / reference_speed, -e.restitution_exponent);
   if (context.leg == e.leg) {
     change.friction_ratio *= e.leg_friction;
     change.restitution_ratio *= e.leg_restitution;

@@ -62,6 +62,7 @@ struct StepContext {
   double friction_shift = 0;                  ///< of this trial, added to mu's mean
   double friction_ratio = 1;                  ///< of this collision's mu
   double friction_scatter = 1;                ///< ratio of the deviation of its mu from the mean
+  double restitution_ratio = 1;               ///< of this collision's eta
 };
 
 /// Extends one wheel on one ramp. The stance conserves energy but for the resisting torques, whose work is integrated

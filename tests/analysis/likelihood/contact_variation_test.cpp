@@ -29,7 +29,8 @@ TEST(ContactVariation, FitsFindWhatTheDataWereDrawnWith) {
     const char* id;
     std::vector<double> variant, values;
   };
-  const std::vector<Case> cases{{"mean friction by order", {2}, {0, 0.06}},
+  const std::vector<Case> cases{{"mean friction by order", {4}, {0, 0.06}},
+                                {"mean restitution by order", {7}, {0.07, 0}},
                                 {"mean friction by every other trial", {}, {0.05}},
                                 {"scatter of friction by position", {}, {0.4}}};
   for (const Case& one : cases) {
