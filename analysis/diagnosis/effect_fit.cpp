@@ -75,6 +75,7 @@ Fit fit_one_more(const TransitionModel& model, const Effort& effort, const Fit& 
 
 void refine_variant(const TransitionModel& model, const Effort& effort, Fit& best) {
   const std::vector<double> spacing = best.terms.back().candidate->refine;
+  const bool was_converged = best.converged;
   double share = 0.5;
   for (int round = 0; round < effort.refinements; ++round, share /= 2)
     for (std::size_t entry = 0; entry < spacing.size(); ++entry) {
@@ -85,12 +86,14 @@ void refine_variant(const TransitionModel& model, const Effort& effort, Fit& bes
         Fit tried = fit(model, best.nuisance, terms,
                         {.count = {}, .refit_nuisances = true, .most_iterations = effort.refining_steps});
         if (!(tried.penalised > best.penalised + worth_moving)) continue;
-        const bool was_converged = best.converged;
         best = std::move(tried);
-        best.converged = best.converged || was_converged;
         break;
       }
     }
+  if (best.converged || !was_converged) return;
+  // Its last step was cut short, and its slopes are those before it.
+  best = fit(model, best.nuisance, best.terms,
+             {.count = {}, .refit_nuisances = true, .most_iterations = effort.most_iterations});
 }
 
 }  // namespace metastable::analysis

@@ -5,11 +5,13 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "dynamics/wheel/coulomb_law.h"
 #include "dynamics/wheel/plastic_law.h"
 #include "dynamics/wheel/published_law.h"
+#include "dynamics/wheel/ranges.h"
 
 namespace metastable::dynamics {
 namespace {
@@ -23,12 +25,10 @@ double radius_of_gyration(const Wheel& wheel, Law law) {
   if (wheel.radius_of_gyration) return *wheel.radius_of_gyration;
   if (law == Law::published) return 0;  // the law takes r = L2
   if (wheel.inertia) {
+    if (const std::string objection = inertia_objection(wheel); !objection.empty())
+      throw std::invalid_argument("inertia: " + objection);
     const double about_foot = wheel.hub_mass * wheel.mean_leg_length() * wheel.mean_leg_length();
     // A point mass written with rounded digits is still a point mass.
-    if (*wheel.inertia < about_foot * (1 - 1e-6))
-      throw std::invalid_argument(
-          fmt::format("inertia: {} kg m^2 is outside [{}, inf) (hub mass times mean leg length squared)",
-                      *wheel.inertia, about_foot));
     return std::sqrt(std::max(0.0, (*wheel.inertia - about_foot) / wheel.hub_mass));
   }
   return law == Law::plastic ? 0 : assumed_gyration;
