@@ -114,8 +114,8 @@ double quantile(const std::vector<VariantSays>& all, std::size_t number, double 
 // model have them, scaled to what the fit made of its own.
 void cover_variants(const RankedCause& ranked, const EffectScan& scan, std::vector<EstimatedParameter>& fitted) {
   const EffectTerm& term = ranked.terms[0];
-  const auto scanned = std::ranges::find(scan.effects, term.candidate, &ScannedEffect::candidate);
-  if (scanned == scan.effects.end() || term.values.size() != 1) return;
+  const ScannedEffect* scanned = scan.find(term.candidate);
+  if (!scanned || term.values.size() != 1) return;
   const std::vector<std::vector<double>>& variants = term.candidate->variants;
   const auto listed = std::ranges::find(variants, term.variant);
   const std::size_t own =

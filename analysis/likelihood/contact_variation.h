@@ -42,8 +42,8 @@ struct ContactVariation {
 
 /// Lists them for these runs. Of the means: smooth changes along a trial by the clock, swings over the trials, every
 /// other trial, every other leg, one condition, one leg over the trials, the speed of the launch, the first collision,
-/// the change of speed since the collision before and how unusual it was, waves along the ramp. Of the scatter: by
-/// speed, place, order of trials, leg, at the first collision.
+/// the change of speed since the collision before and how unusual it was, the speed, waves along the ramp. Of the
+/// scatter: by speed, place, order of trials, leg, at the first collision.
 std::vector<ContactVariation> contact_variations(const WheelRuns& measured);
 
 }  // namespace metastable::analysis

@@ -158,14 +158,17 @@ TEST(Diagnosis, TriesThePairsAskedFor) {
   EXPECT_THROW(diagnose(*experiment, options), std::invalid_argument);
 }
 
-// Noise of the contact grows with speed here: two effects on its mean that cancel one another take its shape.
-TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
+Experiment with_outside_effect(const std::string& id, double size) {
   auto conditions = stand_in_conditions(stand_in_setting());
   const dynamics::LaboratorySetup setup =
-      laboratory_setup(conditions, {.outside = {{"speed_spread", 0.45}}, .sensor_noise = 0.008, .seed = 31});
+      laboratory_setup(conditions, {.outside = {{id, size}}, .sensor_noise = 0.008, .seed = 31});
   const ExperimentFiles files = reality_files(conditions, setup, run_laboratory(setup, 0), {}).files;
-  const Experiment experiment =
-      parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+  return parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+}
+
+// Noise of the contact grows with speed here: two effects on its mean that cancel one another take its shape.
+TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
+  const Experiment experiment = with_outside_effect("speed_spread", 0.45);
   DiagnosisOptions options = quick();
   options.catalogue = {"speed_dependent_restitution", "speed_dependent_friction", "leg_contact"};
   const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
@@ -180,12 +183,7 @@ TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
 
 // Friction rises and falls over the trials, as no effect does: of all that it may vary by, the swing has most evidence.
 TEST(Diagnosis, WhatVariesWithoutANameSaysByWhat) {
-  auto conditions = stand_in_conditions(stand_in_setting());
-  const dynamics::LaboratorySetup setup =
-      laboratory_setup(conditions, {.outside = {{"daily_cycle", 0.03}}, .sensor_noise = 0.008, .seed = 31});
-  const ExperimentFiles files = reality_files(conditions, setup, run_laboratory(setup, 0), {}).files;
-  const Experiment experiment =
-      parse_experiment({"lab", files.experiment_toml, files.collisions_csv, files.trials_csv, {}});
+  const Experiment experiment = with_outside_effect("daily_cycle", 0.03);
   DiagnosisOptions options = quick();
   options.catalogue = {"trial_spread", "trial_drift", "leg_contact"};
   const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
