@@ -8,7 +8,7 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr int speeds = 15, restitutions = 13, places = 20;
+constexpr int speeds = 15, restitutions = 13;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
 constexpr double just_above = 1e-7;           // mu_r, of the first place
 // Are the places at which a wheel of so much more J is followed, for the changes with J: every so many speeds and
@@ -29,15 +29,15 @@ void fill(LandingShares& grid, const SettledMap& map, int leg, int row) {
     if (found < of_leg.sticking) two = one, one = found;
     const std::size_t cell = grid.cell(leg, i, row);
     grid.resting[cell] = static_cast<float>(resting);
-    for (int k = 0; k < grid.parts; ++k) {
-      const double part = std::max(just_above, grid.part(k));
-      const double mu =
-          k == grid.parts - 1 ? of_leg.sticking + clear_of_sticking : resting + part * (of_leg.sticking - resting);
+    for (int k = 0; k < LandingShares::parts; ++k) {
+      const double part = std::max(just_above, LandingShares::part(k));
+      const double mu = k == LandingShares::parts - 1 ? of_leg.sticking + clear_of_sticking
+                                                      : resting + part * (of_leg.sticking - resting);
       const Landing landing = map.motion().land(leg, omega, {eta, mu});
       const bool rests = landing.end == LandingEnd::rest || landing.end == LandingEnd::given_up;
       const double carried =
           rests ? std::min(landing.settled_squared, 0.999 * of_leg.barrier_squared) : landing.carried_squared;
-      const std::size_t at = cell * static_cast<std::size_t>(grid.parts) + static_cast<std::size_t>(k);
+      const std::size_t at = cell * static_cast<std::size_t>(LandingShares::parts) + static_cast<std::size_t>(k);
       grid.kept[at] = static_cast<float>(carried / square);
       grid.displacement[at] = static_cast<float>(landing.displacement);
     }
@@ -117,7 +117,7 @@ void fill_rates(LandingShares& grid, const LandingShares& heavier, int leg) {
                                  fast * ((1 - high) * coarse(slow + 1, low, k) + high * coarse(slow + 1, low + 1, k)));
       }
   };
-  const auto parts = static_cast<std::size_t>(grid.parts);
+  const auto parts = static_cast<std::size_t>(LandingShares::parts);
   values_at(grid.resting_rate, grid.resting, heavier.resting, 1);
   values_at(grid.kept_rate, grid.kept, heavier.kept, parts);
   // Where feet are unsettled a kink has passed between the two: that is no rate.
@@ -141,7 +141,6 @@ std::shared_ptr<const LandingShares> share_grid(
   const double reach = std::max(sds * sd, least_width / 2);
   const double top = std::clamp(mean + reach, least_width, most_settled_restitution);
   grid->restitution = {std::clamp(mean - reach, 0.0, top - least_width), top, restitutions};
-  grid->parts = places;
   double settles = slowest;
   for (int leg = 0; leg < wheel.legs(); ++leg) {
     LandingShares::Leg one = plain_leg(*map, leg);

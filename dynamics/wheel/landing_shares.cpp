@@ -19,17 +19,6 @@ std::pair<int, double> between_nodes(const LandingShares::GridAxis& axis, double
 
 }  // namespace
 
-struct LandingShares::SharesAtSpeed::Corners {
-  std::array<std::size_t, 4> cell;
-  std::array<double, 4> weight;
-  double of(const std::vector<float>& values, std::size_t stride, std::size_t place) const {
-    double sum = 0;
-    for (std::size_t k = 0; k < cell.size(); ++k)
-      sum += weight[k] * static_cast<double>(values[cell[k] * stride + place]);
-    return sum;
-  }
-};
-
 double plastic_share(double chord, double ahead, double height, double gyration_sq) {
   const double kept = 1 - chord * ahead / (gyration_sq + ahead * ahead + height * height);
   return kept * kept;
@@ -76,33 +65,50 @@ LandingShares::SharesAtSpeed::SharesAtSpeed(const LandingShares& grid, int leg, 
   faster_ = weight;
 }
 
-LandingShares::SharesAtSpeed::Corners LandingShares::SharesAtSpeed::around(double eta) const {
+LandingShares::SharesAtRestitution LandingShares::SharesAtSpeed::at_restitution(double eta) const {
   const auto [below, weight] = between_nodes(grid_->restitution, eta);
   const auto row = static_cast<std::size_t>(below);
-  return {{slow_ + row, slow_ + row + 1, fast_ + row, fast_ + row + 1},
+  return {*grid_,
+          *leg_,
+          {slow_ + row, slow_ + row + 1, fast_ + row, fast_ + row + 1},
           {(1 - faster_) * (1 - weight), (1 - faster_) * weight, faster_ * (1 - weight), faster_ * weight}};
 }
 
-double LandingShares::SharesAtSpeed::resting_friction(double eta) const { return around(eta).of(grid_->resting, 1, 0); }
+LandingShares::SharesAtRestitution::SharesAtRestitution(const LandingShares& grid, const Leg& leg,
+                                                        std::array<std::size_t, 4> cells, std::array<double, 4> weights)
+    : grid_(&grid), leg_(&leg), cells_(cells), weights_(weights), resting_(of(grid.resting, 1, 0)) {}
 
-LandingShares::Kept LandingShares::SharesAtSpeed::at(double eta, double friction) const {
-  const Corners corners = around(eta);
-  const double resting = corners.of(grid_->resting, 1, 0);
-  const double part = std::min(1.0, (friction - resting) / std::max(1e-6, leg_->sticking - resting));
-  const auto stride = static_cast<std::size_t>(grid_->parts);
+double LandingShares::SharesAtRestitution::of(const std::vector<float>& values, int stride, int place) const {
+  double sum = 0;
+  for (std::size_t k = 0; k < cells_.size(); ++k)
+    sum += weights_[k] *
+           static_cast<double>(values[cells_[k] * static_cast<std::size_t>(stride) + static_cast<std::size_t>(place)]);
+  return sum;
+}
+
+LandingShares::Kept LandingShares::SharesAtRestitution::at_place(int place) const {
+  return {of(grid_->kept, parts, place), of(grid_->displacement, parts, place)};
+}
+
+LandingShares::Kept LandingShares::SharesAtRestitution::at(double friction) const {
+  const double part = std::min(1.0, (friction - resting_) / std::max(1e-6, leg_->sticking - resting_));
+  if (!(part > 0)) {
+    const Kept resting = at_place(0);
+    return {resting.share + part / LandingShares::part(1) * (at_place(1).share - resting.share), resting.displacement};
+  }
   // From mu_r on the share rises as a root and near mu_c evenly: in the root of the part both are smooth, and parabolas
-  // through three places hold them. Below mu_r it falls on by a straight line.
-  const double along = part > 0 ? std::sqrt(part) * (grid_->parts - 1) : 0;
-  const std::size_t below = std::min(static_cast<std::size_t>(along), stride - 2), first = below > 0 ? below - 1 : 0;
-  const double t = along - static_cast<double>(first);
-  const std::array<double, 3> weights = part > 0 ? std::array{(t - 1) * (t - 2) / 2, t * (2 - t), t * (t - 1) / 2}
-                                                 : std::array{1 - part / grid_->part(1), part / grid_->part(1), 0.0};
-  const auto read = [&](const std::vector<float>& values) {
-    double sum = 0;
-    for (std::size_t k = 0; k < weights.size(); ++k) sum += weights[k] * corners.of(values, stride, first + k);
-    return sum;
-  };
-  return {read(grid_->kept), part > 0 ? read(grid_->displacement) : corners.of(grid_->displacement, stride, 0)};
+  // through three places hold them.
+  const double along = std::sqrt(part) * (parts - 1);
+  const int first = std::max(0, std::min(static_cast<int>(along), parts - 2) - 1);
+  const double t = along - first;
+  const std::array<double, 3> weights{(t - 1) * (t - 2) / 2, t * (2 - t), t * (t - 1) / 2};
+  Kept kept;
+  for (int k = 0; k < 3; ++k) {
+    const Kept one = at_place(first + k);
+    kept.share += weights[static_cast<std::size_t>(k)] * one.share;
+    kept.displacement += weights[static_cast<std::size_t>(k)] * one.displacement;
+  }
+  return kept;
 }
 
 }  // namespace metastable::dynamics

@@ -38,7 +38,7 @@ struct LandingShares {
     double settles_below = 0;    ///< omega- up to which the landed foot stands before the next leg touches [rad/s]
   };
   GridAxis speed, restitution;
-  int parts = 20;  ///< places between mu_r and mu_c, both included
+  static constexpr int parts = 20;  ///< places between mu_r and mu_c, both included
   std::vector<Leg> legs;
   std::vector<float> resting;             ///< by leg, speed, restitution: mu_r; mu_c where even a sticking foot rests
   std::vector<float> kept, displacement;  ///< ... and place: carried omega^2 / omega-^2, slide of the foot [m]
@@ -51,25 +51,44 @@ struct LandingShares {
   std::size_t cell(int leg, int speed, int restitution) const;
   /// Returns the landings of a wheel of other J. @param gyration_sq  J / M by leg [m^2]
   LandingShares of_gyration(const std::vector<double>& gyration_sq) const;
-  double part(int place) const { return static_cast<double>(place) * place / ((parts - 1.0) * (parts - 1.0)); }
+  static constexpr double part(int place) {
+    return static_cast<double>(place) * place / ((parts - 1.0) * (parts - 1.0));
+  }
 
   /// Holds a landing's omega_eq^2 / omega-^2 and the slide of its foot [m].
   struct Kept {
     double share = 0, displacement = 0;
   };
-  /// Is one leg at one speed; beyond the axes the last values are kept. It refers to the grid.
+  /// Is one leg at one speed and one restitution; beyond the axes the last values are kept. It refers to the grid.
+  class SharesAtRestitution {
+   public:
+    double resting_friction() const { return resting_; }
+    /// Friction above mu_c is read as mu_c; below mu_r the share falls on by the straight line through the first two
+    /// places.
+    Kept at(double friction) const;
+    Kept at_place(int place) const;  ///< of the grid: from mu_r to mu_c as `part` says
+
+   private:
+    friend LandingShares;
+    SharesAtRestitution(const LandingShares& grid, const Leg& leg, std::array<std::size_t, 4> cells,
+                        std::array<double, 4> weights);
+    double of(const std::vector<float>& values, int stride, int place) const;
+    const LandingShares* grid_;
+    const Leg* leg_;
+    std::array<std::size_t, 4> cells_;  // of speeds and restitutions around
+    std::array<double, 4> weights_;
+    double resting_;
+  };
+  /// Is one leg at one speed; beyond the axes as above.
   class SharesAtSpeed {
    public:
     SharesAtSpeed(const LandingShares& grid, int leg, double omega);
     const Leg& leg() const { return *leg_; }
-    double resting_friction(double eta) const;
-    /// Friction above mu_c is read as mu_c; below mu_r the share falls on by the straight line through the first two
-    /// places.
-    Kept at(double eta, double friction) const;
+    const LandingShares& grid() const { return *grid_; }
+    SharesAtRestitution at_restitution(double eta) const;
+    Kept at(double eta, double friction) const { return at_restitution(eta).at(friction); }
 
    private:
-    struct Corners;
-    Corners around(double eta) const;
     const LandingShares* grid_;
     const Leg* leg_;
     std::size_t slow_, fast_;  // first cells of the speeds around

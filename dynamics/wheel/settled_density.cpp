@@ -6,21 +6,25 @@
 #include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 
+#include "dynamics/wheel/normal_table.h"
 #include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::dynamics {
 namespace {
 
-constexpr std::size_t nodes_of_restitution = 12;
-constexpr double far_score = 4.2;
+constexpr std::size_t nodes_of_restitution = 12, nodes_of_all = 8;
+constexpr double far_score = 4.2, far_of_all = 3.4;           // of restitutions
 constexpr double unknown_share = 0.002, unknown_error = 0.2;  // of landings; [rad/s]
-constexpr double thin = 0.05;                                 // a cell that counts as a point, in blurs
+constexpr double thin = 0.02;                                 // a cell whose ends' mean is taken, in blurs
+
+double square(double v) { return v * v; }
 
 // Weighs restitutions and frictions of one landing.
 class Weights {
  public:
   Weights(const SettledContact& c, double ratio)
       : c_(c),
+        ratio_(ratio),
         friction_mean_(c.friction_mean * ratio),
         friction_sd_(c.friction_sd * ratio),
         friction_mass_(std::max(1e-300, normal_cdf(friction_mean_ / friction_sd_))),
@@ -30,7 +34,7 @@ class Weights {
     return mu > 0 ? normal_density((mu - friction_mean_) / friction_sd_) / (friction_sd_ * friction_mass_) : 0;
   }
   double friction_above(double mu) const {
-    return mu > 0 ? normal_cdf((friction_mean_ - mu) / friction_sd_) / friction_mass_ : 1;
+    return mu > 0 ? normal_at((friction_mean_ - mu) / friction_sd_).below / friction_mass_ : 1;
   }
   double restitution_density(double eta) const {
     return eta >= 0 && eta <= 1
@@ -41,12 +45,22 @@ class Weights {
     if (eta >= 1) return 0;
     return eta > 0 ? 1 - (normal_cdf((eta - c_.restitution_mean) / c_.restitution_sd) - low_) / mass_ : 1;
   }
-  double least_restitution() const { return std::max(0.0, c_.restitution_mean - far_score * c_.restitution_sd); }
-  double most_restitution() const { return std::min(1.0, c_.restitution_mean + far_score * c_.restitution_sd); }
+  // Returns the same with a variance of restitution that is smaller by so much.
+  Weights less_spread(double variance) const {
+    SettledContact less = c_;
+    less.restitution_sd = std::sqrt(std::max(0.25 * square(c_.restitution_sd), square(c_.restitution_sd) - variance));
+    return {less, ratio_};
+  }
+  double least_restitution(double far = far_score) const {
+    return std::max(0.0, c_.restitution_mean - far * c_.restitution_sd);
+  }
+  double most_restitution(double far = far_score) const {
+    return std::min(1.0, c_.restitution_mean + far * c_.restitution_sd);
+  }
 
  private:
-  const SettledContact& c_;
-  double friction_mean_, friction_sd_, friction_mass_, low_, mass_;
+  SettledContact c_;
+  double ratio_, friction_mean_, friction_sd_, friction_mass_, low_, mass_;
 };
 
 // Is Student's density with three degrees of freedom: a foot that slides far does so less surely than the grid says.
@@ -55,12 +69,11 @@ double slide_density(double z) {
   return 0.3675525969478614 / (tail * tail);
 }
 
-using Rule = boost::math::quadrature::gauss<double, nodes_of_restitution>;
-
-// Calls use(eta, weight) at twelve restitutions, rising.
-template <class Use>
+// Calls use(eta, weight) at so many restitutions, rising.
+template <std::size_t nodes = nodes_of_restitution, class Use>
 void restitutions(double from, double to, Use use) {
   if (!(to > from)) return;
+  using Rule = boost::math::quadrature::gauss<double, nodes>;
   const auto& at = Rule::abscissa();  // the positive half
   const double middle = (from + to) / 2, half = (to - from) / 2;
   for (std::size_t k = at.size(); k-- > 0;) use(middle - half * at[k], half * Rule::weights()[k]);
@@ -97,19 +110,39 @@ class FirstImpact {
 // Adds up what cells of landings say of the next touch.
 class TouchSum {
  public:
+  // Is one end of a cell.
+  struct End {
+    double squared = 0;      // omega_eq^2
+    double next = 0, z = 0;  // the next omega-; what was seen less that, in blurs
+    NormalAt at = {};        // z
+    double area = 0;         // Phi's integral up to z
+  };
+
   TouchSum(const SettledLanding& landing, const SeenOfLanding& seen, double blur, double next)
       : landing_(landing),
         displacement_(seen.displacement),
         slide_error_(seen.displacement_error),
         blur_(blur),
-        at_(next) {}
+        at_(next),
+        normal_(normal_nodes()),
+        barrier_(end(landing.barrier_squared)) {}
 
-  // Adds landings that carry omega^2 spread evenly over [first, second], whose feet slide so far.
-  void add(double mass, double first, double second, double slide) {
-    if (first > second) std::swap(first, second);
-    const double barrier = landing_.barrier_squared;
-    double rests = first < barrier ? 1 : 0;
-    if (first < barrier && second > barrier) rests = (barrier - first) / (second - first);
+  End end(double squared) const {
+    constexpr double reach = normal_reach;
+    End e{.squared = squared, .next = landing_.next(squared)};
+    e.z = (at_ - e.next) / blur_;
+    e.at = normal_in_reach(std::clamp(e.z, -reach, reach), normal_);
+    e.area = e.z * e.at.below + e.at.density;
+    return e;
+  }
+
+  // Adds landings that carry omega^2 spread evenly from `first` to `second`, whose feet slide so far.
+  void add(double mass, const End& first, const End& second, double slide) {
+    if (first.squared > second.squared) return add(mass, second, first, slide);
+    const double barrier = barrier_.squared;
+    double rests = first.squared < barrier ? 1 : 0;
+    if (first.squared < barrier && second.squared > barrier)
+      rests = (barrier - first.squared) / (second.squared - first.squared);
     all_ += mass;
     rest_ += mass * rests;
     mass *= 1 - rests;
@@ -120,20 +153,15 @@ class TouchSum {
       mass *= slide_density(z) / slide_error_;
     }
     touch_ += mass;
-    const double low = landing_.next(std::max(first, barrier)), high = landing_.next(second);
-    middle_ += mass * (low + high) / 2;
-    const double above = (at_ - low) / blur_, below = (at_ - high) / blur_;
-    if (above < -8) return;
-    if (below > 8) {
-      below_ += mass;
-    } else if (above - below < thin) {
-      const double z = (above + below) / 2;
-      density_ += mass * normal_density(z) / blur_;
-      below_ += mass * normal_cdf(z);
+    const End& low = rests > 0 ? barrier_ : first;
+    middle_ += mass * (low.next + second.next) / 2;
+    const double width = low.z - second.z;
+    if (width < thin) {
+      density_ += mass * (low.at.density + second.at.density) / 2;
+      below_ += mass * (low.at.below + second.at.below) / 2;
     } else {
-      const double up = normal_cdf(above), down = normal_cdf(below);
-      density_ += mass * (up - down) / (high - low);
-      below_ += mass * (above * up + normal_density(above) - below * down - normal_density(below)) / (above - below);
+      density_ += mass / width * (low.at.below - second.at.below);
+      below_ += mass / width * (low.area - second.area);
     }
   }
 
@@ -147,7 +175,7 @@ class TouchSum {
     if (!(touch_ > 0)) return {{0, 1}, 1};
     // A slide is that of a foot whose next one touched: what it says is of those landings, beside the rests of all.
     const double width = std::hypot(blur_, unknown_error), z = (at_ - middle_ / touch_) / width;
-    const double density = (1 - unknown_share) * density_ / touch_ + unknown_share * normal_density(z) / width;
+    const double density = (1 - unknown_share) * density_ / touch_ / blur_ + unknown_share * normal_density(z) / width;
     const double below = (1 - unknown_share) * below_ / touch_ + unknown_share * normal_cdf(z);
     const double touches = gone_ / all_;
     return {{touches * density, std::clamp(rest_ / all_ + touches * below, 0.0, 1.0)},
@@ -158,6 +186,8 @@ class TouchSum {
   const SettledLanding& landing_;
   std::optional<double> displacement_;
   double slide_error_, blur_, at_;
+  const NormalNodes& normal_;
+  End barrier_;
   double all_ = 0, rest_ = 0, gone_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0;
 };
 
@@ -171,11 +201,13 @@ struct Cells {
   std::size_t count = 0;
 
   void add_to(TouchSum& sum, std::optional<double> first_edge = {}) const {
+    if (count == 0) return;
+    TouchSum::End before = sum.end(first_edge.value_or(cells[0].kept.share));
     for (std::size_t k = 0; k < count; ++k) {
       const double here = cells[k].kept.share;
-      const double before = k > 0 ? (cells[k - 1].kept.share + here) / 2 : first_edge.value_or(here);
-      const double after = k + 1 < count ? (cells[k + 1].kept.share + here) / 2 : here;
+      const TouchSum::End after = sum.end(k + 1 < count ? (cells[k + 1].kept.share + here) / 2 : here);
       sum.add(cells[k].mass, before, after, cells[k].kept.displacement);
+      before = after;
     }
   }
 };
@@ -238,34 +270,71 @@ void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weig
   const double stuck = share * weights.friction_above(critical) * first.sticking_rate();
   if (const double here = stuck * weights.restitution_density(std::max(0.0, eta_stuck)); here > 0) {
     const LandingShares::Kept at = landing.carried({std::max(0.0, eta_stuck), critical});
-    sum.add(here, at.share, at.share, at.displacement);
+    const TouchSum::End end = sum.end(at.share);
+    sum.add(here, end, end, at.displacement);
   }
 }
 
-// Adds all landings: for twelve restitutions cells of friction, and the sticking foot between its neighbours.
+// Are every second of the grid's places, and the first.
+constexpr std::array<int, LandingShares::parts / 2 + 1> cell_places = [] {
+  std::array<int, LandingShares::parts / 2 + 1> places{};
+  for (std::size_t k = 1; k < places.size(); ++k) places[k] = 2 * static_cast<int>(k) - 1;
+  return places;
+}();
+static_assert(cell_places.back() == LandingShares::parts - 1);
+
+// Adds those of a foot that sticks, in cells of restitution.
+void add_sticking(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
+  constexpr int cells = 14;
+  const double from = weights.least_restitution(), width = (weights.most_restitution() - from) / cells;
+  // Even within cells, landings would spread by more than they do: of normal ones the variance by a sixth of the square
+  // of a cell.
+  const Weights narrower = weights.less_spread(width * width / 6);
+  const auto kept_at = [&](double eta) {
+    return landing.carried_as(landing.place.at_restitution(eta).at_place(LandingShares::parts - 1));
+  };
+  double above = 1;
+  LandingShares::Kept kept = kept_at(from);
+  TouchSum::End end = sum.end(kept.share);
+  for (int k = 1; k <= cells; ++k) {
+    const double eta = from + width * k, next_above = k < cells ? narrower.restitution_above(eta) : 0;
+    const LandingShares::Kept next_kept = kept_at(eta);
+    const TouchSum::End next_end = sum.end(next_kept.share);
+    sum.add(share * (above - next_above), end, next_end, (kept.displacement + next_kept.displacement) / 2);
+    above = next_above;
+    kept = next_kept;
+    end = next_end;
+  }
+}
+
+// Adds all landings: for each of some restitutions cells of friction between places of the grid, and for the sticking
+// foot cells of restitution.
 void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
-  constexpr int cells = 12;
-  const double critical = landing.sticking(), off = critical - landing.place.leg().sticking;
-  Cells stuck;
-  restitutions(weights.least_restitution(), weights.most_restitution(), [&](double eta, double weight) {
-    const double mass = share * weight * weights.restitution_density(eta);
-    const double resting = landing.place.resting_friction(eta) + off, width = critical - resting;
-    // It starts from somewhat below the grid's mu_r, that the wheel's own may be lower.
-    const double start = resting - 0.1 * width;
-    double above = weights.friction_above(start);
-    LandingShares::Kept last = landing.carried({eta, start});
-    sum.add_rest(mass * (1 - above));
-    for (int k = 0; k <= cells; ++k) {
-      const double part = static_cast<double>(k) / cells, mu = resting + part * part * width;
-      const double next_above = weights.friction_above(mu);
-      const LandingShares::Kept here = landing.carried({eta, mu});
-      sum.add(mass * (above - next_above), last.share, here.share, (last.displacement + here.displacement) / 2);
-      above = next_above;
-      last = here;
-    }
-    stuck.cells[stuck.count++] = {eta, mass * above, last};
-  });
-  stuck.add_to(sum);
+  const double critical = landing.sticking(), own = landing.place.leg().sticking, off = critical - own;
+  constexpr std::size_t cells = cell_places.size();
+  restitutions<nodes_of_all>(
+      weights.least_restitution(far_of_all), weights.most_restitution(far_of_all), [&](double eta, double weight) {
+        const double mass = share * weight * weights.restitution_density(eta);
+        const LandingShares::SharesAtRestitution at = landing.place.at_restitution(eta);
+        const double resting = at.resting_friction(), width = own - resting;
+        // It starts from somewhat below the grid's mu_r, that the wheel's own may be lower. Loops of one kind of work
+        // each take half the time of one.
+        const double start = resting - 0.1 * width;
+        std::array<LandingShares::Kept, cells + 1> kept;
+        std::array<double, cells + 1> above;
+        std::array<TouchSum::End, cells + 1> ends;
+        kept[0] = landing.carried_as(at.at(start));
+        above[0] = weights.friction_above(start + off);
+        for (std::size_t k = 0; k < cells; ++k) kept[k + 1] = landing.carried_as(at.at_place(cell_places[k]));
+        for (std::size_t k = 0; k < cells; ++k)
+          above[k + 1] = weights.friction_above(resting + LandingShares::part(cell_places[k]) * width + off);
+        for (std::size_t k = 0; k <= cells; ++k) ends[k] = sum.end(kept[k].share);
+        sum.add_rest(mass * (1 - above[0]));
+        for (std::size_t k = 0; k < cells; ++k)
+          sum.add(mass * (above[k] - above[k + 1]), ends[k], ends[k + 1],
+                  (kept[k].displacement + kept[k + 1].displacement) / 2);
+      });
+  add_sticking(sum, landing, weights, share * weights.friction_above(critical));
 }
 
 // Adds usual and rare frictions.
@@ -308,11 +377,12 @@ double SettledLanding::first_impact(const Contact& contact) const {
 }
 
 LandingShares::Kept SettledLanding::carried(const Contact& contact) const {
-  const double critical = sticking(), own = place.leg().sticking;
-  LandingShares::Kept kept = place.at(contact.restitution, contact.friction - critical + own);
-  kept.share += plastic_share(chord, ahead, height, gyration_sq) - place.leg().plastic;
-  kept.share = (1 - loss_ratio * (1 - kept.share)) * omega * omega;
-  return kept;
+  return carried_as(place.at(contact.restitution, contact.friction - sticking() + place.leg().sticking));
+}
+
+LandingShares::Kept SettledLanding::carried_as(const LandingShares::Kept& of_grid) const {
+  const double share = of_grid.share + plastic_share(chord, ahead, height, gyration_sq) - place.leg().plastic;
+  return {(1 - loss_ratio * (1 - share)) * omega * omega, of_grid.displacement};
 }
 
 SpeedDensity after_first_impact(const SettledLanding& landing, const SettledContact& contact, double omega_plus) {

@@ -39,6 +39,8 @@ struct SettledLanding {
   /// Returns omega_eq^2 [rad^2/s^2] and the slide [m]: the grid's share at the same distance from mu_c, moved by what a
   /// plastic landing of this wheel keeps more or less than one of the grid's.
   LandingShares::Kept carried(const Contact& contact) const;
+  /// Returns the same from what the grid keeps there.
+  LandingShares::Kept carried_as(const LandingShares::Kept& of_grid) const;
 };
 
 /// Holds mu = ratio N(mean, sd^2), mu >= 0, and eta = N(mean, sd^2) in [0, 1], at one landing; of one in so many other

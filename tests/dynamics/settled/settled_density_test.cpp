@@ -101,7 +101,7 @@ TEST(ShareGrid, IsNotBiasedWhereAWheelBarelyPasses) {
   for (int i = 0; i < 60; ++i) {
     const double omega = 4.2 + 1.5 * i / 60, eta = 0.3 + 0.2 * ((i * 7) % 60) / 60;
     const LandingShares::SharesAtSpeed place = grid()->place(3, omega);
-    const double resting = place.resting_friction(eta), width = place.leg().sticking - resting;
+    const double resting = place.at_restitution(eta).resting_friction(), width = place.leg().sticking - resting;
     for (const double part : {0.02, 0.04, 0.07}) {
       const Landing landing = motion.land(3, omega, {eta, resting + part * width});
       if (landing.end != LandingEnd::settled) continue;
