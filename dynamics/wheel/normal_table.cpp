@@ -1,26 +1,50 @@
 #include "dynamics/wheel/normal_table.h"
 
-#include <cmath>
+#include <array>
 
 #include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::dynamics {
+namespace {
 
-const NormalNodes& normal_nodes() {
-  static const NormalNodes nodes = [] {
-    NormalNodes all;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      const double z = static_cast<double>(i) / normal_nodes_per_unit - normal_reach;
-      all[i] = {normal_cdf(z), normal_density(z)};
+constexpr int per_unit = 64;  // nodes
+constexpr double reach = 8;
+
+struct NormalNodes {
+  std::array<double, 2 * static_cast<std::size_t>(reach) * per_unit + 1> below, density;
+  NormalNodes() {
+    for (std::size_t i = 0; i < below.size(); ++i) {
+      const double z = static_cast<double>(i) / per_unit - reach;
+      below[i] = normal_cdf(z);
+      density[i] = normal_density(z);
     }
-    return all;
-  }();
-  return nodes;
+  }
+};
+
+METASTABLE_WIDE void read(const NormalNodes& nodes, const double* __restrict z, std::size_t count,
+                          double* __restrict below, double* __restrict density) {
+  const double *below_nodes = nodes.below.data(), *density_nodes = nodes.density.data();
+  for (std::size_t k = 0; k < count; ++k) {
+    const double low = z[k] < -reach ? -reach : z[k], here = low > reach ? reach : low;
+    const std::ptrdiff_t i = static_cast<int>((here + reach) * per_unit + 0.5);
+    const double from = static_cast<double>(i) * (1.0 / per_unit) - reach, d = here - from;
+    // Taylor's series about the node: of exp(-from d - d^2 / 2), and of the density's integral (Hermite's polynomials).
+    const double x = -d * (from + d * 0.5), square = from * from;
+    const double ratio = 1 + x * (1 + x * (1.0 / 2 + x * (1.0 / 6 + x * (1.0 / 24 + x * (1.0 / 120)))));
+    const double width =
+        d *
+        (1 + d * (-from * 0.5 + d * ((square - 1) * (1.0 / 6) + d * (from * (3 - square) * (1.0 / 24) +
+                                                                     d * ((square - 6) * square + 3) * (1.0 / 120)))));
+    below[k] = below_nodes[i] + density_nodes[i] * width;
+    density[k] = density_nodes[i] * ratio;
+  }
 }
 
-NormalAt normal_at(double z) {
-  if (!(std::abs(z) < normal_reach)) return {normal_cdf(z), normal_density(z)};
-  return normal_in_reach(z, normal_nodes());
+}  // namespace
+
+void normals_at(const double* z, std::size_t count, double* below, double* density) {
+  static const NormalNodes nodes;
+  read(nodes, z, count, below, density);
 }
 
 }  // namespace metastable::dynamics

@@ -2,7 +2,9 @@
 // Describes one landing of the law `settled` with random (eta, mu): densities of the speed after its first impact and
 // of the speed at the next touch.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "dynamics/wheel/collision_density.h"
@@ -26,7 +28,10 @@ struct SettledLanding {
   double next_ratio = 1;  ///< multiplies the next omega-
 
   /// Returns omega- at the next touch from omega_eq^2 [rad/s]; rising.
-  double next(double omega_eq_squared) const;
+  double next(double omega_eq_squared) const {
+    const double taken = dragged[0] + omega_eq_squared * (dragged[1] + omega_eq_squared * dragged[2]);
+    return next_ratio * std::sqrt(std::max(1e-6, next_rate * omega_eq_squared + next_gain - taken));
+  }
 
   double sticking() const { return sticking_friction(ahead, height, gyration_sq); }  ///< mu_c
   /// Returns the part of omega- that the first impact takes at eta = 0 if the foot sticks.

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <vector>
 
 #include "dynamics/wheel/truncated_normal.h"
 
@@ -10,16 +10,26 @@ namespace metastable::dynamics {
 namespace {
 
 TEST(NormalTable, IsErfcAndExp) {
-  for (double z = -12; z < 12; z += 0.00137) {
-    const NormalAt at = normal_at(z);
-    EXPECT_NEAR(at.below / normal_cdf(z), 1, 1e-9) << z;
-    EXPECT_NEAR(at.density / normal_density(z), 1, 1e-9) << z;
+  std::vector<double> z;
+  for (double at = -8; at < 8; at += 0.00137) z.push_back(at);
+  std::vector<double> below(z.size()), density(z.size());
+  normals_at(z.data(), z.size(), below.data(), density.data());
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    EXPECT_NEAR(below[k] / normal_cdf(z[k]), 1, 1e-9) << z[k];
+    EXPECT_NEAR(density[k] / normal_density(z[k]), 1, 1e-9) << z[k];
   }
-  EXPECT_EQ(normal_at(-60).below, 0);
-  EXPECT_EQ(normal_at(60).below, 1);
 }
 
-TEST(NormalTable, OfNoNumberIsNone) { EXPECT_TRUE(std::isnan(normal_at(std::nan("")).below)); }
+TEST(NormalTable, EndsAtEight) {
+  const double z[] = {-1e300, -8, 8, 1e300};
+  double below[4], density[4];
+  normals_at(z, 4, below, density);
+  EXPECT_EQ(below[0], below[1]);
+  EXPECT_EQ(below[2], below[3]);
+  EXPECT_LT(below[0], 1e-15);
+  EXPECT_GT(below[3], 1 - 1e-15);
+  EXPECT_EQ(density[0], density[3]);
+}
 
 }  // namespace
 }  // namespace metastable::dynamics

@@ -1,0 +1,119 @@
+#include "dynamics/wheel/touch_sum.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/wheel/normal_table.h"
+#include "dynamics/wheel/truncated_normal.h"
+
+namespace metastable::dynamics {
+namespace {
+
+constexpr double unknown_share = 0.002, unknown_error = 0.2;  // of landings; [rad/s]
+constexpr double thin = 0.02;                                 // a cell whose ends' mean is taken, in blurs
+constexpr std::size_t all_ends = LandingCells::most + 1;
+
+// Is Student's density with three degrees of freedom: a foot that slides far does so less surely than the grid says.
+double slide_density(double z) {
+  const double tail = 1 + z * z / 3;
+  return 0.3675525969478614 / (tail * tail);
+}
+
+METASTABLE_WIDE void find_next(const SettledLanding& landing, double at, double per_blur,
+                               const LandingCells::Values& squared, std::size_t count, TouchSum::Ends& ends) {
+  for (std::size_t k = 0; k < count; ++k) {
+    ends.next[k] = landing.next(squared[k]);
+    ends.z[k] = (at - ends.next[k]) * per_blur;
+  }
+}
+
+METASTABLE_WIDE void find_area(std::size_t count, TouchSum::Ends& ends) {
+  for (std::size_t k = 0; k < count; ++k) ends.area[k] = ends.z[k] * ends.below[k] + ends.density[k];
+}
+
+// Is what a cell adds by unit of mass.
+struct OfCell {
+  double middle, density, below;
+};
+
+[[gnu::always_inline]] inline OfCell between(const TouchSum::Ends& ends, std::size_t k, const TouchSum::Ends& others,
+                                             std::size_t j) {
+  const double width = std::abs(ends.z[k] - others.z[j]);
+  const double density = std::abs(ends.below[k] - others.below[j]) / width,
+               below = std::abs(ends.area[k] - others.area[j]) / width;
+  const bool is_thin = width < thin;
+  return {(ends.next[k] + others.next[j]) / 2, is_thin ? (ends.density[k] + others.density[j]) / 2 : density,
+          is_thin ? (ends.below[k] + others.below[j]) / 2 : below};
+}
+
+METASTABLE_WIDE void weigh_cells(const TouchSum::Ends& ends, std::size_t count, LandingCells::Values& middle,
+                                 LandingCells::Values& density, LandingCells::Values& below) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const OfCell cell = between(ends, k, ends, k + 1);
+    middle[k] = cell.middle;
+    density[k] = cell.density;
+    below[k] = cell.below;
+  }
+}
+
+constexpr std::size_t whole_vectors(std::size_t count) { return (count + 3) / 4 * 4; }
+
+}  // namespace
+
+TouchSum::TouchSum(const SettledLanding& landing, const SeenOfLanding& seen, double blur, double next)
+    : landing_(landing),
+      displacement_(seen.displacement),
+      slide_error_(seen.displacement_error),
+      blur_(blur),
+      at_(next) {
+  find({landing.barrier_squared}, 1, barrier_);
+}
+
+// Finds what is at the first ends, rounded up to whole vectors.
+void TouchSum::find(const LandingCells::Values& squared, std::size_t count, Ends& ends) const {
+  const std::size_t whole = whole_vectors(count);
+  find_next(landing_, at_, 1 / blur_, squared, whole, ends);
+  normals_at(ends.z.data(), whole, ends.below.data(), ends.density.data());
+  find_area(whole, ends);
+}
+
+void TouchSum::add(const LandingCells& cells) {
+  Ends ends;
+  LandingCells::Values middle, density, below;
+  find(cells.squared, cells.count + 1, ends);
+  weigh_cells(ends, std::min(whole_vectors(cells.count), all_ends - 1), middle, density, below);
+  const double barrier = landing_.barrier_squared;
+  for (std::size_t k = 0; k < cells.count; ++k) {
+    double mass = cells.mass[k];
+    OfCell cell{middle[k], density[k], below[k]};
+    all_ += mass;
+    const double first = cells.squared[k], second = cells.squared[k + 1], least = std::min(first, second);
+    if (least < barrier) {
+      const double most = std::max(first, second);
+      const double rests = most > barrier ? (barrier - least) / (most - least) : 1;
+      rest_ += mass * rests;
+      mass *= 1 - rests;
+      cell = between(ends, first < second ? k + 1 : k, barrier_, 0);
+    }
+    if (!(mass > 0)) continue;
+    gone_ += mass;
+    if (displacement_) mass *= slide_density((*displacement_ - cells.slide[k]) / slide_error_) / slide_error_;
+    touch_ += mass;
+    middle_ += mass * cell.middle;
+    density_ += mass * cell.density;
+    below_ += mass * cell.below;
+  }
+}
+
+NextTouch TouchSum::result() const {
+  if (!(touch_ > 0)) return {{0, 1}, 1};
+  // A slide is that of a foot whose next one touched: what it says is of those landings, beside the rests of all.
+  const double width = std::hypot(blur_, unknown_error), z = (at_ - middle_ / touch_) / width;
+  const double density = (1 - unknown_share) * density_ / touch_ / blur_ + unknown_share * normal_density(z) / width;
+  const double below = (1 - unknown_share) * below_ / touch_ + unknown_share * normal_cdf(z);
+  const double touches = gone_ / all_;
+  return {{touches * density, std::clamp(rest_ / all_ + touches * below, 0.0, 1.0)},
+          displacement_ ? touch_ / gone_ : 1};
+}
+
+}  // namespace metastable::dynamics
