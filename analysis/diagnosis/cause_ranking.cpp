@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <utility>
 
@@ -110,7 +111,8 @@ class Ranker {
     const std::lock_guard lock(speaking_);
     if (options_.progress) options_.progress(share_);
   }
-  void scan_beside(std::size_t leader);
+  const EffectScan& scan_beside(std::size_t leader);
+  void try_beside(std::size_t leader);
   std::size_t index_of(const Candidate* candidate) const;
   void refine_single(std::size_t i);
   void fit_law(RankedCause& cause) const;
@@ -131,7 +133,8 @@ class Ranker {
   EffectScan scan_;
   ChanceGains chance_;
   std::vector<RankedCause> singles_, pairs_;
-  std::vector<char> refined_;  // by single effect: its variant, between the listed ones
+  std::vector<char> refined_;                 // by single effect: its variant, between the listed ones
+  std::map<std::size_t, EffectScan> beside_;  // by leader: of all others beside its fit
   std::vector<Try> tries_;
   double least_p_ = 1;  // of the single effects as listed: chance is drawn for those
   double share_ = 0;
@@ -285,6 +288,7 @@ void Ranker::refine_single(std::size_t i) {
   refine_variant(model_, effort_, refined);
   take(singles_[i], std::move(refined));
   refined_[i] = true;
+  beside_.erase(i);
 }
 
 // Fits once more where a fit did not settle near the top: further along its own way, and from the nuisances that suit
@@ -336,14 +340,22 @@ bool knows_start(const TransitionModel& model, const std::vector<EffectTerm>& te
                      [&](const FitStart& start) { return start.values.back() != terms.back().values; });
 }
 
-// Scans again what a leader leaves. Where the model knows better starts than the scores, the scores do not decide.
-void Ranker::scan_beside(std::size_t leader) {
-  const double prior = pair_log_prior(candidates_.size());
+// Scans again what a leader leaves.
+const EffectScan& Ranker::scan_beside(std::size_t leader) {
+  if (const auto known = beside_.find(leader); known != beside_.end()) return known->second;
   const RankedCause& first = singles_[leader];
   std::vector<const Candidate*> others;
   for (const Candidate* other : candidates_)
     if (other != first.terms[0].candidate) others.push_back(other);
-  const EffectScan scan = scan_effects(model_, first.fit, others, threads_, {&scan_, first.terms[0].candidate});
+  return beside_.emplace(leader, scan_effects(model_, first.fit, others, threads_, {&scan_, first.terms[0].candidate}))
+      .first->second;
+}
+
+// Where the model knows better starts than the scores, the scores do not decide.
+void Ranker::try_beside(std::size_t leader) {
+  const double prior = pair_log_prior(candidates_.size());
+  const RankedCause& first = singles_[leader];
+  const EffectScan& scan = scan_beside(leader);
   std::vector<std::pair<double, const ScannedEffect*>> promising;
   for (const ScannedEffect& effect : scan.effects) {
     const double promised = evidence_of(effect, effect.gain[effect.best]);
@@ -360,7 +372,7 @@ void Ranker::scan_beside(std::size_t leader) {
 }
 
 void Ranker::scan_pairs() {
-  for (const std::size_t leader : leaders(false)) scan_beside(leader);
+  for (const std::size_t leader : leaders(false)) try_beside(leader);
 }
 
 // Scans the pairs asked for, whatever the scores promise.
@@ -437,10 +449,9 @@ void Ranker::refine_paired() {
     const Candidate* partner = best->terms[&term == &best->terms[0] ? 1 : 0].candidate;
     heartbeat();
     refine_single(i);
-    scan_beside(i);
+    try_beside(i);
     if (std::ranges::none_of(tries_, [&](const Try& t) { return t.leader == i && t.second.candidate == partner; }))
-      tries_.push_back(
-          {i, scan_effects(model_, singles_[i].fit, {partner}, threads_, {&scan_, term.candidate}).effects.front()});
+      tries_.push_back({i, *scan_beside(i).find(partner)});
   }
   if (tries_.empty()) return;
   for (RankedCause& pair : pairs_) pair.together = pair.gain / std::max(1.0, gain_apart(pair));
@@ -463,10 +474,7 @@ void Ranker::complete_pairs() {
   for (const EffectTerm& term : best->terms) {
     const std::size_t leader = index_of(term.candidate);
     if (!fitted(singles_[leader])) continue;
-    std::vector<const Candidate*> others;
-    for (const Candidate* other : candidates_)
-      if (other != term.candidate && other->undecidable.empty()) others.push_back(other);
-    const EffectScan scan = scan_effects(model_, singles_[leader].fit, others, threads_, {&scan_, term.candidate});
+    const EffectScan& scan = scan_beside(leader);
     std::vector<double> promised;
     for (const ScannedEffect& effect : scan.effects) promised.push_back(evidence_of(effect, effect.gain[effect.best]));
     if (promised.empty()) continue;

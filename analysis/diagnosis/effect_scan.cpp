@@ -14,8 +14,8 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double largest_step = 0.1;      // of a difference, in standard errors
-constexpr std::size_t most_scanned = 24;  // variants of an effect that are scanned beside another one
+constexpr double largest_step = 0.1, small_step = 0.05;  // of a difference, in standard errors
+constexpr std::size_t most_scanned = 24;                 // variants of an effect that are scanned beside another one
 constexpr double far_out = 0.03;  // share of the draws beyond which a tail follows its law instead of their count
 
 // Returns what the score `u` gains with information `info` of the data, beside the prior; one parameter at its lower
@@ -55,6 +55,16 @@ std::vector<double> promised_beside(const ScanBeside& beside, const ScannedEffec
         scan.information.block(first, first, count, count) - cross.transpose() * taken, nullptr));
   }
   return promised;
+}
+
+// Returns a step that the earlier scan resolves well, where it is smaller than the parameter's own.
+double first_step(const ScanBeside& beside, const EffectTerm& term, std::size_t parameter) {
+  const double own = term.candidate->parameters[parameter].step;
+  const ScannedEffect* effect = beside.earlier ? beside.earlier->find(term.candidate) : nullptr;
+  if (!effect) return own;
+  const auto variant = std::ranges::find(term.candidate->variants, term.variant) - term.candidate->variants.begin();
+  const Eigen::Index column = effect->first[static_cast<std::size_t>(variant)] + static_cast<Eigen::Index>(parameter);
+  return std::min(own, small_step / std::sqrt(std::max(1e-300, beside.earlier->information(column, column))));
 }
 
 // Says by variant of a candidate whether it is scanned.
@@ -111,7 +121,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
     const std::size_t count = one.terms.back().values.size();
     for (std::size_t p = 0; p < count; ++p) {
       const auto column = one.first + static_cast<Eigen::Index>(p);
-      double step = one.terms.back().candidate->parameters[p].step;
+      double step = first_step(beside, one.terms.back(), p);
       for (int attempt = 0; attempt < 2; ++attempt) {
         std::vector<EffectTerm> moved = one.terms;
         moved.back().values[p] += step;
@@ -123,7 +133,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
         }
         const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(column).squaredNorm()));
         if (step < largest_step * resolved) break;
-        step = 0.5 * largest_step * resolved;
+        step = small_step * resolved;
       }
     }
   });
