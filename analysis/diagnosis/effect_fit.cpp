@@ -1,6 +1,7 @@
 #include "analysis/diagnosis/effect_fit.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -27,12 +28,23 @@ std::vector<std::size_t> leading_variants(const ScannedEffect& scanned, std::siz
   return leading;
 }
 
+// Says whether scores scatter more than effects of the catalogue leave them once the model is recalibrated, however
+// large these are (1.04 at a gain of 1 nat a collision).
+bool is_far_off(const std::vector<double>& scores) {
+  constexpr double widest = 1.3, sds = 4;
+  double sum = 0;
+  for (const double score : scores) sum += score * score;
+  const auto count = static_cast<double>(scores.size());
+  return sum > count * widest + sds * std::sqrt(2 * count);
+}
+
 }  // namespace
 
 Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
   constexpr std::size_t many_events = 6000;
   constexpr double far_off = 50;  // rise of the log likelihood that a recalibration has left
-  if (!recalibrated.converged && recalibrated.promised > far_off) return {20, 1, 1, 1, 1, 2, 6};
+  if ((!recalibrated.converged && recalibrated.promised > far_off) || is_far_off(recalibrated.evaluation.score))
+    return {20, 1, 1, 1, 1, 2, 6};
   if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 2, 12};
   return {};
 }

@@ -5,6 +5,8 @@
 #include <boost/math/quadrature/gauss.hpp>
 #include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "dynamics/wheel/normal_table.h"
 #include "dynamics/wheel/touch_sum.h"
@@ -18,6 +20,25 @@ constexpr double far_score = 4.2, far_of_all = 3.4;  // of restitutions
 
 double square(double v) { return v * v; }
 
+// Are contacts that gave one omega+, at some restitutions.
+struct Contacts {
+  using Values = std::array<double, nodes_of_restitution>;
+  std::size_t count = 0;
+  Values eta{}, weight{};             // of the rule
+  Values mu{}, rate{};                // and its change with omega+
+  Values of_eta{}, of_mu{}, above{};  // densities; share of higher frictions
+  double mass(std::size_t k) const { return weight[k] * of_eta[k] * of_mu[k] * rate[k]; }
+};
+
+// Finds Phi and the density also where the table ends.
+template <std::size_t size>
+void normals(const std::array<double, size>& z, std::size_t count, std::array<double, size>& below,
+             std::array<double, size>& density) {
+  normals_at(z.data(), size, below.data(), density.data());
+  for (std::size_t k = 0; k < count; ++k)
+    if (std::abs(z[k]) > 8) below[k] = normal_cdf(z[k]), density[k] = normal_density(z[k]);
+}
+
 // Weighs restitutions and frictions of one landing.
 class Weights {
  public:
@@ -28,9 +49,6 @@ class Weights {
         friction_mass_(std::max(1e-300, normal_cdf(friction_mean_ / friction_sd_))),
         low_(normal_cdf(-c.restitution_mean / c.restitution_sd)),
         mass_(std::max(1e-300, normal_cdf((1 - c.restitution_mean) / c.restitution_sd) - low_)) {}
-  double friction_density(double mu) const {
-    return mu > 0 ? normal_density((mu - friction_mean_) / friction_sd_) / (friction_sd_ * friction_mass_) : 0;
-  }
   double friction_above(double mu) const {
     return mu > 0 ? normal_cdf((friction_mean_ - mu) / friction_sd_) / friction_mass_ : 1;
   }
@@ -38,9 +56,23 @@ class Weights {
   void frictions_above(const LandingCells::Values& mu, std::size_t count, LandingCells::Values& above) const {
     LandingCells::Values score{}, density;
     for (std::size_t k = 0; k < count; ++k) score[k] = (friction_mean_ - mu[k]) / friction_sd_;
-    normals_at(score.data(), score.size(), above.data(), density.data());
-    for (std::size_t k = count; k-- > 0 && score[k] < -8;) above[k] = normal_cdf(score[k]);
+    normals(score, count, above, density);
     for (std::size_t k = 0; k < count; ++k) above[k] = mu[k] > 0 ? above[k] / friction_mass_ : 1;
+  }
+  // Finds densities and shares of contacts.
+  void weigh(Contacts& at) const {
+    Contacts::Values eta{}, mu{}, below;  // scores
+    for (std::size_t k = 0; k < at.count; ++k) {
+      eta[k] = (at.eta[k] - c_.restitution_mean) / c_.restitution_sd;
+      mu[k] = (friction_mean_ - at.mu[k]) / friction_sd_;
+    }
+    normals(eta, at.count, below, at.of_eta);
+    normals(mu, at.count, below, at.of_mu);
+    for (std::size_t k = 0; k < at.count; ++k) {
+      at.of_eta[k] = at.eta[k] >= 0 && at.eta[k] <= 1 ? at.of_eta[k] / (c_.restitution_sd * mass_) : 0;
+      at.of_mu[k] = at.mu[k] > 0 ? at.of_mu[k] / (friction_sd_ * friction_mass_) : 0;
+      at.above[k] = at.mu[k] > 0 ? below[k] / friction_mass_ : 1;
+    }
   }
   double restitution_density(double eta) const {
     return eta >= 0 && eta <= 1
@@ -136,6 +168,23 @@ struct Landings {
   }
 };
 
+// Finds the contacts that gave omega+ at twelve restitutions of [low, high], which `of` maps with their weights.
+template <class Map>
+Contacts contacts(const FirstImpact& first, const Weights& weights, double low, double high, Map of) {
+  Contacts at;
+  restitutions(low, high, [&](double node, double weight) {
+    std::tie(at.eta[at.count], at.weight[at.count]) = of(node, weight);
+    std::tie(at.mu[at.count], at.rate[at.count]) = first.friction(at.eta[at.count]);
+    ++at.count;
+  });
+  weights.weigh(at);
+  return at;
+}
+
+Contacts contacts(const FirstImpact& first, const Weights& weights, double low, double high) {
+  return contacts(first, weights, low, high, [](double eta, double weight) { return std::pair(eta, weight); });
+}
+
 // Is the restitution at which omega_eq^2 crosses the barrier.
 struct Edge {
   double eta;
@@ -164,30 +213,27 @@ std::optional<Edge> barrier(const Landings& along, double level, double to, Beyo
 void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share, double omega_plus) {
   const FirstImpact first(landing, omega_plus);
   const double eta_stuck = first.sticking_restitution(), critical = landing.sticking();
-  const auto mass = [&](double eta) {
-    const auto [mu, rate] = first.friction(eta);
-    return share * weights.restitution_density(eta) * weights.friction_density(mu) * rate;
+  const auto kept = [&](double eta, double mu) { return landing.carried({eta, mu}); };
+  const auto beyond = [&](double eta) { return kept(eta, first.friction(eta).first).share - landing.barrier_squared; };
+  const auto landings = [&](const Contacts& at) {
+    Landings all;
+    for (std::size_t k = 0; k < at.count; ++k)
+      if (const double mass = share * at.mass(k); mass > 0)
+        all.list[all.count++] = {at.eta[k], mass, kept(at.eta[k], at.mu[k])};
+    return all;
   };
-  const auto kept = [&](double eta) { return landing.carried({eta, first.friction(eta).first}); };
-  const auto add = [&](Landings& landings, double eta, double weight) {
-    if (const double here = weight * mass(eta); here > 0) landings.list[landings.count++] = {eta, here, kept(eta)};
-  };
-  const auto beyond = [&](double eta) { return kept(eta).share - landing.barrier_squared; };
 
   const double to = std::min(eta_stuck, weights.most_restitution());
   const double from = std::min(weights.least_restitution(), to - 1e-3);
-  Landings all;
-  restitutions(from, to, [&](double eta, double weight) { add(all, eta, weight); });
+  const Landings all = landings(contacts(first, weights, from, to));
   if (const auto edge = barrier(all, landing.barrier_squared, to, beyond)) {
     const auto [resting, going] = edge->rising ? std::pair(from, to) : std::pair(to, from);
-    restitutions(std::min(resting, edge->eta), std::max(resting, edge->eta),
-                 [&](double eta, double weight) { sum.add_rest(weight * mass(eta)); });
-    Landings gone;
+    const Contacts rest = contacts(first, weights, std::min(resting, edge->eta), std::max(resting, edge->eta));
+    for (std::size_t k = 0; k < rest.count; ++k) sum.add_rest(share * rest.mass(k));
     const double width = going - edge->eta;
-    restitutions(0, 1, [&](double root, double weight) {
-      add(gone, edge->eta + width * root * root, 2 * root * weight * std::abs(width));
-    });
-    gone.add_to(sum, landing.barrier_squared);
+    landings(contacts(first, weights, 0, 1, [&, at = edge->eta](double root, double weight) {
+      return std::pair(at + width * root * root, 2 * root * weight * std::abs(width));
+    })).add_to(sum, landing.barrier_squared);
   } else {
     all.add_to(sum);
   }
@@ -308,13 +354,12 @@ SpeedDensity after_first_impact(const SettledLanding& landing, const SettledCont
     result.below += share * weights.restitution_above(eta_stuck);
     result.density +=
         share * weights.friction_above(critical) * weights.restitution_density(eta_stuck) * first.sticking_rate();
-    restitutions(weights.least_restitution(), std::min(eta_stuck, weights.most_restitution()),
-                 [&](double eta, double weight) {
-                   const auto [mu, rate] = first.friction(eta);
-                   const double here = share * weight * weights.restitution_density(eta);
-                   result.density += here * weights.friction_density(mu) * rate;
-                   result.below += here * (1 - weights.friction_above(mu));
-                 });
+    const Contacts at =
+        contacts(first, weights, weights.least_restitution(), std::min(eta_stuck, weights.most_restitution()));
+    for (std::size_t k = 0; k < at.count; ++k) {
+      result.density += share * at.mass(k);
+      result.below += share * at.weight[k] * at.of_eta[k] * (1 - at.above[k]);
+    }
   });
   result.below = std::clamp(result.below, 0.0, 1.0);
   return result;
