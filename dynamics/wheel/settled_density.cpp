@@ -277,29 +277,28 @@ void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weight
   const double critical = landing.sticking(), own = landing.place.leg().sticking, off = critical - own;
   LandingCells cells{.count = cell_places.size()};
   LandingCells::Values mu, above;
-  restitutions<nodes_of_all>(weights.least_restitution(far_of_all), weights.most_restitution(far_of_all),
-                             [&](double eta, double weight) {
-                               const double mass = share * weight * weights.restitution_density(eta);
-                               const LandingShares::SharesAtRestitution at = landing.place.at_restitution(eta);
-                               const double resting = at.resting_friction(), width = own - resting;
-                               // It starts from somewhat below the grid's mu_r, that the wheel's own may be lower.
-                               mu[0] = resting - 0.1 * width;
-                               LandingShares::Kept last = landing.carried_as(at.at(mu[0]));
-                               cells.squared[0] = last.share;
-                               for (std::size_t k = 0; k < cells.count; ++k) {
-                                 mu[k + 1] = resting + LandingShares::part(cell_places[k]) * width;
-                                 const LandingShares::Kept kept = landing.carried_as(at.at_place(cell_places[k]));
-                                 cells.squared[k + 1] = kept.share;
-                                 cells.slide[k] = (last.displacement + kept.displacement) / 2;
-                                 last = kept;
-                               }
-                               for (std::size_t k = 0; k <= cells.count; ++k) mu[k] += off;
-                               weights.frictions_above(mu, cells.count + 1, above);
-                               sum.add_rest(mass * (1 - above[0]));
-                               for (std::size_t k = 0; k < cells.count; ++k)
-                                 cells.mass[k] = mass * (above[k] - above[k + 1]);
-                               sum.add(cells);
-                             });
+  const double least = weights.least_restitution(far_of_all), most = weights.most_restitution(far_of_all);
+  restitutions<nodes_of_all>(least, most, [&](double eta, double weight) {
+    const double mass = share * weight * weights.restitution_density(eta);
+    const LandingShares::SharesAtRestitution at = landing.place.at_restitution(eta);
+    const double resting = at.resting_friction(), width = own - resting;
+    // It starts from somewhat below the grid's mu_r, that the wheel's own may be lower.
+    mu[0] = resting - 0.1 * width;
+    LandingShares::Kept last = landing.carried_as(at.at(mu[0]));
+    cells.squared[0] = last.share;
+    for (std::size_t k = 0; k < cells.count; ++k) {
+      mu[k + 1] = resting + LandingShares::part(cell_places[k]) * width;
+      const LandingShares::Kept kept = landing.carried_as(at.at_place(cell_places[k]));
+      cells.squared[k + 1] = kept.share;
+      cells.slide[k] = (last.displacement + kept.displacement) / 2;
+      last = kept;
+    }
+    for (std::size_t k = 0; k <= cells.count; ++k) mu[k] += off;
+    weights.frictions_above(mu, cells.count + 1, above);
+    sum.add_rest(mass * (1 - above[0]));
+    for (std::size_t k = 0; k < cells.count; ++k) cells.mass[k] = mass * (above[k] - above[k + 1]);
+    sum.add(cells);
+  });
   add_sticking(sum, landing, weights, share * weights.friction_above(critical));
 }
 

@@ -11,7 +11,6 @@ namespace {
 
 constexpr double unknown_share = 0.002, unknown_error = 0.2;  // of landings; [rad/s]
 constexpr double thin = 0.02;                                 // a cell whose ends' mean is taken, in blurs
-constexpr std::size_t all_ends = LandingCells::most + 1;
 
 // Is Student's density with three degrees of freedom: a foot that slides far does so less surely than the grid says.
 double slide_density(double z) {
@@ -81,7 +80,7 @@ void TouchSum::add(const LandingCells& cells) {
   Ends ends;
   LandingCells::Values middle, density, below;
   find(cells.squared, cells.count + 1, ends);
-  weigh_cells(ends, std::min(whole_vectors(cells.count), all_ends - 1), middle, density, below);
+  weigh_cells(ends, cells.count, middle, density, below);
   const double barrier = landing_.barrier_squared;
   for (std::size_t k = 0; k < cells.count; ++k) {
     double mass = cells.mass[k];

@@ -163,6 +163,33 @@ TEST(SettledDensity, OfTheNextTouchIsThatOfDrawnContacts) {
   EXPECT_LT(kolmogorov(drawn, below), kolmogorov_999);
 }
 
+// A foot that sticks leaves a next speed that only restitution spreads. (Cells that stand for points in even widths
+// spread it more.)
+TEST(SettledDensity, OfAFootThatSticksIsTheIntegralOverRestitution) {
+  const ContactSpread grips{0.4, 0.05, 0.6, 0.01};
+  const ExtendedWheel wheel(equal_wheel(), slope, Law::settled, grips, Extension{}, grid());
+  const StepContext context{.leg = 2};
+  constexpr double omega = 4.9, blur = 0.003, width = 0.02;  // of the steps of a trapezoid in scores
+  std::vector<double> next, mass;
+  double mean = 0, square = 0;
+  for (double score = -5; score < 5; score += width) {
+    next.push_back(wheel.land(context, omega, {0.4 + 0.05 * score, 0.6}, false).next.value());
+    mass.push_back(width * std::exp(-0.5 * score * score) / std::sqrt(2 * std::numbers::pi));
+    mean += mass.back() * next.back();
+    square += mass.back() * next.back() * next.back();
+  }
+  const double sd = std::sqrt(square - mean * mean);
+  ASSERT_GT(sd, 2 * blur);
+  for (const double away : {-2.0, -1.0, 0.0, 1.0, 2.0}) {
+    const double at = mean + away * sd;
+    double density = 0;
+    for (std::size_t k = 0; k < next.size(); ++k)
+      density +=
+          mass[k] * std::exp(-0.5 * std::pow((at - next[k]) / blur, 2)) / (blur * std::sqrt(2 * std::numbers::pi));
+    EXPECT_NEAR(wheel.at_next_touch(context, omega, {}, blur, at).speed.density / density, 1, 0.015) << away;
+  }
+}
+
 // The error of the law's form is of every next speed, and may tilt about 8 deg.
 TEST(SettledDensity, TheErrorOfItsFormTiltsWithTheSlope) {
   const StepContext context{.leg = 2};
