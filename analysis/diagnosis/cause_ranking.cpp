@@ -288,7 +288,6 @@ void Ranker::refine_single(std::size_t i) {
   refine_variant(model_, effort_, refined);
   take(singles_[i], std::move(refined));
   refined_[i] = true;
-  beside_.erase(i);
 }
 
 // Fits once more where a fit did not settle near the top: further along its own way, and from the nuisances that suit
@@ -449,9 +448,13 @@ void Ranker::refine_paired() {
     const Candidate* partner = best->terms[&term == &best->terms[0] ? 1 : 0].candidate;
     heartbeat();
     refine_single(i);
+    beside_.erase(i);
     try_beside(i);
-    if (std::ranges::none_of(tries_, [&](const Try& t) { return t.leader == i && t.second.candidate == partner; }))
-      tries_.push_back({i, *scan_beside(i).find(partner)});
+    // Another law has nothing to scan.
+    const ScannedEffect* second = scan_beside(i).find(partner);
+    if (second &&
+        std::ranges::none_of(tries_, [&](const Try& t) { return t.leader == i && t.second.candidate == partner; }))
+      tries_.push_back({i, *second});
   }
   if (tries_.empty()) return;
   for (RankedCause& pair : pairs_) pair.together = pair.gain / std::max(1.0, gain_apart(pair));

@@ -38,7 +38,8 @@ struct ScanBeside {
 /// @param fit  of nuisances, and possibly terms, whose derivatives are projected out
 /// @param candidates  those to scan; candidates without parameters are skipped
 /// @param beside  where given, of each effect's variants no more are scanned than a scan is worth: those of which the
-///   earlier one promises most, to first order; the others gain 0
+///   earlier one promises most, to first order; the others gain 0. Differences start from steps that the earlier one
+///   resolves
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
                         int threads, const ScanBeside& beside = {});
 

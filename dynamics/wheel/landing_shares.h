@@ -84,7 +84,6 @@ struct LandingShares {
    public:
     SharesAtSpeed(const LandingShares& grid, int leg, double omega);
     const Leg& leg() const { return *leg_; }
-    const LandingShares& grid() const { return *grid_; }
     SharesAtRestitution at_restitution(double eta) const;
     Kept at(double eta, double friction) const { return at_restitution(eta).at(friction); }
 

@@ -8,7 +8,7 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr int per_unit = 64;  // nodes
-constexpr double reach = 8;
+constexpr double reach = normal_reach;
 
 struct NormalNodes {
   std::array<double, 2 * static_cast<std::size_t>(reach) * per_unit + 1> below, density;
@@ -25,7 +25,7 @@ METASTABLE_WIDE void read(const NormalNodes& nodes, const double* __restrict z, 
                           double* __restrict below, double* __restrict density) {
   const double *below_nodes = nodes.below.data(), *density_nodes = nodes.density.data();
   for (std::size_t k = 0; k < count; ++k) {
-    const double low = z[k] < -reach ? -reach : z[k], here = low > reach ? reach : low;
+    const double low = z[k] > -reach ? z[k] : -reach, here = low < reach ? low : reach;
     const std::ptrdiff_t i = static_cast<int>((here + reach) * per_unit + 0.5);
     const double from = static_cast<double>(i) * (1.0 / per_unit) - reach, d = here - from;
     // Taylor's series about the node: of exp(-from d - d^2 / 2), and of the density's integral (Hermite's polynomials).

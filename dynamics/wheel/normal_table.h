@@ -5,8 +5,11 @@
 
 namespace metastable::dynamics {
 
-/// Finds Phi(z) and the density there, to 1e-9 of either; beyond |z| = 8 they are those there. The arrays must not
-/// overlap.
+/// Is where the table ends.
+inline constexpr double normal_reach = 8;
+
+/// Finds Phi(z) and the density there, to 1e-9 of either; beyond |z| = 8 they are those there, and of NaN those at -8.
+/// The arrays must not overlap.
 void normals_at(const double* z, std::size_t count, double* below, double* density);
 
 }  // namespace metastable::dynamics

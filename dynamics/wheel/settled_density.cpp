@@ -36,7 +36,7 @@ void normals(const std::array<double, size>& z, std::size_t count, std::array<do
              std::array<double, size>& density) {
   normals_at(z.data(), size, below.data(), density.data());
   for (std::size_t k = 0; k < count; ++k)
-    if (std::abs(z[k]) > 8) below[k] = normal_cdf(z[k]), density[k] = normal_density(z[k]);
+    if (std::abs(z[k]) > normal_reach) below[k] = normal_cdf(z[k]), density[k] = normal_density(z[k]);
 }
 
 // Weighs restitutions and frictions of one landing.
@@ -52,7 +52,7 @@ class Weights {
   double friction_above(double mu) const {
     return mu > 0 ? normal_cdf((friction_mean_ - mu) / friction_sd_) / friction_mass_ : 1;
   }
-  // Finds the same of so many, which rise.
+  // Finds the same of so many.
   void frictions_above(const LandingCells::Values& mu, std::size_t count, LandingCells::Values& above) const {
     LandingCells::Values score{}, density;
     for (std::size_t k = 0; k < count; ++k) score[k] = (friction_mean_ - mu[k]) / friction_sd_;
@@ -86,8 +86,7 @@ class Weights {
   // Finds the shares of restitutions between ends `width` apart, the first one at `from`.
   void restitutions_between(double from, double width, LandingCells& cells) const {
     // Even within cells they would spread by more than they do: a normal variance by a sixth of the square of a cell.
-    const double variance = square(c_.restitution_sd),
-                 sd = std::sqrt(std::max(0.25 * variance, variance - width * width / 6));
+    const double sd = std::sqrt(square(c_.restitution_sd) - width * width / 6);
     LandingCells::Values score{}, below, density;
     for (std::size_t k = 0; k <= cells.count; ++k)
       score[k] = (from + width * static_cast<double>(k) - c_.restitution_mean) / sd;
@@ -95,11 +94,19 @@ class Weights {
     const double all = std::max(1e-300, below[cells.count] - below[0]);
     for (std::size_t k = 0; k < cells.count; ++k) cells.mass[k] = (below[k + 1] - below[k]) / all;
   }
+  // Return where restitutions end that are weighed: so many sds from the mean, or where they can be. Of a mean that no
+  // restitution has they are a standard deviation wide.
   double least_restitution(double far = far_score) const {
-    return std::max(0.0, c_.restitution_mean - far * c_.restitution_sd);
+    return std::max(0.0, std::min(c_.restitution_mean - far * c_.restitution_sd, 1 - c_.restitution_sd));
   }
   double most_restitution(double far = far_score) const {
-    return std::min(1.0, c_.restitution_mean + far * c_.restitution_sd);
+    return std::min(1.0, std::max(c_.restitution_mean + far * c_.restitution_sd, c_.restitution_sd));
+  }
+  // Says how far the few restitutions of all landings reach: by so much less where no end cuts them off.
+  double reach_of_all() const {
+    const bool cut = c_.restitution_mean < far_of_all * c_.restitution_sd ||
+                     c_.restitution_mean + far_of_all * c_.restitution_sd > 1;
+    return cut ? far_score : far_of_all;
   }
 
  private:
@@ -256,6 +263,7 @@ static_assert(cell_places.back() == LandingShares::parts - 1);
 void add_sticking(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
   constexpr std::size_t count = 14;
   const double from = weights.least_restitution(), width = (weights.most_restitution() - from) / count;
+  if (!(width > 0)) return;
   LandingCells cells{.count = count};
   weights.restitutions_between(from, width, cells);
   for (std::size_t k = 0; k <= count; ++k) {
@@ -277,7 +285,8 @@ void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weight
   const double critical = landing.sticking(), own = landing.place.leg().sticking, off = critical - own;
   LandingCells cells{.count = cell_places.size()};
   LandingCells::Values mu, above;
-  const double least = weights.least_restitution(far_of_all), most = weights.most_restitution(far_of_all);
+  const double reach = weights.reach_of_all(), least = weights.least_restitution(reach),
+               most = weights.most_restitution(reach);
   restitutions<nodes_of_all>(least, most, [&](double eta, double weight) {
     const double mass = share * weight * weights.restitution_density(eta);
     const LandingShares::SharesAtRestitution at = landing.place.at_restitution(eta);

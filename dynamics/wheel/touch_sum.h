@@ -9,7 +9,8 @@
 
 namespace metastable::dynamics {
 
-/// Holds landings in cells, from end to end of each of which omega_eq^2 is spread evenly.
+/// Holds landings in cells, from end to end of each of which the next omega- is spread evenly, and omega_eq^2 where
+/// some of them rest.
 struct LandingCells {
   static constexpr std::size_t most = 15;
   using Values = std::array<double, most + 1>;
@@ -19,7 +20,8 @@ struct LandingCells {
   Values slide{};    ///< by cell, of the feet [m]
 };
 
-/// Sums cells of one landing, for what was seen of it and of the next omega-.
+/// Sums cells of one landing, for what was seen of it and of the next omega-. What is further off than eight blurs
+/// counts as eight.
 class TouchSum {
  public:
   /// @param landing  must outlive the sum; @param blur, next  [rad/s]

@@ -190,6 +190,21 @@ TEST(SettledDensity, OfAFootThatSticksIsTheIntegralOverRestitution) {
   }
 }
 
+// Effects may move the mean of restitution beyond 1, to where hardly any of its normal distribution can be.
+TEST(SettledDensity, GoesOnWhereTheMeanOfRestitutionLeavesItsRange) {
+  const ContactSpread narrow{0.4, 0.02, 0.36, 0.03};
+  const ExtendedWheel wheel(equal_wheel(), slope, Law::settled, narrow, Extension{}, grid());
+  std::optional<double> last;
+  for (double ratio = 2; ratio < 4; ratio += 0.01) {
+    const StepContext context{.leg = 2, .restitution_ratio = ratio};
+    const double rests = wheel.rest_share(context, 4.9, std::nullopt);
+    EXPECT_GT(rests, 0) << ratio;
+    EXPECT_LT(rests, 1) << ratio;
+    EXPECT_NEAR(rests, last.value_or(rests), 0.01) << ratio;
+    last = rests;
+  }
+}
+
 // The error of the law's form is of every next speed, and may tilt about 8 deg.
 TEST(SettledDensity, TheErrorOfItsFormTiltsWithTheSlope) {
   const StepContext context{.leg = 2};

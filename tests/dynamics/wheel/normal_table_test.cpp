@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
 #include "dynamics/wheel/truncated_normal.h"
@@ -21,14 +22,15 @@ TEST(NormalTable, IsErfcAndExp) {
 }
 
 TEST(NormalTable, EndsAtEight) {
-  const double z[] = {-1e300, -8, 8, 1e300};
-  double below[4], density[4];
-  normals_at(z, 4, below, density);
+  const double z[] = {-1e300, -8, 8, 1e300, std::nan("")};
+  double below[5], density[5];
+  normals_at(z, 5, below, density);
   EXPECT_EQ(below[0], below[1]);
   EXPECT_EQ(below[2], below[3]);
   EXPECT_LT(below[0], 1e-15);
   EXPECT_GT(below[3], 1 - 1e-15);
   EXPECT_EQ(density[0], density[3]);
+  EXPECT_EQ(below[4], below[0]);
 }
 
 }  // namespace
