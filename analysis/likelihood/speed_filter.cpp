@@ -44,7 +44,9 @@ SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, doub
       scatter2_(std::max(0.0, law_scatter * law_scatter - extension.noise_sd * extension.noise_sd)),
       slide_error_(slide_error),
       memory_(extension.memory),
-      told_(memory_ == 0 ? 0 : memory(memory_) / memory_),
+      // Where scores go mostly with the squares of contacts' a negative memory may turn them the other way: that is not
+      // followed.
+      told_(memory_ == 0 ? 0 : std::max(0.0, memory(memory_) / memory_)),
       blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
 
 SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {

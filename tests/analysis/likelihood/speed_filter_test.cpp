@@ -82,5 +82,25 @@ TEST(SpeedFilter, WhatContactsRememberOutlastsTheLastScore) {
   }
 }
 
+// Of a foot that sticks the next speed may go with the square of restitution's score, more than with itself.
+TEST(SpeedFilter, ANegativeMemoryOfSquaresIsNone) {
+  constexpr double omega = 4.9;
+  dynamics::Extension extension;
+  extension.memory = -0.475;
+  const dynamics::ExtendedWheel wheel(dynamics::Wheel{}, 7.02 * degree, dynamics::Law::published,
+                                      {0.487, 0.034, 0.435, 0.037}, extension);
+  const auto scores = [&](const MemoryOfScores& memory) {
+    SpeedFilter filter(extension, ScoreTilt(0, 0), 1e-4, 0, 0, 0, 1e-3, memory);
+    std::vector<double> seen;
+    for (const double plus : {2.4, 3.1, 2.7}) {
+      filter.start(omega);
+      seen.push_back(filter.collision(wheel, {}, plus).score);
+    }
+    return seen;
+  };
+  EXPECT_EQ(scores({.linear = 0.2, .square = 0.8}), scores({.linear = 0}));
+  EXPECT_NE(scores({.linear = 0.8, .square = 0.2}), scores({.linear = 0}));
+}
+
 }  // namespace
 }  // namespace metastable::analysis
