@@ -19,5 +19,12 @@ TEST(EffectFit, TakesLessEffortWhereScoresScatterFarMoreThanTheyShould) {
   EXPECT_EQ(effort_for(model, recalibrated).most_leaders, 1U);
 }
 
+TEST(EffectFit, TakesAllItsTimeOverFewEvents) {
+  const auto model = line(0, 5, 300);
+  Fit recalibrated = fit(model, {0, 0}, {});
+  for (double& score : recalibrated.evaluation.score) score *= 2;
+  EXPECT_EQ(effort_for(model, recalibrated).most_leaders, Effort{}.most_leaders);
+}
+
 }  // namespace
 }  // namespace metastable::analysis
