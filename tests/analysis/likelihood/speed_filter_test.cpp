@@ -89,8 +89,9 @@ TEST(SpeedFilter, ANegativeMemoryOfSquaresIsNone) {
   extension.memory = -0.475;
   const dynamics::ExtendedWheel wheel(dynamics::Wheel{}, 7.02 * degree, dynamics::Law::published,
                                       {0.487, 0.034, 0.435, 0.037}, extension);
+  const ScoreTilt tilt(0, 0);
   const auto scores = [&](const MemoryOfScores& memory) {
-    SpeedFilter filter(extension, ScoreTilt(0, 0), 1e-4, 0, 0, 0, 1e-3, memory);
+    SpeedFilter filter(extension, tilt, 1e-4, 0, 0, 0, 1e-3, memory);
     std::vector<double> seen;
     for (const double plus : {2.4, 3.1, 2.7}) {
       filter.start(omega);
