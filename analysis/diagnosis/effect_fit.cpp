@@ -42,6 +42,7 @@ bool is_far_off(const std::vector<double>& scores) {
 }  // namespace
 
 Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
+  // Few events are fitted soon at any effort.
   constexpr std::size_t many_events = 6000, few_events = 1000;
   constexpr double far_off = 50;  // rise of the log likelihood that a recalibration has left
   if ((!recalibrated.converged && recalibrated.promised > far_off) ||
