@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "analysis/blind/blind_dice.h"
+#include "analysis/blind/outside_power.h"
 #include "analysis/blind/sized_effect.h"
 #include "analysis/experiment/stand_in.h"
 
@@ -28,23 +29,23 @@ constexpr std::string_view recalibration = dynamics::contact_distribution_id;
 
 // Finds the size whose power is `target`. Powers grow like a power of a small size, mostly its square: it takes secant
 // steps in logarithms, inside the bracket known so far.
-double find_size(const SizedEffect& effect, double target,
-                 const std::function<double(const dynamics::Effect&)>& power) {
-  double size = std::min(effect.start * std::sqrt(target / 16), effect.largest);
-  double low = 0, high = effect.largest, exponent = 2;
+// @param start  has a power of about 16
+double find_size(double start, double largest, double target, const std::function<double(double)>& power) {
+  double size = std::min(start * std::sqrt(target / 16), largest);
+  double low = 0, high = largest, exponent = 2;
   double last_size = 0, last_power = 0;
   for (int i = 0; i < 8; ++i) {
-    const double now = power(effect.at(size));
+    const double now = power(size);
     if (std::abs(now / target - 1) < 0.1) break;
-    if (now < target && size == effect.largest) break;
+    if (now < target && size == largest) break;
     (now < target ? low : high) = size;
     if (now > 0 && last_power > 0 && size != last_size)
       exponent = std::clamp(std::log(now / last_power) / std::log(size / last_size), 0.7, 3.0);
     last_size = size;
     last_power = now;
     double next = now > 0.02 * target ? size * std::pow(target / now, 1 / exponent) : 3 * size;
-    next = std::min(next, effect.largest);
-    if (next <= low || (next >= high && high < effect.largest)) next = (low + high) / 2;
+    next = std::min(next, largest);
+    if (next <= low || (next >= high && high < largest)) next = (low + high) / 2;
     size = next;
   }
   return size;
@@ -186,23 +187,35 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   design.reality.threads = 1;
   std::vector<SizedEffect> sized;
   std::set<std::string> needed;
-  if (plan.kind != BlindKind::outside)
+  const dynamics::OutsideInfo* outside = nullptr;
+  if (plan.kind == BlindKind::outside) {
+    outside = &dynamics::outside_info(plan.effects.front());
+    if (outside->by_leg) needed.insert("leg");
+  } else {
     for (const std::string& id : plan.effects) {
       sized.push_back(sized_effect(id, contact, dice));
       needed.insert(sized.back().needs.begin(), sized.back().needs.end());
     }
+  }
   design.dropped = draw_dropped(needed, dice);
-  constexpr std::array<double, 5> targets{0, 16, 64, 0, 256};
+  const double target = 16 * plan.strength * plan.strength;
   for (const SizedEffect& one : sized) {
-    const double size = find_size(one, targets.at(static_cast<std::size_t>(plan.strength)),
-                                  [&](const dynamics::Effect& effect) { return power(design, {effect}); });
+    const double size = find_size(one.start, one.largest, target, [&](double s) { return power(design, {one.at(s)}); });
     truth.effects.push_back(one.at(size));
   }
   if (!truth.effects.empty()) truth.power = power(design, truth.effects);
-  if (plan.kind == BlindKind::outside) {
-    const dynamics::OutsideInfo& info = dynamics::outside_info(plan.effects.front());
-    // Twice the size is four times the power: 0.4 of the range stands for 2x, 0.8 for 4x.
-    truth.outside = {info.id, info.upper * 0.2 * plan.strength * dice.uniform(0.85, 1.15)};
+  if (outside) {
+    const auto power_of = [&](double size) {
+      design.reality.outside = {{outside->id, size}};
+      return power(design, {});
+    };
+    // Twice the size is four times the power: 0.4 of the range stands for 2x where no likelihood says so.
+    const double usual = 0.2 * outside->upper;
+    const bool weighed = can_be_weighed(outside->id);
+    const double size =
+        weighed ? find_size(usual, outside->upper, target, power_of) : usual * plan.strength * dice.uniform(0.85, 1.15);
+    if (weighed) truth.power = power_of(size);
+    truth.outside = {outside->id, size};
     design.reality.outside = {*truth.outside};
   }
 
@@ -240,10 +253,12 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
 
 void complete_truth(BlindCase& made) {
   BlindTruth& truth = made.truth;
-  if (truth.effects.empty()) return;
+  const bool outside = truth.outside && can_be_weighed(truth.outside->id);
+  if (truth.effects.empty() && !outside) return;
   const Experiment experiment = parse_experiment(source_of(made.files.files, fmt::format("case {}", truth.number)));
-  truth.left = power_left(experiment, stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length),
-                          truth.effects);
+  const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length);
+  truth.left = outside ? outside_power_left(experiment, contact, *truth.outside)
+                       : power_left(experiment, contact, truth.effects);
 }
 
 void complete_pair(BlindTruth& truth, const Experiment& experiment) {

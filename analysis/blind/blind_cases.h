@@ -47,7 +47,7 @@ struct BlindTruth {
   dynamics::Law law = dynamics::Law::published;  ///< that the wheel obeys and the model states
   std::vector<dynamics::Effect> effects;
   std::optional<dynamics::OutsideEffect> outside;
-  int strength = 0;  ///< 1, 2, 4; of `outside` by its size alone; 0 where it is not defined (none)
+  int strength = 0;  ///< 1, 2, 4; by size alone where an outside effect cannot be weighed; 0: not defined (none)
   double power = 0;  ///< expected 2 Delta log likelihood, true contact known
   double left = 0;   ///< realised, after recalibration; 0 until complete_truth()
   /// Of a pair, by effect, it is what was realised after recalibration with the other effect in the model. Not sealed,
@@ -83,10 +83,12 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed);
 
 /// Draws case `number` (from 1) of a plan. Sizes are found by a search on `power` for 16, 64, 256 (each effect of a
 /// pair for 64); an effect that cannot be made so strong within its range keeps its largest size, and truth.power
-/// tells. truth.left is not worked out: a case that is graded takes complete_truth() too.
+/// tells. An outside effect that cannot be weighed (outside_power.h) has its strength by its size alone. truth.left is
+/// not worked out: a case that is graded takes complete_truth() too.
 BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, const Power& power);
 
-/// Sets truth.left from the case's own files; a case without catalogue effects keeps 0. A fit takes about a second.
+/// Sets truth.left from the case's own files; a case without an effect that can be weighed keeps 0. A fit takes about a
+/// second.
 void complete_truth(BlindCase& made);
 /// Sets truth.left_by_effect of a pair by two fits; other kinds stay as they are.
 /// @param experiment  the case as it was written

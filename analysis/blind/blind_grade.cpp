@@ -78,7 +78,7 @@ struct Tally {
   double beyond_alike = 0, most_beyond_alike = 0;  // names of sets at 2x, sum and most
   Proportion absorbed, interval, shrinkage;
   Proportion both, both_findable, no_third, no_third_first, no_third_alike;
-  Proportion misnamed, unexplained;
+  Proportion misnamed, unexplained, unexplained_left;
   Proportion left_misnamed, left_right;
   std::vector<std::pair<double, bool>> forecasts;  // probability of the first cause, and whether it is right
 };
@@ -157,9 +157,10 @@ void count_pair(Tally& tally, const BlindTruth& truth, const Answer& answer) {
   tally.no_third_alike.count(of_the_two(answer->cause_set.front()) || std::ranges::any_of(answer->alike, of_the_two));
 }
 
-void count_outside(Tally& tally, const Answer& answer) {
+void count_outside(Tally& tally, const BlindTruth& truth, const Answer& answer) {
   tally.misnamed.count(!answer || confident(answer));
   tally.unexplained.count(is(answer, Verdict::unexplained));
+  if (truth.left >= no_power_left) tally.unexplained_left.count(is(answer, Verdict::unexplained));
 }
 
 using Groups = std::map<std::string, std::vector<std::string>>;
@@ -257,6 +258,7 @@ std::vector<Grade> measures(Tally tally) {
     add(fmt::format("95 % set holds the truth, {}x", strength), tally.holds[strength], 0.95, 1);
   add("effect outside the catalogue confidently misnamed", tally.misnamed, 0, 0.1);
   add("effect outside the catalogue called unexplained", tally.unexplained, 0.7, 1);
+  add("  with power left for who knows it", tally.unexplained_left, 0.7, 1);
   add("left-out effect confidently misnamed", tally.left_misnamed, 0, 0.1);
   add("left-out effect unexplained, or of its ambiguity group", tally.left_right, 0.7, 1);
   add("two effects: both named", tally.both, 0.7, 1);
@@ -322,7 +324,7 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
         count_pair(tally, truth, answer);
         break;
       case BlindKind::outside:
-        count_outside(tally, answer);
+        count_outside(tally, truth, answer);
         break;
       case BlindKind::left_out:
         count_left_out(tally, truth, answer, result.alike);

@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "analysis/blind/outside_power.h"
 #include "analysis/diagnosis/model_fit.h"
 #include "analysis/likelihood/wheel_nuisances.h"
 #include "analysis/likelihood/wheel_transitions.h"
@@ -56,9 +57,13 @@ double expected_power(const PowerDesign& design, const std::vector<dynamics::Eff
     const RealityFiles made =
         reality_files(design.conditions, setup, run_laboratory(setup, 1), {.dropped = design.dropped});
     const Experiment experiment = parse_experiment(source_of(made.files, "laboratory"));
-    const auto model = wheel_transitions(experiment);
     const Setting& stated = design.conditions.front().setting;
     const dynamics::NominalValues contact = stated_values(stated.restitution, stated.friction, stated.wheel.leg_length);
+    if (!reality.outside.empty()) {
+      sum += outside_power(experiment, contact, reality.outside.front());
+      continue;
+    }
+    const auto model = wheel_transitions(experiment);
     const std::vector<double> with = true_nuisances(*model, contact_of(contact, effects));
     sum += 2 * (model->evaluate(with, terms_of(*model, effects)).total() -
                 model->evaluate(true_nuisances(*model, contact), {}).total());

@@ -13,7 +13,7 @@ namespace metastable::analysis {
 /// Describes an experiment in the laboratory, with what its folder tells.
 struct PowerDesign {
   std::vector<RealityCondition> conditions;  ///< stated; contact as it truly is
-  RealityOptions reality;                    ///< without effects
+  RealityOptions reality;                    ///< without effects of the catalogue
   std::vector<std::string> dropped;
 };
 
@@ -27,7 +27,8 @@ std::vector<double> true_nuisances(const TransitionModel& model, const dynamics:
 
 /// Returns the mean over `replicates` laboratory experiments with the effects of 2 log(likelihood with them / without),
 /// true contact known to both: about the effects' own noncentrality. Seeds follow design.reality.seed, apart from the
-/// case's own. @throws std::invalid_argument for replicates < 1
+/// case's own. A design with an effect outside the catalogue is weighed by that one alone, and takes no others.
+/// @throws std::invalid_argument for replicates < 1, and for an outside effect that cannot be weighed
 double expected_power(const PowerDesign& design, const std::vector<dynamics::Effect>& effects, int replicates);
 
 /// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effects) on one experiment: what

@@ -17,12 +17,9 @@ namespace metastable::dynamics {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr double reference_speed = 5;   // [rad/s] of the catalogue's power laws
-constexpr double plank = 0.31;          // [m]
-constexpr double slosh_time = 0.15;     // [s]
-constexpr double warming_time = 1;      // [s]
-constexpr double sway_frequency = 0.8;  // [Hz]
-constexpr double lead = 0.3;            // [s] of motion kept before collision 1
+constexpr double reference_speed = 5;  // [rad/s] of the catalogue's power laws
+constexpr double slosh_time = 0.15;    // [s]
+constexpr double lead = 0.3;           // [s] of motion kept before collision 1
 
 enum class Stream : std::uint64_t { trial = 100, contact = 101, sensor = 102 };
 
@@ -170,7 +167,6 @@ class Laboratory::Roll {
     drift_ = trials > 1 ? 1 + c_.drift * static_cast<double>(index) / (trials - 1) : 1;
     body_.constant_drag += c_.wind * own.score[2];
     phase_ = 2 * std::numbers::pi * own.uniform;
-    progress_ = static_cast<double>(index) / trials;
   }
 
   LaboratoryTrial run() {
@@ -244,27 +240,18 @@ class Laboratory::Roll {
     next(friction_score_, fresh[1]);
   }
 
-  // Says what effects outside the catalogue make of the deviation of mu from its mean, and of mu.
-  double outside_scatter(int leg, double position, double speed) const {
-    double factor = std::pow(speed / reference_speed, 8 * c_.spread);
-    if (leg == 2 || leg == 5) factor *= 1 + c_.loose;
-    if (position > 0.5 && position < 1) factor *= 1 + c_.rough;
-    return factor;
-  }
-  double outside_friction(int leg, double position, double speed, double time) const {
-    constexpr double turn = 2 * std::numbers::pi;
-    const std::size_t conditions = lab_.setup_.conditions.size();
-    double factor = 1 + c_.planks * std::cos(turn * position / plank);
-    factor *= 1 + (leg % 2 == 1 ? c_.plates : -c_.plates);
-    factor *= 1 - c_.warming * -std::expm1(-time / warming_time);
-    factor *= 1 + (index_ % 2 == 0 ? c_.crews : -c_.crews);
-    if (conditions > 1 && condition_ + 1 == conditions) factor *= 1 + c_.wet;
-    factor *= 1 + c_.cycle * std::sin(2 * turn * progress_);
-    if (!trial_.collisions.empty()) factor *= 1 + c_.hysteresis * (trial_.collisions.back().omega_minus - speed);
-    if (leg == 3) factor *= 1 + c_.wear * (1 - 2 * progress_);
-    if (trial_.collisions.empty()) factor *= 1 + c_.sticky;
-    factor *= 1 + c_.sway * std::cos(turn * sway_frequency * time + phase_);
-    return std::max(0.0, factor);
+  // Says what effects outside the catalogue make of the contact.
+  OutsideRatios outside(int leg, double position, double speed, double time) const {
+    OutsideRatios ratios;
+    OutsidePlace at{leg, position, speed, 0, time, trial_.collisions.empty()};
+    if (!at.first) at.slowed = trial_.collisions.back().omega_minus - speed;
+    at.trial = index_;
+    at.trials = lab_.setup_.order.size();
+    at.condition = condition_;
+    at.conditions = lab_.setup_.conditions.size();
+    at.phase = phase_;
+    for (const OutsideEffect& effect : c_.of_contact) outside_info(effect.id).change(effect.size, at, ratios);
+    return ratios;
   }
 
   // Draws eta and mu of the collision that comes, effects included.
@@ -278,8 +265,8 @@ class Laboratory::Roll {
       contact.restitution = lab_.restitution_.mean() +
                             lab_.restitution_.sd() * skewed(lab_.setup_.restitution_skewness, restitution_score_[0]);
     const double mean = lab_.friction_.mean();
-    if (const double scatter = outside_scatter(leg, position, speed); scatter != 1)
-      contact.friction = mean + (contact.friction - mean) * scatter;
+    const OutsideRatios ratios = outside(leg, position, speed, time);
+    if (ratios.scatter != 1) contact.friction = mean + (contact.friction - mean) * ratios.scatter;
     contact.friction = std::max(0.0, contact.friction + added_friction_) * drift_;
     for (const LegChange& change : c_.legs)
       if (change.leg == leg) {
@@ -291,12 +278,11 @@ class Laboratory::Roll {
       if (position >= patch.from && position <= (patch.to > 0 ? patch.to : ramp))
         contact.friction *= patch.friction_ratio;
     contact.friction *= 1 + c_.stribeck_amplitude * std::exp(-speed / c_.stribeck_speed);
-    contact.friction *= outside_friction(leg, position, speed, time);
+    contact.friction *= std::max(0.0, ratios.friction);
     if (d.uniform < c_.outlier_share) contact.friction *= c_.outlier_ratio;
     contact.friction = std::max(0.0, contact.friction);
     contact.restitution *= std::pow(speed / reference_speed, -c_.restitution_exponent);
-    const double off_resonance = (speed - 5.3) / 0.35;
-    contact.restitution *= 1 - c_.resonance * std::exp(-off_resonance * off_resonance);
+    contact.restitution *= ratios.restitution;
     contact.restitution = std::clamp(contact.restitution, 0.0, 1.0);
     return contact;
   }
@@ -423,7 +409,7 @@ class Laboratory::Roll {
   LaboratoryTrial trial_;
   Contact contact_;
   double launch_ = 0, added_friction_ = 0, drift_ = 1;
-  double phase_ = 0, progress_ = 0;  // of the trial: of its swing, and its share of all trials
+  double phase_ = 0;                                              // that the trial draws
   std::array<double, 2> restitution_score_{}, friction_score_{};  // of the last collision and of the one before
   double loss_sum_ = 0, last_loss_ = 0;
   int losses_ = 0;

@@ -95,21 +95,20 @@ LaboratoryChanges laboratory_changes(const NominalValues& stated, const std::vec
     found->second.make(c, effect.values);
   }
   using C = LaboratoryChanges;
-  const std::map<std::string, double C::*, std::less<>> sizes{
-      {"sloshing_fluid", &C::slosh},        {"planks", &C::planks},         {"frame_resonance", &C::resonance},
-      {"stored_energy", &C::stored},        {"speed_spread", &C::spread},   {"double_plate", &C::plates},
-      {"warming_feet", &C::warming},        {"two_crews", &C::crews},       {"loose_feet", &C::loose},
-      {"second_memory", &C::second_memory}, {"crosswind", &C::wind},        {"wet_day", &C::wet},
-      {"daily_cycle", &C::cycle},           {"hysteresis", &C::hysteresis}, {"wearing_leg", &C::wear},
-      {"rough_stretch", &C::rough},         {"sticky_start", &C::sticky},   {"swaying_floor", &C::sway},
-  };
+  const std::map<std::string, double C::*, std::less<>> sizes{{"sloshing_fluid", &C::slosh},
+                                                              {"stored_energy", &C::stored},
+                                                              {"second_memory", &C::second_memory},
+                                                              {"crosswind", &C::wind}};
   for (const OutsideEffect& effect : outside) {
     const OutsideInfo& info = outside_info(effect.id);
     if (!(effect.size >= 0 && effect.size <= info.upper))
       throw std::invalid_argument(
           fmt::format("effect {}: size {} is outside [0, {}]", effect.id, effect.size, info.upper));
     if (!seen.insert(effect.id).second) throw std::invalid_argument(fmt::format("effect {}: given twice", effect.id));
-    c.*sizes.at(effect.id) = effect.size;
+    if (info.change)
+      c.of_contact.push_back(effect);
+    else
+      c.*sizes.at(effect.id) = effect.size;
   }
   return c;
 }

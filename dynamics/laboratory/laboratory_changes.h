@@ -40,9 +40,8 @@ struct LaboratoryChanges {
   double vibration = 0, vibration_hz = 10;
   bool slip_reversal = false;
   // These are outside the catalogue.
-  double slosh = 0, planks = 0, resonance = 0, stored = 0, spread = 0, plates = 0;
-  double warming = 0, crews = 0, loose = 0, second_memory = 0, wind = 0, wet = 0;
-  double cycle = 0, hysteresis = 0, wear = 0, rough = 0, sticky = 0, sway = 0;
+  double slosh = 0, stored = 0, second_memory = 0, wind = 0;
+  std::vector<OutsideEffect> of_contact;  // those with an OutsideInfo::change
 };
 
 /// @throws std::invalid_argument for an unknown id, a wrong number of values, a size out of range, or an id given twice

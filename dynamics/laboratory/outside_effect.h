@@ -2,17 +2,38 @@
 // Lists laboratory effects that no catalogue holds, so that a diagnosis can be asked about what it does not know.
 // They stay out of effect_catalogue() for good.
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace metastable::dynamics {
 
+/// Says where a collision stands, as far as these effects ask.
+struct OutsidePlace {
+  int leg = 0;          ///< that lands
+  double position = 0;  ///< of its foot, down the ramp from foot 1 [m]
+  double speed = 0;     ///< omega- [rad/s]
+  double slowed = 0;    ///< omega- of the collision before, less this one's [rad/s]; 0 at the first
+  double clock = 0;     ///< since collision 1 [s]
+  bool first = true;    ///< of its trial
+  std::size_t trial = 0, trials = 1, condition = 0, conditions = 1;
+  double phase = 0;  ///< drawn by the trial, [0, 2 pi)
+};
+
+/// Says what becomes of the contact drawn for a collision: mu, its deviation from the mean, eta.
+struct OutsideRatios {
+  double friction = 1, scatter = 1, restitution = 1;
+};
+
 /// One parameter sets the size, neutral at 0; the others are constants of the family.
 struct OutsideInfo {
   std::string id;
   std::string summary;
-  double upper = 1;  ///< largest size the laboratory takes
+  double upper = 1;     ///< largest size the laboratory takes
+  bool by_leg = false;  ///< nobody can tell it who does not know which leg lands
+  /// What a size makes of a contact; null for what acts on the body or by what was drawn before.
+  void (*change)(double size, const OutsidePlace& at, OutsideRatios& ratios) = nullptr;
 };
 
 /// sloshing_fluid   a fluid in the hub keeps its spin through collisions and drags on the wheel afterwards; size: its

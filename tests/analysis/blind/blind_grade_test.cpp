@@ -96,10 +96,12 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
   BlindTruth pair = truth(BlindKind::pair, {"inertia", "trial_drift"}, 2), hidden = pair;
   pair.left_by_effect = {30, 40};
   hidden.left_by_effect = {1, 60};  // recalibration takes up the first
-  const BlindTruth outside = truth(BlindKind::outside, {}, 0), left = truth(BlindKind::left_out, {"leg_contact"}, 2);
+  const BlindTruth outside = truth(BlindKind::outside, {}, 2), left = truth(BlindKind::left_out, {"leg_contact"}, 2);
+  BlindTruth nothing_left = outside;
+  nothing_left.left = 8;
   const BlindTruth full = truth(BlindKind::effect, {"leg_contact"}, 2);
   const BlindGrades g =
-      grade({pair, pair, hidden, pair, outside, outside, outside, left, left, left, full},
+      grade({pair, pair, hidden, pair, outside, nothing_left, outside, left, left, left, full},
             {said(Verdict::explained, {"trial_drift+inertia"}), said(Verdict::explained, {"inertia"}),
              said(Verdict::explained, {"inertia+bounce"}),
              said(Verdict::explained, {"bounce+inertia", "inertia+trial_drift"}), said(Verdict::unexplained),
@@ -113,6 +115,7 @@ TEST(BlindGrade, PairsOutsideAndLeftOut) {
   expect(g, "  in the first of the set, or what is alike to it", 2, 4);
   expect(g, "effect outside the catalogue confidently misnamed", 1, 3);
   expect(g, "effect outside the catalogue called unexplained", 1, 3);
+  expect(g, "  with power left for who knows it", 1, 2);
   // leg_lengths shares the sets of leg_contact in this run: it is its own ambiguity group.
   expect(g, "left-out effect confidently misnamed", 1, 3);
   expect(g, "left-out effect unexplained, or of its ambiguity group", 2, 3);

@@ -1,0 +1,27 @@
+#pragma once
+// Measures how visible an effect outside the catalogue is to somebody who knows it: the likelihood of an experiment in
+// which each contact is changed as the effect changes it.
+
+#include <string_view>
+
+#include "analysis/experiment/experiment.h"
+#include "dynamics/laboratory/outside_effect.h"
+#include "dynamics/wheel/effect_catalogue.h"
+
+namespace metastable::analysis {
+
+/// Says whether the effect's likelihood is known. It is not where it acts through what was drawn or lost before
+/// (sloshing_fluid, stored_energy, second_memory).
+bool can_be_weighed(std::string_view outside);
+
+/// Returns 2 log(likelihood with the effect / without), true contact known to both. What trials draw (a torque, a
+/// phase) is integrated over. @throws std::invalid_argument for an effect that cannot be weighed
+double outside_power(const Experiment& experiment, const dynamics::NominalValues& contact,
+                     const dynamics::OutsideEffect& effect);
+
+/// Returns 2 log(likelihood of the truth / of the best recalibrated model without the effect).
+/// @throws std::invalid_argument for an effect that cannot be weighed
+double outside_power_left(const Experiment& experiment, const dynamics::NominalValues& contact,
+                          const dynamics::OutsideEffect& effect);
+
+}  // namespace metastable::analysis

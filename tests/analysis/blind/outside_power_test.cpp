@@ -1,0 +1,70 @@
+#include "analysis/blind/outside_power.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "analysis/blind/effect_power.h"
+
+namespace metastable::analysis::test {
+namespace {
+
+PowerDesign two_ramps() {
+  PowerDesign design;
+  Setting base;
+  base.restitution = {0.54, 0.045};
+  base.friction = {0.352, 0.043};
+  base.slope_deg = 9.59;
+  base.initial_speed = {5.83, 0.28};
+  design.conditions = {{"steep", base, 40}, {"flat", base, 40}};
+  design.conditions[1].setting.slope_deg = 8.5;
+  design.reality.flight = false;
+  return design;
+}
+
+double power_of(const dynamics::OutsideEffect& effect) {
+  PowerDesign design = two_ramps();
+  design.reality.outside = {effect};
+  return expected_power(design, {}, 2);
+}
+
+// A wheel whose contacts are changed is likelier where the change is known: had either a sign or a place wrong, it
+// would be less likely than without.
+TEST(OutsidePower, WhoKnowsTheEffectSeesIt) {
+  int weighed = 0;
+  for (const dynamics::OutsideInfo& info : dynamics::outside_effects()) {
+    if (!can_be_weighed(info.id)) continue;
+    ++weighed;
+    EXPECT_NEAR(power_of({info.id, 0}), 0, 1e-6) << info.id;
+    const double half = power_of({info.id, 0.15 * info.upper}), whole = power_of({info.id, 0.3 * info.upper});
+    EXPECT_GT(whole, 5) << info.id;
+    EXPECT_GT(whole, 1.8 * half) << info.id;
+  }
+  EXPECT_EQ(weighed, 15);
+}
+
+TEST(OutsidePower, WhatActsThroughThePastHasNoLikelihood) {
+  for (const char* id : {"sloshing_fluid", "stored_energy", "second_memory"}) {
+    EXPECT_FALSE(can_be_weighed(id));
+    EXPECT_THROW(power_of({id, 0.1}), std::invalid_argument);
+  }
+}
+
+// Every other trial's friction is nobody's mean; that of the last of two conditions is half in the means.
+TEST(OutsidePower, RecalibrationTakesWhatMeansHold) {
+  const auto left = [](const dynamics::OutsideEffect& effect) {
+    PowerDesign design = two_ramps();
+    design.reality.outside = {effect};
+    design.reality.seed = 4;
+    const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.reality);
+    const Experiment made = experiment_of(design.conditions, setup, run_laboratory(setup, 1), {});
+    const Setting& stated = design.conditions[0].setting;
+    const dynamics::NominalValues contact = stated_values(stated.restitution, stated.friction, stated.wheel.leg_length);
+    return outside_power_left(made, contact, effect) / outside_power(made, contact, effect);
+  };
+  EXPECT_GT(left({"two_crews", 0.06}), 0.8);
+  EXPECT_LT(left({"wet_day", 0.1}), 0.7);
+}
+
+}  // namespace
+}  // namespace metastable::analysis::test
