@@ -245,6 +245,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   std::vector<LeftInFacet> left = left_by_facet(model, recalibrated, 0, 0);
   const double of_left = evidence_of_more(left);
   d.causes.unnamed.push_back({{}, of_left, std::move(left)});
+  const EffectScan variations = scan_variations(model, recalibrated, options.threads);
+  d.gap.p_variations = variations_p_value(variations, options.draws, options.seed);
   test_for_gap(d, ranking, candidates.size(), recalibrated);
   note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
   leave_undecided(d, ranking, candidates);
@@ -254,8 +256,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   if (gap && ranking.scan.trials_suffice) {
     progress(0.66, "what has no name");
     Unnamed& alone = d.causes.unnamed.front();
-    for (LeftInFacet& varied :
-         fitted_variations(model, recalibrated, options.threads, [&] { progress(0.66, "what has no name"); }))
+    for (LeftInFacet& varied : fitted_variations(model, recalibrated, variations, options.threads,
+                                                 [&] { progress(0.66, "what has no name"); }))
       alone.facets.push_back(std::move(varied));
     alone.evidence = evidence_of_more(alone.facets);
   }

@@ -141,10 +141,11 @@ struct Diagnosis {
   struct Gap {
     double p_as_given = 1;       ///< of the model as given: twice the smaller of the next two
     double p_recalibration = 1;  ///< of as large a gain by recalibration
-    double p_value = 1;          ///< of a gap after it: the smallest of the next three and one of pairs, shared out
+    double p_value = 1;          ///< of a gap after it: the smallest of the next four and one of pairs, shared out
     double p_effects = 1;        ///< of the best single effect, with the look elsewhere
     double p_where = 1;          ///< of the largest cell of the map
     double p_facets = 1;         ///< of the facet that has most left, its cells together, with the look elsewhere
+    double p_variations = 1;     ///< of what varies most in a way that has no name, with the look elsewhere
     GapMap as_given, recalibrated, left;      ///< maps under the nominal, the refitted, and the chosen model
     std::string refitted;                     ///< what a recalibration refits (TransitionModel::recalibrated)
     std::vector<EstimatedParameter> contact;  ///< recalibrated

@@ -27,12 +27,25 @@ LeftInFacet as_left(const Variation& variation, const ScannedEffect& scanned, do
 
 }  // namespace
 
-std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const Fit& recalibrated, int threads,
-                                           const std::function<void()>& heartbeat) {
+EffectScan scan_variations(const TransitionModel& model, const Fit& recalibrated, int threads) {
   std::vector<const Candidate*> candidates;
   for (const Variation& variation : model.variations()) candidates.push_back(&variation.candidate);
-  if (candidates.empty()) return {};
-  const EffectScan scan = scan_effects(model, recalibrated, candidates, threads);
+  return scan_effects(model, recalibrated, candidates, threads);
+}
+
+double variations_p_value(const EffectScan& variations, int draws, std::uint64_t seed) {
+  if (variations.effects.empty() || !variations.trials_suffice) return 1;
+  const ChanceGains chance(variations, draws, seed);
+  double least = 1;
+  for (const ScannedEffect& one : variations.effects)
+    least = std::min(least, chance.p_value(one.candidate, one.gain[one.best]));
+  return chance.look_elsewhere(least);
+}
+
+std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const Fit& recalibrated,
+                                           const EffectScan& scan, int threads,
+                                           const std::function<void()>& heartbeat) {
+  if (scan.effects.empty()) return {};
   std::vector<LeftInFacet> all;
   std::vector<std::size_t> order(scan.effects.size());  // by falling evidence promised
   for (std::size_t i = 0; i < order.size(); ++i) {

@@ -12,10 +12,12 @@ namespace metastable::analysis {
 namespace {
 
 // These levels decide whether there is a gap.
-constexpr double share_for_effects = 0.85;  // of the level; the rest is for gaps that no effect describes:
-constexpr double share_for_facets = 0.05;   //   in all cells of a facet together, the others in one cell
-constexpr double share_for_pairs = 0.1;     // on top: pairs whose effects hide one another; hardly ever used up
-constexpr double least_p_value = 1e-12;     // smaller ones are beyond what chance levels can say
+constexpr double share_for_effects = 0.8;      // of the level; the rest is for gaps that no effect describes:
+constexpr double share_for_facets = 0.05;      //   in all cells of a facet together,
+constexpr double share_for_variations = 0.05;  //   in what varies without a name,
+constexpr double share_for_cells = 0.1;        //   in one cell of the map
+constexpr double share_for_pairs = 0.1;        // on top: pairs whose effects hide one another; hardly ever used up
+constexpr double least_p_value = 1e-12;        // smaller ones are beyond what chance levels can say
 
 // Two effects may hide one another from the scores of each alone: judges the best pair's gain, for all pairs there are.
 double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit& recalibrated) {
@@ -74,9 +76,10 @@ void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candida
   d.gap.p_facets = std::max(least_p_value, facets_p_value(ranking, d.causes.unnamed.front().facets));
   d.gap.p_recalibration = std::max(least_p_value, d.gap.p_recalibration);
   const double pairs = std::max(least_p_value, pairs_p_value(ranking, candidates, recalibrated));
+  d.gap.p_variations = std::max(least_p_value, d.gap.p_variations);
   d.gap.p_value =
-      std::min({1.0, d.gap.p_effects / share_for_effects, d.gap.p_where / (1 - share_for_effects - share_for_facets),
-                d.gap.p_facets / share_for_facets, pairs / share_for_pairs});
+      std::min({1.0, d.gap.p_effects / share_for_effects, d.gap.p_where / share_for_cells,
+                d.gap.p_facets / share_for_facets, d.gap.p_variations / share_for_variations, pairs / share_for_pairs});
   d.gap.p_as_given = std::min(1.0, 2 * std::min(d.gap.p_recalibration, d.gap.p_value));
 }
 

@@ -15,8 +15,8 @@ struct Fit;
 /// @param gain  2 Delta log likelihood of the recalibration
 double recalibration_p_value(const TransitionModel& model, const Fit& as_given, double gain);
 
-/// Puts the tests for a gap together in `d.gap`, which has the map after recalibration and p_recalibration, and whose
-/// `d.causes` have what the recalibrated model leaves by facet.
+/// Puts the tests for a gap together in `d.gap`, which has the map after recalibration, p_recalibration and
+/// p_variations; `d.causes` have what the recalibrated model leaves by facet.
 /// @param candidates  effects that were considered
 void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated);
 

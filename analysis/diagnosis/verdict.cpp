@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -35,15 +36,18 @@ constexpr double set_share = 0.95;          // of what the effects share that th
 constexpr double least_of_first = 0.05;  // one less likely than this share of the first is not named for completeness
 constexpr double told_apart = 6;         // 2 Delta log likelihood that makes odds of 20 to 1
 
+// Says whether a hypothesis has all effects of another one.
+bool extends(const RankedCause& cause, const RankedCause& other) {
+  return std::ranges::all_of(other.terms, [&](const EffectTerm& wanted) {
+    return std::ranges::any_of(cause.terms, [&](const EffectTerm& term) { return term.candidate == wanted.candidate; });
+  });
+}
+
 // Says whether a hypothesis adds an effect to a likelier one: what it leaves is then the likelier one's to leave.
 bool extends_likelier(const RankedCause& cause, const std::vector<const RankedCause*>& ordered) {
-  const auto holds = [&](const EffectTerm& wanted) {
-    return std::any_of(cause.terms.begin(), cause.terms.end(),
-                       [&](const EffectTerm& term) { return term.candidate == wanted.candidate; });
-  };
   for (const RankedCause* likelier : ordered) {
     if (likelier == &cause) return false;
-    if (std::all_of(likelier->terms.begin(), likelier->terms.end(), holds)) return true;
+    if (extends(cause, *likelier)) return true;
   }
   return false;
 }
@@ -54,10 +58,12 @@ double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRa
                        const std::vector<const RankedCause*>& ordered, const Fit& recalibrated) {
   if (!ranking.scan.trials_suffice) return 0;
   const double top = ordered.front()->evidence;
-  double all = 0, joined = 0, beside = 0;  // hypotheses, those of them that are joined, and those joined
+  double all = 0;
+  std::vector<const RankedCause*> joined;  // hypotheses beside which it is supposed
+  std::vector<Unnamed> unnamed;            // beside each of them
   for (const RankedCause* cause : ordered) {
     all += std::exp(cause->evidence - top);
-    if (d.causes.unnamed.size() > most_beside || cause->evidence < top - beside_margin) continue;
+    if (joined.size() == most_beside || cause->evidence < top - beside_margin) continue;
     if (cause->fit.nuisance.empty() || extends_likelier(*cause, ordered)) continue;
     const PhaseGain gained = phase_gain(model, cause->fit, exact_part(ranking.singles, cause->terms, recalibrated));
     constexpr double tolerated = facet_errors * model_error * model_error;
@@ -65,16 +71,26 @@ double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRa
                 cause->evidence,
                 left_by_facet(model, cause->fit, tolerated * gained.collisions, tolerated * gained.stances)};
     for (const EffectTerm& term : cause->terms) one.beside.push_back(term.candidate->id);
-    bound_evidence(d.causes.unnamed.front().facets, cause->gain, one.facets);
-    one.evidence += evidence_of_more(one.facets);
-    joined += std::exp(cause->evidence - top);
-    beside += std::exp(std::min(largest_log_odds, one.evidence - top));
-    d.causes.unnamed.push_back(std::move(one));
+    joined.push_back(cause);
+    unnamed.push_back(std::move(one));
   }
+  // What has no name gains no more beside one effect than both of a pair do, and what these leave.
   Unnamed& alone = d.causes.unnamed.front();
+  double of_joined = 0, beside = 0;
+  for (std::size_t i = 0; i < joined.size(); ++i) {
+    bound_evidence(alone.facets, joined[i]->gain, unnamed[i].facets);
+    for (std::size_t k = 0; k < joined.size(); ++k)
+      if (k != i && extends(*joined[k], *joined[i]))
+        bound_evidence(unnamed[i].facets, joined[k]->gain - joined[i]->gain, unnamed[k].facets);
+    unnamed[i].evidence += evidence_of_more(unnamed[i].facets);
+    of_joined += std::exp(joined[i]->evidence - top);
+    beside += std::exp(std::min(largest_log_odds, unnamed[i].evidence - top));
+  }
   alone.evidence = evidence_of_more(alone.facets);
-  return unnamed_alone * std::exp(std::min(largest_log_odds, alone.evidence - top)) / all +
-         (joined > 0 ? unnamed_beside * beside / joined : 0);
+  const double odds = unnamed_alone * std::exp(std::min(largest_log_odds, alone.evidence - top)) / all +
+                      (of_joined > 0 ? unnamed_beside * beside / of_joined : 0);
+  std::ranges::move(unnamed, std::back_inserter(d.causes.unnamed));
+  return odds;
 }
 
 // Says whether the design itself cannot tell two effects apart where the first of them gains that much.

@@ -186,7 +186,8 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
                  {"p_value_recalibration", number(d.gap.p_recalibration)},
                  {"p_value_effects", number(d.gap.p_effects)},
                  {"p_value_where", number(d.gap.p_where)},
-                 {"p_value_facets", number(d.gap.p_facets)}};
+                 {"p_value_facets", number(d.gap.p_facets)},
+                 {"p_value_variations", number(d.gap.p_variations)}};
   json["where"] = where_json(recalibrated);
   json["where_as_given"] = where_json(as_given);
   json["where_left"] = where_json(left);

@@ -45,7 +45,8 @@ TEST(ContactVariation, FitsFindWhatTheDataWereDrawnWith) {
     EXPECT_GT(with.penalised, without.penalised + 10) << one.id;
     for (std::size_t p = 0; p < one.values.size(); ++p)
       EXPECT_NEAR(with.terms[0].values[p], one.values[p], 0.03 + 0.3 * one.values[p]) << one.id;
-    const std::vector<LeftInFacet> all = fitted_variations(*data, without, 1, [] {});
+    const std::vector<LeftInFacet> all =
+        fitted_variations(*data, without, scan_variations(*data, without, 1), 1, [] {});
     const auto best = std::ranges::max_element(all, {}, &LeftInFacet::evidence);
     EXPECT_EQ(best->aspect + " by " + best->facet, one.id);
     EXPECT_NEAR(best->quadratic, 2 * (with.penalised - without.penalised), 1) << one.id;
@@ -56,7 +57,10 @@ TEST(ContactVariation, FitsFindWhatTheDataWereDrawnWith) {
 TEST(ContactVariation, NoneHasEvidenceWhereNothingVaries) {
   const auto design = wheel_transitions(test::wheel_design(100, 14));
   const auto data = design->simulate(nominal_values(*design), {}, 6);
-  const std::vector<LeftInFacet> all = fitted_variations(*data, best_fit(*data, nominal_values(*data), {}), 1, [] {});
+  const Fit best = best_fit(*data, nominal_values(*data), {});
+  const EffectScan scan = scan_variations(*data, best, 1);
+  EXPECT_GT(variations_p_value(scan, 500, 1), 0.05);
+  const std::vector<LeftInFacet> all = fitted_variations(*data, best, scan, 1, [] {});
   EXPECT_EQ(all.size(), data->variations().size());
   for (const LeftInFacet& one : all) EXPECT_LT(one.evidence, 5) << one.aspect << " by " << one.facet;
 }
