@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -246,7 +247,20 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const double of_left = evidence_of_more(left);
   d.causes.unnamed.push_back({{}, of_left, std::move(left)});
   const EffectScan variations = scan_variations(model, recalibrated, options.threads);
-  d.gap.p_variations = variations_p_value(variations, options.draws, options.seed);
+  d.gap.p_variations = variations_p_value(variations, promised_gains(variations), options.draws, options.seed);
+  std::vector<LeftInFacet> varied;
+  const auto fit_variations = [&] {
+    progress(0.66, "what has no name");
+    varied = fitted_variations(model, recalibrated, variations, options.threads,
+                               [&] { progress(0.66, "what has no name"); });
+  };
+  if (d.gap.p_variations < options.level) {  // what scores promise, fits must keep
+    fit_variations();
+    std::vector<double> gains;
+    for (const LeftInFacet& one : varied) gains.push_back(std::max(0.0, one.quadratic - 2 * recalibrated.promised));
+    d.gap.p_variations =
+        std::max(d.gap.p_variations, variations_p_value(variations, gains, options.draws, options.seed));
+  }
   test_for_gap(d, ranking, candidates.size(), recalibrated);
   note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
   leave_undecided(d, ranking, candidates);
@@ -254,11 +268,9 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const bool gap = d.gap.p_value < options.level;
 
   if (gap && ranking.scan.trials_suffice) {
-    progress(0.66, "what has no name");
+    if (varied.empty()) fit_variations();
     Unnamed& alone = d.causes.unnamed.front();
-    for (LeftInFacet& varied : fitted_variations(model, recalibrated, variations, options.threads,
-                                                 [&] { progress(0.66, "what has no name"); }))
-      alone.facets.push_back(std::move(varied));
+    std::ranges::move(varied, std::back_inserter(alone.facets));
     alone.evidence = evidence_of_more(alone.facets);
   }
   Chosen chosen{&recalibrated};
@@ -277,8 +289,12 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
         gap_shrinkage(model, given, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
                       options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
   // Even a cause that closes nearly all of a huge gap may leave a large one.
-  if (named && !d.shrinkage.measures.empty() && leaves_gap_held_out(d, chosen.bent))
-    chosen.none = std::max(chosen.none, certain_odds);
+  if (named && !d.shrinkage.measures.empty() && leaves_gap_held_out(d, chosen.bent, 0)) {
+    const double by_itself = gap_by_itself(model, *chosen.fit, options.folds, options.threads, options.seed,
+                                           [&] { progress(0.85, "how far it shrinks"); });
+    if (leaves_gap_held_out(d, chosen.bent, std::max(0.0, by_itself)))
+      chosen.none = std::max(chosen.none, certain_odds);
+  }
   const double share_of_effects = share_probabilities(d, model, ranking, ordered, candidates.size(), gap, chosen.none);
   give_verdict(d, gap, chosen.none, share_of_effects);
 

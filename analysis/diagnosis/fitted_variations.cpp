@@ -33,12 +33,19 @@ EffectScan scan_variations(const TransitionModel& model, const Fit& recalibrated
   return scan_effects(model, recalibrated, candidates, threads);
 }
 
-double variations_p_value(const EffectScan& variations, int draws, std::uint64_t seed) {
-  if (variations.effects.empty() || !variations.trials_suffice) return 1;
+std::vector<double> promised_gains(const EffectScan& variations) {
+  std::vector<double> gains;
+  for (const ScannedEffect& one : variations.effects) gains.push_back(one.gain[one.best]);
+  return gains;
+}
+
+double variations_p_value(const EffectScan& variations, const std::vector<double>& gains, int draws,
+                          std::uint64_t seed) {
+  if (gains.empty() || !variations.trials_suffice) return 1;
   const ChanceGains chance(variations, draws, seed);
   double least = 1;
-  for (const ScannedEffect& one : variations.effects)
-    least = std::min(least, chance.p_value(one.candidate, one.gain[one.best]));
+  for (std::size_t i = 0; i < gains.size(); ++i)
+    least = std::min(least, chance.p_value(variations.effects[i].candidate, gains[i]));
   return chance.look_elsewhere(least);
 }
 
@@ -70,9 +77,16 @@ std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const F
     all[order[k]] =
         as_left(model.variations()[order[k]], scanned, std::max(0.0, 2 * (best.penalised - recalibrated.penalised)));
   });
-  double best = 0;
-  for (std::size_t k = 0; k < fitted; ++k) best = std::max(best, all[order[k]].evidence);
-  for (std::size_t k = fitted; k < order.size(); ++k) all[order[k]].evidence = std::min(all[order[k]].evidence, best);
+  double most = 0, best = 0;
+  for (std::size_t k = 0; k < fitted; ++k) {
+    most = std::max(most, all[order[k]].quadratic);
+    best = std::max(best, all[order[k]].evidence);
+  }
+  for (std::size_t k = fitted; k < order.size(); ++k) {
+    LeftInFacet& left = all[order[k]];
+    left = as_left(model.variations()[order[k]], scan.effects[order[k]], std::min(left.quadratic, most));
+    left.evidence = std::min(left.evidence, best);
+  }
   return all;
 }
 

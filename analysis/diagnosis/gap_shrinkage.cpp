@@ -24,7 +24,7 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double cell_shift_sd = 0.15;   // prior of a cell's shift, in scores
-constexpr double parameter_price = 1.5;  // log likelihood that a rival pays for each of its effects' parameters
+constexpr double parameter_price = 1.5;  // log likelihood that a rival pays for a parameter of its effects
 constexpr int interval_draws = 400;      // of the bootstrap over trials
 constexpr int fold_steps = 3;            // of a fit that starts from the optimum of all trials
 constexpr double bounded_score = 6;      // scores further out count as this one to the flexible model
@@ -134,9 +134,11 @@ Fit best_rival(const TransitionModel& model, const Fit& recalibrated, const std:
   for (const Fit* rival : rivals) {
     heartbeat();
     Fit tried = fit_from(*rival, model, recalibrated, options);
-    std::size_t parameters = 0;
-    for (const EffectTerm& term : rival->terms) parameters += term.values.size();
-    const double score = tried.penalised - parameter_price * static_cast<double>(parameters);
+    double price = 0;  // those that have a prior have paid by it
+    for (const EffectTerm& term : rival->terms)
+      for (const FreeParameter& parameter : term.candidate->parameters)
+        if (!(parameter.prior_sd > 0)) price += parameter_price;
+    const double score = tried.penalised - price;
     if (score > best) {
       best = score;
       chosen = std::move(tried);
@@ -251,6 +253,19 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& gi
     v[3] = h.crps_floor;
   }));
   return all;
+}
+
+double gap_by_itself(const TransitionModel& model, const Fit& chosen, int folds, int threads, std::uint64_t seed,
+                     const std::function<void()>& heartbeat) {
+  constexpr std::uint64_t draws = 2;
+  double sum = 0;
+  for (std::uint64_t draw = 1; draw <= draws; ++draw) {
+    if (heartbeat) heartbeat();
+    const auto drawn = model.simulate(chosen.nuisance, chosen.terms, seed + draw);
+    const Fit fitted = fit(*drawn, chosen.nuisance, chosen.terms);
+    sum += gap_shrinkage(*drawn, fitted, fitted, {}, folds, threads, seed, heartbeat).front().with_effect;
+  }
+  return sum / static_cast<double>(draws);
 }
 
 Shrinkage rest_shrinkage(double at_risk, double rests, const StepsBeforeFailure& steps) {

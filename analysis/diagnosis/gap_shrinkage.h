@@ -24,6 +24,12 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& gi
                                      const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
                                      const std::function<void()>& heartbeat = {});
 
+/// Returns what held-out trials show as a gap where there is none [nats a collision]: the mean of the log score's
+/// measure over two experiments drawn from the model of `fit`, refitted. A likelihood that reads its landings from a
+/// table leaves some.
+double gap_by_itself(const TransitionModel& model, const Fit& fit, int folds, int threads, std::uint64_t seed,
+                     const std::function<void()>& heartbeat = {});
+
 /// Compares the share of collisions that led to rest, model against observed, by what the models expect in steps before
 /// failure. Rests are counts, so intervals are those of a Poisson mean (exact, 90 %), and the floor is the mean
 /// deviation of such a count from the last model's own expectation. All trials count: rests are too few to hold any

@@ -173,12 +173,13 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
   return chosen;
 }
 
-bool leaves_gap_held_out(const Diagnosis& d, double bent) {
+bool leaves_gap_held_out(const Diagnosis& d, double bent, double by_itself) {
   const Shrinkage& log_score = d.shrinkage.measures.front();
+  const double left = log_score.with_effect - by_itself;
   const double tolerated = model_error * model_error * left_over_errors * bent * log_score.baseline;
-  if (log_score.with_effect > least_left_over + tolerated) return true;
-  return d.data.trials >= enough_trials && log_score.with_effect_least > tolerated &&
-         log_score.with_effect * static_cast<double>(d.data.collisions) > least_left_in_all;
+  if (left > least_left_over + tolerated) return true;
+  return d.data.trials >= enough_trials && log_score.with_effect_least > tolerated + by_itself &&
+         left * static_cast<double>(d.data.collisions) > least_left_in_all;
 }
 
 double share_probabilities(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,

@@ -34,7 +34,8 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
               const std::vector<const RankedCause*>& ordered, const Fit& recalibrated, const DiagnosisOptions& options);
 
 /// Says whether trials that the cause was not fitted to still show a gap, beyond what its form may be off.
-bool leaves_gap_held_out(const Diagnosis& d, double bent);
+/// @param by_itself  gap_by_itself() [nats a collision]
+bool leaves_gap_held_out(const Diagnosis& d, double bent, double by_itself);
 
 /// Shares probabilities over everything; the prior gives a gap even odds, shared by the effects. Returns the share of
 /// the effects together.

@@ -44,6 +44,12 @@ std::optional<double> expected_next(const ExtendedWheel& wheel, const dynamics::
   return wheel.land(context, m.before, {std::max(0.0, eta), much_friction}, false).next;
 }
 
+// Returns the median distance of values from `middle`.
+double median_deviation(std::vector<double> values, double middle) {
+  for (double& value : values) value = std::abs(value - middle);
+  return median(values);
+}
+
 // Where legs were not noted the stances tell them if omega_plus is there, because the legs' lengths differ.
 void find_legs(WheelRuns& measured, bool column) {
   if (column || measured.wheel.equal_legs()) {
@@ -97,6 +103,47 @@ void find_legs(WheelRuns& measured, bool column) {
   std::fill(measured.wheel.leg_length.begin(), measured.wheel.leg_length.end(), measured.wheel.mean_leg_length());
 }
 
+// Says by how much the speeds before collisions scatter about what the times since the collisions before imply [rad/s];
+// nothing where too few times were measured.
+std::optional<double> scatter_about_times(const WheelRuns& measured) {
+  constexpr double change = 1e-3;  // of a speed, for its slope by time
+  const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
+  std::vector<double> residual;
+  for (const WheelRun& run : measured.runs)
+    for (std::size_t k = 1; k < run.collisions.size(); ++k) {
+      const ExtendedWheel& wheel = wheels[run.condition];
+      const RunCollision &m = run.collisions[k], &previous = run.collisions[k - 1];
+      const auto from = wheel.back(previous.context, m.before),
+                 faster = wheel.back(previous.context, m.before * (1 + change));
+      if (!m.context.since_previous || !from || !faster) continue;
+      const double time = wheel.duration(previous.context, *from);
+      const double slope = (wheel.duration(previous.context, *faster) - time) / (change * m.before);
+      if (slope < 0) residual.push_back((*m.context.since_previous - time) / slope);
+    }
+  if (residual.size() < least_stances) return std::nullopt;
+  const double middle = median(residual);
+  return median_deviation_to_sd * median_deviation(std::move(residual), middle);
+}
+
+// A time since the collision before that is far more exact than the speeds tells how they are off: whoever judged what
+// a model leaves by it would find the noise there.
+void judge_times(WheelRuns& measured) {
+  constexpr double largest_share = 0.25;  // of the speeds' own deviation
+  if (measured.law == dynamics::Law::settled) return;  // its hops scatter times by themselves
+  std::vector<double> speeds;
+  for (const WheelRun& run : measured.runs)
+    for (const RunCollision& m : run.collisions) speeds.push_back(m.before);
+  const std::optional<double> scatter = scatter_about_times(measured);
+  if (!scatter) return;
+  const double middle = median(speeds), own = median_deviation_to_sd * median_deviation(std::move(speeds), middle);
+  measured.times_judge = *scatter < largest_share * own;
+  if (!measured.times_judge)
+    measured.notes.push_back(fmt::format(
+        "speeds scatter by {:.2g} rad/s about those that time_s implies: what is left is not judged by the time since "
+        "the previous collision, which tells that noise",
+        *scatter));
+}
+
 // Positions and times that were not measured follow from the geometry.
 void complete_contexts(WheelRuns& measured) {
   const std::vector<ExtendedWheel> wheels = stated_wheels(measured);
@@ -132,12 +179,6 @@ std::vector<std::vector<double>> stance_residuals(const WheelRuns& measured) {
               run.collisions[k + 1].before - *next);
   }
   return residual;
-}
-
-// Returns the median distance of values from `middle`.
-double median_deviation(std::vector<double> values, double middle) {
-  for (double& value : values) value = std::abs(value - middle);
-  return median(values);
 }
 
 // Returns a word that the reported speeds make.
@@ -376,6 +417,7 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   tabulate_landings(measured);
   find_legs(measured, leg_column);
   if (!leg_column && !measured.legs_known) tabulate_landings(measured);  // of legs of the mean length
+  judge_times(measured);
   complete_contexts(measured);
   for (WheelRun& run : measured.runs) mark_counted(measured, run);
   estimate_noise(measured, experiment.sensor);
@@ -418,7 +460,7 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
       event.number = static_cast<int>(k) + 1;
       if (measured.legs_known) event.leg = m.context.leg;
       event.position = m.context.position;
-      event.since_previous = m.context.since_previous;
+      if (measured.times_judge) event.since_previous = m.context.since_previous;
       event.speed = m.before;
       const auto add = [&](EventKind kind) {
         event.kind = kind;

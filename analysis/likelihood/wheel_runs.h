@@ -52,6 +52,7 @@ struct WheelRuns {
   bool speeds_after = false;       ///< omega+ is there
   bool slides_seen = false;        ///< the feet's places are there; `settled` only
   bool exact_stances = false;      ///< they repeat the model to rounding, and say nothing
+  bool times_judge = true;         ///< false: times are so much more exact than speeds that they tell the speeds' noise
   std::vector<std::string> notes;  ///< what was assumed, a sentence each
 };
 
