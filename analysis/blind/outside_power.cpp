@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -73,7 +74,10 @@ double outside_power(const Experiment& experiment, const dynamics::NominalValues
     throw std::invalid_argument(fmt::format("outside effect {}: its likelihood is not known", effect.id));
   const WheelRuns measured = wheel_runs(experiment);
   const std::vector<Event> events = wheel_events(measured);
-  const WheelHypothesis without = hypothesis_at(true_nuisances(*wheel_transitions(experiment), contact));
+  std::vector<double> nuisance;
+  for (const Nuisance& one : wheel_nuisances(experiment.contact, std::nullopt)) nuisance.push_back(one.nominal);
+  set_contact(nuisance, {contact.restitution_mean, contact.restitution_sd, contact.friction_mean, contact.friction_sd});
+  const WheelHypothesis without = hypothesis_at(nuisance);
   const auto change = dynamics::outside_info(effect.id).change;
   const std::vector<Drawn> drawn = what_trials_draw(effect);
   std::vector<std::vector<double>> with;  // [what a trial drew][trial]
