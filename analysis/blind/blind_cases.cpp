@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -28,19 +29,26 @@ constexpr std::array<std::pair<std::string_view, BlindKind>, 5> kinds{{{"none", 
 constexpr std::string_view recalibration = dynamics::contact_distribution_id;
 
 // Finds the size whose power is `target`. Powers grow like a power of a small size, mostly its square: it takes secant
-// steps in logarithms, inside the bracket known so far.
-// @param start  has a power of about 16
+// steps in logarithms, inside the bracket known so far. A large effect may stop every trial at once, which leaves no
+// power: sizes beyond one from which it falls are not looked at. Returns the size tried that came nearest.
+// @param start  has a power of about 16, or less
 double find_size(double start, double largest, double target, const std::function<double(double)>& power) {
   double size = std::min(start * std::sqrt(target / 16), largest);
   double low = 0, high = largest, exponent = 2;
-  double last_size = 0, last_power = 0;
-  for (int i = 0; i < 8; ++i) {
-    const double now = power(size);
+  double last_size = 0, last_power = 0, best = size, nearest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 10; ++i) {
+    const double now = power(size), off = std::abs(std::log(std::max(now, 1e-9) / target));
+    if (off < nearest) nearest = off, best = size;
     if (std::abs(now / target - 1) < 0.1) break;
-    if (now < target && size == largest) break;
-    (now < target ? low : high) = size;
-    if (now > 0 && last_power > 0 && size != last_size)
+    const bool falls = size > last_size && now < 0.8 * last_power;
+    if (now < target && !falls && size == largest) break;
+    (now < target && !falls ? low : high) = size;
+    if (now > 0 && last_power > 0 && size != last_size && !falls)
       exponent = std::clamp(std::log(now / last_power) / std::log(size / last_size), 0.7, 3.0);
+    if (falls) {
+      size = (low + high) / 2;
+      continue;
+    }
     last_size = size;
     last_power = now;
     double next = now > 0.02 * target ? size * std::pow(target / now, 1 / exponent) : 3 * size;
@@ -48,7 +56,7 @@ double find_size(double start, double largest, double target, const std::functio
     if (next <= low || (next >= high && high < largest)) next = (low + high) / 2;
     size = next;
   }
-  return size;
+  return best;
 }
 
 Setting base_setting(dynamics::Law law) {
@@ -190,7 +198,7 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   const dynamics::OutsideInfo* outside = nullptr;
   if (plan.kind == BlindKind::outside) {
     outside = &dynamics::outside_info(plan.effects.front());
-    if (outside->by_leg) needed.insert("leg");
+    if (!outside->needs.empty()) needed.insert(outside->needs);
   } else {
     for (const std::string& id : plan.effects) {
       sized.push_back(sized_effect(id, contact, dice));
@@ -210,10 +218,9 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
       return power(design, {});
     };
     // Twice the size is four times the power: 0.4 of the range stands for 2x where no likelihood says so.
-    const double usual = 0.2 * outside->upper;
     const bool weighed = can_be_weighed(outside->id);
-    const double size =
-        weighed ? find_size(usual, outside->upper, target, power_of) : usual * plan.strength * dice.uniform(0.85, 1.15);
+    const double size = weighed ? find_size(0.03 * outside->upper, outside->upper, target, power_of)
+                                : 0.2 * outside->upper * plan.strength * dice.uniform(0.85, 1.15);
     if (weighed) truth.power = power_of(size);
     truth.outside = {outside->id, size};
     design.reality.outside = {*truth.outside};

@@ -72,7 +72,7 @@ double outside_power(const Experiment& experiment, const dynamics::NominalValues
                      const dynamics::OutsideEffect& effect) {
   if (!can_be_weighed(effect.id))
     throw std::invalid_argument(fmt::format("outside effect {}: its likelihood is not known", effect.id));
-  const WheelRuns measured = wheel_runs(experiment);
+  const WheelRuns measured = runs_with_legs(experiment);
   const std::vector<Event> events = wheel_events(measured);
   std::vector<double> nuisance;
   for (const Nuisance& one : wheel_nuisances(experiment.contact, std::nullopt)) nuisance.push_back(one.nominal);

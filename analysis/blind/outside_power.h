@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "analysis/experiment/experiment.h"
-#include "dynamics/laboratory/outside_effect.h"
+#include "analysis/experiment/reality.h"
 #include "dynamics/wheel/effect_catalogue.h"
 
 namespace metastable::analysis {

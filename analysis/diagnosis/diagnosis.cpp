@@ -246,7 +246,8 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   std::vector<LeftInFacet> left = left_by_facet(model, recalibrated, 0, 0);
   const double of_left = evidence_of_more(left);
   d.causes.unnamed.push_back({{}, of_left, std::move(left)});
-  const EffectScan variations = scan_variations(model, recalibrated, options.threads);
+  EffectScan variations;
+  if (ranking.scan.trials_suffice) variations = scan_variations(model, recalibrated, options.threads);
   d.gap.p_variations = variations_p_value(variations, promised_gains(variations), options.draws, options.seed);
   std::vector<LeftInFacet> varied;
   const auto fit_variations = [&] {
@@ -279,7 +280,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     chosen = choose(d, model, ranking, ordered, recalibrated, options);
   } else {
     d.gap.left = d.gap.recalibrated;
-    if (gap) chosen.none = certain_odds;  // cells of the map stand out, and no effect does
+    if (gap) chosen.none = certain_odds;  // something stands out, and no effect does
   }
   progress(0.7, "how far it shrinks");
   const bool named = chosen.fit != &recalibrated;

@@ -12,7 +12,8 @@ namespace metastable::analysis {
 struct Fit;
 
 /// Cross-validates by trial: in every fold nuisances and each of `rivals` are refitted to the other trials, the rival
-/// with the best penalised likelihood there is used on the held-out ones (an empty list of terms: none). Measures:
+/// with the best penalised likelihood there, less a price of its parameters without a prior, is used on the held-out
+/// ones (an empty list of terms: none). Measures:
 /// log score per collision below that of a flexible model (the chosen one plus a ridge-fitted shift in every cell of
 /// the gap map, cross-fitted), and CRPS of the next speed. The floor is the same measure on data of the chosen model
 /// itself. Intervals are 90 % over trials, by a bootstrap of 400 draws; that of the share closed ends at 1.
@@ -25,9 +26,9 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& gi
                                      const std::function<void()>& heartbeat = {});
 
 /// Returns what held-out trials show as a gap where there is none [nats a collision]: the mean of the log score's
-/// measure over two experiments drawn from the model of `fit`, refitted. A likelihood that reads its landings from a
+/// measure over two experiments drawn from the model of `chosen`, refitted. A likelihood that reads its landings from a
 /// table leaves some.
-double gap_by_itself(const TransitionModel& model, const Fit& fit, int folds, int threads, std::uint64_t seed,
+double gap_by_itself(const TransitionModel& model, const Fit& chosen, int folds, int threads, std::uint64_t seed,
                      const std::function<void()>& heartbeat = {});
 
 /// Compares the share of collisions that led to rest, model against observed, by what the models expect in steps before

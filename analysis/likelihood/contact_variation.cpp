@@ -130,10 +130,11 @@ std::vector<ContactVariation> contact_variations(const WheelRuns& measured) {
     }));
     std::vector<Values> swings = from_one_to(std::min(most_swings, static_cast<int>(trials) / trials_a_swing));
     if (swings.size() > 1) swings.erase(swings.begin());  // half a one is a drift
-    all.push_back(
-        variation("order", mean, 2, std::move(swings), [trials](const Place& at, const Values& v, std::size_t p) {
-          return swing(static_cast<double>(at.trial) / trials, v[0], p);
-        }));
+    if (!swings.empty())
+      all.push_back(
+          variation("order", mean, 2, std::move(swings), [trials](const Place& at, const Values& v, std::size_t p) {
+            return swing(static_cast<double>(at.trial) / trials, v[0], p);
+          }));
     all.push_back(variation("every other trial", mean, 1, {{}}, [](const Place& at, const Values&, std::size_t) {
       return is_odd(static_cast<long>(at.trial));
     }));

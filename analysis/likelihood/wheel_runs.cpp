@@ -128,7 +128,7 @@ std::optional<double> scatter_about_times(const WheelRuns& measured) {
 // A time since the collision before that is far more exact than the speeds tells how they are off: whoever judged what
 // a model leaves by it would find the noise there.
 void judge_times(WheelRuns& measured) {
-  constexpr double largest_share = 0.25;  // of the speeds' own deviation
+  constexpr double largest_share = 0.25;               // of the speeds' own deviation
   if (measured.law == dynamics::Law::settled) return;  // its hops scatter times by themselves
   std::vector<double> speeds;
   for (const WheelRun& run : measured.runs)
@@ -136,11 +136,11 @@ void judge_times(WheelRuns& measured) {
   const std::optional<double> scatter = scatter_about_times(measured);
   if (!scatter) return;
   const double middle = median(speeds), own = median_deviation_to_sd * median_deviation(std::move(speeds), middle);
-  measured.times_judge = *scatter < largest_share * own;
+  measured.times_judge = !(own > 0) || *scatter < largest_share * own;  // a design to be drawn from has one speed
   if (!measured.times_judge)
     measured.notes.push_back(fmt::format(
-        "speeds scatter by {:.2g} rad/s about those that time_s implies: what is left is not judged by the time since "
-        "the previous collision, which tells that noise",
+        "speeds and those that time_s implies differ by {:.2g} rad/s: what is left is not judged by the time since the "
+        "previous collision",
         *scatter));
 }
 

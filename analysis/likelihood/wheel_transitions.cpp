@@ -19,9 +19,7 @@
 #include "analysis/likelihood/wheel_simulation.h"
 
 namespace metastable::analysis {
-namespace {
 
-// Legs that were neither noted nor found follow from the stated first one, where the transitions bear that out.
 WheelRuns runs_with_legs(const Experiment& experiment) {
   constexpr double clearly = 3;  // in log likelihood
   WheelRuns measured = wheel_runs(experiment);
@@ -38,6 +36,8 @@ WheelRuns runs_with_legs(const Experiment& experiment) {
                       "leg is missing: taken from each condition's first_landing_leg, which the transitions bear out");
   return stated;
 }
+
+namespace {
 
 constexpr double least_shift = 1e-4;  // of mu from day to day: no two days are more alike
 
@@ -68,7 +68,9 @@ class WheelTransitions : public TransitionModel {
   std::size_t conditions() const override { return measured_.conditions.size(); }
   int legs() const override { return measured_.legs_known ? measured_.wheel.legs() : 0; }
   // Times that were not measured follow from the speeds, and from the leg where it is known.
-  bool time_tells() const override { return measured_.legs_known || experiment_.columns.time != Presence::none; }
+  bool time_tells() const override {
+    return measured_.times_judge && (measured_.legs_known || experiment_.columns.time != Presence::none);
+  }
   std::string condition_name(std::size_t condition) const override { return measured_.conditions.at(condition).id; }
   const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
   const std::vector<Candidate>& candidates() const override { return candidates_; }

@@ -5,8 +5,13 @@
 
 #include "analysis/diagnosis/transition_model.h"
 #include "analysis/experiment/experiment.h"
+#include "analysis/likelihood/wheel_runs.h"
 
 namespace metastable::analysis {
+
+/// Returns wheel_runs() of an experiment; legs that were neither noted nor found follow from the stated first one,
+/// where the transitions bear that out. @throws std::invalid_argument as wheel_runs()
+WheelRuns runs_with_legs(const Experiment& experiment);
 
 /// The model gives one-step densities of the wheel's trials under the nominal law with its (eta, mu) and the
 /// catalogue's effects. With omega_plus, collision and stance are separate events; sensor noise is carried along by a

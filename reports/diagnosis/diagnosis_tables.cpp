@@ -107,7 +107,9 @@ Table gap_table(const Diagnosis& d) {
                    {"as given", "other contact parameters", together(d.gap.p_recalibration)},
                    {"recalibrated", "anything else", together(d.gap.p_value)},
                    {"recalibrated", "the effects of the catalogue", together(d.gap.p_effects)},
-                   {"recalibrated", "the cells of the map", together(d.gap.p_where)}}};
+                   {"recalibrated", "the cells of the map", together(d.gap.p_where)},
+                   {"recalibrated", "all cells of a facet", together(d.gap.p_facets)},
+                   {"recalibrated", "what varies without a name", together(d.gap.p_variations)}}};
 }
 
 Table contact_table(const Diagnosis& d) {

@@ -221,6 +221,23 @@ TEST(EffectPower, OfAPairEachEffectIsWeighedBesideTheOther) {
   EXPECT_TRUE(none.left_by_effect.empty());
 }
 
+// Under settled a large effect stops every trial at once and leaves nothing to see: a search that took power for
+// monotone ended there.
+TEST(BlindCases, AnOutsideEffectHasThePowerAskedForBeforeItStopsTheWheel) {
+  for (const double usual : {0.002, 0.02, 0.1}) {  // size of a power of 16
+    const BlindCase made = blind_case({BlindKind::outside, {"two_crews"}, 2}, 1, 5,
+                                      [usual](const PowerDesign& design, const std::vector<dynamics::Effect>&) {
+                                        const double times = design.reality.outside.front().size / usual;
+                                        return times < 2.4 ? 16 * times * times : 0.0;
+                                      });
+    if (usual < 0.05) {
+      EXPECT_NEAR(made.truth.power / 64, 1, 0.1) << usual;
+    } else {
+      EXPECT_DOUBLE_EQ(made.truth.outside->size, 0.075);  // the end of its range
+    }
+  }
+}
+
 TEST(EffectPower, NeedsAReplicate) { EXPECT_THROW(expected_power({}, {}, 0), std::invalid_argument); }
 
 }  // namespace

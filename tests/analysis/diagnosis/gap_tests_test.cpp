@@ -38,5 +38,16 @@ TEST(GapTests, TheLeastOfTheFacetsCountsForAllOfThem) {
   EXPECT_EQ(tests_of({usual}).p_facets, 0.3);
 }
 
+TEST(GapTests, WhatVariesWithoutANameIsAGap) {
+  Diagnosis d;
+  d.gap.recalibrated.p_value = 0.5;
+  d.gap.p_variations = 1e-9;
+  d.causes.unnamed.push_back({{}, 0, {}});
+  CauseRanking ranking;
+  ranking.p_value = 0.5;
+  test_for_gap(d, ranking, 20, {});
+  EXPECT_LT(d.gap.p_value, 1e-7);
+}
+
 }  // namespace
 }  // namespace metastable::analysis
