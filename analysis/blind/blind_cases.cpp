@@ -40,15 +40,15 @@ double find_size(double start, double largest, double target, const std::functio
     const double now = power(size), off = std::abs(std::log(std::max(now, 1e-9) / target));
     if (off < nearest) nearest = off, best = size;
     if (std::abs(now / target - 1) < 0.1) break;
-    const bool falls = size > last_size && now < 0.8 * last_power;
-    if (now < target && !falls && size == largest) break;
-    (now < target && !falls ? low : high) = size;
-    if (now > 0 && last_power > 0 && size != last_size && !falls)
-      exponent = std::clamp(std::log(now / last_power) / std::log(size / last_size), 0.7, 3.0);
-    if (falls) {
+    if (size > last_size && now < 0.8 * last_power) {
+      high = size;
       size = (low + high) / 2;
       continue;
     }
+    if (now < target && size == largest) break;
+    (now < target ? low : high) = size;
+    if (now > 0 && last_power > 0 && size != last_size)
+      exponent = std::clamp(std::log(now / last_power) / std::log(size / last_size), 0.7, 3.0);
     last_size = size;
     last_power = now;
     double next = now > 0.02 * target ? size * std::pow(target / now, 1 / exponent) : 3 * size;
@@ -198,7 +198,7 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   const dynamics::OutsideInfo* outside = nullptr;
   if (plan.kind == BlindKind::outside) {
     outside = &dynamics::outside_info(plan.effects.front());
-    if (!outside->needs.empty()) needed.insert(outside->needs);
+    needed = columns_needed(outside->id);
   } else {
     for (const std::string& id : plan.effects) {
       sized.push_back(sized_effect(id, contact, dice));

@@ -68,6 +68,14 @@ bool can_be_weighed(std::string_view outside) {
   return outside == wind || dynamics::outside_info(outside).change != nullptr;
 }
 
+std::set<std::string> columns_needed(std::string_view outside) {
+  for (const std::string_view by_leg : {"double_plate", "loose_feet", "wearing_leg"})
+    if (outside == by_leg) return {"leg"};
+  for (const std::string_view by_place : {"planks", "rough_stretch"})  // slides make places that follow from legs drift
+    if (outside == by_place) return {"position_m"};
+  return {};
+}
+
 double outside_power(const Experiment& experiment, const dynamics::NominalValues& contact,
                      const dynamics::OutsideEffect& effect) {
   if (!can_be_weighed(effect.id))

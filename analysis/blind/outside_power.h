@@ -2,6 +2,8 @@
 // Measures how visible an effect outside the catalogue is to somebody who knows it: the likelihood of an experiment in
 // which each contact is changed as the effect changes it.
 
+#include <set>
+#include <string>
 #include <string_view>
 
 #include "analysis/experiment/experiment.h"
@@ -13,6 +15,9 @@ namespace metastable::analysis {
 /// Says whether the effect's likelihood is known. It is not where it acts through what was drawn or lost before
 /// (sloshing_fluid, stored_energy, second_memory).
 bool can_be_weighed(std::string_view outside);
+
+/// Lists the columns without which nobody can tell the effect; none for an unknown id.
+std::set<std::string> columns_needed(std::string_view outside);
 
 /// Returns 2 log(likelihood with the effect / without), true contact known to both. What trials draw (a torque, a
 /// phase) is integrated over. @throws std::invalid_argument for an effect that cannot be weighed

@@ -35,7 +35,7 @@ struct Event {
   int number = 1;             ///< of the collision in its trial, from 1
   std::optional<int> leg = {};
   double position = 0;                        ///< [TransitionModel::position_unit()]
-  std::optional<double> since_previous = {};  ///< collision [s]
+  std::optional<double> since_previous = {};  ///< collision [s]; none where it may not judge
   double speed = 0;                           ///< given, the condition of the density [rad/s]
   std::optional<bool> rested = {};            ///< after this collision; none: not known, or no collision
   double added = 0;                           ///< known error that a score judges with the speed observed [rad/s]

@@ -30,8 +30,7 @@ struct OutsideRatios {
 struct OutsideInfo {
   std::string id;
   std::string summary;
-  double upper = 1;        ///< largest size the laboratory takes
-  std::string needs = {};  ///< the column without which nobody can tell it; empty: none
+  double upper = 1;  ///< largest size the laboratory takes
   /// What a size makes of a contact; null for what acts on the body or by what was drawn before.
   void (*change)(double size, const OutsidePlace& at, OutsideRatios& ratios) = nullptr;
 };

@@ -10,6 +10,7 @@
 
 #include "analysis/blind/sized_effect.h"
 #include "analysis/experiment/experiment.h"
+#include "tests/analysis/blind/power_design.h"
 
 namespace metastable::analysis::test {
 namespace {
@@ -167,15 +168,8 @@ TEST(BlindCases, LeftOutEffectsAreNotInTheCatalogueGiven) {
 
 // The laboratory and the likelihood of the diagnosis, which share no formula, agree on the same effects.
 TEST(EffectPower, GrowsLikeTheSquareOfTheSize) {
-  PowerDesign design;
-  Setting base;
-  base.restitution = {0.54, 0.045};
-  base.friction = {0.352, 0.043};
-  base.slope_deg = 9.59;
-  base.initial_speed = {5.83, 0.28};
-  design.conditions = {{"fast", base, 60}};
+  PowerDesign design = steep_ramp(60);
   design.reality.sensor_noise = 0.01;
-  design.reality.flight = false;
   const auto power = [&](const std::string& text) {
     return expected_power(design, {dynamics::effect_from_text(text, paper)}, 4);
   };

@@ -4,21 +4,16 @@
 
 #include <stdexcept>
 
-#include "analysis/blind/effect_power.h"
+#include "tests/analysis/blind/power_design.h"
 
 namespace metastable::analysis::test {
 namespace {
 
 PowerDesign two_ramps() {
-  PowerDesign design;
-  Setting base;
-  base.restitution = {0.54, 0.045};
-  base.friction = {0.352, 0.043};
-  base.slope_deg = 9.59;
-  base.initial_speed = {5.83, 0.28};
-  design.conditions = {{"steep", base, 40}, {"flat", base, 40}};
+  PowerDesign design = steep_ramp(40);
+  design.conditions.push_back(design.conditions[0]);
+  design.conditions[1].id = "flat";
   design.conditions[1].setting.slope_deg = 8.5;
-  design.reality.flight = false;
   return design;
 }
 

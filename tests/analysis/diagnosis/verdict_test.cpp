@@ -32,6 +32,19 @@ TEST(Verdict, ANameIsGivenWhereItIsFourTimesAsLikelyAsNone) {
   EXPECT_TRUE(with_odds_of_none(0.3).causes.set.empty());
 }
 
+// What a likelihood leaves of data of its own is no gap.
+TEST(Verdict, HeldOutACauseIsJudgedBesideWhatItsOwnModelLeaves) {
+  Diagnosis d;
+  d.data.trials = 100;
+  d.data.collisions = 4000;
+  d.shrinkage.measures.emplace_back();
+  d.shrinkage.measures[0].with_effect = 0.003;  // 12 nats
+  d.shrinkage.measures[0].with_effect_least = 0.001;
+  EXPECT_TRUE(leaves_gap_held_out(d, 1, 0));
+  EXPECT_FALSE(leaves_gap_held_out(d, 1, 0.002));
+  EXPECT_TRUE(leaves_gap_held_out(d, 1, 0.0009));
+}
+
 // Something alone is likelier at first than something beside an effect: a little more evidence does not make up for it.
 TEST(Verdict, SaysWhereTheLikelierOfTheUnnamedActs) {
   const auto said = [](double beside) {

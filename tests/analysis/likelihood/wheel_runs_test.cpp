@@ -110,6 +110,17 @@ TEST(WheelRuns, LegsThatWereNotNotedAreFoundFromTheStances) {
   EXPECT_FALSE(read.notes.empty());
 }
 
+// Exact times tell the noise of speeds that have much of it; those of usual speeds judge.
+TEST(WheelRuns, TimesJudgeWhereTheyTellNoNoise) {
+  EXPECT_TRUE(printed(0.02, 6, 0.02).times_judge);
+  const WheelRuns noisy = printed(0.4, 6, 0.4);
+  EXPECT_FALSE(noisy.times_judge);
+  EXPECT_TRUE(std::ranges::any_of(noisy.notes, [](const std::string& note) {
+    return note.find("those that time_s implies") != std::string::npos;
+  }));
+  for (const Event& event : wheel_events(noisy)) EXPECT_FALSE(event.since_previous);
+}
+
 TEST(WheelRuns, SaysWhatItCannotRead) {
   Experiment plastic = test::wheel_design(2, 3);
   plastic.contact.law = dynamics::Law::plastic;
