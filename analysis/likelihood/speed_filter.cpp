@@ -35,13 +35,12 @@ double square(double v) { return v * v; }
 double score_of_probability(double below) { return dynamics::normal_quantile(std::clamp(below, 1e-15, 1 - 1e-15)); }
 
 SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, double noise, double slack,
-                         double law_error, double law_scatter, double slide_error, const MemoryOfScores& memory)
+                         double law_error, double slide_error, const MemoryOfScores& memory)
     : extension_(extension),
       tilt_(tilt),
       noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
       slack2_(slack * slack),
       law2_(law_error * law_error),
-      scatter2_(std::max(0.0, law_scatter * law_scatter - extension.noise_sd * extension.noise_sd)),
       slide_error_(slide_error),
       memory_(extension.memory),
       // Where scores go mostly with the squares of contacts' a negative memory may turn them the other way: that is not
@@ -131,11 +130,11 @@ SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const Ste
   } else {
     out = weighed(next.speed.density * std::exp(tilt_.log_density(next.speed.below)), tilt_.below(next.speed.below), 1);
   }
-  // Of what was missed the known error is not the speed's, and the sensor's part of the rest is taken back: left in, it
-  // would be missed again, with the other sign, at the next touch.
-  const double rest = std::max(out.unit * out.unit - law2_, noise2_) + scatter2_, gain = noise2_ / rest;
-  mean_ = std::max(1e-2, reported - gain * (std::clamp(out.score, -4.0, 4.0) * out.unit - touch.law_error));
-  variance_ = (1 - gain) * noise2_;
+  // The sensor's part of what was missed is taken back: left in, it would be missed again, with the other sign, at the
+  // next touch. Mean and variance of a normal error follow from the log density of what was seen (Tweedie's formula).
+  constexpr double surest = 0.02;
+  mean_ = std::max(1e-2, reported + noise2_ * next.slope);
+  variance_ = noise2_ * std::clamp(1 + noise2_ * next.curvature, surest, 1.0);
   before_.reset();
   out.log_density = std::max(least_log_density, out.log_density + std::log(std::max(1e-300, next.slide_density)));
   return out;

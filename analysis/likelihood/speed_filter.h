@@ -38,13 +38,10 @@ class SpeedFilter {
   /// @param noise  stated sd of reported speeds [rad/s]
   /// @param slack  sd of the least speed that a next collision can have, where the legs are not known [rad/s]
   /// @param law_error  sd of the law errors that reported speeds are given [rad/s]; `settled` only
-  /// @param law_scatter  sd of what the law really does not know of a next omega-, as far as known [rad/s]; `settled`
-  ///        only
   /// @param slide_error  sd of what the law does not know of a slide [m]; `settled` only
   /// @param memory  of scores that the extension's memory of contacts is
   SpeedFilter(const dynamics::Extension& extension, const ScoreTilt& tilt, double noise, double slack = 0,
-              double law_error = 0, double law_scatter = 0, double slide_error = 1e-3,
-              const MemoryOfScores& memory = {});
+              double law_error = 0, double slide_error = 1e-3, const MemoryOfScores& memory = {});
 
   /// The first speed is seen: it is held against the stated launch.
   Out launch(const Condition& condition, double reported);
@@ -74,7 +71,7 @@ class SpeedFilter {
   const dynamics::Extension& extension_;
   const ScoreTilt& tilt_;
   double noise2_;  // variance of a reported speed
-  double slack2_, law2_, scatter2_, slide_error_;
+  double slack2_, law2_, slide_error_;
   double memory_;  // of contacts
   double told_;    // share of it that a score tells
   bool blurred_;

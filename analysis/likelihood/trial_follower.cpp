@@ -59,9 +59,9 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       friction_sd_(hypothesis.extension.trial_friction_sd),
       nodes_(nodes_for(friction_sd_ * std::sqrt(static_cast<double>(run.collisions.size())) /
                        hypothesis.contact.friction_sd)),
-      filters_(nodes_.size(), SpeedFilter(hypothesis.extension, hypothesis.tilt,
-                                          hypothesis.noise.value_or(measured.noise), measured.slack, measured.law_error,
-                                          measured.law_scatter, measured.slide_error, measured.memory)) {
+      filters_(nodes_.size(),
+               SpeedFilter(hypothesis.extension, hypothesis.tilt, hypothesis.noise.value_or(measured.noise),
+                           measured.slack, measured.law_error, measured.slide_error, measured.memory)) {
   for (const ScoreNode& node : nodes_) log_weight_.push_back(std::log(node.weight));
 }
 

@@ -312,8 +312,6 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
   // Where stances scatter more than that, the law may know less of this machine.
   const double root = std::sqrt(std::max(1.0, static_cast<double>(all - left_out))), known = settled_precision * root;
   measured.law_error = std::clamp(3 * measured.noise_seen, known, std::max(known, 0.03));
-  measured.law_scatter =
-      std::sqrt(std::max(0.0, measured.noise_seen * measured.noise_seen - measured.noise * measured.noise));
   measured.slide_error = settled_slide_precision * root;
   measured.notes.push_back(
       fmt::format("`settled` is held to tell a next speed to {:.2g} rad/s: {:.2g} rad/s, as n "

@@ -44,7 +44,6 @@ struct WheelRuns {
   double noise_seen = 0;           ///< by how much stances scatter [rad/s]; 0: too few to say
   double slack = 0;                ///< sd of a stance's outcome because its leg is not known [rad/s]
   double law_error = 0;            ///< sd of what the law does not know of a next omega- [rad/s]; `settled` only
-  double law_scatter = 0;          ///< of it what stances show beyond the noise [rad/s]; `settled` only
   double slide_error = 1e-3;       ///< sd of what the law does not know of a slide [m]; `settled` only
   MemoryOfScores memory;           ///< of the speeds that tell of landings; under other laws that of the contacts
   bool noise_stated = true;        ///< noise is the experiment's own

@@ -73,6 +73,8 @@ SpeedDensity after_first_impact(const SettledLanding& landing, const SettledCont
 struct NextTouch {
   SpeedDensity speed;        ///< of the next omega-, given the slide where that was seen; no touch counts as below
   double slide_density = 1;  ///< of the slide given that the next foot touched, where it was seen [1/m]
+  double slope = 0;          ///< of the log density of the next omega- [s/rad]
+  double curvature = 0;      ///< its second derivative [s^2/rad^2]
 };
 
 /// Finds the next omega-, blurred by a normal error. One landing in 500 is taken as one that the law knows little of:

@@ -32,26 +32,34 @@ METASTABLE_WIDE void find_area(std::size_t count, TouchSum::Ends& ends) {
 
 // Is what a cell adds by unit of mass.
 struct OfCell {
-  double middle, density, below;
+  double middle, density, below, slope, curvature;  // the last two are the density's, in z
 };
 
 [[gnu::always_inline]] inline OfCell between(const TouchSum::Ends& ends, std::size_t k, const TouchSum::Ends& others,
                                              std::size_t j) {
-  const double width = std::abs(ends.z[k] - others.z[j]);
-  const double density = std::abs(ends.below[k] - others.below[j]) / width,
-               below = std::abs(ends.area[k] - others.area[j]) / width;
-  const bool is_thin = width < thin;
-  return {(ends.next[k] + others.next[j]) / 2, is_thin ? (ends.density[k] + others.density[j]) / 2 : density,
-          is_thin ? (ends.below[k] + others.below[j]) / 2 : below};
+  const double z = ends.z[k], other = others.z[j], width = z - other;
+  const double phi = ends.density[k], its = others.density[j];
+  const bool is_thin = std::abs(width) < thin;
+  const auto rise = [&](double here, double there) { return (here - there) / width; };
+  return {.middle = (ends.next[k] + others.next[j]) / 2,
+          .density = is_thin ? (phi + its) / 2 : std::abs(rise(ends.below[k], others.below[j])),
+          .below = is_thin ? (ends.below[k] + others.below[j]) / 2 : std::abs(rise(ends.area[k], others.area[j])),
+          .slope = is_thin ? -(z * phi + other * its) / 2 : rise(phi, its),
+          .curvature = is_thin ? ((z * z - 1) * phi + (other * other - 1) * its) / 2 : rise(-z * phi, -other * its)};
 }
 
-METASTABLE_WIDE void weigh_cells(const TouchSum::Ends& ends, std::size_t count, LandingCells::Values& middle,
-                                 LandingCells::Values& density, LandingCells::Values& below) {
+struct OfCells {
+  LandingCells::Values middle, density, below, slope, curvature;
+};
+
+METASTABLE_WIDE void weigh_cells(const TouchSum::Ends& ends, std::size_t count, OfCells& cells) {
   for (std::size_t k = 0; k < count; ++k) {
     const OfCell cell = between(ends, k, ends, k + 1);
-    middle[k] = cell.middle;
-    density[k] = cell.density;
-    below[k] = cell.below;
+    cells.middle[k] = cell.middle;
+    cells.density[k] = cell.density;
+    cells.below[k] = cell.below;
+    cells.slope[k] = cell.slope;
+    cells.curvature[k] = cell.curvature;
   }
 }
 
@@ -78,13 +86,13 @@ void TouchSum::find(const LandingCells::Values& squared, std::size_t count, Ends
 
 void TouchSum::add(const LandingCells& cells) {
   Ends ends;
-  LandingCells::Values middle, density, below;
+  OfCells of;
   find(cells.squared, cells.count + 1, ends);
-  weigh_cells(ends, cells.count, middle, density, below);
+  weigh_cells(ends, cells.count, of);
   const double barrier = landing_.barrier_squared;
   for (std::size_t k = 0; k < cells.count; ++k) {
     double mass = cells.mass[k];
-    OfCell cell{middle[k], density[k], below[k]};
+    OfCell cell{of.middle[k], of.density[k], of.below[k], of.slope[k], of.curvature[k]};
     all_ += mass;
     const double first = cells.squared[k], second = cells.squared[k + 1], least = std::min(first, second);
     if (least < barrier) {
@@ -101,6 +109,8 @@ void TouchSum::add(const LandingCells& cells) {
     middle_ += mass * cell.middle;
     density_ += mass * cell.density;
     below_ += mass * cell.below;
+    slope_ += mass * cell.slope;
+    curvature_ += mass * cell.curvature;
   }
 }
 
@@ -108,11 +118,18 @@ NextTouch TouchSum::result() const {
   if (!(touch_ > 0)) return {{0, 1}, 1};
   // A slide is that of a foot whose next one touched: what it says is of those landings, beside the rests of all.
   const double width = std::hypot(blur_, unknown_error), z = (at_ - middle_ / touch_) / width;
-  const double density = (1 - unknown_share) * density_ / touch_ / blur_ + unknown_share * normal_density(z) / width;
+  const auto known = [&](double sum) { return (1 - unknown_share) * sum / touch_ / blur_; };
+  const double unknown = unknown_share * normal_density(z) / width, density = known(density_) + unknown;
   const double below = (1 - unknown_share) * below_ / touch_ + unknown_share * normal_cdf(z);
   const double touches = gone_ / all_;
-  return {{touches * density, std::clamp(rest_ / all_ + touches * below, 0.0, 1.0)},
-          displacement_ ? touch_ / gone_ : 1};
+  NextTouch next{{touches * density, std::clamp(rest_ / all_ + touches * below, 0.0, 1.0)},
+                 displacement_ ? touch_ / gone_ : 1};
+  if (density > 0) {
+    next.slope = (known(slope_) / blur_ - unknown * z / width) / density;
+    const double bend = known(curvature_) / (blur_ * blur_) + unknown * (z * z - 1) / (width * width);
+    next.curvature = bend / density - next.slope * next.slope;
+  }
+  return next;
 }
 
 }  // namespace metastable::dynamics

@@ -49,7 +49,7 @@ class TouchSum {
   std::optional<double> displacement_;
   double slide_error_, blur_, at_;
   Ends barrier_;
-  double all_ = 0, rest_ = 0, gone_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0;
+  double all_ = 0, rest_ = 0, gone_ = 0, touch_ = 0, middle_ = 0, density_ = 0, below_ = 0, slope_ = 0, curvature_ = 0;
 };
 
 }  // namespace metastable::dynamics

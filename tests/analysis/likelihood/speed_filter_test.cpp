@@ -61,7 +61,7 @@ TEST(SpeedFilter, WhatContactsRememberOutlastsTheLastScore) {
   extension.memory = rho;
   const dynamics::ExtendedWheel wheel(dynamics::Wheel{}, 7.02 * degree, dynamics::Law::published, contact, extension);
   const ScoreTilt tilt(0, 0);
-  SpeedFilter filter(extension, tilt, 1e-4, 0, 0, 0, 1e-3, {.linear = told});
+  SpeedFilter filter(extension, tilt, 1e-4, 0, 0, 1e-3, {.linear = told});
   std::mt19937_64 generator(3);
   std::normal_distribution<double> normal;
   double remembered = normal(generator);
@@ -91,7 +91,7 @@ TEST(SpeedFilter, ANegativeMemoryOfSquaresIsNone) {
                                       {0.487, 0.034, 0.435, 0.037}, extension);
   const ScoreTilt tilt(0, 0);
   const auto scores = [&](const MemoryOfScores& memory) {
-    SpeedFilter filter(extension, tilt, 1e-4, 0, 0, 0, 1e-3, memory);
+    SpeedFilter filter(extension, tilt, 1e-4, 0, 0, 1e-3, memory);
     std::vector<double> seen;
     for (const double plus : {2.4, 3.1, 2.7}) {
       filter.start(omega);

@@ -163,6 +163,23 @@ TEST(SettledDensity, OfTheNextTouchIsThatOfDrawnContacts) {
   EXPECT_LT(kolmogorov(drawn, below), kolmogorov_999);
 }
 
+TEST(SettledDensity, SlopeAndCurvatureAreThoseOfItsLogarithm) {
+  const ExtendedWheel wheel = extended();
+  const StepContext context{.leg = 2};
+  constexpr double omega = 4.9, blur = 0.02, step = 1e-4;
+  for (const std::optional<double>& plus : {std::optional<double>(), std::optional(2.9)})
+    for (const double at : {4.5, 4.62, 4.7, 4.8, 5.0}) {
+      const auto log_density = [&](double next) {
+        return std::log(wheel.at_next_touch(context, omega, {plus, {}}, blur, next).speed.density);
+      };
+      const double before = log_density(at - step), here = log_density(at), after = log_density(at + step);
+      const NextTouch next = wheel.at_next_touch(context, omega, {plus, {}}, blur, at);
+      const double slope = (after - before) / (2 * step), curvature = (after - 2 * here + before) / (step * step);
+      EXPECT_NEAR(next.slope, slope, 0.01 / blur) << at;
+      EXPECT_NEAR(next.curvature, curvature, 0.05 / (blur * blur)) << at;
+    }
+}
+
 // A foot that sticks leaves a next speed that only restitution spreads. (Cells that stand for points in even widths
 // spread it more.)
 TEST(SettledDensity, OfAFootThatSticksIsTheIntegralOverRestitution) {
@@ -266,6 +283,7 @@ TEST(SettledDensity, IsANumberWhereHardlyAnyGoOn) {
       EXPECT_GE(next.speed.below, 0) << plus;
       EXPECT_LE(next.speed.below, 1) << plus;
       EXPECT_TRUE(std::isfinite(next.slide_density)) << plus;
+      EXPECT_TRUE(std::isfinite(next.slope) && std::isfinite(next.curvature)) << plus;
     }
 }
 
