@@ -40,6 +40,11 @@ constexpr double law_hopeless = -100;  // log likelihood below the recalibrated 
 
 constexpr double strained = 2;  // cost of its priors [log likelihood], for a fit to be tried from what is stated
 
+// These numbers say when an effect is fitted again from where a pair has it.
+constexpr double gained_beside = 9;  // by the pair, beyond the effect's own gain
+constexpr double lost_alone = 30;    // most that it is short of its own fit there, without the other [log likelihood]
+constexpr std::size_t most_other_ways = 3;
+
 // These numbers say when a fit that did not settle is decided all the same.
 constexpr double law_refuted = -30;     // gain of another law: so far below that what it could still rise is nothing
 constexpr double small_gain = 10;       // by fit and by scores: at the optimum up to what differences resolve
@@ -90,8 +95,10 @@ class Ranker {
   void scan_pairs();
   void scan_asked_pairs();
   void fit_pairs();
+  void refit_from_pairs();
   void refine_paired();
   void complete_pairs();
+  void bound_pairs();
   void reach(double share) {
     share_ = share;
     heartbeat();
@@ -120,6 +127,7 @@ class Ranker {
   void take(RankedCause& cause, Fit better) const;
   bool near_the_top(const RankedCause& cause) const;
   double gain_apart(const RankedCause& pair) const;
+  double measure_second(RankedCause& pair) const;
   double gain(const Fit& fit) const { return 2 * (fit.penalised - recalibrated_.penalised); }
   double p_value(const Candidate* candidate, double gain) const;
   std::vector<std::size_t> leaders(bool to_refine) const;
@@ -407,6 +415,15 @@ double Ranker::gain_apart(const RankedCause& pair) const {
   return std::max(beside(one, other), beside(other, one));
 }
 
+// Sets what a pair says of its second effect, and returns what that earned.
+double Ranker::measure_second(RankedCause& pair) const {
+  const RankedCause& first = singles_[index_of(pair.terms[0].candidate)];
+  const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
+  pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
+  pair.together = pair.gain / std::max(1.0, gain_apart(pair));
+  return second;
+}
+
 void Ranker::fit_pairs() {
   const double prior = pair_log_prior(candidates_.size());
   std::vector<RankedCause> tried(tries_.size());
@@ -417,10 +434,8 @@ void Ranker::fit_pairs() {
     pair = as_cause(fit_one_more(model_, effort_, first.fit, tries_[i].second));
     pair.gain = gain(pair.fit);
     if (!std::isfinite(pair.gain)) return give_up(pair);
-    const double second = earned(model_, pair.fit, first.fit, exact_part(singles_, first.terms, recalibrated_));
+    const double second = measure_second(pair);
     pair.evidence = first.evidence + evidence_of(tries_[i].second, second) + prior;
-    pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
-    pair.together = pair.gain / std::max(1.0, gain_apart(pair));
   });
   // The same pair, from either side or once more, counts once, the better fit.
   for (RankedCause& pair : tried) {
@@ -434,6 +449,40 @@ void Ranker::fit_pairs() {
     else if (pair.evidence > same->evidence)
       *same = std::move(pair);
   }
+}
+
+// What a pair gains beyond its first effect may be a better optimum of that effect, which the pair's fit came upon.
+void Ranker::refit_from_pairs() {
+  std::vector<const RankedCause*> gaining;
+  for (const RankedCause& pair : pairs_) {
+    const RankedCause& first = singles_[index_of(pair.terms[0].candidate)];
+    if (std::isfinite(pair.evidence) && !pair.terms[0].candidate->parameters.empty() &&
+        pair.gain > first.gain + gained_beside &&
+        model_.evaluate(pair.fit.nuisance, std::vector{pair.terms[0]}).total() > first.fit.log_likelihood - lost_alone)
+      gaining.push_back(&pair);
+  }
+  std::sort(gaining.begin(), gaining.end(),
+            [](const RankedCause* a, const RankedCause* b) { return a->gain > b->gain; });
+  gaining.resize(std::min(gaining.size(), most_other_ways));
+  std::vector<Fit> again(gaining.size());
+  markov::parallel_for(gaining.size(), threads_, [&](std::size_t k) {
+    heartbeat();
+    again[k] = fit(model_, gaining[k]->fit.nuisance, {gaining[k]->terms[0]},
+                   {.count = {}, .refit_nuisances = true, .most_iterations = effort_.most_iterations});
+  });
+  bool any = false;
+  for (std::size_t k = 0; k < again.size(); ++k) {
+    RankedCause& first = singles_[index_of(gaining[k]->terms[0].candidate)];
+    if (!(2 * (again[k].penalised - first.fit.penalised) > 1)) continue;
+    first.not_decided = again[k].converged ? "" : again[k].reason;
+    take(first, std::move(again[k]));
+    first.p_value = p_value(first.terms[0].candidate, first.gain);
+    top_ = std::max(top_, first.evidence);
+    any = true;
+  }
+  if (!any) return;
+  for (RankedCause& pair : pairs_)
+    if (std::isfinite(pair.evidence)) measure_second(pair);
 }
 
 // An effect of the best pair that was not worth refining by itself is refined now, and paired anew.
@@ -489,6 +538,20 @@ void Ranker::complete_pairs() {
   fit_pairs();
 }
 
+// Evidence shrinks gains by the number of parameters: eight leg lengths, which take in an eccentric hub, would count
+// for less than the hub with them beside it. A pair that gains nothing beyond one of its effects is that effect.
+void Ranker::bound_pairs() {
+  for (RankedCause& pair : pairs_)
+    for (const std::size_t k : {std::size_t{0}, std::size_t{1}}) {
+      const RankedCause& one = singles_[index_of(pair.terms[k].candidate)];
+      const double beyond = pair.gain - one.gain;
+      if (!fitted(one) || !std::isfinite(one.evidence) || beyond > gained_beside) continue;
+      const auto parameters = static_cast<double>(pair.terms[1 - k].candidate->parameters.size());
+      pair.evidence = std::min(pair.evidence, one.evidence + evidence_of_gain(std::max(0.0, beyond), parameters) +
+                                                  pair_log_prior(candidates_.size()));
+    }
+}
+
 }  // namespace
 
 const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<EffectTerm>& terms,
@@ -516,8 +579,10 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   ranker.scan_asked_pairs();
   ranker.reach(0.8);
   ranker.fit_pairs();
+  ranker.refit_from_pairs();
   ranker.refine_paired();
   ranker.complete_pairs();
+  ranker.bound_pairs();
   ranker.reach(1);
   return ranker.result();
 }
