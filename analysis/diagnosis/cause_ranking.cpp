@@ -125,6 +125,7 @@ class Ranker {
   void fit_law(RankedCause& cause) const;
   void fit_effect(RankedCause& cause, const ScannedEffect& scanned) const;
   void take(RankedCause& cause, Fit better) const;
+  void take_again(std::size_t i, Fit better);
   bool near_the_top(const RankedCause& cause) const;
   double gain_apart(const RankedCause& pair) const;
   double measure_second(RankedCause& pair) const;
@@ -257,6 +258,15 @@ void Ranker::take(RankedCause& cause, Fit better) const {
   cause.terms = cause.fit.terms;
 }
 
+// Takes a better fit of a single effect. Where its variant is refined the p-value stays that of the listed ones: chance
+// has not been drawn between them.
+void Ranker::take_again(std::size_t i, Fit better) {
+  RankedCause& cause = singles_[i];
+  cause.not_decided = better.converged ? "" : better.reason;
+  take(cause, std::move(better));
+  if (!refined_[i]) cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
+}
+
 bool Ranker::near_the_top(const RankedCause& cause) const {
   return cause.evidence >= refined_share * top_ - refined_margin;
 }
@@ -273,16 +283,12 @@ void Ranker::refit_from_stated() {
       return;
     Fit other = fit(model_, stated, cause.terms,
                     {.count = {}, .refit_nuisances = true, .most_iterations = effort_.most_iterations});
-    if (!(other.penalised > cause.fit.penalised)) return;
-    cause.not_decided = other.converged ? "" : other.reason;
-    take(cause, std::move(other));
-    cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
+    if (other.penalised > cause.fit.penalised) take_again(i, std::move(other));
   });
   for (const RankedCause& cause : singles_)
     if (!cause.candidate_undecided()) top_ = std::max(top_, cause.evidence);
 }
 
-// The p-value stays that of the listed variants: chance has not been drawn between them.
 void Ranker::refine_leaders() {
   const std::vector<std::size_t> strongest = leaders(true);
   markov::parallel_for(strongest.size(), threads_, [&](std::size_t k) {
@@ -318,10 +324,7 @@ void Ranker::refit_unsettled() {
     Fit again = fit_from(cause.fit.nuisance, more_steps);
     if (!again.converged && &cause != &*best)
       if (Fit other = fit_from(leaders_nuisance, 1); other.penalised > again.penalised) again = std::move(other);
-    if (!(again.penalised > cause.fit.penalised)) return;
-    take(cause, std::move(again));
-    if (!refined_[i]) cause.p_value = p_value(cause.terms[0].candidate, cause.gain);
-    if (cause.fit.converged) cause.not_decided.clear();
+    if (again.penalised > cause.fit.penalised) take_again(i, std::move(again));
   });
   for (const RankedCause& cause : singles_)
     if (!cause.candidate_undecided()) top_ = std::max(top_, cause.evidence);
@@ -472,12 +475,11 @@ void Ranker::refit_from_pairs() {
   });
   bool any = false;
   for (std::size_t k = 0; k < again.size(); ++k) {
-    RankedCause& first = singles_[index_of(gaining[k]->terms[0].candidate)];
-    if (!(2 * (again[k].penalised - first.fit.penalised) > 1)) continue;
-    first.not_decided = again[k].converged ? "" : again[k].reason;
-    take(first, std::move(again[k]));
-    first.p_value = p_value(first.terms[0].candidate, first.gain);
-    top_ = std::max(top_, first.evidence);
+    const std::size_t i = index_of(gaining[k]->terms[0].candidate);
+    if (!(gain(again[k]) > singles_[i].gain + 1)) continue;
+    take_again(i, std::move(again[k]));
+    beside_.erase(i);
+    top_ = std::max(top_, singles_[i].evidence);
     any = true;
   }
   if (!any) return;

@@ -10,11 +10,11 @@ namespace {
 
 constexpr int speeds = 15, restitutions = 13;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
+constexpr double nearly_all = 2;              // of these sds above the mean, at which a foot must still come to stand
 constexpr double just_above = 1e-7;           // mu_r, of the first place
 // Are the places at which a wheel of so much more J is followed, for the changes with J: every so many speeds and
 // restitutions.
 constexpr double more_inertia = 1.1;
-constexpr double nearly_all = 2;  // sds of restitution above its mean at which a foot must still come to stand
 constexpr int speed_stride = 2, restitution_stride = 2;
 constexpr double most_rate = 0.03;  // of the share kept with ln J, beside what a plastic landing keeps
 
@@ -145,7 +145,8 @@ std::shared_ptr<const LandingShares> share_grid(
   double settles = slowest;
   for (int leg = 0; leg < wheel.legs(); ++leg) {
     LandingShares::Leg one = plain_leg(*map, leg);
-    one.settles_below = settles_below(*map, leg, std::min(mean + nearly_all * sd, most_settled_restitution), slowest, fastest);
+    one.settles_below =
+        settles_below(*map, leg, std::min(mean + nearly_all * sd, most_settled_restitution), slowest, fastest);
     settles = std::max(settles, one.settles_below);
     one.drag =
         drag_of(map->motion(), leg, (slowest + one.settles_below) / 2, std::clamp(mean, 0.0, most_settled_restitution));

@@ -12,8 +12,8 @@ namespace metastable::dynamics {
 
 /// Makes the landings of this wheel on its slope, each followed. Some 70,000 of them take 2 to 3 s.
 /// @param slowest, fastest  speeds omega- to be read [rad/s], 0 < slowest < fastest
-/// @param contact  nominal: LandingShares::Leg::settles_below is that at its mean restitution plus two sds; speeds above
-///        it are not tabulated, nor restitutions beyond four sds
+/// @param contact  nominal: LandingShares::Leg::settles_below is that at its mean restitution plus two sds; speeds
+///        above it are not tabulated, nor restitutions beyond four sds
 /// @param executor  calls the work for every index in [0, count), in any order, from any threads; none: in order
 /// @throws std::invalid_argument as SettledWheel::validate()
 std::shared_ptr<const LandingShares> share_grid(

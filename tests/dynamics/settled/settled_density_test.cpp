@@ -149,6 +149,16 @@ TEST(SettledDensity, OfTheFirstImpactIsSmoothInTheLoss) {
   }
 }
 
+// A landing counts where its foot comes to stand, but for one in forty of its contacts. (At one sd a sixth of the feet
+// just below the limit still moved: an engine's wheel without an effect had a gap by that.)
+TEST(SettledDensity, FeetStandUpToTwoSdsOfRestitution) {
+  const auto settles_below = [](double mean, double sd) {
+    return share_grid(rigid(equal_wheel()), 4, 9, {mean, sd, 0.4, 0.03})->legs[2].settles_below;
+  };
+  EXPECT_DOUBLE_EQ(settles_below(0.4, 0.05), settles_below(0.5, 0));
+  EXPECT_GT(settles_below(0.4, 0.02), settles_below(0.4, 0.05));
+}
+
 TEST(SettledDensity, OfTheNextTouchIsThatOfDrawnContacts) {
   const ExtendedWheel wheel = extended();
   const StepContext context{.leg = 2};
