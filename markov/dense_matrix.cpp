@@ -18,6 +18,16 @@ SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
+Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& whole, double least_share) {
+  if (!matrix.allFinite() || !whole.allFinite()) return Eigen::MatrixXd(whole.size(), 0);
+  const Eigen::VectorXd unit =
+      whole.unaryExpr([](double information) { return information > 0 ? 1 / std::sqrt(information) : 0; });
+  const SymmetricEigen split = symmetric_eigen(unit.asDiagonal() * matrix * unit.asDiagonal());
+  const Eigen::Index resolved = (split.values.array() > least_share).count();  // the last ones
+  return unit.asDiagonal() * split.vectors.rightCols(resolved) *
+         split.values.tail(resolved).cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
 double spectral_radius(Eigen::MatrixXd matrix) {
   double log_radius = 0, power = 1;
   for (int squaring = 0; squaring < 40; ++squaring, power *= 2) {

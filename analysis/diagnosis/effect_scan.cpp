@@ -18,26 +18,34 @@ constexpr double largest_step = 0.1, small_step = 0.05;  // of a difference, in 
 constexpr std::size_t most_scanned = 24;                 // variants of an effect that are scanned beside another one
 constexpr double far_out = 0.03;  // share of the draws beyond which a tail follows its law instead of their count
 
-// Returns what the score `u` gains with information `info` of the data, beside the prior; one parameter at its lower
-// bound gains only upwards.
-double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, Eigen::MatrixXd info,
-                     Eigen::VectorXd* start) {
-  for (Eigen::Index p = 0; p < u.size(); ++p)
-    if (const double sd = candidate.parameters[static_cast<std::size_t>(p)].prior_sd; sd > 0)
+// Returns the root of the inverse of an effect's information, that of its priors included, in the directions that the
+// data resolve. @param whole  the information's diagonal before the projection
+Eigen::MatrixXd root_with_priors(const Candidate& candidate, Eigen::MatrixXd info, Eigen::VectorXd whole) {
+  for (Eigen::Index p = 0; p < whole.size(); ++p)
+    if (const double sd = candidate.parameters[static_cast<std::size_t>(p)].prior_sd; sd > 0) {
       info(p, p) += 1 / (sd * sd);
+      whole[p] += 1 / (sd * sd);
+    }
+  return markov::resolved_root(info, whole, resolved_share);
+}
+
+Eigen::MatrixXd root_of_variant(const EffectScan& scan, const Candidate& candidate, Eigen::Index first) {
+  const auto count = static_cast<Eigen::Index>(candidate.parameters.size());
+  return root_with_priors(candidate, scan.information.block(first, first, count, count),
+                          scan.whole.segment(first, count));
+}
+
+// Returns what the score `u` gains beside the prior; one parameter at its lower bound gains only upwards.
+double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& root,
+                     Eigen::VectorXd* start) {
+  const Eigen::VectorXd along = root.transpose() * u;
+  if (start) *start = root * along;
   if (u.size() == 1) {
-    if (!(info(0, 0) > 0)) return 0;
     const FreeParameter& p = candidate.parameters[0];
-    const double step = u[0] / info(0, 0);
-    if (start) *start = Eigen::VectorXd::Constant(1, step);
-    const bool blocked = (p.lower >= p.neutral && u[0] < 0) || (p.upper <= p.neutral && u[0] > 0);
-    return blocked ? 0 : u[0] * step;
+    if ((p.lower >= p.neutral && u[0] < 0) || (p.upper <= p.neutral && u[0] > 0)) return 0;
   }
-  info.diagonal() *= 1 + 1e-8;
-  const Eigen::VectorXd step = markov::solve_symmetric(info, u);
-  if (start) *start = step;
-  const double gain = u.dot(step);
-  return std::isfinite(gain) && gain > 0 ? gain : 0;
+  const double gain = along.squaredNorm();
+  return std::isfinite(gain) ? gain : 0;
 }
 
 // Returns [variants] what the earlier scan promises of an effect once what the other one takes up is projected out.
@@ -46,13 +54,16 @@ std::vector<double> promised_beside(const ScanBeside& beside, const ScannedEffec
   const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
   const auto held = static_cast<Eigen::Index>(other.candidate->parameters.size());
   const Eigen::Index at = other.first[other.best];
+  const Eigen::MatrixXd root =
+      markov::resolved_root(scan.information.block(at, at, held, held), scan.whole.segment(at, held), resolved_share);
   std::vector<double> promised;
   for (const Eigen::Index first : effect.first) {
     const Eigen::MatrixXd cross = scan.information.block(at, first, held, count);
-    const Eigen::MatrixXd taken = markov::solve_columns(scan.information.block(at, at, held, held), cross);
+    const Eigen::MatrixXd taken = root * (root.transpose() * cross);
+    const Eigen::MatrixXd left = scan.information.block(first, first, count, count) - cross.transpose() * taken;
     promised.push_back(promised_gain(
         *effect.candidate, scan.scores.segment(first, count) - taken.transpose() * scan.scores.segment(at, held),
-        scan.information.block(first, first, count, count) - cross.transpose() * taken, nullptr));
+        root_with_priors(*effect.candidate, left, scan.whole.segment(first, count)), nullptr));
   }
   return promised;
 }
@@ -147,7 +158,9 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
       held.change.transpose() * all.change + held_stretch.transpose() * stretch;  // [held x columns]
   Eigen::MatrixXd weights = cross;
   if (columns > 0) weights = markov::solve_columns(fit.information, cross);  // Eigen's solve refers to a first element
-  scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch - cross.transpose() * weights;
+  scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch;
+  scan.whole = scan.information.diagonal();
+  scan.information -= cross.transpose() * weights;
   const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
   for (Eigen::Index k = 0; k < events; ++k)
@@ -161,8 +174,8 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
     for (const Eigen::Index first : effect.first) {
       Eigen::VectorXd start;
       effect.gain.push_back(promised_gain(*effect.candidate, scan.scores.segment(first, count),
-                                          scan.information.block(first, first, count, count), &start));
-      effect.start.push_back(start.size() == count ? start : Eigen::VectorXd::Zero(count));
+                                          root_of_variant(scan, *effect.candidate, first), &start));
+      effect.start.push_back(start);
     }
     effect.best =
         static_cast<std::size_t>(std::max_element(effect.gain.begin(), effect.gain.end()) - effect.gain.begin());
@@ -193,6 +206,10 @@ Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
 ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) {
   if (draws < 1) throw std::invalid_argument(fmt::format("draws: {} is below 1", draws));
   const Eigen::MatrixXd rows = rows_of_chance(scan);
+  std::vector<std::vector<Eigen::MatrixXd>> roots(scan.effects.size());  // by effect and variant
+  for (std::size_t e = 0; e < scan.effects.size(); ++e)
+    for (const Eigen::Index first : scan.effects[e].first)
+      roots[e].push_back(root_of_variant(scan, *scan.effects[e].candidate, first));
   std::vector<std::vector<double>> gains(scan.effects.size());  // by effect and draw
   for (int draw = 0; draw < draws; ++draw) {
     const std::vector<double> normals = normal_multipliers(
@@ -203,9 +220,9 @@ ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) 
       const ScannedEffect& effect = scan.effects[e];
       const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
       double largest = 0;
-      for (const Eigen::Index first : effect.first)
-        largest = std::max(largest, promised_gain(*effect.candidate, score.segment(first, count),
-                                                  scan.information.block(first, first, count, count), nullptr));
+      for (std::size_t v = 0; v < roots[e].size(); ++v)
+        largest = std::max(largest, promised_gain(*effect.candidate, score.segment(effect.first[v], count), roots[e][v],
+                                                  nullptr));
       gains[e].push_back(largest);
     }
   }

@@ -24,6 +24,7 @@ struct EffectScan {
   Eigen::VectorXd scores;       ///< [columns] sums of the slopes
   Eigen::MatrixXd by_trial;     ///< [trials x columns] efficient scores, summed over a trial's events
   Eigen::MatrixXd information;  ///< [columns x columns] efficient
+  Eigen::VectorXd whole;        ///< [columns] its diagonal before the projection
   bool trials_suffice = true;   ///< to draw chance from them
   /// Returns what it says of a candidate, null if that was not scanned.
   const ScannedEffect* find(const Candidate* candidate) const;

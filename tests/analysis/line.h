@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -93,5 +94,30 @@ inline Line line(double slope, unsigned seed, std::size_t count = 400, double ju
   }
   return {y, w};
 }
+
+// Has a slope, and eight waves of which the first is that slope.
+class SlopeAmongWaves : public Line {
+ public:
+  explicit SlopeAmongWaves(const Line& from) : Line(from) {
+    Candidate waves = candidates_[0];
+    waves.id = "waves";
+    waves.parameters.assign(8, waves.parameters[0]);
+    candidates_ = {candidates_[0], waves};
+    for (std::size_t i = 0; i < y_.size(); ++i)
+      for (std::size_t k = 1; k < 8; ++k) y_[i] += 0.12 * wave(i, k);
+  }
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    Evaluation e = Line::evaluate(n, {});
+    for (std::size_t i = 0; i < e.score.size(); ++i) {
+      for (const EffectTerm& term : terms)
+        for (std::size_t k = 0; k < term.values.size(); ++k) e.score[i] -= term.values[k] * wave(i, k) / std::exp(n[1]);
+      e.log_density[i] = -0.5 * e.score[i] * e.score[i] - 0.91893853320467274 - n[1];
+    }
+    return e;
+  }
+
+ private:
+  double wave(std::size_t i, std::size_t k) const { return k == 0 ? w_[i] : std::sin(static_cast<double>(i * k)); }
+};
 
 }  // namespace metastable::analysis::test

@@ -27,5 +27,21 @@ TEST(DenseMatrix, SolvesAndTakesApart) {
   EXPECT_LT(eigen.values[0], eigen.values[2]);
 }
 
+// A matrix of full rank is inverted; of 2 u u^T only u is left: the rounding of a singular matrix is not inverted.
+TEST(DenseMatrix, ResolvedRootLeavesOutWhatIsLost) {
+  const Eigen::VectorXd u{{0.6, 0.8}}, v{{0.8, -0.6}};
+  const Eigen::MatrixXd whole_rank = 2 * u * u.transpose() + 0.02 * v * v.transpose();
+  const Eigen::VectorXd two = Eigen::VectorXd::Constant(2, 2);
+  const Eigen::MatrixXd full = resolved_root(whole_rank, two, 1e-3);
+  EXPECT_LT((full * full.transpose() - inverse_of(whole_rank)).norm(), 1e-11);
+  for (const double rounding : {1e-16, -1e-16, 0.0}) {
+    const Eigen::MatrixXd root = resolved_root(2 * u * u.transpose() + rounding * v * v.transpose(), two, 1e-6);
+    ASSERT_EQ(root.cols(), 1);
+    EXPECT_LT((root * root.transpose() - 0.5 * u * u.transpose()).norm(), 1e-14);
+  }
+  EXPECT_EQ(resolved_root(Eigen::MatrixXd::Identity(2, 2), Eigen::VectorXd::Zero(2), 1e-6).cols(), 0);
+  EXPECT_EQ(resolved_root(Eigen::MatrixXd::Constant(2, 2, NAN), two, 1e-6).cols(), 0);
+}
+
 }  // namespace
 }  // namespace metastable::markov

@@ -19,6 +19,7 @@ namespace {
 
 using test::Line;
 using test::line;
+using test::SlopeAmongWaves;
 
 RankingOptions few_draws() { return {.threads = 1, .draws = 300, .seed = 1, .progress = {}}; }
 
@@ -81,31 +82,6 @@ TEST(RankCauses, BuildsNoPairOnWhatIsFarBehind) {
   });
   EXPECT_TRUE(paired);
 }
-
-// Has a slope, and eight waves of which the first is that slope.
-class SlopeAmongWaves : public Line {
- public:
-  explicit SlopeAmongWaves(const Line& from) : Line(from) {
-    Candidate waves = candidates_[0];
-    waves.id = "waves";
-    waves.parameters.assign(8, waves.parameters[0]);
-    candidates_ = {candidates_[0], waves};
-    for (std::size_t i = 0; i < y_.size(); ++i)
-      for (std::size_t k = 1; k < 8; ++k) y_[i] += 0.12 * wave(i, k);
-  }
-  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
-    Evaluation e = Line::evaluate(n, {});
-    for (std::size_t i = 0; i < e.score.size(); ++i) {
-      for (const EffectTerm& term : terms)
-        for (std::size_t k = 0; k < term.values.size(); ++k) e.score[i] -= term.values[k] * wave(i, k) / std::exp(n[1]);
-      e.log_density[i] = -0.5 * e.score[i] * e.score[i] - 0.91893853320467274 - n[1];
-    }
-    return e;
-  }
-
- private:
-  double wave(std::size_t i, std::size_t k) const { return k == 0 ? w_[i] : std::sin(static_cast<double>(i * k)); }
-};
 
 // The eight take in the slope: a pair of the two gains nothing beyond them. (An eccentric hub stood beside eight leg
 // lengths, which alone were at work.)

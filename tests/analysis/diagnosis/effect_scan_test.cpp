@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <vector>
 
 #include "tests/analysis/line.h"
 
@@ -12,6 +13,7 @@ namespace {
 
 using test::Line;
 using test::line;
+using test::SlopeAmongWaves;
 
 TEST(EffectScan, ScoresPromiseWhatTheFitGains) {
   const Line model = line(0.08, 4, 2000);
@@ -21,6 +23,23 @@ TEST(EffectScan, ScoresPromiseWhatTheFitGains) {
   EXPECT_NEAR(scan.effects[0].gain[0], 2 * (with.penalised - plain.penalised), 0.5);
   EXPECT_NEAR(scan.effects[0].start[0][0], with.terms[0].values[0], 2e-3);
   EXPECT_EQ(scan.effects[0].gain[0], scan.effects[1].gain[0]);
+}
+
+// Beside a fitted slope the first of eight waves, which is that slope, is singular up to rounding. It promises nothing,
+// and the other seven promise what least squares gain by them: no last bit decides.
+TEST(EffectScan, WhatAFittedEffectTakesUpPromisesNothing) {
+  const SlopeAmongWaves model(line(0.5, 1, 1200));
+  const Candidate &slope = model.candidates()[0], &waves = model.candidates()[1];
+  const Fit with_slope = fit(model, {0, 0}, {{&slope, {}, {0.0}}});
+  const EffectScan beside_slope = scan_effects(model, with_slope, {&slope, &waves}, 1);
+  EXPECT_EQ(beside_slope.effects[0].gain[0], 0);
+  EXPECT_EQ(beside_slope.effects[1].start[0].size(), 8);
+  const Fit with_waves = fit(model, {0, 0}, {{&waves, {}, std::vector<double>(8, 0.0)}});
+  const double removed = 1 - std::exp((with_slope.log_likelihood - with_waves.log_likelihood) / 600);  // of the variance
+  EXPECT_NEAR(beside_slope.effects[1].gain[0], 1200 * removed, 0.05 * 1200 * removed);
+  const EffectScan beside_waves = scan_effects(model, with_waves, {&slope, &waves}, 1);
+  EXPECT_EQ(beside_waves.effects[0].gain[0], 0);
+  EXPECT_EQ(beside_waves.effects[1].gain[0], 0);
 }
 
 // Under no effect the p-values of many data sets are uniform.
