@@ -35,8 +35,9 @@ TEST(EffectScan, WhatAFittedEffectTakesUpPromisesNothing) {
   EXPECT_EQ(beside_slope.effects[0].gain[0], 0);
   EXPECT_EQ(beside_slope.effects[1].start[0].size(), 8);
   const Fit with_waves = fit(model, {0, 0}, {{&waves, {}, std::vector<double>(8, 0.0)}});
-  const double removed = 1 - std::exp((with_slope.log_likelihood - with_waves.log_likelihood) / 600);  // of the variance
-  EXPECT_NEAR(beside_slope.effects[1].gain[0], 1200 * removed, 0.05 * 1200 * removed);
+  // Of n events' variance they remove a share r: n r, over what the sd's own parameter leaves of their information.
+  const double r = 1 - std::exp((with_slope.log_likelihood - with_waves.log_likelihood) / 600);
+  EXPECT_NEAR(beside_slope.effects[1].gain[0], 1200 * r / (1 - r / 2), 1);
   const EffectScan beside_waves = scan_effects(model, with_waves, {&slope, &waves}, 1);
   EXPECT_EQ(beside_waves.effects[0].gain[0], 0);
   EXPECT_EQ(beside_waves.effects[1].gain[0], 0);
