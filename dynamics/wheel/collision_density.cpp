@@ -243,36 +243,136 @@ SpeedDensity sum_over_restitution(const PublishedCollision& collision, const Con
   return result;
 }
 
-// Describes one collision under `coulomb`. Its loss is mass (1 - eta^2) + rubbing (1 + eta)^2, in J per v0^2/2.
+// Describes one collision under `coulomb`. Its loss is mass (1 - kept eta^2) + rubbing (1 + eta)^2, in J per v0^2/2.
 struct CoulombParts {
   double mass, rubbing;
 };
+
+// Holds the restitutions that lose as much as was lost: those between them lose more.
+struct RestitutionRoots {
+  double low = 0, high = 0;
+  double root = 0;       // of the discriminant; 0: no restitution loses just as much
+  bool all_more = false;  // where there is none: every restitution loses more, not less
+};
+
 class CoulombCollision {
  public:
-  CoulombCollision(const ContactModel& model, const Collision& c)
-      : m_(model.mass), rg2_(coulomb_squared_gyration(model, c)), x_(c.contact_x), y_(c.contact_y) {}
-
-  CoulombParts sticking() const { return {m_ * (rg2_ + y_ * y_) / (rg2_ + x_ * x_ + y_ * y_), 0}; }
-  CoulombParts slipping(double mu) const {
-    const double normal = (rg2_ + x_ * x_ - mu * x_ * y_) / (m_ * rg2_);
-    const double tangential = (x_ * y_ - mu * (rg2_ + y_ * y_)) / (m_ * rg2_);
-    return {1 / normal, mu * std::abs(tangential) / (normal * normal)};
+  // @param kept  share of the rebound's energy that is kept, in [0, 1]
+  // @param loss  [J per v0^2/2]
+  CoulombCollision(const ContactModel& model, const Collision& c, double kept, double loss)
+      : kept_(kept), loss_(loss), sticks_(coulomb_sticking_friction(model, c)) {
+    const double m = model.mass, rg2 = coulomb_squared_gyration(model, c);
+    const double x = c.contact_x, y = c.contact_y;
+    normal_ = {(rg2 + x * x) / (m * rg2), x * y / (m * rg2)};
+    tangential_ = {x * y / (m * rg2), (rg2 + y * y) / (m * rg2)};
+    sticking_mass_ = m * (rg2 + y * y) / (rg2 + x * x + y * y);
   }
-  // Returns the spacing of nodes in mu's score, from the slipping loss's slopes at mu and at the mean of eta.
-  double spacing(const Restitution& restitution, double mu, double friction_sd) const {
-    constexpr double step = 1e-4;
-    const auto [mass, rubbing] = slipping(mu);
-    const auto [mass_less, rubbing_less] = slipping(mu - step);
-    const double eta = restitution.mean(), squared = (1 + eta) * (1 + eta);
-    const double by_mu = ((mass - mass_less) * (1 - eta * eta) + (rubbing - rubbing_less) * squared) / step;
-    const double by_eta = -2 * eta * mass + 2 * (1 + eta) * rubbing;
-    return std::min(0.5, node_spacing(friction_sd * std::abs(by_mu),
-                                      restitution.sd() * (std::abs(by_eta) + restitution.sd() * mass)));
+
+  double sticking_friction() const { return sticks_; }
+  RestitutionRoots sticking() const { return roots({sticking_mass_, 0}); }
+  RestitutionRoots slipping(double mu) const {
+    const double normal = normal_[0] - mu * normal_[1], tangential = tangential_[0] - mu * tangential_[1];
+    return roots({1 / normal, mu * std::abs(tangential) / (normal * normal)});
+  }
+
+  // Adds the frictions between which the roots pass 0 or 1, or meet: there the density of a single friction jumps, or
+  // grows like an inverse square root.
+  void add_breaks(double from, double to, std::vector<double>& breaks) const {
+    const auto [n0, n1] = normal_;
+    const auto [t0, t1] = tangential_;
+    for (const double eta : {0.0, 1.0}) {  // the loss of this restitution, times normal^2, is a parabola in mu
+      const double normal = 1 - kept_ * eta * eta, rubbing = (1 + eta) * (1 + eta);
+      add_zeros({normal * n0 - loss_ * n0 * n0, rubbing * t0 - normal * n1 + 2 * loss_ * n0 * n1,
+                 -rubbing * t1 - loss_ * n1 * n1, 0},
+                from, to, breaks);
+    }
+    const double pull = kept_ - 1, held = kept_ * loss_;  // the discriminant, times normal^3, is a cubic
+    add_zeros({kept_ * n0 - held * n0 * n0, pull * t0 - kept_ * n1 + 2 * held * n0 * n1 + loss_ * n0 * t0,
+               -pull * t1 - held * n1 * n1 - loss_ * (n0 * t1 + n1 * t0), loss_ * n1 * t1},
+              from, to, breaks);
   }
 
  private:
-  double m_, rg2_, x_, y_;
+  RestitutionRoots roots(const CoulombParts& parts) const {
+    const auto [mass, rubbing] = parts;
+    const double curvature = mass * kept_ - rubbing, excess = mass + rubbing - loss_;
+    const double discriminant = rubbing * rubbing + curvature * excess;
+    if (!(discriminant > 0)) return {0, 0, 0, excess > 0};
+    const double root = std::sqrt(discriminant);
+    // Where rubbing takes more than restitution gives back, all restitutions above the lower one lose more.
+    const double high = curvature > 0 ? (rubbing + root) / curvature : std::numeric_limits<double>::infinity();
+    return {-excess / (rubbing + root), high, root, false};
+  }
+
+  // Adds the zeros in (from, to) of a polynomial, given by its coefficients, at which it changes sign.
+  static void add_zeros(const std::array<double, 4>& c, double from, double to, std::vector<double>& zeros) {
+    const auto value = [&](double mu) { return c[0] + mu * (c[1] + mu * (c[2] + mu * c[3])); };
+    std::array<double, 4> ends{from, to, to, to};  // between which it rises or falls
+    std::size_t count = 1;
+    const double half = c[2] * c[2] - 3 * c[3] * c[1];
+    if (half > 0) {
+      const double q = -(c[2] + std::copysign(std::sqrt(half), c[2]));
+      std::array<double, 2> turns{q / (3 * c[3]), c[1] / q};
+      if (turns[0] > turns[1]) std::swap(turns[0], turns[1]);
+      for (const double turn : turns)
+        if (turn > from && turn < to) ends[count++] = turn;
+    }
+    ends[count] = to;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double left = value(ends[i]), right = value(ends[i + 1]);
+      if (!(left * right < 0)) continue;
+      std::uintmax_t iterations = 60;
+      zeros.push_back(boost::math::tools::toms748_solve(value, ends[i], ends[i + 1], left, right,
+                                                        boost::math::tools::eps_tolerance<double>(48), iterations)
+                          .second);
+    }
+  }
+
+  double kept_, loss_, sticks_;
+  std::array<double, 2> normal_{}, tangential_{};  // change of the contact's speeds with the normal impulse: a - b mu
+  double sticking_mass_ = 0;
 };
+
+// Sums over the frictions of slipping feet with restitution in closed form, from one break to the next. At each the
+// density of a single friction may be an inverse square root: in the angle of which the friction is a cosine it is
+// smooth.
+template <class Add>
+void sum_over_friction(const CoulombCollision& collision, const Friction& friction, double restitution_sd, Add add) {
+  using Rule = boost::math::quadrature::gauss<double, 10>;
+  constexpr double panel_width = 3;  // in sds of both variables, along the line of equal loss
+  constexpr int most_panels = 40, samples = 6;
+  std::vector<double> breaks{std::max(0.0, friction.mean() - farthest_score * friction.sd()),
+                             std::min(collision.sticking_friction(), friction.mean() + farthest_score * friction.sd())};
+  const double from = breaks[0], to = breaks[1];
+  if (!(from < to)) return;
+  collision.add_breaks(from, to, breaks);
+  std::sort(breaks.begin(), breaks.end());
+  for (std::size_t i = 0; i + 1 < breaks.size(); ++i) {
+    const double middle = (breaks[i] + breaks[i + 1]) / 2, half = (breaks[i + 1] - breaks[i]) / 2;
+    if (const RestitutionRoots none = collision.slipping(middle); none.root == 0 && !none.all_more) continue;
+    const auto at = [&](double angle) { return middle - half * std::cos(angle); };
+    const auto inside = [](double eta) { return std::clamp(eta, 0.0, 1.0); };
+    double width = 0;
+    RestitutionRoots before = collision.slipping(at(0));
+    for (int k = 1; k <= samples; ++k) {
+      const double angle = std::numbers::pi * k / samples;
+      const RestitutionRoots here = collision.slipping(at(angle));
+      const double restitution = std::max(std::abs(inside(here.low) - inside(before.low)),
+                                          std::abs(inside(here.high) - inside(before.high)));
+      width += std::hypot((at(angle) - at(angle - std::numbers::pi / samples)) / friction.sd(),
+                          restitution / restitution_sd);
+      before = here;
+    }
+    const int panels = width < most_panels * panel_width ? static_cast<int>(width / panel_width) + 1 : most_panels;
+    const double step = std::numbers::pi / (2 * panels);
+    for (int panel = 0; panel < panels; ++panel)
+      for (std::size_t k = 0; k < Rule::abscissa().size(); ++k)
+        for (const double side : {-1.0, 1.0}) {
+          const double angle = step * (2 * panel + 1 + side * Rule::abscissa()[k]), mu = at(angle);
+          add(Rule::weights()[k] * step * half * std::sin(angle) * friction.density(mu), collision.slipping(mu));
+        }
+  }
+}
 
 }  // namespace
 
@@ -358,28 +458,20 @@ SpeedDensity CollisionDensity::coulomb(const Collision& c, double before, double
   const double loss_rate = after * speed / unit;
   const Friction friction(contact_, change);
   const Restitution restitution(contact_, change, restitution_mass_);
-  const CoulombCollision collision(model_, c);
+  const CoulombCollision collision(model_, c, 1 - change.rebound_lost, loss);
 
   SpeedDensity result;
-  const auto add = [&](double weight, const CoulombParts& parts) {
-    const auto [mass, rubbing] = parts;
-    const double curvature = mass * (1 - change.rebound_lost) - rubbing;
-    if (!(curvature > 1e-9 * mass)) return;  // rubbing takes more than any restitution gives back
-    const double discriminant = rubbing * rubbing + curvature * (mass + rubbing - loss);
-    if (!(discriminant > 0)) return;  // every restitution loses less
-    const double root = std::sqrt(discriminant);
-    const double high = (rubbing + root) / curvature, low = (rubbing - root) / curvature;
-    result.below += weight * (restitution.below(high) - restitution.below(low));
-    result.density += weight * (restitution.density(high) + restitution.density(low)) * loss_rate / (2 * root);
+  const auto add = [&](double weight, const RestitutionRoots& roots) {
+    if (roots.root == 0) {
+      if (roots.all_more) result.below += weight;
+      return;
+    }
+    result.below += weight * (restitution.below(roots.high) - restitution.below(roots.low));
+    result.density +=
+        weight * (restitution.density(roots.high) + restitution.density(roots.low)) * loss_rate / (2 * roots.root);
   };
-  const double critical = coulomb_sticking_friction(model_, c);
-  add(friction.above(critical), collision.sticking());
-  const double from = -friction.mean() / friction.sd(), to = (critical - friction.mean()) / friction.sd();
-  const double mass_above_zero = normal_cdf(-from);
-  const double spacing = collision.spacing(restitution, std::min(friction.mean(), critical), friction.sd());
-  score_nodes(from, to, spacing, [&](double score, double weight) {
-    add(weight / mass_above_zero, collision.slipping(friction.mean() + friction.sd() * score));
-  });
+  add(friction.above(collision.sticking_friction()), collision.sticking());
+  sum_over_friction(collision, friction, restitution.sd(), add);
   result.below = std::clamp(result.below, 0.0, 1.0);
   return result;
 }

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include "dynamics/return_map/landing_density.h"
 #include "dynamics/return_map/rest_probability.h"
+#include "dynamics/wheel/truncated_normal.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics {
@@ -88,7 +91,9 @@ INSTANTIATE_TEST_SUITE_P(Laws, AgainstTheExactDensity,
                                            std::tuple{Law::published, 7.02, ContactSpread{0.4, 0.05, 0.3, 0.05}, 1e-4},
                                            std::tuple{Law::published, 7.02, ContactSpread{0.5, 0.09, 0.03, 0.05}, 1e-3},
                                            std::tuple{Law::published, 9.59, ContactSpread{0.5, 0.05, 0.1, 0.05}, 2e-3},
-                                           std::tuple{Law::coulomb, 7.02, ContactSpread{0.4, 0.05, 0.45, 0.03}, 5e-4}));
+                                           std::tuple{Law::coulomb, 7.02, ContactSpread{0.4, 0.05, 0.45, 0.03}, 5e-4},
+                                           std::tuple{Law::coulomb, 9.59, ContactSpread{0.4, 0.1, 0.4, 0.1}, 5e-4},
+                                           std::tuple{Law::coulomb, 9.59, ContactSpread{0.4, 0.1, 0.3, 0.05}, 5e-4}));
 
 TEST(CollisionDensity, IsTheDerivativeOfItsDistribution) {
   for (const Law law : {Law::published, Law::coulomb}) {
@@ -107,6 +112,66 @@ TEST(CollisionDensity, IsTheDerivativeOfItsDistribution) {
                   2e-4 + 2e-3 * at(plus).density)
           << plus;
     }
+  }
+}
+
+// Frictions of which the largest loss is the one that was lost have an infinite density each: nodes between which it
+// lies must know of it, or densities and slopes are noise.
+TEST(CollisionDensity, UnderCoulombTheLargestLossOfAFrictionLeavesNoTrace) {
+  for (const auto& [contact, rebound_lost] : {std::pair{ContactSpread{0.4, 0.1, 0.4, 0.1}, 0.0},
+                                              std::pair{ContactSpread{0.4, 0.1, 0.3, 0.05}, 0.0},
+                                              std::pair{ContactSpread{0.3, 0.1, 0.2, 0.1}, 0.0},
+                                              std::pair{ContactSpread{0.4, 0.05, 0.3, 0.05}, 0.5},
+                                              std::pair{ContactSpread{0.4, 0.1, 0.2, 0.1}, 0.95}}) {
+    const WheelMap map = uneven(Law::coulomb, 9.59, contact);
+    const CollisionDensity fast(map.contact_model(), contact);
+    const double omega = 5.5, step = 5e-4;
+    const auto at = [&](double plus) {
+      return fast.at(map.collision(7, omega), inertia_before(map, 7), map.stance(7).inertia,
+                     {.rebound_lost = rebound_lost}, plus);
+    };
+    // Below lies the integrable pole of feet that stick and do not spring.
+    for (double plus = 4.05; plus < 5.4; plus += 0.013) {
+      const double density = at(plus).density;
+      EXPECT_NEAR((at(plus + step).below - at(plus - step).below) / (2 * step), density, 5e-3 + 1e-3 * density)
+          << plus << ' ' << contact.friction_mean << ' ' << rebound_lost;
+    }
+  }
+}
+
+// Scores of the law's own draws at the true contact are uniform: Kolmogorov-Smirnov, and the sum of their squares.
+TEST(CollisionDensity, UnderCoulombScoresOfItsOwnDrawsAreUniform) {
+  constexpr int draws = 8000;
+  for (const ContactSpread& contact : {ContactSpread{0.4, 0.1, 0.4, 0.1}, ContactSpread{0.4, 0.1, 0.3, 0.05},
+                                       ContactSpread{0.4, 0.1, 0.2, 0.1}}) {
+    const WheelMap map = uneven(Law::coulomb, 9.59, contact);
+    const CollisionDensity fast(map.contact_model(), contact);
+    std::mt19937_64 generator(11);
+    std::normal_distribution<double> normal;
+    const auto drawn_in = [&](double mean, double sd, double most) {
+      double value = -1;
+      while (value < 0 || value > most) value = mean + sd * normal(generator);
+      return value;
+    };
+    const double omega = 5.5, before = inertia_before(map, 3), after = map.stance(3).inertia;
+    const Collision collision = map.collision(3, omega);
+    std::vector<double> scores;
+    double squares = 0;
+    for (int i = 0; i < draws; ++i) {
+      const Contact drawn{drawn_in(contact.restitution_mean, contact.restitution_sd, 1),
+                          drawn_in(contact.friction_mean, contact.friction_sd, 10)};
+      const double lost = collide(map.contact_model(), collision, drawn).total();
+      const double plus = std::sqrt((before * omega * omega - 2 * lost) / after);
+      scores.push_back(fast.at(collision, before, after, {}, plus).below);
+      squares += std::pow(normal_quantile(std::clamp(scores.back(), 1e-12, 1 - 1e-12)), 2);
+    }
+    std::sort(scores.begin(), scores.end());
+    double farthest = 0;
+    for (int i = 0; i < draws; ++i)
+      farthest = std::max({farthest, (i + 1.0) / draws - scores[static_cast<std::size_t>(i)],
+                           scores[static_cast<std::size_t>(i)] - static_cast<double>(i) / draws});
+    EXPECT_LT(farthest, 1.95 / std::sqrt(draws)) << contact.friction_mean;  // at 0.1 %
+    EXPECT_NEAR(squares / draws, 1, 3.3 * std::sqrt(2.0 / draws)) << contact.friction_mean;
   }
 }
 
