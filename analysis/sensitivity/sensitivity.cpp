@@ -215,11 +215,8 @@ Sensitivities sensitivities(const Metastability& study, const StudyOptions& opti
   if (!study.setting) throw std::invalid_argument("sensitivities: the study is not of a wheel's setting");
   const Setting& setting = *study.setting;
   if (std::isinf(study.steps.from_start.value)) return {{}, "the expected steps are infinite or not resolved"};
-  const dynamics::ContactNoise noise = setting.noise();
-  const bool constant =
-      noise.is_empirical() ? noise.pairs().size() == 1 : noise.restitution().constant() && noise.friction().constant();
-  if (constant || setting.law == dynamics::Law::plastic)
-    return {{}, "without noise the steps are a staircase in every parameter"};
+  if (setting.noise_free()) return {{}, "without noise the steps are a staircase in every parameter"};
+  if (study.method == Method::followed) return {{}, "the noise is too narrow for cells of states"};
   if (setting.law == dynamics::Law::settled && options.direct)
     return {{}, "landings that are all followed would take hours for them; leave out --direct"};
   if (setting.law == dynamics::Law::settled && (!setting.pairs.empty() || setting.correlation != 0))

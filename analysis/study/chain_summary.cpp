@@ -19,7 +19,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double quantile_levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
 constexpr std::size_t least_survival = 64, most_survival = 10000;  // values of the curve
 constexpr std::size_t violation_draws = 65536, launch_violation_draws = 4096, fewest_violation_draws = 16;
 constexpr double least_violated = 1e-9;  // share of collisions at a state
@@ -83,22 +82,11 @@ MeanSd relaunched(const Problem& problem, std::span<const double> states, const 
   return observe(problem, states, markov::stationary_with_restart(solver, launch.after));
 }
 
-// Does the noise leave the landings of the launches alone? Then the chain is an orbit smeared over cells: nilpotent but
-// for rounding, without a spectrum beyond lambda_1 that means anything.
-bool noise_free(const Problem& problem) {
-  for (const double score : {-2.0, -1.0, 0.0, 1.0, 2.0}) {
-    const auto range = problem.map.landing_range(problem.launch.state(score), problem.launch.phase);
-    if (!range || range->first != range->second) return false;
-  }
-  return true;
-}
-
 // Returns the moduli per step of the eigenvalues of a chain watched once a revolution of `period` steps. It is lambda_1
-// alone for a map without noise, and where Spectra does not converge (its message is then added to `message`).
-std::vector<double> moduli_per_step(const Problem& problem, const markov::Chain& revolution, int period, int count,
-                                    double failure_rate, std::string& message) {
+// alone where Spectra does not converge (its message is then added to `message`).
+std::vector<double> moduli_per_step(const markov::Chain& revolution, int period, int count, double failure_rate,
+                                    std::string& message) {
   const std::vector<double> first{1 - failure_rate};
-  if (noise_free(problem)) return first;
   constexpr double rounding = 1e-13;  // of a revolution's eigenvalue: below it a modulus means nothing
   std::vector<double> moduli;
   try {
@@ -190,13 +178,12 @@ markov::QuasiStationary regime_of(const markov::ChainSolver& solver, const std::
   return quasi;
 }
 
-// Counts to the end of the course, where that is not too far.
+}  // namespace
+
 std::size_t survival_steps(const Problem& problem) {
   const auto course = static_cast<std::size_t>(problem.last_event.value_or(0)) + 1;
   return std::clamp(course, least_survival, most_survival);
 }
-
-}  // namespace
 
 SolvedChain::SolvedChain(const markov::SampledChain& sampled, const std::vector<std::uint32_t>& regime)
     : solver(sampled.chain),
@@ -275,7 +262,7 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
   if (problem.last_event) result.steps.reach_end = survival.at(*problem.last_event);
 
   if (!options.brief) {
-    result.spectrum.moduli = moduli_per_step(problem, solver.revolution(), result.spectrum.period, options.eigenvalues,
+    result.spectrum.moduli = moduli_per_step(solver.revolution(), result.spectrum.period, options.eigenvalues,
                                              quasi.failure_rate, result.message);
     result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
     if (goes_on(launch))
@@ -342,7 +329,7 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   const markov::Chain closed = sampled.chain.restricted_to(recurrent);
   const markov::Period period = markov::find_period(closed);
   result.spectrum.period = period.period;
-  result.spectrum.moduli = moduli_per_step(problem, markov::revolution_chain(closed, period), period.period,
+  result.spectrum.moduli = moduli_per_step(markov::revolution_chain(closed, period), period.period,
                                            options.eigenvalues, 0.0, result.message);
   result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
   describe_survivors(problem, space, midpoints(space), stationary, result);

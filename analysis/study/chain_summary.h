@@ -37,6 +37,12 @@ struct ChainSteps {
 ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space, const SolvedChain& solved,
                        const std::vector<markov::DrawOptions>& draws);
 
+/// Are the levels of all quantiles.
+inline constexpr double quantile_levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
+
+/// Counts the values of the survival curve that a study gives: to the end of the course, where that is not too far.
+std::size_t survival_steps(const Problem& problem);
+
 /// Returns what a study says where rest is too rare for it. @param message  follows "rest is possible, but "
 Metastability rest_unresolved(const Problem& problem, const StudyOptions& options, const std::string& message);
 

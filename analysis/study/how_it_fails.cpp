@@ -194,10 +194,8 @@ LastMoments nothing(const char* reason) {
 
 LastMoments how_it_fails(const Setting& setting, const Metastability& study, const StudyOptions& options) {
   if (std::isinf(study.steps.from_start.value)) return nothing("the expected steps are infinite or not resolved");
-  const dynamics::ContactNoise noise = setting.noise();
-  const bool constant =
-      noise.is_empirical() ? noise.pairs().size() == 1 : noise.restitution().constant() && noise.friction().constant();
-  if (constant || setting.law == dynamics::Law::plastic) return nothing("without noise every step is the same");
+  if (setting.noise_free()) return nothing("without noise every step is the same");
+  if (study.method == Method::followed) return nothing("the noise is too narrow for cells of states");
   const Problem problem = setting.problem({options.direct, options.threads});
   const StudyOptions own = deep_enough(options, study.spectrum.failure_rate.value);
   const bool beside = study.steps.safe_state.has_value();

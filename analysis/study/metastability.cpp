@@ -11,6 +11,7 @@
 #include "analysis/statistics/t_interval.h"
 #include "analysis/study/chain_summary.h"
 #include "analysis/study/consistency.h"
+#include "analysis/study/followed_study.h"
 #include "analysis/study/integrated_study.h"
 #include "analysis/study/landing_error.h"
 #include "analysis/study/pilot.h"
@@ -289,6 +290,7 @@ class Study {
 }  // namespace
 
 void StudyOptions::validate() const {
+  if (method == Method::followed) throw std::invalid_argument("method: followed is none that can be asked for");
   if (cells != 0 && (cells < 8 || cells > 4096))
     throw std::invalid_argument(fmt::format("cells: {} is outside 8..4096", cells));
   if (samples != 0 && (samples < 16 || samples > (1u << 24)))
@@ -310,10 +312,12 @@ void StudyOptions::validate() const {
 Metastability study(const Problem& problem, const StudyOptions& options) {
   options.validate();
   try {
-    Metastability result =
-        options.method == Method::integrated ? integrated_study(problem, options) : Study(problem, options).run();
+    Metastability result = without_noise(problem)                 ? followed_study(problem, options)
+                           : options.method == Method::integrated ? integrated_study(problem, options)
+                                                                  : Study(problem, options).run();
     require_consistent(result);
     require_followed(problem, result, options);
+    result = held_against_trials(problem, std::move(result), options);
     // Interpolated rows keep to that within their error; a curve that rises in its ninth digit is not to be shown.
     for (std::size_t n = 1; n < result.steps.survival.size(); ++n)
       result.steps.survival[n] = std::min(result.steps.survival[n], result.steps.survival[n - 1]);
@@ -365,7 +369,9 @@ std::optional<double> Accumulated::quantile(double level) const {
   return std::nullopt;
 }
 
-std::string_view method_name(Method method) { return method == Method::sampled ? "sampled" : "integrated"; }
+std::string_view method_name(Method method) {
+  return method == Method::sampled ? "sampled" : method == Method::integrated ? "integrated" : "followed";
+}
 
 Method method_from_name(std::string_view name) {
   for (const Method method : {Method::sampled, Method::integrated})

@@ -36,6 +36,7 @@ namespace metastable::analysis {
 enum class Method {
   sampled,     ///< by draws of the noise in every cell
   integrated,  ///< from the landing's density on Gauss-Legendre nodes (integrated_study.h)
+  followed,    ///< none: launches are followed one by one. Only of results (followed_study.h)
 };
 
 struct StudyOptions {
@@ -168,7 +169,8 @@ struct Metastability {
 /// cell sizes of the chain of all replicates' draws; everything else is read off that chain at the finest size.
 /// The 95 % interval is a t-interval over the replicates' extrapolations and, as an independent error, a third of the
 /// difference of the last two extrapolations of all draws.
-/// Method::integrated: integrated_study().
+/// Method::integrated: integrated_study(). A problem without noise is followed whatever the method
+/// (followed_study()), and every chain's answer is held against trials (held_against_trials()).
 /// @throws std::invalid_argument for options out of range; markov::ConvergenceError when a solver fails or the results
 /// contradict each other (consistency.h)
 Metastability study(const Problem& problem, const StudyOptions& options = {});
@@ -184,9 +186,9 @@ Metastability study(const Setting& setting, const StudyOptions& options = {});
 
 /// Returns "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.
 std::string status_text(Status status);
-/// Returns "sampled", "integrated".
+/// Returns "sampled", "integrated", "followed".
 std::string_view method_name(Method method);
-/// @throws std::invalid_argument naming the two
+/// Takes what may be asked for. @throws std::invalid_argument naming the two
 Method method_from_name(std::string_view name);
 
 }  // namespace metastable::analysis

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -30,12 +32,36 @@ void require_spread(const std::string& name, const Spread& spread, const std::st
   require_range(name + ": sd", spread.sd, unit, range);
 }
 
+// Follows a wheel under `settled` whose contact never changes.
+std::function<Run(double, int)> rolls(std::shared_ptr<const dynamics::SettledMotion> motion,
+                                      const dynamics::ContactNoise& noise) {
+  const std::vector<double> middle(static_cast<std::size_t>(noise.dimension()));
+  return [motion = std::move(motion), contact = noise.draw(middle)](double state, int phase) -> Run {
+    return [motion, contact, roll = dynamics::SettledRoll(*motion, phase, std::sqrt(state), contact, contact),
+            seconds = 0.0, metres = 0.0]() mutable -> std::optional<FollowedEvent> {
+      if (!roll.step().touched) return std::nullopt;
+      roll.set_contact(contact);
+      const FollowedEvent event{roll.spin() * roll.spin(), roll.time() - seconds, roll.position() - metres};
+      seconds = roll.time(), metres = roll.position();
+      return event;
+    };
+  };
+}
+
 }  // namespace
 
 dynamics::ContactNoise Setting::noise() const {
   if (!pairs.empty()) return dynamics::ContactNoise::empirical(pairs);
   return dynamics::ContactNoise::normal(restitution.mean, restitution.sd, friction.mean, friction.sd, correlation,
                                         law == dynamics::Law::settled ? dynamics::most_settled_restitution : 1);
+}
+
+bool Setting::noise_free() const {
+  if (law == dynamics::Law::plastic) return true;
+  const auto same = [&](const dynamics::Contact& one) {
+    return one.restitution == pairs.front().restitution && one.friction == pairs.front().friction;
+  };
+  return pairs.empty() ? restitution.sd == 0 && friction.sd == 0 : std::all_of(pairs.begin(), pairs.end(), same);
 }
 
 dynamics::SettledMotion Setting::motion() const {
@@ -107,6 +133,8 @@ Problem Setting::problem(const LandingOptions& landings) const {
   };
   const auto problem_of = [&](const auto& map) {
     Problem problem{map, {state, first_landing_leg % map.phases()}, [](double x) { return std::sqrt(x); }, {}, {}};
+    problem.observed = "omega-";
+    problem.observed_unit = " rad/s";
     std::vector<double> advance;
     for (int p = 0; p < map.phases(); ++p) advance.push_back(map.advance(p));
     if (std::isfinite(ramp_length))
@@ -115,7 +143,7 @@ Problem Setting::problem(const LandingOptions& landings) const {
   };
   if (law != dynamics::Law::settled) return problem_of(map());
   dynamics::SettledMapOptions options;
-  options.direct = landings.direct;
+  options.direct = landings.direct || noise_free();  // few landings are asked for then
   options.progress = landings.progress;
   options.executor = markov::on_threads(landings.threads);
   Problem problem = problem_of(dynamics::SettledReturnMap(wheel, slope_deg * std::numbers::pi / 180.0, noise(),
@@ -123,6 +151,7 @@ Problem Setting::problem(const LandingOptions& landings) const {
   problem.follow = [=, motion = motion(), noise = noise(), leg = first_landing_leg](auto seed, auto index, auto most) {
     return dynamics::steps_to_rest(motion, noise, speed, leg, seed, index, most);
   };
+  if (noise_free()) problem.run = rolls(std::make_shared<const dynamics::SettledMotion>(motion()), noise());
   return problem;
 }
 
