@@ -143,11 +143,11 @@ void describe_violations(const Problem& problem, const markov::StateSpace& space
 }
 
 // Finds ln of a revolution's survival in the quasi-stationary distribution, class by class.
-double log_survival_of_a_revolution(const markov::ChainSolver& solver, const markov::QuasiStationary& quasi) {
+double log_survival_of_a_revolution(const SolvedChain& solved) {
   double log_survival = 0;
-  for (const std::vector<std::uint32_t>& of_class : solver.period().classes) {
+  for (const std::vector<std::uint32_t>& of_class : solved.solver.period().classes) {
     double rest = 0;
-    for (const std::uint32_t i : of_class) rest += quasi.distribution[i] * solver.chain().kill(i);
+    for (const std::uint32_t i : of_class) rest += solved.survivors[i] * solved.solver.chain().kill(i);
     log_survival += std::log1p(-std::min(1.0, rest));
   }
   return log_survival;
@@ -162,12 +162,13 @@ Accumulated accumulated(const markov::Moments& moments, const std::vector<double
 // Finds the regime of the survivors among `states` alone (none: all). Cells that only a fast launch passes are wide
 // enough to lead back into themselves, which no wheel does; they would pass for a regime of their own.
 markov::QuasiStationary regime_of(const markov::ChainSolver& solver, const std::vector<std::uint32_t>& states) {
-  if (states.empty()) return markov::quasi_stationary(solver);
+  constexpr auto few = markov::FewSurvivors::unsettled;  // where hardly anybody survives, there is no regime to tell of
+  if (states.empty()) return markov::quasi_stationary(solver, few);
   const markov::ChainSolver inside(solver.chain().restricted_to(states));
-  if (inside.period().period != solver.period().period) return markov::quasi_stationary(solver);
-  markov::QuasiStationary quasi = markov::quasi_stationary(inside);
+  if (inside.period().period != solver.period().period) return markov::quasi_stationary(solver, few);
+  markov::QuasiStationary quasi = markov::quasi_stationary(inside, few);
   // Where rest is rare no such cell keeps anything as long, and the few who leave the states would count as failures.
-  if (quasi.failure_rate < frequent_rest) return markov::quasi_stationary(solver);
+  if (quasi.failure_rate < frequent_rest) return markov::quasi_stationary(solver, few);
   const auto scatter = [&](std::vector<double>& vector) {
     std::vector<double> all(solver.chain().size(), 0.0);
     for (std::size_t i = 0; i < states.size(); ++i) all[states[i]] = vector[i];
@@ -189,6 +190,7 @@ SolvedChain::SolvedChain(const markov::SampledChain& sampled, const std::vector<
     : solver(sampled.chain),
       mean(markov::mean_first_passage(solver)),
       quasi(regime_of(solver, regime)),
+      survivors(markov::shares_in_classes(solver.period(), quasi.distribution)),
       from_start(1 + dot(sampled.launch.after, mean)) {}
 
 Metastability rest_unresolved(const Problem& problem, const StudyOptions& options, const std::string& message) {
@@ -256,7 +258,7 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
   result.agreements.push_back(
       {"expected steps, solved and summed over survival", result.steps.distribution.mean, survival.mean(), same_sum});
   result.agreements.push_back({"failure rate of a revolution, and that of its survivors", quasi.revolution_failure_rate,
-                               -std::expm1(log_survival_of_a_revolution(solver, quasi)), same_chain});
+                               -std::expm1(log_survival_of_a_revolution(solved)), same_chain});
   const std::size_t shown = survival_steps(problem);
   for (std::size_t n = 0; n < shown; ++n) result.steps.survival.push_back(survival.at(static_cast<double>(n)));
   if (problem.last_event) result.steps.reach_end = survival.at(*problem.last_event);
@@ -269,14 +271,14 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
       result.spectrum.total_variation_steps =
           markov::total_variation_mixing(solver, quasi, launch.after, options.mixing_distance);
   }
-  describe_survivors(problem, space, states, quasi.distribution, result);
+  describe_survivors(problem, space, states, solved.survivors, result);
   const bool regime = 1 - quasi.failure_rate > least_regime;
   if (!regime) result.survivors.mean = result.survivors.sd = std::numeric_limits<double>::quiet_NaN();
   const MeanSd again = relaunched(problem, states, solver, launch);
   result.survivors.restart_mean = again.mean;
   result.survivors.restart_sd = again.sd;
   if (!options.brief)
-    describe_violations(problem, space, quasi.distribution, solver.solve_left(launch.after), options, result);
+    describe_violations(problem, space, solved.survivors, solver.solve_left(launch.after), options, result);
   if (!regime)
     for (ViolationShare& share : result.violations)
       share.quasi_stationary = share.quasi_stationary_error = std::numeric_limits<double>::quiet_NaN();
@@ -292,7 +294,7 @@ void summarize(const Problem& problem, const markov::StateSpace& space, std::spa
 void compare_survivors(const Problem& problem, std::span<const double> states, const markov::SampledChain& sampled,
                        const SolvedChain& solved, Metastability& result) {
   Survivors& fine = result.survivors;
-  const MeanSd coarse = observe(problem, states, solved.quasi.distribution),
+  const MeanSd coarse = observe(problem, states, solved.survivors),
                again = relaunched(problem, states, solved.solver, sampled.launch);
   if (!std::isnan(fine.mean)) fine.error = std::max(std::abs(fine.mean - coarse.mean), std::abs(fine.sd - coarse.sd));
   if (!std::isnan(fine.restart_mean))

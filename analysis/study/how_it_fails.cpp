@@ -56,7 +56,7 @@ class Failures {
     markov::parallel_for(noise_.size(), options_.threads, [&](std::size_t p) { weigh(static_cast<int>(p)); });
     for (std::size_t k = 0; k < last_.share.size(); ++k)
       told.last.push_back(profile(last_.share[k], static_cast<int>(k)));
-    told.regime = profile(solved_.quasi.distribution, -1);
+    told.regime = profile(solved_.survivors, -1);
     told.by_phase.assign(static_cast<std::size_t>(space_.phases()), 0.0);
     for (std::size_t i = 0; i < space_.size(); ++i)
       told.by_phase[static_cast<std::size_t>(space_.phase(i))] += last_.share[0][i] * (1 - sampled_.launch.rest);
@@ -78,7 +78,7 @@ class Failures {
   std::vector<std::uint8_t> middle_of_regime() const {
     std::vector<double> states;
     for (std::size_t i = 0; i < space_.size(); ++i) states.push_back(state(i));
-    const double median = middle_90(states, solved_.quasi.distribution).value;
+    const double median = middle_90(states, solved_.survivors).value;
     std::vector<std::uint8_t> set;
     for (const double one : states) set.push_back(one >= median);
     return set;

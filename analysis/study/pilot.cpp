@@ -67,14 +67,15 @@ std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& opt
     }
     if (!rests(sampled)) return std::nullopt;
     const markov::ChainSolver solver(sampled.chain);
-    const markov::QuasiStationary quasi = markov::quasi_stationary(solver);
-    if (markov::top_share(space, quasi.distribution) < 1e-10 || reach > 1e6)
+    const markov::QuasiStationary quasi = markov::quasi_stationary(solver, markov::FewSurvivors::unsettled);
+    const std::vector<double> nu = markov::shares_in_classes(solver.period(), quasi.distribution);
+    if (markov::top_share(space, nu) < 1e-10 || reach > 1e6)
       return Pilot{space,
-                   quasi.distribution,
+                   nu,
                    quasi.survival_weight,
                    early_visits(sampled),
                    beside,
-                   cells > pilot_cells ? top_of(space, quasi.distribution) : std::numeric_limits<double>::infinity()};
+                   cells > pilot_cells ? top_of(space, nu) : std::numeric_limits<double>::infinity()};
   }
 }
 

@@ -59,7 +59,7 @@ double by_launch(const markov::Launch& launch, const std::vector<double>& mean) 
 void answer(Verified& result) {
   const markov::ChainSolver solver(result.chain.chain);
   result.from_start = by_launch(result.chain.launch, markov::mean_first_passage(solver));
-  result.failure_rate = markov::quasi_stationary(solver).failure_rate;
+  result.failure_rate = markov::quasi_stationary(solver, markov::FewSurvivors::unsettled).failure_rate;
   result.from_quasi_stationary = 1 / result.failure_rate;
 }
 

@@ -296,7 +296,8 @@ RewardMixture::RewardMixture(const ChainSolver& solver, const QuasiStationary& q
       rest_at_launch_(launch.rest),
       log_factor_(std::log1p(-quasi.revolution_failure_rate)),
       largest_reward_(*std::max_element(reward.begin(), reward.end())) {
-  drift_ = dot(quasi.distribution, reward) / total(quasi.distribution);
+  const Row in_classes = shares_in_classes(solver.period(), quasi.distribution);  // a step in each class a revolution
+  drift_ = dot(in_classes, reward) / total(in_classes);
   const Row nothing(chain_.size(), 0.0);
   log_surviving_ = log_survival(total(launch.after), launch.rest);
   enter(launch.after, nothing, nothing, nothing);

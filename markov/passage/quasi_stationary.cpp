@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -11,14 +12,17 @@ namespace metastable::markov {
 namespace {
 
 constexpr int kIterations = 10000;     // of interpolated rows
-constexpr int kPatience = 500;         // of all others, before each iteration gets a shift and an elimination
-constexpr int kShifted = 100;          // iterations with a shift
+constexpr int kPatience = 500;         // of all others, before leading_pair() is asked
+constexpr std::size_t kSmall = 64;     // states, of which leading_pair() is asked at once
+constexpr std::size_t kWhole = 512;    // states of a cyclic chain, up to which leading_pair() takes all of them
+constexpr double kSameEnd = 1e-9;      // of two starts, relative
+constexpr double kWorstResidual = 1e-8;
 constexpr double kSmallEntry = 1e-12;  // of the largest: below it an entry's relative change is not watched
 constexpr double kAccuracy = 1e-13;    // wanted of an entry, relative
 constexpr double kRounding = 1e-11;    // a change that has stopped falling below this is rounding
 constexpr int kStagnant = 8;           // iterations without a smaller change
 constexpr double kRateAccuracy = 1e-14;
-constexpr double kStays = 1e-12;
+constexpr double kStays = 1e-12;        // a probability of staying below it is the rounding of a row sum
 constexpr double kNobody = 1e-13;        // lambda_1 of interpolated rows from which nobody survives: rounding
 constexpr int kNobodyLeft = 100;         // iterations spent on its vectors
 constexpr double kHardlyAnybody = 1e-6;  // lambda_1 of rows that keep so few that neighbouring eigenvalues are rounding
@@ -45,7 +49,8 @@ double relative_change(const std::vector<double>& before, const std::vector<doub
 class StoppingRule {
  public:
   bool done(double change) {
-    const double ratio = std::clamp(change / previous_, 0.0, 0.9999);
+    // Of the first change it is not known how it falls.
+    const double ratio = std::isinf(previous_) ? kSlowest : std::clamp(change / previous_, 0.0, kSlowest);
     previous_ = change;
     stagnant_ = change < smallest_ ? 0 : stagnant_ + 1;
     smallest_ = std::min(smallest_, change);
@@ -53,17 +58,19 @@ class StoppingRule {
   }
 
  private:
+  static constexpr double kSlowest = 0.9999;
   double previous_ = std::numeric_limits<double>::infinity();
   double smallest_ = std::numeric_limits<double>::infinity();
   int stagnant_ = 0;
 };
 
-struct LeadingPair {
+struct IteratedPair {
   std::vector<double> left;   ///< sum 1
   std::vector<double> right;  ///< max 1
   double rate = 1;
   int iterations = 0;
   double residual = 0;
+  bool settled = true;
 };
 
 /// Is true when no state can be visited twice: lambda_1 = 0.
@@ -88,9 +95,9 @@ bool never_returns(const Chain& chain) {
 
 /// Returns the eigenvectors of a chain that never returns (eigenvalue 0): the last survivors of an even start, and the
 /// states survival from which lasts longest.
-LeadingPair last_survivors(const Chain& chain) {
+IteratedPair last_survivors(const Chain& chain) {
   const std::size_t n = chain.size();
-  LeadingPair pair;
+  IteratedPair pair;
   pair.left.assign(n, 1.0 / static_cast<double>(n));
   pair.right.assign(n, 1.0);
   for (;; ++pair.iterations) {
@@ -103,7 +110,10 @@ LeadingPair last_survivors(const Chain& chain) {
       }
     }
     const double survivors = total(left);
-    if (survivors == 0) return pair;
+    if (survivors == 0) {
+      pair.settled = false;  // there is no rate to tell of
+      return pair;
+    }
     divide(left, survivors);
     divide(right, *std::max_element(right.begin(), right.end()));
     pair.left = std::move(left);
@@ -117,68 +127,41 @@ std::string still_changing(int iterations) {
          "apart";
 }
 
-/// Goes on with (sigma I - Q)^{-1} where sigma is the largest (Qx)_i / x_i, hardly above lambda_1 (Noda 1971): it tells
-/// neighbouring eigenvalues apart by squaring the error each time. Solved for x_i = 1 (Doob's transform), the matrix is
-/// again a chain, which rests from state i with probability 1 - (Qx)_i / (sigma x_i).
-LeadingPair iterate_shifted(const Chain& chain, LeadingPair pair) {
-  const std::size_t n = chain.size();
-  for (double& entry : pair.right) entry = std::max(entry, std::numeric_limits<double>::min());
-  for (int k = 0; k < kShifted; ++k, ++pair.iterations) {
-    std::vector<double>&x = pair.right, growth(n);  // (Qx)_i / x_i; (Qx)_i itself may be too small for doubles
-    for (std::size_t i = 0; i < n; ++i) {
-      growth[i] = chain.stay(i);
-      const auto to = chain.columns(i);
-      for (std::size_t e = 0; e < to.size(); ++e) growth[i] += chain.values(i)[e] * (x[to[e]] / x[i]);
-    }
-    const double shift =
-        *std::max_element(growth.begin(), growth.end()) * (1 + 8 * std::numeric_limits<double>::epsilon());
-    std::vector<std::size_t> start{0};
-    std::vector<std::uint32_t> column;
-    std::vector<double> value, kill, left(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto to = chain.columns(i);
-      for (std::size_t e = 0; e < to.size(); ++e) {
-        column.push_back(to[e]);
-        value.push_back(chain.values(i)[e] / shift * (x[to[e]] / x[i]));
-      }
-      start.push_back(column.size());
-      kill.push_back(std::max(0.0, 1 - growth[i] / shift));
-      left[i] = pair.left[i] * x[i];
-    }
-    const Elimination shifted(Chain(std::move(start), std::move(column), std::move(value), std::move(kill)));
-    left = shifted.solve_left(left);
-    std::vector<double> right = shifted.solve(std::vector<double>(n, 1.0));
-    for (std::size_t i = 0; i < n; ++i) {
-      left[i] /= x[i];
-      right[i] *= x[i];
-    }
-    divide(left, total(left));
-    divide(right, *std::max_element(right.begin(), right.end()));
-    for (double& entry : right) entry = std::max(entry, std::numeric_limits<double>::min());
-    pair.residual = std::max(relative_change(pair.left, left), relative_change(x, right));
-    pair.left = std::move(left);
-    pair.right = std::move(right);
-    if (pair.residual <= kRounding) return pair;
-  }
-  throw ConvergenceError("inverse iteration", pair.residual, still_changing(pair.iterations));
+/// Does one iteration of left vectors; returns what all entries sum to before the step, 1 / rate.
+double iterate_left(const Chain& chain, const Elimination& elimination, std::vector<double>& left) {
+  std::vector<double> next = elimination.solve_left(left);
+  const double visits = total(next);
+  next = apply_left(chain, next);
+  divide(next, total(next));
+  left = std::move(next);
+  return visits;
+}
+
+/// Goes from a start that favours some states to where the even one has ended. A component that fades so slowly that its
+/// changes pass for rounding is of another size there.
+double distance_between_ends(const Chain& chain, const Elimination& elimination, const IteratedPair& pair) {
+  constexpr double golden = 0.6180339887498949, least = 0.1;
+  std::vector<double> left(chain.size());
+  for (std::size_t i = 0; i < left.size(); ++i) left[i] = least + std::fmod(golden * static_cast<double>(i + 1), 1);
+  for (int k = 0; k < pair.iterations; ++k) iterate_left(chain, elimination, left);
+  return relative_change(left, pair.left);
 }
 
 /// Iterates with Q (I - Q)^{-1}, whose eigenvalues are lambda / (1 - lambda): lambda_2 fades at least as fast as under
-/// inverse iteration (rare rest) and as under plain iteration (frequent rest).
-LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
+/// inverse iteration (rare rest) and as under plain iteration (frequent rest). Returns nothing where that does not tell.
+std::optional<IteratedPair> iterate(const Chain& chain, const Elimination& elimination, FewSurvivors few) {
   const std::size_t n = chain.size();
-  LeadingPair pair;
+  const bool unsettled_ends = chain.interpolated() || few == FewSurvivors::unsettled;
+  IteratedPair pair;
   pair.left.assign(n, 1.0 / static_cast<double>(n));
   pair.right.assign(n, 1.0);
   StoppingRule left_rule, right_rule;
   bool left_done = false, right_done = false;
   while (pair.iterations < (chain.interpolated() ? kIterations : kPatience)) {
     ++pair.iterations;
-    std::vector<double> left = elimination.solve_left(pair.left);
-    const double rate = 1 / total(left);
-    left = apply_left(chain, left);
+    std::vector<double> left = pair.left;
+    const double rate = 1 / iterate_left(chain, elimination, left);
     std::vector<double> right = markov::apply(chain, elimination.solve(pair.right));
-    divide(left, total(left));
     divide(right, *std::max_element(right.begin(), right.end()));
 
     const double left_change = relative_change(pair.left, left);
@@ -191,33 +174,53 @@ LeadingPair iterate(const Chain& chain, const Elimination& elimination) {
     left_done = left_rule.done(left_change) || left_done;
     right_done = right_rule.done(right_change) || right_done;
     const bool settled = left_done && right_done && (rate_change <= kRateAccuracy || left_change <= kAccuracy);
-    if (settled) return pair;
-    if ((pair.iterations >= kNobodyLeft && std::abs(1 - rate) <= kNobody) ||
-        (pair.iterations >= kFewLeft && std::abs(1 - rate) <= kHardlyAnybody)) {
+    if (settled) {
+      if (chain.interpolated()) return pair;
+      pair.residual = std::max(pair.residual, distance_between_ends(chain, elimination, pair));
+      if (pair.residual > kSameEnd) return std::nullopt;
+      return pair;
+    }
+    if (unsettled_ends && ((pair.iterations >= kNobodyLeft && std::abs(1 - rate) <= kNobody) ||
+                           (pair.iterations >= kFewLeft && std::abs(1 - rate) <= kHardlyAnybody))) {
       // Of vectors that are still changing the rate is that of the survivors they tell of.
       pair.rate = 1 - std::clamp(total(apply_left(chain, pair.left)), 0.0, 1.0);
+      pair.settled = false;
       return pair;
     }
   }
   if (chain.interpolated())
     throw ConvergenceError("inverse iteration", pair.residual, still_changing(kIterations));
-  pair = iterate_shifted(chain, std::move(pair));
-  pair.rate = 1 / total(elimination.solve_left(pair.left));
-  return pair;
+  return std::nullopt;
 }
 
-/// Fills the classes after class 0 of a left eigenvector, each to sum one; classes no survivor reaches stay 0.
-void propagate_distribution(const Chain& chain, const Period& period, std::vector<double>& y) {
-  for (std::size_t c = 0; c + 1 < period.classes.size(); ++c) {
-    double sum = 0;
+/// Fills the classes after class 0 of a left eigenvector, y_{c+1} = y_c Q_c / lambda with lambda per step, from what is
+/// left after a revolution. Returns log lambda.
+double propagate_distribution(const Chain& chain, const Period& period, std::vector<double>& y) {
+  double log_survival = 0;  // each class is scaled on its way, so that none is lost
+  std::vector<double> log_mass{0};
+  for (std::size_t c = 0; c < period.classes.size(); ++c) {
+    double left = 0;
+    std::vector<double> next(y.size(), 0.0);
     for (const std::uint32_t i : period.classes[c]) {
       const auto to = chain.columns(i);
-      for (std::size_t e = 0; e < to.size(); ++e) y[to[e]] += y[i] * chain.values(i)[e];
+      for (std::size_t e = 0; e < to.size(); ++e) {
+        next[to[e]] += y[i] * chain.values(i)[e];
+        left += y[i] * chain.values(i)[e];
+      }
     }
-    for (const std::uint32_t j : period.classes[c + 1]) sum += y[j];
-    if (sum == 0) return;
-    for (const std::uint32_t j : period.classes[c + 1]) y[j] /= sum;
+    if (left == 0) break;
+    log_survival += std::log(std::abs(left));
+    log_mass.push_back(log_survival);
+    if (c + 1 < period.classes.size())
+      for (const std::uint32_t j : period.classes[c + 1]) y[j] = next[j] / left;
   }
+  const double log_lambda = log_survival / static_cast<double>(period.classes.size());
+  for (std::size_t c = 0; c < std::min(period.classes.size(), log_mass.size()); ++c) {
+    const double mass = std::exp(log_mass[c] - static_cast<double>(c) * log_lambda);
+    for (const std::uint32_t i : period.classes[c]) y[i] *= mass;
+  }
+  divide(y, total(y));
+  return log_lambda;
 }
 
 /// Fills the classes after class 0 of a right eigenvector: lambda x_c = Q_c x_{c+1} with lambda per step.
@@ -232,6 +235,80 @@ void propagate_weight(const Chain& chain, const Period& period, double lambda, s
   }
   const double largest = *std::max_element(x.begin(), x.end());
   divide(x, largest);
+}
+
+/// Tells of all cyclic classes what is known of class 0.
+QuasiStationary of_all_classes(const ChainSolver& solver, const IteratedPair& pair) {
+  const Period& period = solver.period();
+  const double revolution_rate = std::min(1.0, pair.rate);
+  QuasiStationary quasi{pair.left, pair.right, revolution_rate, revolution_rate, pair.iterations, pair.residual};
+  if (period.period == 1) return quasi;
+  quasi.failure_rate = -std::expm1(std::log1p(-revolution_rate) / period.period);
+  quasi.distribution.assign(solver.chain().size(), 0.0);
+  quasi.survival_weight.assign(solver.chain().size(), 0.0);
+  for (std::size_t i = 0; i < pair.left.size(); ++i) {
+    quasi.distribution[period.classes[0][i]] = pair.left[i];
+    quasi.survival_weight[period.classes[0][i]] = pair.right[i];
+  }
+  const double log_lambda = propagate_distribution(solver.chain(), period, quasi.distribution);
+  // Where most fail in a revolution, those who do not are known better than by difference.
+  if (revolution_rate > 0.5 && pair.settled && !solver.chain().interpolated()) {
+    quasi.failure_rate = -std::expm1(log_lambda);
+    quasi.revolution_failure_rate = -std::expm1(period.period * log_lambda);
+  }
+  propagate_weight(solver.chain(), period, 1 - quasi.failure_rate, quasi.survival_weight);
+  return quasi;
+}
+
+/// Takes the chain as it is, or, where that would take long, watched once a revolution.
+QuasiStationary by_classes(const ChainSolver& solver) {
+  const Period& period = solver.period();
+  if (period.period == 1 || solver.chain().size() <= kWhole) {
+    const LeadingPair exact = leading_pair(generator_of(solver.chain()));
+    const auto rate = static_cast<double>(exact.rate);
+    return {{exact.left.begin(), exact.left.end()},
+            {exact.right.begin(), exact.right.end()},
+            rate,
+            period.period == 1 ? rate : -std::expm1(period.period * std::log1p(-rate)),
+            exact.iterations,
+            exact.error};
+  }
+  try {
+    const LeadingPair exact = leading_pair(generator_of(solver.revolution()));
+    return of_all_classes(solver, {{exact.left.begin(), exact.left.end()},
+                                   {exact.right.begin(), exact.right.end()},
+                                   static_cast<double>(exact.rate),
+                                   exact.iterations,
+                                   exact.error});
+  } catch (const NotUnique& error) {
+    throw NotUnique(period.classes[0][error.one()], period.classes[0][error.other()], error.rate(), error.equal());
+  }
+}
+
+/// Returns the largest of |flow - (exit - rate) v| / (exit v): y Q - lambda y, or Q x - lambda x, over v's own terms.
+double residual_of(const Generator& generator, Extended rate, const std::vector<double>& vector, bool left) {
+  constexpr double least = 1e-290;  // products with smaller entries leave the range of doubles
+  std::vector<Extended> flow(vector.size(), 0);
+  for (std::size_t i = 0; i < vector.size(); ++i)
+    for (std::size_t e = generator.start[i]; e < generator.start[i + 1]; ++e)
+      (left ? flow[generator.column[e]] : flow[i]) +=
+          generator.rate[e] * static_cast<Extended>(vector[left ? i : generator.column[e]]);
+  Extended largest = 0;
+  for (std::size_t i = 0; i < vector.size(); ++i) {
+    const Extended exit = generator.exit(i), own = exit * static_cast<Extended>(vector[i]);
+    const Extended off = std::abs(flow[i] - (exit - rate) * static_cast<Extended>(vector[i]));
+    if (std::max(own, flow[i]) > least) largest = std::max(largest, off / std::max(own, flow[i]));
+  }
+  return static_cast<double>(largest);
+}
+
+void check_residual(const ChainSolver& solver, QuasiStationary& quasi) {
+  const Generator generator = generator_of(solver.chain());
+  for (const bool left : {true, false})
+    quasi.residual = std::max(quasi.residual, residual_of(generator, static_cast<Extended>(quasi.failure_rate),
+                                                          left ? quasi.distribution : quasi.survival_weight, left));
+  if (!(quasi.residual <= kWorstResidual))
+    throw ConvergenceError("inverse iteration", quasi.residual, "the vectors found are not those of the chain");
 }
 
 std::vector<std::uint32_t> marked_states(const std::vector<std::uint8_t>& marked) {
@@ -285,32 +362,33 @@ std::vector<std::uint32_t> closed_class(const Chain& chain, const std::vector<st
 
 }  // namespace
 
-QuasiStationary quasi_stationary(const ChainSolver& solver) {
+QuasiStationary quasi_stationary(const ChainSolver& solver, FewSurvivors few) {
   const Chain& revolution = solver.revolution();
-  const Period& period = solver.period();
   if (revolution.size() == 0) throw std::invalid_argument("quasi-stationary distribution: the chain has no states");
-  const LeadingPair pair =
-      never_returns(revolution) ? last_survivors(revolution) : iterate(revolution, solver.revolution_elimination());
-  QuasiStationary quasi;
-  quasi.iterations = pair.iterations;
-  quasi.residual = pair.residual;
-  quasi.revolution_failure_rate = std::min(1.0, pair.rate);
-  quasi.failure_rate = quasi.revolution_failure_rate;
-  if (period.period == 1) {
-    quasi.distribution = pair.left;
-    quasi.survival_weight = pair.right;
-    return quasi;
+  const bool unsettled = few == FewSurvivors::unsettled;
+  if (unsettled && never_returns(revolution)) return of_all_classes(solver, last_survivors(revolution));
+  if (!unsettled && never_returns(solver.chain())) {
+    IteratedPair last = last_survivors(solver.chain());
+    return {std::move(last.left), std::move(last.right), 1, 1, last.iterations, 0};
   }
-  quasi.failure_rate = -std::expm1(std::log1p(-quasi.revolution_failure_rate) / period.period);
-  quasi.distribution.assign(solver.chain().size(), 0.0);
-  quasi.survival_weight.assign(solver.chain().size(), 0.0);
-  for (std::size_t i = 0; i < pair.left.size(); ++i) {
-    quasi.distribution[period.classes[0][i]] = pair.left[i];
-    quasi.survival_weight[period.classes[0][i]] = pair.right[i];
+  std::optional<QuasiStationary> quasi;
+  if (unsettled || revolution.interpolated() || solver.chain().size() > kSmall) {
+    const std::optional<IteratedPair> pair = iterate(revolution, solver.revolution_elimination(), few);
+    if (pair) quasi = of_all_classes(solver, *pair);
+    if (pair && (!pair->settled || revolution.interpolated())) return *quasi;
   }
-  propagate_distribution(solver.chain(), period, quasi.distribution);
-  propagate_weight(solver.chain(), period, 1 - quasi.failure_rate, quasi.survival_weight);
-  return quasi;
+  if (!quasi) quasi = by_classes(solver);
+  check_residual(solver, *quasi);
+  return *quasi;
+}
+
+std::vector<double> shares_in_classes(const Period& period, std::vector<double> distribution) {
+  for (const std::vector<std::uint32_t>& states : period.classes) {
+    double sum = 0;
+    for (const std::uint32_t i : states) sum += distribution[i];
+    for (const std::uint32_t i : states) distribution[i] /= sum != 0 ? sum : 1;
+  }
+  return distribution;
 }
 
 std::vector<double> stationary(const Chain& chain, std::span<const double> start) {
@@ -354,6 +432,7 @@ std::optional<int> total_variation_mixing(const ChainSolver& solver, const Quasi
   const Period& period = solver.period();
   if (start.size() != chain.size()) throw std::invalid_argument("mixing: one start entry per state expected");
   if (!(distance > 0)) throw std::invalid_argument("mixing: the distance must be positive");
+  const std::vector<double> settled = shares_in_classes(period, quasi.distribution);
   std::vector<double> survivors(start.begin(), start.end());
   int within = 0;
   for (int step = 0; step <= limit; ++step) {
@@ -366,8 +445,8 @@ std::optional<int> total_variation_mixing(const ChainSolver& solver, const Quasi
     }
     double variation = 0;
     for (std::size_t i = 0; i < survivors.size(); ++i) {
-      const double settled = class_mass[static_cast<std::size_t>(period.state_class[i])] * quasi.distribution[i];
-      variation += 0.5 * std::abs(survivors[i] - settled);
+      const double expected = class_mass[static_cast<std::size_t>(period.state_class[i])] * settled[i];
+      variation += 0.5 * std::abs(survivors[i] - expected);
     }
     within = variation <= distance ? within + 1 : 0;
     if (within > period.period) return step - period.period;

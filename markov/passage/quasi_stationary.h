@@ -7,13 +7,15 @@
 
 #include "markov/chain/chain.h"
 #include "markov/chain/solver.h"
+#include "markov/passage/leading_pair.h"
 
 namespace metastable::markov {
 
 /// Describes how survivors of an absorbing chain behave (Byl & Tedrake 2009, their lambda_2 is lambda_1 here).
 struct QuasiStationary {
-  /// Is the left eigenvector of lambda_1 (size n), which says what survivors look like. For period d it is the
-  /// distribution per class: each class's entries sum to one (one distribution per landing leg).
+  /// Is the left eigenvector of lambda_1 (size n), y Q = lambda_1 y, sum 1, which says what survivors look like. For
+  /// period d > 1 survivors are in one cyclic class at a time, and the shares that classes have in it are those of
+  /// walkers spread over all of them; what survivors in one class look like is its part, see shares_in_classes().
   std::vector<double> distribution;
   /// Is the right eigenvector, max 1, which is the relative long-run survival from each state.
   std::vector<double> survival_weight;
@@ -23,19 +25,28 @@ struct QuasiStationary {
   /// It is 1 - lambda of one revolution (failure_rate when the period is 1).
   double revolution_failure_rate = 0;
   int iterations = 0;
-  double residual = 0;  ///< largest relative change of an entry > 1e-12 in the last iteration
+  /// Is the largest of: |y Q - lambda_1 y| and |Q x - lambda_1 x| entry by entry, relative to that entry times the
+  /// probability of leaving its state; and what is left of the error along other eigenvectors, relative, which these do
+  /// not show where states change places slowly.
+  double residual = 0;
 };
 
+enum class FewSurvivors { as_others, unsettled };
+
 /// Iterates inversely with the subtraction-free factors, each time followed by one step of the chain (iterates stay
-/// positive; an iteration shrinks the rest by (1 - lambda_1) |lambda_2| / (lambda_1 |1 - lambda_2|)). A chain that
-/// cannot visit a state twice has lambda_1 = 0: failure_rate = 1, and the distribution is that of the last survivors
-/// (zero on classes they do not reach). O(n^2) an iteration for full rows. Where 500 iterations were not enough,
-/// because |lambda_2| is nearly lambda_1, shifts follow (Noda, Numer. Math. 17, 1971), each with an elimination. Where
-/// nobody survives (lambda_1 < 1e-13) the vectors are those of 100 iterations, settled or not; where hardly anybody
-/// does (lambda_1 < 1e-6), those of 500.
-/// @throws ConvergenceError("inverse iteration", residual, ...) after 10000 iterations of interpolated rows, or 100
-/// shifts of others.
-QuasiStationary quasi_stationary(const ChainSolver& solver);
+/// positive; an iteration shrinks the rest by (1 - lambda_1) |lambda_2| / (lambda_1 |1 - lambda_2|)), from two starts.
+/// Chains of up to 64 states, and those for which 500 iterations were not enough or the starts lead to different ends,
+/// take leading_pair(). A chain that cannot visit a state twice has lambda_1 = 0: failure_rate = 1, and the distribution
+/// is that of the last survivors of an even start. O(n^2) an iteration for full rows.
+/// @param few  unsettled: where hardly anybody survives (lambda_1 < 1e-6) the vectors are those of 500 iterations,
+/// settled or not (of 100 for lambda_1 < 1e-13), and mean little. Interpolated rows are always taken so.
+/// @throws NotUnique where the chain has several quasi-stationary distributions, or double precision does not tell;
+/// ConvergenceError("inverse iteration", residual, ...) after 10000 iterations of interpolated rows, or where the
+/// residual exceeds 1e-8.
+QuasiStationary quasi_stationary(const ChainSolver& solver, FewSurvivors few = FewSurvivors::as_others);
+
+/// Scales the entries of every cyclic class of a distribution to sum to one; classes without any stay 0.
+std::vector<double> shares_in_classes(const Period& period, std::vector<double> distribution);
 
 /// Finds the stationary distribution of a chain without rest (all kill rates zero on its only closed class) by
 /// subtraction-free elimination. It has size n, sums to one, is zero on transient states, and is the time average

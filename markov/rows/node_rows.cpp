@@ -56,7 +56,7 @@ std::vector<LaunchPoint> launch_points(const LaunchState& launch, std::span<cons
 std::vector<double> survivors_or_visits(const Chain& chain, std::span<const double> after) {
   const ChainSolver solver(chain);
   try {
-    return quasi_stationary(solver).distribution;
+    return shares_in_classes(solver.period(), quasi_stationary(solver, FewSurvivors::unsettled).distribution);
   } catch (const RestTooRare&) {
     throw;
   } catch (const ConvergenceError&) {

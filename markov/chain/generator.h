@@ -1,0 +1,62 @@
+#pragma once
+// Eliminates the generator I - Q of a chain in extended precision, off-diagonals and kill rates apart from each other.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "markov/chain/chain.h"
+
+namespace metastable::markov {
+
+using Extended = long double;
+
+/// Holds I - Q, or a diagonally scaled and shifted one: row i has the off-diagonals -rate and sums to kill[i] >= 0. The
+/// diagonal, exit(i), is a sum and never stored; so it keeps its digits however small it is.
+struct Generator {
+  std::vector<std::size_t> start{0};
+  std::vector<std::uint32_t> column;
+  std::vector<Extended> rate;
+  std::vector<Extended> kill;
+
+  std::size_t size() const { return kill.size(); }
+  Extended exit(std::size_t row) const;
+  /// Restricts it to `states` (ascending); what leaves them is added to the kill rates. O(entries of their rows).
+  /// @param scratch  size n, all `outside`, and left so
+  Generator restricted_to(std::span<const std::uint32_t> states, std::vector<std::uint32_t>& scratch) const;
+  static constexpr std::uint32_t outside = 0xffffffffU;
+};
+
+/// Takes the entries of a chain that is not interpolated.
+Generator generator_of(const Chain& chain);
+
+/// Factorizes a generator without a subtraction, as Elimination does in double precision. Costs O(n b^2) for bandwidth
+/// b, O(n^3) for full rows, about ten times Elimination.
+class GeneratorFactors {
+ public:
+  /// @throws RestTooRare("elimination", ...) naming the state where a rate of leaving is zero
+  explicit GeneratorFactors(const Generator& generator);
+  /// Solves (I - Q) x = rhs, entries >= 0.
+  std::vector<Extended> solve(std::span<const Extended> rhs) const;
+  /// Solves y (I - Q) = rhs (row vectors), entries >= 0.
+  std::vector<Extended> solve_left(std::span<const Extended> rhs) const;
+
+ private:
+  friend std::vector<Extended> stationary_vector(Generator generator);
+  GeneratorFactors(const Generator& generator, bool closed);
+  Extended* row(std::size_t i) { return entries_.data() + offset_[i] - low_[i]; }
+  const Extended* row(std::size_t i) const { return entries_.data() + offset_[i] - low_[i]; }
+
+  std::vector<std::size_t> low_, high_, offset_;
+  std::vector<Extended> entries_, exit_;
+};
+
+/// Returns the stationary distribution of an irreducible generator, its kill rates left out; sums to one.
+std::vector<Extended> stationary_vector(Generator generator);
+
+/// Returns the communicating classes of a chain, the states of each ascending, in an order in which every transition
+/// stays in its class or leads to a later one. O(entries).
+std::vector<std::vector<std::uint32_t>> communicating_classes(const Generator& generator);
+
+}  // namespace metastable::markov

@@ -1,0 +1,274 @@
+#include "markov/passage/leading_pair.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+namespace metastable::markov {
+namespace {
+
+using Row = std::vector<Extended>;
+using States = std::vector<std::uint32_t>;
+
+constexpr Extended rounding = std::numeric_limits<Extended>::epsilon();
+constexpr int most_iterations = 400;
+/// An iteration that changes no entry by more, twice running, leaves errors of its square: the shift has come as near.
+constexpr Extended same_vector = 1e-10L;
+/// Of the rate, so much is taken for its rounding: sums of a few entries, some ten eliminations.
+constexpr Extended rate_rounding = 16 * rounding;
+/// A vector whose error may be larger than this is not given.
+constexpr Extended undecided = 1e-7L;
+
+Extended total(const Row& v) { return std::accumulate(v.begin(), v.end(), Extended{0}); }
+
+/// Holds the leading pair of one communicating class, its rate in two parts: the smallest kill rate and the excess.
+struct ClassPair {
+  Extended common = 0, excess = 0;
+  Row left, right;
+  int iterations = 0;
+  double error = 0;
+  Extended rate() const { return common + excess; }
+};
+
+/// Returns how long, at most, walkers of the killed-free generator take to its most visited state, forwards or
+/// backwards in time, and the state from which: about one over the distance of the next eigenvalue.
+std::pair<Extended, std::uint32_t> slowest_return(const Generator& closed, const Row& stationary,
+                                                  std::uint32_t most_visited) {
+  States others;
+  Row weight;
+  for (std::uint32_t i = 0; i < closed.size(); ++i) {
+    if (i == most_visited) continue;
+    others.push_back(i);
+    weight.push_back(stationary[i]);
+  }
+  Generator without = closed;
+  std::fill(without.kill.begin(), without.kill.end(), Extended{0});
+  std::vector<std::uint32_t> scratch(closed.size(), Generator::outside);
+  const GeneratorFactors factors(without.restricted_to(others, scratch));
+  const Row forwards = factors.solve(Row(others.size(), 1)), backwards = factors.solve_left(weight);
+  std::pair<Extended, std::uint32_t> slowest{0, most_visited};
+  for (std::size_t k = 0; k < others.size(); ++k) {
+    const Extended time = std::max(forwards[k], weight[k] > 0 ? backwards[k] / weight[k] : 0);
+    if (time > slowest.first) slowest = {time, others[k]};
+  }
+  return slowest;
+}
+
+/// Scales a generator that holds X^-1 (G - tau) X by the expected steps w, and moves tau up as far as it can. Returns
+/// the move.
+Extended move_up(Generator& scaled, const Row& steps, Extended longest) {
+  for (std::size_t i = 0; i < scaled.size(); ++i) {
+    for (std::size_t e = scaled.start[i]; e < scaled.start[i + 1]; ++e)
+      scaled.rate[e] *= steps[scaled.column[e]] / steps[i];
+    scaled.kill[i] = (longest - steps[i]) / longest / steps[i];
+  }
+  return 1 / longest;
+}
+
+ClassPair pair_of_class(Generator scaled, const States& states) {
+  const std::size_t n = scaled.size();
+  ClassPair pair;
+  if (n == 1) {
+    pair.common = scaled.kill[0];
+    pair.left = pair.right = {1};
+    return pair;
+  }
+  pair.common = *std::min_element(scaled.kill.begin(), scaled.kill.end());
+  for (Extended& kill : scaled.kill) kill -= pair.common;
+  pair.right.assign(n, 1);
+  Extended change = 0;
+  for (Extended before = 1;; before = change) {
+    if (std::all_of(scaled.kill.begin(), scaled.kill.end(), [](Extended kill) { return kill == 0; })) break;
+    const Row steps = GeneratorFactors(scaled).solve(Row(n, 1));
+    const auto [least, longest] = std::minmax_element(steps.begin(), steps.end());
+    const Extended most = *longest;
+    change = (most - *least) / *least;
+    if (++pair.iterations > most_iterations || !std::isfinite(change))
+      throw ConvergenceError("Noda's iteration", static_cast<double>(change),
+                             fmt::format("still changing after {} iterations", pair.iterations));
+    for (std::size_t i = 0; i < n; ++i) pair.right[i] *= steps[i] / most;
+    pair.excess += move_up(scaled, steps, most);
+    if (change <= same_vector && before <= same_vector) break;
+  }
+  const Row stationary = stationary_vector(scaled);
+  pair.excess += std::inner_product(stationary.begin(), stationary.end(), scaled.kill.begin(), Extended{0});
+  const auto most_visited =
+      static_cast<std::uint32_t>(std::max_element(stationary.begin(), stationary.end()) - stationary.begin());
+  const auto [time, from] = slowest_return(scaled, stationary, most_visited);
+  const Extended error = std::max(change <= same_vector ? change * change : 0, rate_rounding * pair.excess * time);
+  if (!(error <= undecided)) throw NotUnique(states[most_visited], states[from], static_cast<double>(pair.rate()), false);
+  pair.error = static_cast<double>(error);
+  for (std::size_t i = 0; i < n; ++i) pair.left.push_back(stationary[i] / pair.right[i]);
+  const Extended sum = total(pair.left);
+  for (Extended& entry : pair.left) entry /= sum;
+  return pair;
+}
+
+/// Holds a chain by its classes, those that may lead solved.
+class Classes {
+ public:
+  explicit Classes(const Generator& generator)
+      : all_(generator), states_(communicating_classes(generator)), class_of_(generator.size()) {
+    std::vector<std::uint32_t> scratch(generator.size(), Generator::outside);
+    for (std::size_t c = 0; c < states_.size(); ++c) {
+      for (const std::uint32_t i : states_[c]) class_of_[i] = c;
+      parts_.push_back(all_.restricted_to(states_[c], scratch));
+      least_.push_back(*std::min_element(parts_[c].kill.begin(), parts_[c].kill.end()));
+    }
+    solve_those_that_may_lead();
+  }
+
+  LeadingPair lead() const {
+    std::vector<std::size_t> tied;
+    for (std::size_t c = 0; c < pairs_.size(); ++c)
+      if (pairs_[c] && pairs_[c]->rate() - lowest_ <= rate_rounding * lowest_) tied.push_back(c);
+    const std::size_t left = only(tied, true), right = only(tied, false);
+    LeadingPair lead{spread(left, true), spread(right, false), lowest_, 0, 0};
+    for (const auto& pair : pairs_)
+      if (pair) lead.iterations += pair->iterations;
+    lead.error = std::max(pairs_[left]->error, pairs_[right]->error);
+    return lead;
+  }
+
+ private:
+  /// The rate of a class lies between its least kill rate and its least rate of leaving a state.
+  void solve_those_that_may_lead() {
+    pairs_.resize(states_.size());
+    std::vector<std::size_t> order(states_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return least_[a] < least_[b]; });
+    lowest_ = std::numeric_limits<Extended>::infinity();
+    for (const Generator& part : parts_)
+      for (std::size_t i = 0; i < part.size(); ++i) lowest_ = std::min(lowest_, part.exit(i));
+    for (const std::size_t c : order) {
+      if (least_[c] - lowest_ > rate_rounding * lowest_) break;
+      pairs_[c] = pair_of_class(parts_[c], states_[c]);
+      lowest_ = std::min(lowest_, pairs_[c]->rate());
+    }
+  }
+
+  /// Marks the classes that class c leads to (or that lead to it), without itself.
+  std::vector<std::uint8_t> beyond(std::size_t c, bool after) const {
+    std::vector<std::uint8_t> marked(states_.size(), 0);
+    const auto reach = [&](std::size_t from) {
+      bool any = false;
+      for (const std::uint32_t i : states_[from])
+        for (std::size_t e = all_.start[i]; e < all_.start[i + 1]; ++e) {
+          const std::size_t to = class_of_[all_.column[e]];
+          if (to == from) continue;
+          if (after) marked[to] = 1;
+          any = any || marked[to] || to == c;
+        }
+      return any;
+    };
+    if (after) {
+      reach(c);
+      for (std::size_t d = c + 1; d < states_.size(); ++d)
+        if (marked[d]) reach(d);
+    } else {
+      for (std::size_t d = c; d-- > 0;) marked[d] = reach(d);
+    }
+    return marked;
+  }
+
+  /// Finds the one of the tied classes that leads to no other (or that no other leads to): only there does a vector of
+  /// one sign begin (Frobenius; Schneider, Linear Algebra Appl. 84, 1986).
+  std::size_t only(const std::vector<std::size_t>& tied, bool after) const {
+    std::vector<std::size_t> ends;
+    for (const std::size_t c : tied) {
+      const std::vector<std::uint8_t> marked = tied.size() == 1 ? std::vector<std::uint8_t>() : beyond(c, after);
+      if (std::none_of(tied.begin(), tied.end(), [&](std::size_t d) { return d != c && marked[d]; }))
+        ends.push_back(c);
+    }
+    if (ends.size() > 1)
+      throw NotUnique(states_[ends[0]].front(), states_[ends[1]].front(), static_cast<double>(lowest_), true);
+    return ends.front();
+  }
+
+  /// Continues the vector of class c through the classes after it (before it, for the right vector).
+  Row spread(std::size_t c, bool left) const {
+    Row vector(all_.size(), 0);
+    for (std::size_t i = 0; i < states_[c].size(); ++i)
+      vector[states_[c][i]] = left ? pairs_[c]->left[i] : pairs_[c]->right[i];
+    Row arriving(all_.size(), 0);
+    const auto push = [&](std::size_t from) {
+      for (const std::uint32_t i : states_[from])
+        for (std::size_t e = all_.start[i]; e < all_.start[i + 1]; ++e)
+          if (class_of_[all_.column[e]] != from) arriving[all_.column[e]] += vector[i] * all_.rate[e];
+    };
+    const auto pull = [&](std::size_t to) {
+      for (const std::uint32_t i : states_[to])
+        for (std::size_t e = all_.start[i]; e < all_.start[i + 1]; ++e)
+          if (class_of_[all_.column[e]] != to) arriving[i] += all_.rate[e] * vector[all_.column[e]];
+    };
+    if (left) {
+      push(c);
+      for (std::size_t d = c + 1; d < states_.size(); ++d)
+        if (follow(d, c, arriving, true, vector)) push(d);
+    } else {
+      for (std::size_t d = c; d-- > 0;) {
+        pull(d);
+        follow(d, c, arriving, false, vector);
+      }
+    }
+    const Extended scale = left ? total(vector) : *std::max_element(vector.begin(), vector.end());
+    for (Extended& entry : vector) entry /= scale;
+    return vector;
+  }
+
+  /// Solves y (G_d - rate) = arriving, or (G_d - rate) x = arriving, in class d; false where nothing arrives.
+  bool follow(std::size_t d, std::size_t leader, const Row& arriving, bool left, Row& vector) const {
+    const States& states = states_[d];
+    Row rhs;
+    for (const std::uint32_t i : states) rhs.push_back(arriving[i]);
+    if (total(rhs) == 0) return false;
+    Generator shifted = parts_[d];
+    Row scale(states.size(), 1);
+    if (pairs_[d]) {  // its own right vector makes all kill rates the distance of the rates
+      const ClassPair &own = *pairs_[d], &lead = *pairs_[leader];
+      scale = own.right;
+      for (std::size_t i = 0; i < states.size(); ++i) {
+        shifted.kill[i] = (own.common - lead.common) + (own.excess - lead.excess);
+        for (std::size_t e = shifted.start[i]; e < shifted.start[i + 1]; ++e)
+          shifted.rate[e] *= scale[shifted.column[e]] / scale[i];
+      }
+    } else {
+      for (Extended& kill : shifted.kill) kill -= lowest_;
+    }
+    for (std::size_t i = 0; i < rhs.size(); ++i) rhs[i] = left ? rhs[i] * scale[i] : rhs[i] / scale[i];
+    const GeneratorFactors factors(shifted);
+    const Row solved = left ? factors.solve_left(rhs) : factors.solve(rhs);
+    for (std::size_t i = 0; i < states.size(); ++i)
+      vector[states[i]] = left ? solved[i] / scale[i] : solved[i] * scale[i];
+    return true;
+  }
+
+  const Generator& all_;
+  std::vector<States> states_;
+  std::vector<std::size_t> class_of_;
+  std::vector<Generator> parts_;
+  std::vector<Extended> least_;
+  std::vector<std::optional<ClassPair>> pairs_;
+  Extended lowest_ = 0;
+};
+
+}  // namespace
+
+NotUnique::NotUnique(std::uint32_t one, std::uint32_t other, double rate, bool equal)
+    : ConvergenceError(fmt::format(
+          "the quasi-stationary distribution is not unique: survivors around state {} and survivors around state {} "
+          "fade at {} ({:.9g}), and {}",
+          one, other, equal ? "the same rate" : "rates that double precision does not tell apart", rate,
+          equal ? "neither kind leads to the other" : "their shares depend on the difference")),
+      one_(one),
+      other_(other),
+      rate_(rate),
+      equal_(equal) {}
+
+LeadingPair leading_pair(const Generator& generator) { return Classes(generator).lead(); }
+
+}  // namespace metastable::markov
