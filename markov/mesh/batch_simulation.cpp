@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "markov/mesh/score_lattice.h"
@@ -17,9 +18,10 @@ namespace {
 constexpr std::size_t kTogether = 128;  // trials followed side by side
 constexpr std::uint64_t kStream = 0x2000;
 
-/// Follows trials first .. first + count - 1, all to their failures; stops early once `spent` exceeds the limit.
-void follow(const BatchMap& map, std::span<const double> start, const SimulationOptions& options, std::size_t first,
-            std::span<std::uint64_t> steps, std::atomic<std::uint64_t>& spent) {
+/// Follows trials first .. first + count - 1 to their failures, `longest` steps at most; stops early once `spent` exceeds
+/// the limit of all.
+void follow(const BatchMap& map, std::span<const double> start, const SimulationOptions& options, std::uint64_t longest,
+            std::size_t first, std::span<std::uint64_t> steps, std::atomic<std::uint64_t>& spent) {
   const auto d = static_cast<std::size_t>(map.dimension), s = static_cast<std::size_t>(map.scores);
   std::vector<std::size_t> trial(steps.size());
   std::vector<double> states, scores, next;
@@ -29,7 +31,7 @@ void follow(const BatchMap& map, std::span<const double> start, const Simulation
     trial[i] = first + i;
     states.insert(states.end(), start.begin(), start.end());
   }
-  for (std::uint64_t number = 1; !trial.empty(); ++number) {
+  for (std::uint64_t number = 1; !trial.empty() && number <= longest; ++number) {
     const int phase = static_cast<int>((number - 1) % static_cast<std::uint64_t>(map.phases));
     next.resize(states.size());
     failed.assign(trial.size(), 0);
@@ -62,29 +64,44 @@ void follow(const BatchMap& map, std::span<const double> start, const Simulation
   }
 }
 
-}  // namespace
-
-std::optional<SimulatedSteps> simulate_steps(const BatchMap& map, std::span<const double> start,
-                                             const SimulationOptions& options) {
+/// Returns whether all trials were followed before the limit on their steps.
+bool follow_all(const BatchMap& map, std::span<const double> start, std::uint64_t longest,
+                const SimulationOptions& options, std::vector<std::uint64_t>& steps) {
   require_start(map, start);
   if (options.trials < 2)
     throw std::invalid_argument(fmt::format("simulation: {} trials, 2 or more expected", options.trials));
-  SimulatedSteps simulated;
-  simulated.trials = options.trials;
-  simulated.steps.assign(options.trials, 0);
+  steps.assign(options.trials, 0);
   std::atomic<std::uint64_t> spent = 0;
   parallel_for((options.trials + kTogether - 1) / kTogether, options.threads, [&](std::size_t share) {
     const std::size_t first = share * kTogether, count = std::min(kTogether, options.trials - first);
     if (spent <= options.most_steps)
-      follow(map, start, options, first, std::span(simulated.steps).subspan(first, count), spent);
+      follow(map, start, options, longest, first, std::span(steps).subspan(first, count), spent);
   });
-  if (spent > options.most_steps) return std::nullopt;
+  return spent <= options.most_steps;
+}
+
+}  // namespace
+
+std::optional<SimulatedSteps> simulate_steps(const BatchMap& map, std::span<const double> start,
+                                             const SimulationOptions& options) {
+  SimulatedSteps simulated;
+  simulated.trials = options.trials;
+  if (!follow_all(map, start, std::numeric_limits<std::uint64_t>::max(), options, simulated.steps)) return std::nullopt;
   const auto n = static_cast<double>(options.trials);
   double squares = 0;
   for (const std::uint64_t steps : simulated.steps) simulated.mean += static_cast<double>(steps) / n;
   for (const std::uint64_t steps : simulated.steps) squares += std::pow(static_cast<double>(steps) - simulated.mean, 2);
   simulated.standard_error = std::sqrt(squares / (n - 1) / n);
   return simulated;
+}
+
+std::vector<std::uint64_t> follow_walks(const BatchMap& map, std::span<const double> start, std::uint64_t longest,
+                                        const SimulationOptions& options) {
+  SimulationOptions unlimited = options;
+  unlimited.most_steps = std::numeric_limits<std::uint64_t>::max();
+  std::vector<std::uint64_t> steps;
+  follow_all(map, start, longest, unlimited, steps);
+  return steps;
 }
 
 }  // namespace metastable::markov

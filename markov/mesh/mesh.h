@@ -14,6 +14,18 @@
 
 namespace metastable::markov {
 
+/// Says that no failure was found as far as meshes look: within an action of 60.
+class NoFailureFound : public MapError {
+ public:
+  using MapError::MapError;
+};
+
+/// Is a further state of phase 0 that a mesh grows from.
+struct MeshSource {
+  std::vector<double> state;
+  double action = 0;  ///< with which it starts, >= 0
+};
+
 struct MeshOptions {
   double spacing = 0.5;  ///< of the nodes, in stationary sds of the noise; in (0, 2]
   std::uint64_t seed = 1;
@@ -22,6 +34,11 @@ struct MeshOptions {
   double score_spacing = 0.6;  ///< of places on a curve in the first score, and of the lattice of the others
   double score_reach = 8.5;
   std::size_t most_bytes = std::size_t{3} << 30;  ///< for rows and nodes; more is refused
+  std::vector<MeshSource> sources = {};           ///< other gaits (OtherGaits)
+  double start_action = 0;                        ///< of the start and its orbit
+  double limit = 0;                               ///< > 0: nodes as far as this action, wherever failures are
+  /// Are states of phase 0 whose actions are asked for: if there are any, it grows until they and a failure are met.
+  std::vector<std::vector<double>> targets = {};
 };
 
 /// Rows are interpolated: a landing is shared among the nodes around it in proportion to nearness on every axis, so
@@ -36,7 +53,7 @@ struct MeshOptions {
 class Mesh {
  public:
   /// @param start  a state at phase 0
-  /// @throws MapError as checked_step does; when no failure is met within an action of 60: it never fails within reach
+  /// @throws MapError as checked_step does; NoFailureFound when no failure is met within an action of 60
   /// @throws std::invalid_argument for options out of range
   /// @throws std::length_error when it would take more memory than allowed: says how much for how many nodes
   Mesh(const BatchMap& map, std::vector<NoiseFrame> frames, std::span<const double> start, const MeshOptions& options);

@@ -10,7 +10,6 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kFarthest = 60;                          // action beyond which failures are not looked for
 constexpr double kBucket = 1;                             // of actions, expanded together
 constexpr double kWorthAgain = 0.05;                      // a row speaks again if its node's action falls by this
 constexpr double kFarther = 0.5;                          // scores looked at, beyond what the action allows
@@ -27,7 +26,32 @@ MeshGrowth::MeshGrowth(const BatchMap& map, const NodeLattice& lattice, const Me
   if (map.scores > 1) others_.emplace(map.scores - 1, options.score_spacing, options.score_reach);
 }
 
-double MeshGrowth::limit() const { return std::min(kFarthest, cheapest_failure_ + options_.margin); }
+double MeshGrowth::limit() const {
+  if (options_.limit > 0) return options_.limit;
+  if (target_.empty()) return std::min(farthest, cheapest_failure_ + options_.margin);
+  const std::vector<double> actions = target_actions();
+  return std::min(farthest, std::max(cheapest_failure_, *std::max_element(actions.begin(), actions.end())));
+}
+
+void MeshGrowth::mark_targets() {
+  for (const std::vector<double>& state : options_.targets) {
+    target_.emplace_back();
+    NodeLattice::Point point{};
+    if (!lattice_.locate(0, state.data(), point)) continue;
+    NodeSimplex simplex;
+    lattice_.find_simplex(0, point, 0, simplex);
+    for (std::size_t i = 0; i <= state.size(); ++i) target_.back().push_back(node_at(simplex.key[i]));
+  }
+}
+
+std::vector<double> MeshGrowth::target_actions() const {
+  std::vector<double> actions;
+  for (const auto& nodes : target_) {
+    actions.push_back(infinity);
+    for (const std::uint32_t node : nodes) actions.back() = std::min(actions.back(), action_[node]);
+  }
+  return actions;
+}
 
 int MeshGrowth::owner(std::uint64_t key) const {
   if (!exchange_) return 0;
@@ -49,7 +73,7 @@ std::uint32_t MeshGrowth::node_at(std::uint64_t key) {
   return node;
 }
 
-void MeshGrowth::start_from(int phase, std::span<const double> state) {
+void MeshGrowth::start_from(int phase, std::span<const double> state, double action) {
   NodeLattice::Point point{};
   if (!lattice_.locate(phase, state.data(), point))
     throw MapError(fmt::format("mesh: the start {} is too far from the noise-free orbit", describe_state(map_, state)));
@@ -57,13 +81,21 @@ void MeshGrowth::start_from(int phase, std::span<const double> state) {
   lattice_.find_simplex(phase, point, 0, simplex);
   for (std::size_t i = 0; i <= state.size(); ++i) {
     const std::uint32_t node = node_at(simplex.key[i]);
-    if (own_[node]) lower(node, 0);
+    if (own_[node]) lower(node, action);
   }
 }
 
 void MeshGrowth::grow_from(std::span<const double> start) {
-  start_from(0, start);
-  for (int phase = 0; phase < map_.phases; ++phase) start_from(phase, lattice_.frame(phase).centre);
+  start_from(0, start, options_.start_action);
+  for (int phase = 0; phase < map_.phases; ++phase)
+    start_from(phase, lattice_.frame(phase).centre, options_.start_action);
+  for (const MeshSource& source : options_.sources) start_from(0, source.state, source.action);
+  grow();
+}
+
+void MeshGrowth::grow_from_state(std::span<const double> state) {
+  start_from(0, state, 0);
+  mark_targets();
   grow();
 }
 
@@ -293,11 +325,11 @@ void MeshGrowth::grow() {
     for (const std::uint32_t node : wave) spoken.push_back(row_of_[node]);
     follow(std::move(spoken));
   }
-  if (!(cheapest_failure_ < kFarthest))
-    throw MapError(
-        fmt::format("return map: it never fails within reach of its noise (none of {} nodes around {} leads to a "
-                    "failure within an action of {})",
-                    sum(static_cast<double>(nodes())), describe_state(map_, lattice_.frame(0).centre), kFarthest));
+  if (!(cheapest_failure_ < std::max(farthest, options_.limit)) && target_.empty())
+    throw NoFailureFound(
+        fmt::format("return map: no failure is found within an action of {} (half the sum of squares of the scores that "
+                    "lead to it) from {}, on a mesh of {} nodes",
+                    farthest, describe_state(map_, lattice_.frame(0).centre), sum(static_cast<double>(nodes()))));
 }
 
 std::span<const std::uint32_t> MeshGrowth::columns(std::size_t row) const {

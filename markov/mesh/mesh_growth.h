@@ -42,6 +42,7 @@ class Exchange {
 /// nodes nor the number of ranks changes which nodes and entries there are. Blocks of nodes belong to ranks by a hash.
 class MeshGrowth {
  public:
+  static constexpr double farthest = 60;  ///< action beyond which failures are not looked for
   static constexpr std::size_t entry_bytes = sizeof(std::uint32_t) + sizeof(double);
 
   /// @param exchange  of the ranks; nullptr: one process
@@ -49,6 +50,11 @@ class MeshGrowth {
   /// Grows from a state at phase 0 and the noise-free orbit.
   /// @throws MapError, std::length_error as Mesh does, on all ranks alike
   void grow_from(std::span<const double> start);
+
+  /// Grows from one state at phase 0 alone. @throws as grow_from
+  void grow_from_state(std::span<const double> state);
+  /// Returns the least action of each of MeshOptions::targets; infinite where it was not met.
+  std::vector<double> target_actions() const;
 
   /// Give the nodes that were met, by number, and rows of those that this process landed, in the order of landing.
   std::size_t nodes() const { return key_.size(); }
@@ -89,7 +95,8 @@ class MeshGrowth {
   };
   using Parts = std::vector<std::pair<std::uint64_t, double>>;
 
-  void start_from(int phase, std::span<const double> state);
+  void start_from(int phase, std::span<const double> state, double action);
+  void mark_targets();
   void grow();
   double limit() const;
   std::uint32_t node_at(std::uint64_t key);
@@ -125,6 +132,7 @@ class MeshGrowth {
   std::vector<std::uint32_t> again_;      ///< rows
   std::vector<std::uint32_t> to_others_;  ///< nodes of other ranks whose action fell
   double cheapest_failure_ = std::numeric_limits<double>::infinity();
+  std::vector<std::vector<std::uint32_t>> target_;  ///< nodes around each of MeshOptions::targets
 };
 
 }  // namespace metastable::markov

@@ -26,6 +26,11 @@ constexpr double kSampledFrom = 100;   // expected steps above which guided samp
 constexpr double kLeast = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double kRows = 5e-4;         // what reading rows off curves may leave, about so much
 constexpr std::size_t kFewestTrials = 100;
+constexpr std::size_t kWalks = 512;              // counted where trials would be fewer
+constexpr std::size_t kPilotShare = 16;          // trials for one of the pilot, which sees whether trials end,
+constexpr std::size_t kPilotLeast = 8, kPilotMost = 128;
+constexpr double kPilotSteps = 4;                // within so many times the expected steps: of 8, 8 or 7 do.
+constexpr double kLongestTrial = 30;             // times the expected steps: one trial of 1e13 takes longer
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
 double coarsest(int dimension) {
@@ -92,14 +97,29 @@ std::string disagreement(const char* one, const MeshEstimate& a, const char* oth
       a.value, a.lower, a.upper, other, b.value, b.lower, b.upper);
 }
 
+struct MeanAndError {
+  double mean = 0, error = 0;
+};
+
+MeanAndError mean_and_error(const std::vector<std::uint64_t>& steps) {
+  const auto n = static_cast<double>(steps.size());
+  MeanAndError found;
+  double squares = 0;
+  for (const std::uint64_t s : steps) found.mean += static_cast<double>(s) / n;
+  for (const std::uint64_t s : steps) squares += std::pow(static_cast<double>(s) - found.mean, 2);
+  found.error = std::sqrt(squares / (n - 1) / n);
+  return found;
+}
+
 /// Makes one study.
 class Run {
  public:
-  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options)
+  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
+      std::vector<NoiseFrame> frames)
       : map_(map),
         start_(start),
         options_(options),
-        frames_(noise_frames(map, start)),
+        frames_(std::move(frames)),
         sizes_(options.sizes > 0    ? static_cast<std::size_t>(options.sizes)
                : map.dimension == 4 ? 4
                                     : 3),
@@ -119,9 +139,8 @@ class Run {
     });
     join();
     simulate();
+    if (!study_.disagreement.empty()) return std::move(study_);
     sample();
-    if (study_.simulated)
-      study_.disagreement = disagreement("the mesh", study_.steps, "direct simulation", *study_.simulated);
     if (study_.disagreement.empty() && study_.guided)
       study_.disagreement = disagreement("the mesh", study_.steps, "guided sampling", *study_.guided);
     return std::move(study_);
@@ -169,6 +188,7 @@ class Run {
     if (size + 1 < sizes_) return mesh.bytes();
     study_.mixing_steps = passage.mixing_steps;
     study_.survival = std::move(passage.survival);
+    tail_rate_ = passage.failure_rate;
     study_.cheapest_failure = mesh.cheapest_failure();
     return mesh.bytes();
   }
@@ -200,23 +220,53 @@ class Run {
                                  std::hypot(by_rate.shift_error, by_rate.discretization_error) + study_.bracket);
   }
 
+  ForetoldHazard hazard() const {
+    return {study_.survival, tail_rate_, std::exp(steps_[0][sizes_ - 1]) / study_.steps.value,
+            half_width(study_.steps)};
+  }
+
+  /// Follows walks, which may refute the mesh. Returns the steps of each.
+  std::vector<std::uint64_t> count(std::size_t walks, double longest) {
+    const auto steps = static_cast<std::uint64_t>(std::max(1.0, std::ceil(longest)));
+    std::vector<std::uint64_t> walked = follow_walks(
+        map_, start_, steps, {.trials = walks, .seed = options_.seed, .threads = options_.threads});
+    study_.walks = count_failures(walked, steps, hazard());
+    if (study_.walks->refutes(hazard()))
+      study_.disagreement =
+          fmt::format("the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation disagree: {}: no number is given",
+                      study_.steps.value, study_.steps.lower, study_.steps.upper, count_text(*study_.walks));
+    return walked;
+  }
+
   void simulate() {
-    const auto trials =
-        static_cast<std::size_t>(static_cast<double>(options_.simulated_steps) / std::max(1.0, study_.steps.value));
-    if (trials < kFewestTrials) return;
-    const auto simulated = simulate_steps(map_, start_,
-                                          {.trials = trials,
-                                           .seed = options_.seed,
-                                           .threads = options_.threads,
-                                           .most_steps = 4 * options_.simulated_steps});
-    if (!simulated) return;
-    const double half = normal_95 * simulated->standard_error;
-    study_.simulated = MeshEstimate{simulated->mean, simulated->mean - half, simulated->mean + half};
+    const auto allowed = static_cast<double>(options_.simulated_steps), expected = std::max(1.0, study_.steps.value);
+    const auto trials = static_cast<std::size_t>(allowed / expected);
+    if (options_.simulated_steps == 0) {
+      study_.no_simulated = "not asked for";
+      return;
+    }
+    if (trials < kFewestTrials) {
+      const std::size_t walks = std::clamp<std::size_t>(options_.simulated_steps, 2, kWalks);
+      count(walks, std::floor(allowed / static_cast<double>(walks)));
+      study_.no_simulated = "too few trials would fail; " + count_text(*study_.walks);
+      return;
+    }
+    count(std::clamp(trials / kPilotShare, kPilotLeast, kPilotMost), kPilotSteps * expected);
+    if (!study_.disagreement.empty()) return;
+    const std::vector<std::uint64_t> steps = count(trials, kLongestTrial * expected);
+    if (!study_.disagreement.empty()) return;
+    study_.walks.reset();
+    const auto [mean, error] = mean_and_error(steps);
+    study_.simulated = MeshEstimate{mean, mean - normal_95 * error, mean + normal_95 * error};
     study_.simulated_trials = trials;
+    study_.disagreement = disagreement("the mesh", study_.steps, "direct simulation", *study_.simulated);
   }
 
   void sample() {
-    if (options_.guided_samples == 0 || study_.steps.value <= kSampledFrom) return;
+    if (options_.guided_samples == 0) study_.no_guided = "not asked for";
+    if (options_.guided_samples > 0 && study_.steps.value <= kSampledFrom)
+      study_.no_guided = "failures are too frequent for it";
+    if (!study_.no_guided.empty()) return;
     const Mesh mesh(map_, frames_, start_, mesh_options(1, 0));
     // It goes from the start to where failures keep their share: the time to forget the start, some times over. A
     // window too short to reach the failures from an ordinary state leaves the weight to a few rare ones, which few
@@ -236,12 +286,15 @@ class Run {
       if (window == kLongestWindow) break;
     }
     study_.guided_samples = guided.samples;
+    study_.no_guided = guided.samples > 0 ? "too few of its samples lead to failure to tell"
+                                          : "failures are too frequent for windows that forget the start";
     if (!(guided.rate > 0)) return;
     const double half = normal_95 * guided.standard_error / guided.rate * std::max(1.0, kEven / even);
     if (!(half < 1)) return;                                                   // it tells nothing
     const double beyond = study_.steps.value - 1 / study_.failure_rate.value;  // what the start is worth
     const double sampled = 1 / guided.rate + beyond;
     study_.guided = MeshEstimate{sampled, sampled / (1 + half), sampled / (1 - half)};
+    study_.no_guided.clear();
   }
 
   const BatchMap& map_;
@@ -252,9 +305,27 @@ class Run {
   int threads_;
   std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]
   MeshStudy study_;
+  double tail_rate_ = 0;  ///< a step, beyond the survival of the study
   std::mutex mutex_;
   double done_ = 0;
 };
+
+/// Says what direct simulation finds where there is no mesh, and whether walks fail in it.
+std::pair<std::string, bool> walked_alone(const BatchMap& map, std::span<const double> start,
+                                          const MeshStudyOptions& options) {
+  const std::size_t walks = std::clamp<std::size_t>(options.simulated_steps, 2, kWalks);
+  const std::uint64_t longest = std::max<std::uint64_t>(1, options.simulated_steps / walks);
+  const std::vector<std::uint64_t> walked =
+      follow_walks(map, start, longest, {.trials = walks, .seed = options.seed, .threads = options.threads});
+  const auto failed = static_cast<std::size_t>(std::count_if(walked.begin(), walked.end(), [](auto n) { return n > 0; }));
+  if (failed == 0) return {fmt::format("none of {} simulated walks of {} steps fails", walks, longest), false};
+  if (failed < walks)
+    return {fmt::format("{} of {} simulated walks fail within {} steps", failed, walks, longest), true};
+  const auto [mean, error] = mean_and_error(walked);
+  return {fmt::format("direct simulation: {} walks fail after {:.4g} steps in the mean (standard error {:.2g})", walks,
+                      mean, error),
+          true};
+}
 
 }  // namespace
 
@@ -268,7 +339,22 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     throw std::invalid_argument(fmt::format("mesh study: {} sizes, 3 or 4 expected", options.sizes));
   if (options.shifts < 6)
     throw std::invalid_argument(fmt::format("mesh study: {} shifts, 6 or more expected", options.shifts));
-  return Run(map, start, options).run();
+  std::vector<NoiseFrame> frames;
+  try {
+    frames = noise_frames(map, start);
+  } catch (const NoOrbit& error) {
+    if (options.simulated_steps == 0) throw;
+    throw NoOrbit(fmt::format("{}; {}", error.what(), walked_alone(map, start, options).first));
+  }
+  try {
+    return Run(map, start, options, std::move(frames)).run();
+  } catch (const NoFailureFound& error) {
+    if (options.simulated_steps == 0) throw;
+    const auto [found, fails] = walked_alone(map, start, options);
+    const std::string text = fmt::format("{}; {}", error.what(), found);
+    if (fails) throw Disagreement(text + ": no number is given");
+    throw NoFailureFound(text);
+  }
 }
 
 void require_agreement(const MeshStudy& study, const std::string& what) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "markov/mesh/batch_map.h"
+#include "markov/mesh/failure_count.h"
 #include "markov/mesh/mesh.h"
 
 namespace metastable::markov {
@@ -23,7 +24,7 @@ struct MeshStudyOptions {
   std::uint64_t seed = 1;
   int threads = 0;                                ///< 0: all cores; the bits do not depend on it
   std::size_t guided_samples = 4000;              ///< 0: none
-  std::uint64_t simulated_steps = 2000000;        ///< direct simulation takes about so many steps; 0: none
+  std::uint64_t simulated_steps = 2000000;        ///< direct simulation takes about so many steps; 0: none at all
   std::size_t most_bytes = std::size_t{3} << 30;  ///< of all meshes held at once
   /// It is called with the share of the work done, from any thread but one at a time, and may throw to stop.
   std::function<void(double)> progress = {};
@@ -53,12 +54,22 @@ struct MeshStudy {
   double expected_bytes = 0;                             ///< of all meshes held at once, as foreseen from the coarsest
   std::optional<MeshEstimate> guided, simulated;         ///< expected steps in the two other ways, where they reach
   std::size_t guided_samples = 0, simulated_trials = 0;  ///< 0: not asked
+  /// Say, where there is no such estimate, why: a clause.
+  std::string no_guided, no_simulated;
+  /// Holds what was simulated where too few walks fail for an estimate: it may refute the mesh and confirms little.
+  std::optional<FailureCount> walks;
   /// Is empty, or says which ways disagree and that `steps` must not be used.
   std::string disagreement;
 };
 
 /// Returns the spacing of the scores that a study's meshes take.
 double study_score_spacing(const BatchMap& map);
+
+/// Says that ways that share little contradict each other: there is no number to give.
+class Disagreement : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
@@ -67,21 +78,18 @@ double study_score_spacing(const BatchMap& map);
 /// than the default count it by the square of the ratio of their spacings: the sizes show less and less of it.
 ///
 /// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
-/// windows of it, and direct simulation where 100 trials or more fit into `simulated_steps`. Windows are lengthened
+/// windows of it, and direct simulation: trials to failure where 100 or more fit into `simulated_steps`, else 512 walks
+/// of so many steps together, whose failures are counted (FailureCount). Windows are lengthened
 /// until the samples' weights are even; where they stay uneven, the interval is widened in proportion, and beyond a
 /// factor of about two not given. Two ways disagree when they lie further apart than 1.7 times (99.9 %) their joint 95
-/// % half-width. The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries
+/// % half-width, and a count of failures when the mesh foretells one so far off with a chance below refutation_level.
+/// The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries
 /// with them, is foreseen from it.
-/// @param start  a state at phase 0
-/// @throws std::length_error before the other meshes are made if they would take more than most_bytes; as Mesh,
-/// noise_frames and mesh_passage do
+/// @throws Disagreement where meshes find no failure and simulation does; std::length_error before the other meshes are
+/// made if they would take more than most_bytes; as Mesh, noise_frames and mesh_passage do, with what simulation says
+/// where there is no orbit to centre a mesh on
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options = {});
 
-/// Says that ways that share little contradict each other: there is no number to give.
-class Disagreement : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 /// @param what  was studied, for the message
 /// @throws Disagreement with MeshStudy::disagreement, unless that is empty
 void require_agreement(const MeshStudy& study, const std::string& what);

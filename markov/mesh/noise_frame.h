@@ -17,12 +17,19 @@ struct NoiseFrame {
   std::vector<double> sds;  ///< share of each axis in the correlations' spread, falling; sds^2 sum to the dimension
 };
 
+/// Says that there is no noise-free orbit to centre a mesh on: the map fails there, does not settle, or is unstable.
+class NoOrbit : public MapError {
+ public:
+  using MapError::MapError;
+};
+
 /// Finds the noise-free orbit by following the map from `start` at phase 0, its derivatives by central differences, and
 /// from them the stationary covariance of the linear response, S' = A S A^T + B B^T, phase by phase. Axes are the
-/// eigenvectors of its correlations. An axis narrower than 0.05 of the widest counts as that wide:
+/// eigenvectors of its correlations. Where the map jumps in a score, so that the derivative is more than three times the
+/// change from -1 to 1 sd, that change counts. An axis narrower than 0.05 of the widest counts as that wide:
 /// bent landings would fill it with nodes that tell nothing (a compass on facets takes twelve times fewer).
-/// @throws MapError when the noise-free map fails, does not settle, or is unstable, naming the state; as checked_step
-/// does
+/// @throws NoOrbit when the map fails without noise or right beside that, does not settle, or is unstable, naming the
+/// state; MapError as checked_step does, and when the noise does not move every number of the state
 std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double> start);
 
 }  // namespace metastable::markov

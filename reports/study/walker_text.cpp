@@ -47,6 +47,8 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
            {{"shifts", s.shift_error}, {"discretization", s.discretization_error}, {"leaving_mesh", s.bracket}}},
           {"guided_sampling", s.guided ? mesh_estimate_json(*s.guided) : WalkerJson(nullptr)},
           {"direct_simulation", s.simulated ? mesh_estimate_json(*s.simulated) : WalkerJson(nullptr)},
+          {"no_guided_sampling", s.guided ? WalkerJson(nullptr) : WalkerJson(s.no_guided)},
+          {"no_direct_simulation", s.simulated ? WalkerJson(nullptr) : WalkerJson(s.no_simulated)},
           {"meshes", sizes},
           {"memory_bytes", s.expected_bytes}};
 }
@@ -83,10 +85,8 @@ std::string with_interval(const MeshEstimate& e) {
 
 Lines head_lines(const markov::MeshStudy& s) {
   return {{"expected steps before failure", with_interval(s.steps)},
-          {"  by guided sampling", s.guided               ? with_interval(*s.guided)
-                                   : s.guided_samples > 0 ? "too few of its samples lead to failure to tell"
-                                                          : "not asked: failures are too frequent"},
-          {"  by direct simulation", s.simulated ? with_interval(*s.simulated) : "out of reach"},
+          {"  by guided sampling", s.guided ? with_interval(*s.guided) : s.no_guided},
+          {"  by direct simulation", s.simulated ? with_interval(*s.simulated) : s.no_simulated},
           {"status", s.guided || s.simulated ? "agreed: the independent ways lie within their joint intervals"
                                              : "the mesh alone"},
           {"failure rate per step", with_interval(s.failure_rate)},

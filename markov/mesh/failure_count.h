@@ -1,0 +1,43 @@
+#pragma once
+// Holds walks that were simulated against the failures that a mesh foretells of them.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace metastable::markov {
+
+/// The chance of calling a mesh refuted that is right: 1e-3, of either side half. It is the level at which two estimates
+/// disagree as well: 1.7 half-widths of 95 % are 3.33 sds, beyond which a normal number lies with 0.9e-3.
+inline constexpr double refutation_level = 1e-3;
+
+/// Holds what is foretold of walks from the start: the cumulative hazard H(n), so that exp(-H(n)) walk on after n steps.
+struct ForetoldHazard {
+  std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at `rate` a step
+  double rate = 0;               ///< chance of failing in a step, once settled
+  double scale = 1;              ///< of H: the mesh's expected steps over the extrapolated ones
+  double half_width = 0;         ///< of the expected steps' 95 % interval, as a logarithm
+
+  double at(std::uint64_t steps) const;
+};
+
+/// Holds walks of which each failed within so many steps or walked on. Whatever happens in a walk, walks are independent:
+/// their number of failures is binomial, also where failures come in clusters or very late.
+struct FailureCount {
+  std::size_t walks = 0, failed = 0;
+  std::uint64_t longest = 0;  ///< steps of a walk that did not fail
+  double foretold = 0;        ///< failures
+
+  /// Returns whether the count contradicts the hazard at refutation_level, wherever in its 95 % interval it lies.
+  bool refutes(const ForetoldHazard& hazard) const;
+};
+
+/// Counts walks; a walk's entry is the step in which it failed, 0 if it walked on.
+FailureCount count_failures(const std::vector<std::uint64_t>& walks, std::uint64_t longest,
+                            const ForetoldHazard& hazard);
+
+/// Returns "3 of 512 simulated walks failed within 3906 steps, where the mesh foretells 2.7".
+std::string count_text(const FailureCount& count);
+
+}  // namespace metastable::markov
