@@ -16,6 +16,7 @@ import argparse
 import ast
 import code
 import contextlib
+import csv
 import difflib
 import importlib.util
 import io
@@ -115,9 +116,19 @@ class Session:
         return out.getvalue().splitlines()
 
 
+def check_tables(page, text):
+    """Yields what is wrong with the CSV files that a page shows as tables."""
+    for name in re.findall(r"^:file: (.+)$", text, re.MULTILINE):
+        file = page.parent / name
+        rows = list(csv.reader(file.open())) if file.exists() else []
+        if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
+            yield f"{page.name}: {name} is no table with a head and rows of the same length"
+
+
 def check(page, programs, python_folder, write):
     """Returns what is wrong with a page, as text."""
-    text, wrong = page.read_text(), []
+    text = page.read_text()
+    wrong = list(check_tables(page, text))
     with tempfile.TemporaryDirectory() as folder:
         for sample in re.findall(r"<samples/(.+?)>`", text):  # which readers download
             shutil.copy(page.parent / "samples" / sample, folder)

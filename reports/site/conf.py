@@ -4,6 +4,9 @@ import os
 import pathlib
 import re
 
+from docutils import nodes
+from docutils.utils.math import latex2mathml
+
 root = pathlib.Path(os.environ["METASTABLE_SOURCE"])  # the source tree
 pages = pathlib.Path(__file__).parent  # the staged copy of this folder
 
@@ -19,6 +22,8 @@ html_copy_source = False
 html_show_copyright = False
 exclude_patterns = ["xml", "static"]
 myst_heading_anchors = 3
+myst_enable_extensions = ["dollarmath", "deflist"]
+html_math_renderer = "mathml"
 breathe_projects = {"metastable": os.environ["METASTABLE_XML"]}
 breathe_default_project = "metastable"
 breathe_order_parameters_first = True
@@ -71,5 +76,17 @@ def keep_layout(app, what, name, obj, options, lines):
     lines[:] = told
 
 
+def mathml(display):
+    """A writer of formulas as MathML, which browsers show without a script from the network."""
+    def visit(writer, node):
+        formula, row = latex2mathml.math(xmlns="http://www.w3.org/1998/Math/MathML", display=display), latex2mathml.mrow()
+        formula.append(row)
+        latex2mathml.parse_latex_math(row, node.astext())
+        writer.body.append(formula.toprettyxml())
+        raise nodes.SkipNode
+    return visit, None
+
+
 def setup(app):
     app.connect("autodoc-process-docstring", keep_layout)
+    app.add_html_math_renderer("mathml", inline_renderers=mathml("inline"), block_renderers=mathml("block"))
