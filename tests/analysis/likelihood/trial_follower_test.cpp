@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "analysis/likelihood/wheel_likelihood.h"
@@ -116,7 +117,11 @@ TEST_P(OwnFriction, IsIntegratedOver) {
 }
 INSTANTIATE_TEST_SUITE_P(Spreads, OwnFriction,
                          testing::Values(Spread{0.005, 0}, Spread{0.02, 0}, Spread{0.04, 3.4}, Spread{0.08, 3.4},
-                                         Spread{0.08, 4.3}, Spread{0.08, 2.2}));
+                                         Spread{0.08, 4.3}, Spread{0.08, 2.2}),
+                         [](const auto& spread) {
+                           return "SdThousandths" + std::to_string(std::lround(1000 * spread.param.sd)) +
+                                  "OddSpeedTenths" + std::to_string(std::lround(10 * spread.param.odd));
+                         });
 
 // Stances that repeat the model say nothing and are left out: every collision then goes on from its own reported speed,
 // and so does a first one without a stated launch.

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "analysis/study/metastability.h"
 #include "dynamics/return_map/rough_terrain.h"
@@ -39,7 +40,11 @@ TEST_P(PublishedWheel, ExpectedStepsAreInsideTheStudysOwnInterval) {
 
 INSTANTIATE_TEST_SUITE_P(KnownAnswers, PublishedWheel,
                          testing::Values(Row{7.02, 0.4, 0.1, 4.26, 0.0022}, Row{9.59, 0.4, 0.1, 6.17, 0.0018},
-                                         Row{7.02, 0.3, 0.05, 1.30e3, 0.005}, Row{9.59, 0.3, 0.05, 4.66e4, 0.005}));
+                                         Row{7.02, 0.3, 0.05, 1.30e3, 0.005}, Row{9.59, 0.3, 0.05, 4.66e4, 0.005}),
+                         [](const auto& row) {
+                           return "SlopeHundredths" + std::to_string(std::lround(100 * row.param.slope_deg)) +
+                                  "FrictionTenths" + std::to_string(std::lround(10 * row.param.friction_mean));
+                         });
 
 // Direct simulation of whole trials gives 24.68 steps (s.e. 0.03), likewise.
 TEST(KnownAnswers, CoulombOnAGentleSlope) {
@@ -88,7 +93,10 @@ TEST_P(RoughTerrain, StudyHoldsTheReferenceInItsInterval) {
 INSTANTIATE_TEST_SUITE_P(KnownAnswers, RoughTerrain,
                          testing::Values(Rough{2.0, 2.3121853052586986e-4, 4324.9128766870834, 4326.1846791959863},
                                          Rough{1.5, 1.5280057867965971e-6, 654447.78327473479, 654449.43992398285},
-                                         Rough{1.0, 1.1990367683962527e-12, 834002781530.65289, 834002781532.82850}));
+                                         Rough{1.0, 1.1990367683962527e-12, 834002781530.65289, 834002781532.82850}),
+                         [](const auto& rough) {
+                           return "SdTenthsOfADegree" + std::to_string(std::lround(10 * rough.param.sd_deg));
+                         });
 
 // It agrees to 1e-3 at 2 deg on sampled cells, with the kill rates from the error function.
 TEST(KnownAnswers, RoughTerrainOnSampledCellsToOneInAThousand) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "dynamics/return_map/landing_density.h"
@@ -93,7 +94,16 @@ INSTANTIATE_TEST_SUITE_P(Laws, AgainstTheExactDensity,
                                            std::tuple{Law::published, 9.59, ContactSpread{0.5, 0.05, 0.1, 0.05}, 2e-3},
                                            std::tuple{Law::coulomb, 7.02, ContactSpread{0.4, 0.05, 0.45, 0.03}, 5e-4},
                                            std::tuple{Law::coulomb, 9.59, ContactSpread{0.4, 0.1, 0.4, 0.1}, 5e-4},
-                                           std::tuple{Law::coulomb, 9.59, ContactSpread{0.4, 0.1, 0.3, 0.05}, 5e-4}));
+                                           std::tuple{Law::coulomb, 9.59, ContactSpread{0.4, 0.1, 0.3, 0.05}, 5e-4}),
+                         [](const auto& setting) {
+                           const ContactSpread& spread = std::get<2>(setting.param);
+                           const auto hundredths = [](double value) {
+                             return std::to_string(std::lround(100 * value));
+                           };
+                           return std::string(std::get<0>(setting.param) == Law::coulomb ? "Coulomb" : "Published") +
+                                  "Slope" + hundredths(std::get<1>(setting.param)) + "Restitution" +
+                                  hundredths(spread.restitution_mean) + "Friction" + hundredths(spread.friction_mean);
+                         });
 
 TEST(CollisionDensity, IsTheDerivativeOfItsDistribution) {
   for (const Law law : {Law::published, Law::coulomb}) {
