@@ -9,9 +9,13 @@
 
 namespace metastable::analysis {
 
-/// Returns the weighted median as value, 5 % and 95 % quantiles as ends.
+/// Returns the weighted median as value, 5 % and 95 % quantiles as ends, of a continuous distribution: a value's weight
+/// is spread evenly over the width around it, as the start of a step is over its cell. Without widths a value stands in
+/// the middle of its weight, with straight lines between; equal values (to 1e-9 of their range) count as one.
 /// @param weights  >= 0, as many as values, some > 0 (otherwise std::invalid_argument)
-Estimate middle_90(std::span<const double> values, std::span<const double> weights);
+/// @param widths   >= 0, as many as values, or none
+Estimate middle_90(std::span<const double> values, std::span<const double> weights,
+                   std::span<const double> widths = {});
 
 /// Says what steps are like: medians with the middle 90 %.
 struct StepProfile {

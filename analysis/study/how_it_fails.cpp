@@ -131,15 +131,19 @@ class Failures {
   /// Describes step k before failure, or all steps of the regime (k = -1).
   StepProfile profile(const std::vector<double>& share, int k) const {
     StepProfile told;
-    std::vector<double> speeds;
+    std::vector<double> speeds, widths;
     double all = 0;
     for (std::size_t i = 0; i < share.size(); ++i) {
-      speeds.push_back(problem_.observable(state(i)));
+      const markov::Grid& grid = space_.grid(space_.phase(i));
+      const double low = problem_.observable(grid.lower(space_.cell(i))),
+                   high = problem_.observable(grid.lower(space_.cell(i)) + grid.width(space_.cell(i)));
+      speeds.push_back(0.5 * (low + high));
+      widths.push_back(std::abs(high - low));
       told.bound_to_fail += share[i] * bound_[i];
       all += share[i];
     }
     told.bound_to_fail /= all;
-    told.state.push_back(middle_90(speeds, share));
+    told.state.push_back(middle_90(speeds, share, widths));
     std::vector<double> restitution, friction, weight;
     for (const NoiseOfPhase& noise : noise_)
       for (std::size_t n = 0; n < noise.contact.size(); ++n) {

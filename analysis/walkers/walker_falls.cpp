@@ -37,6 +37,7 @@ class Falls {
       : map_(map),
         noises_(noises),
         threads_(threads),
+        spacing_(options.spacing),
         lattice_(map.scores, map.scores == 1 ? score_spacing : score_spacing_of_several, score_reach),
         frames_(markov::noise_frames(map, start)),
         mesh_(map, frames_, start, options),
@@ -84,6 +85,16 @@ class Falls {
     for (std::size_t k = 0; k < d; ++k)
       for (std::size_t i = 0; i < d; ++i) u[k] += frame.inverse[k * d + i] * (state[i] - frame.centre[i]);
     return u;
+  }
+
+  /// Returns how far the nodes are apart along a number of the state: the side of an even distribution that has the
+  /// variance of one over the cell around a node.
+  double width(int phase, std::size_t number) const {
+    const markov::NoiseFrame& frame = frames_[static_cast<std::size_t>(phase)];
+    const std::size_t d = frame.centre.size();
+    double square = 0;
+    for (std::size_t k = 0; k < d; ++k) square += frame.axes[number * d + k] * frame.axes[number * d + k];
+    return spacing_ * std::sqrt(square);
   }
 
   bool matters(std::size_t i) const {
@@ -135,9 +146,12 @@ class Falls {
     }
     told.bound_to_fail /= all;
     for (std::size_t number = 0; number < state_.front().size(); ++number) {
-      std::vector<double> values;
-      for (const std::vector<double>& state : state_) values.push_back(state[number]);
-      told.state.push_back(middle_90(values, share));
+      std::vector<double> values, widths;
+      for (std::size_t i = 0; i < state_.size(); ++i) {
+        values.push_back(state_[i][number]);
+        widths.push_back(width(phase_[i], number));
+      }
+      told.state.push_back(middle_90(values, share, widths));
     }
     for (std::size_t which = 0; which < noises_.size(); ++which) told.noise.push_back(noise_profile(which, k));
     return told;
@@ -184,6 +198,7 @@ class Falls {
   const markov::BatchMap& map_;
   const std::vector<NamedNoise>& noises_;
   int threads_;
+  double spacing_;
   markov::ScoreLattice lattice_;
   std::vector<markov::NoiseFrame> frames_;
   markov::Mesh mesh_;

@@ -132,7 +132,7 @@ Elimination::Factors::Factors(const Chain& chain, int threads) : kill(chain.kill
 
 double Elimination::Factors::checked_rate(std::size_t n, double rate) {
   if (!(rate >= std::numeric_limits<double>::min())) {
-    throw RestTooRare("elimination", rate, "state " + std::to_string(n) + " is left too rarely for double precision");
+    throw RestTooRare(rate, n);
   }
   return rate;
 }
@@ -297,6 +297,15 @@ void check_reach(const Chain& chain) {
 }
 
 }  // namespace
+
+RestTooRare::RestTooRare(double rate, std::size_t state)
+    : ConvergenceError("elimination", rate,
+                       "state " + std::to_string(state) + " is left too rarely for double precision"),
+      state_(state) {}
+
+RestTooRare RestTooRare::in_states(std::span<const std::uint32_t> numbers) const {
+  return state_ ? RestTooRare(residual(), numbers[*state_]) : *this;
+}
 
 Elimination::Elimination(const Chain& chain, int threads) {
   if (chain.interpolated()) {

@@ -3,7 +3,9 @@
 // every entry of the answer has full relative accuracy (Alfa, Xue, Ye 2002), however rare rest is.
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,7 +17,24 @@ namespace metastable::markov {
 class RestTooRare : public ConvergenceError {
  public:
   using ConvergenceError::ConvergenceError;
+  /// Names the state that is left so rarely.
+  RestTooRare(double rate, std::size_t state);
+  /// Returns the same of a chain in which the states have these numbers.
+  RestTooRare in_states(std::span<const std::uint32_t> numbers) const;
+
+ private:
+  std::optional<std::size_t> state_;
 };
+
+/// Does work on some `states` of a chain; a state that an error names is named by its number in the chain.
+template <typename Work>
+auto on_states(std::span<const std::uint32_t> states, Work&& work) {
+  try {
+    return work();
+  } catch (const RestTooRare& error) {
+    throw error.in_states(states);
+  }
+}
 
 /// Factorizes I - Q = (I - U) D (I - L) with U, L >= 0 and D > 0 without a subtraction.
 ///

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
-#include <string>
 
 #include "markov/chain/elimination.h"
 
@@ -79,8 +78,7 @@ GeneratorFactors::GeneratorFactors(const Generator& generator, bool closed) {
     exit_[pivot] = std::accumulate(from + low_[pivot], from + pivot, kill[pivot]);
     if (closed && pivot == 0) exit_[pivot] = 1;
     if (!(exit_[pivot] > 0))
-      throw RestTooRare("elimination", static_cast<double>(exit_[pivot]),
-                        "state " + std::to_string(pivot) + " is left too rarely for extended precision");
+      throw RestTooRare(static_cast<double>(exit_[pivot]), pivot);
     for (std::size_t i = top[pivot]; i < pivot; ++i) {
       if (high_[i] < pivot) continue;
       Extended* target = row(i);

@@ -35,7 +35,7 @@ Generator generator_of(const Chain& chain);
 /// b, O(n^3) for full rows, about ten times Elimination.
 class GeneratorFactors {
  public:
-  /// @throws RestTooRare("elimination", ...) naming the state where a rate of leaving is zero
+  /// @throws RestTooRare naming the state where a rate of leaving is zero
   explicit GeneratorFactors(const Generator& generator);
   /// Solves (I - Q) x = rhs, entries >= 0.
   std::vector<Extended> solve(std::span<const Extended> rhs) const;

@@ -167,7 +167,7 @@ ChainSolver::ChainSolver(const Chain& chain, int threads)
     : chain_(must_reach_rest(chain)),
       period_(find_period(chain_)),
       revolution_(revolution_chain(chain_, period_)),
-      elimination_(revolution_, threads) {}
+      elimination_(on_states(period_.classes[0], [&] { return Elimination(revolution_, threads); })) {}
 
 std::vector<double> ChainSolver::solve(std::span<const double> rhs) const {
   if (period_.period == 1) return elimination_.solve(rhs);

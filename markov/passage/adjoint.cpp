@@ -34,7 +34,7 @@ Adjoint adjoint(const ChainSolver& solver, const Launch& launch) {
     others.push_back(static_cast<std::uint32_t>(i));
     kill.push_back(chain.kill(i));
   }
-  const ChainSolver without(chain.restricted_to(others));
+  const ChainSolver without = on_states(others, [&] { return ChainSolver(chain.restricted_to(others)); });
   const std::vector<double> time = without.solve(std::vector<double>(others.size(), 1.0)), rest = without.solve(kill);
   for (std::size_t k = 0; k < others.size(); ++k) at.excess[others[k]] = time[k] - rest[k] * at.mean[at.reference];
   return at;

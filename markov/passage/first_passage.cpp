@@ -84,6 +84,24 @@ std::vector<double> second_moment(const ChainSolver& solver, std::span<const dou
   return solver.solve(mean);
 }
 
+std::vector<double> first_passage_sd(const ChainSolver& solver, std::span<const double> mean) {
+  check_size(solver, mean, "mean first passage");
+  const Chain& chain = solver.chain();
+  // In units of the largest mean, whose square may be too large for doubles.
+  const double unit = *std::max_element(mean.begin(), mean.end());
+  std::vector<double> sd;
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const auto square = [&](double after) { return std::pow((after - (mean[i] - 1)) / unit, 2); };
+    double variance = chain.kill(i) * square(0) + chain.stay(i) * square(mean[i]);
+    for (std::size_t e = 0; e < chain.columns(i).size(); ++e)
+      variance += chain.values(i)[e] * square(mean[chain.columns(i)[e]]);
+    sd.push_back(variance);
+  }
+  sd = solver.solve(sd);
+  for (double& one : sd) one = unit * std::sqrt(one);
+  return sd;
+}
+
 Moments steps_from_launch(const Launch& launch, std::span<const double> mean, std::span<const double> second) {
   check_launch(launch, mean.size());
   if (second.size() != mean.size()) throw std::invalid_argument("launch: moments of different size");

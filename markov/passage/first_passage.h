@@ -24,6 +24,11 @@ std::vector<double> mean_first_passage(const ChainSolver& solver);
 /// of mean_first_passage(). Takes one solve. @throws std::invalid_argument on a size that is not the chain's.
 std::vector<double> second_moment(const ChainSolver& solver, std::span<const double> mean);
 
+/// Returns the sd of the first-passage time from each of n states [steps], with m = `mean`: its square is solved for
+/// from the variance of m_j after a step, a sum of squares. A certain number of steps has an sd of rounding, not of its
+/// square root. Takes one solve. @throws std::invalid_argument on a size that is not the chain's.
+std::vector<double> first_passage_sd(const ChainSolver& solver, std::span<const double> mean);
+
 struct Moments {
   double mean = 0;  ///< steps, the last one (that leads to rest) counted
   double sd = 0;

@@ -118,34 +118,41 @@ LastSteps last_steps(const Chain& chain, std::span<const double> visits, int ste
 
 PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set) {
   require_size("set", set.size(), chain);
-  std::vector<std::uint32_t> outside;
-  for (std::size_t i = 0; i < set.size(); ++i)
-    if (!set[i]) outside.push_back(static_cast<std::uint32_t>(i));
   PassageTo passage;
   passage.reach.assign(set.begin(), set.end());
   passage.fail.assign(set.size(), 0.0);
   passage.steps.assign(set.size(), 0.0);
-  if (outside.empty()) return passage;
-  std::vector<double> to_set(outside.size(), 0.0), kill, ones(outside.size(), 1.0);
+  std::vector<std::uint32_t> outside, undecided;
+  for (std::size_t i = 0; i < set.size(); ++i)
+    if (!set[i]) outside.push_back(static_cast<std::uint32_t>(i));
+  const Reachability either = classify(chain.restricted_to(outside));
+  std::vector<std::uint8_t> must;
   for (std::size_t n = 0; n < outside.size(); ++n) {
-    kill.push_back(chain.kill(outside[n]));
-    const auto columns = chain.columns(outside[n]);
-    for (std::size_t e = 0; e < columns.size(); ++e)
-      if (set[columns[e]]) to_set[n] += chain.values(outside[n])[e];
+    if (!either.must_rest[n]) passage.steps[outside[n]] = std::numeric_limits<double>::infinity();
+    if (either.can_rest[n]) undecided.push_back(outside[n]), must.push_back(either.must_rest[n]);
   }
-  const Chain inside = chain.restricted_to(outside);
-  const auto scatter = [&](const std::vector<double>& from, std::vector<double>& to) {
-    for (std::size_t n = 0; n < outside.size(); ++n) to[outside[n]] = from[n];
+  if (undecided.empty()) return passage;
+  std::vector<double> to_set(undecided.size(), 0.0), kill, ones(undecided.size(), 1.0);
+  for (std::size_t n = 0; n < undecided.size(); ++n) {
+    kill.push_back(chain.kill(undecided[n]));
+    const auto columns = chain.columns(undecided[n]);
+    for (std::size_t e = 0; e < columns.size(); ++e)
+      if (set[columns[e]]) to_set[n] += chain.values(undecided[n])[e];
+  }
+  const Chain inside = chain.restricted_to(undecided);
+  const auto fill = [&](const auto& solve) {
+    const std::vector<double> reach = solve(to_set), fail = solve(kill), steps = solve(ones);
+    for (std::size_t n = 0; n < undecided.size(); ++n) {
+      passage.reach[undecided[n]] = reach[n];
+      passage.fail[undecided[n]] = fail[n];
+      if (must[n]) passage.steps[undecided[n]] = steps[n];
+    }
   };
-  if (outside.size() <= kEliminated) {
-    const ChainSolver solver(inside);
-    scatter(solver.solve(to_set), passage.reach);
-    scatter(solver.solve(kill), passage.fail);
-    scatter(solver.solve(ones), passage.steps);
+  if (undecided.size() <= kEliminated) {
+    const ChainSolver solver = on_states(undecided, [&] { return ChainSolver(inside); });
+    fill([&](const std::vector<double>& rhs) { return solver.solve(rhs); });
   } else {
-    scatter(by_products(inside, to_set), passage.reach);
-    scatter(by_products(inside, kill), passage.fail);
-    scatter(by_products(inside, ones), passage.steps);
+    fill([&](const std::vector<double>& rhs) { return by_products(inside, rhs); });
   }
   return passage;
 }

@@ -36,13 +36,14 @@ LastSteps last_steps(const Chain& chain, std::span<const double> visits, int ste
 struct PassageTo {
   std::vector<double> reach;  ///< committor: probability of being in the set, now or later, before failing
   std::vector<double> fail;   ///< probability of failing before that; neither is one minus the other
-  std::vector<double> steps;  ///< expected steps until either; 0 in the set
+  std::vector<double> steps;  ///< expected steps until either; 0 in the set, infinite where neither need come
 };
 
-/// Solves the chain outside of the set, by elimination up to 3000 states, beyond them by products.
+/// Solves the chain outside of the set, by elimination up to 3000 states, beyond them by products. Where neither the set
+/// nor failure can be reached, both probabilities are 0.
 /// @param set  one entry a state, 1 for those of the set
-/// @throws std::invalid_argument for another size; std::domain_error where neither is ever reached;
-///         ConvergenceError if 100000 products do not settle
+/// @throws std::invalid_argument for another size; RestTooRare as Elimination; ConvergenceError if 100000 products do
+///         not settle
 PassageTo passage_to(const Chain& chain, std::span<const std::uint8_t> set);
 
 }  // namespace metastable::markov

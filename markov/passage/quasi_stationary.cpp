@@ -410,7 +410,8 @@ std::vector<double> stationary(const Chain& chain, std::span<const double> start
   }
   std::vector<double> rhs;
   for (const std::uint32_t state : others) rhs.push_back(departures[state]);
-  const std::vector<double> visits = Elimination(chain.restricted_to(others)).solve_left(rhs);
+  const std::vector<double> visits =
+      on_states(others, [&] { return Elimination(chain.restricted_to(others)).solve_left(rhs); });
   std::vector<double> distribution(chain.size(), 0.0);
   distribution[states[0]] = 1;
   for (std::size_t i = 0; i < others.size(); ++i) distribution[others[i]] = visits[i];

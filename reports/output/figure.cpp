@@ -1,6 +1,7 @@
 #include "reports/output/figure.h"
 
 #include <fmt/format.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -8,13 +9,16 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <thread>
 
 #include "reports/output/interrupt.h"
 #include "reports/output/text_table.h"
@@ -355,7 +359,36 @@ std::string contents(std::FILE* file) {
   return text;
 }
 
-std::string run_gnuplot(const std::string& script) {
+/// Waits for a program that leads a process group of its own. At the limit, or once a signal has come, the whole group is
+/// ended. @returns its status; nothing at the limit. @throws Interrupted
+std::optional<int> wait_for(pid_t child, std::chrono::milliseconds limit) {
+  constexpr auto glance = std::chrono::milliseconds(5);
+  const auto until = std::chrono::steady_clock::now() + limit;
+  const auto end = [child] {
+    kill(-child, SIGKILL);
+    while (waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  };
+  for (;;) {
+    int status = 0;
+    const pid_t ended = waitpid(child, &status, WNOHANG);
+    if (ended == child) return status;
+    if (ended < 0 && errno != EINTR) throw std::runtime_error(fmt::format("waiting for gnuplot: {}", std::strerror(errno)));
+    try {
+      check_interrupt();
+    } catch (const Interrupted&) {
+      end();
+      throw;
+    }
+    if (std::chrono::steady_clock::now() >= until) {
+      end();
+      return std::nullopt;
+    }
+    std::this_thread::sleep_for(glance);
+  }
+}
+
+std::string run_gnuplot(const std::string& script, const std::string& id, std::chrono::milliseconds limit) {
   const TemporaryFile input = temporary_file();
   const TemporaryFile output = temporary_file();
   const TemporaryFile errors = temporary_file();
@@ -372,19 +405,25 @@ std::string run_gnuplot(const std::string& script) {
   // With -d no start-up file of the user's changes the figure.
   std::string program = "gnuplot", option = "-d", standard_input = "-";
   char* const arguments[] = {program.data(), option.data(), standard_input.data(), nullptr};
+  posix_spawnattr_t attributes;  // a group of its own: with gnuplot end the programs it has started
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setpgroup(&attributes, 0);
   pid_t child = 0;
-  const int failure = posix_spawnp(&child, "gnuplot", &actions, nullptr, arguments, environ);
+  const int failure = posix_spawnp(&child, "gnuplot", &actions, &attributes, arguments, environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (failure == ENOENT) {
     throw std::runtime_error("gnuplot, which draws the figures, was not found: install the package gnuplot-nox");
   }
   if (failure != 0) throw std::runtime_error(fmt::format("gnuplot cannot be started: {}", std::strerror(failure)));
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
+  const std::optional<int> status = wait_for(child, limit);
   check_interrupt();
+  if (!status)
+    throw std::runtime_error(fmt::format("figure '{}' was not drawn: gnuplot did not end within {:.3g} s and was ended", id,
+                                         std::chrono::duration<double>(limit).count()));
   const std::string message = contents(errors.get());
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw std::runtime_error("gnuplot failed: " + message);
+  if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) throw std::runtime_error("gnuplot failed: " + message);
   return contents(output.get());
 }
 
@@ -453,8 +492,8 @@ std::string gnuplot_script(const Figure& figure) {
   return script + "\n";
 }
 
-std::string render_svg(const Figure& figure) {
-  std::string svg = run_gnuplot(gnuplot_script(figure));
+std::string render_svg(const Figure& figure, std::chrono::milliseconds limit) {
+  std::string svg = run_gnuplot(gnuplot_script(figure), figure.id, limit);
   if (svg.find("</svg>") == std::string::npos) {
     throw std::runtime_error(fmt::format("gnuplot drew nothing for figure '{}'", figure.id));
   }

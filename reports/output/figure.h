@@ -1,6 +1,7 @@
 #pragma once
 // A figure is data, drawn by gnuplot into SVG.
 
+#include <chrono>
 #include <optional>
 #include <string>
 #include <vector>
@@ -97,7 +98,9 @@ struct Figure {
 std::string gnuplot_script(const Figure& figure);
 
 /// Returns the figure as a standalone SVG: the same bytes for the same figure (and version of gnuplot) on any machine.
-/// Takes about 30 ms. @throws std::runtime_error if gnuplot is missing or fails; std::invalid_argument as above
-std::string render_svg(const Figure& figure);
+/// Takes about 30 ms. @param limit  to gnuplot's time; when it is over, gnuplot is ended
+/// @throws std::runtime_error if gnuplot is missing, fails or does not end in time; Interrupted once a signal has come,
+/// with gnuplot ended; std::invalid_argument as above
+std::string render_svg(const Figure& figure, std::chrono::milliseconds limit = std::chrono::seconds(30));
 
 }  // namespace metastable::reports

@@ -14,6 +14,7 @@
 #include "markov/passage/first_passage.h"
 #include "markov/passage/last_steps.h"
 #include "markov/passage/quasi_stationary.h"
+#include "markov/passage/survival_after.h"
 #include "reports/python/answer.h"
 #include "reports/python/arguments.h"
 
@@ -28,6 +29,7 @@ class HeldChain {
  public:
   HeldChain(markov::Chain chain, int threads) : chain_(std::move(chain)), threads_(threads) {}
   const markov::Chain& chain() const { return chain_; }
+  int threads() const { return threads_; }
   const markov::ChainSolver& solver() {
     if (!solver_) solver_ = std::make_unique<markov::ChainSolver>(chain_, threads_);
     return *solver_;
@@ -44,34 +46,38 @@ class HeldChain {
   std::optional<markov::QuasiStationary> quasi_;
 };
 
-// Takes rows of compressed storage, columns ascending; the diagonal is looked at and left out.
+// Takes rows of compressed storage, columns ascending; the diagonal is looked at and left out. Where a row gives its
+// own, it has to be what is left in every row; where none does, it is understood.
 HeldChain chain_of(const Index& starts, const Index& columns, const Number& values, const Number& kill, int threads) {
+  constexpr double sum_tolerance = 1e-9;
   const auto n = static_cast<std::size_t>(kill.size());
   std::vector<std::size_t> row_start{0};
   std::vector<std::uint32_t> column;
-  std::vector<double> value;
+  std::vector<double> value, sums(kill.data(), kill.data() + n);
+  std::optional<std::size_t> given;  // the first row with a diagonal
   for (std::size_t i = 0; i < n; ++i) {
-    double sum = kill.data()[i], stay = 0;
     for (std::int64_t at = starts.data()[i]; at < starts.data()[i + 1]; ++at) {
       const double p = values.data()[at];
-      sum += p;
+      sums[i] += p;
       if (columns.data()[at] == static_cast<std::int64_t>(i)) {
-        stay = p;
+        if (!given) given = i;
         if (!(p >= 0)) throw std::invalid_argument(fmt::format("chain: row {}: entry {} on the diagonal", i, p));
         continue;
       }
       column.push_back(static_cast<std::uint32_t>(columns.data()[at]));
       value.push_back(p);
     }
-    // A diagonal that is given has to be what is left; one that is not given is understood.
-    if (stay != 0 && !(std::abs(sum - 1) <= 1e-9))
-      throw std::invalid_argument(fmt::format(
-          "chain: row {} and its kill rate sum to {:.12g}, 1 expected where the diagonal is given", i, sum));
     row_start.push_back(column.size());
   }
-  return {markov::Chain(std::move(row_start), std::move(column), std::move(value),
-                        std::vector<double>(kill.data(), kill.data() + n)),
-          threads};
+  HeldChain held{markov::Chain(std::move(row_start), std::move(column), std::move(value),
+                               std::vector<double>(kill.data(), kill.data() + n)),
+                 threads};
+  for (std::size_t i = 0; i < n && given; ++i)
+    if (!(std::abs(sums[i] - 1) <= sum_tolerance))
+      throw std::invalid_argument(fmt::format(
+          "chain: row {} and its kill rate sum to {:.12g}, 1 expected where the diagonal is given{}", i, sums[i],
+          *given == i ? "" : fmt::format(", as it is in row {}", *given)));
+  return held;
 }
 
 struct Bounds {
@@ -108,21 +114,13 @@ Bounds enclosed(const markov::Chain& chain, const std::vector<double>& v) {
   return bounds;
 }
 
-markov::Launch launch_of(const markov::Chain& chain, const Number& start) {
-  if (static_cast<std::size_t>(start.size()) != chain.size())
-    throw std::invalid_argument(fmt::format("start: {} probabilities given for {} states", start.size(), chain.size()));
-  return {{start.data(), start.data() + start.size()}, 0};
-}
-
 py::dict first_passage(HeldChain& held, const py::object& progress) {
   std::vector<double> mean, sd;
   Bounds bounds;
   Call call(progress);
   call.run([&] {
     mean = markov::mean_first_passage(held.solver());
-    const std::vector<double> second = markov::second_moment(held.solver(), mean);
-    for (std::size_t i = 0; i < mean.size(); ++i)  // E T^2 - (E T)^2 with E T (T + 1) / 2 = second
-      sd.push_back(std::sqrt(std::max(0.0, 2 * (second[i] - mean[i] * mean[i]) + mean[i] * (mean[i] - 1))));
+    sd = markov::first_passage_sd(held.solver(), mean);
     bounds = enclosed(held.chain(), mean);
   });
   py::dict told;
@@ -161,17 +159,12 @@ py::dict committor(const HeldChain& held, const py::array_t<bool, py::array::c_s
   return told;
 }
 
-py::array survival(HeldChain& held, const Number& start, const Number& steps, const py::object& progress) {
-  const markov::Launch launch = launch_of(held.chain(), start);
-  for (py::ssize_t i = 0; i < steps.size(); ++i)
-    if (!(steps.data()[i] >= 0)) throw std::invalid_argument(fmt::format("steps: {} is below 0", steps.data()[i]));
+py::array survival(const HeldChain& held, const Number& start, const Number& steps, const py::object& progress) {
+  const std::vector<double> from(start.data(), start.data() + start.size()),
+      after(steps.data(), steps.data() + steps.size());
   std::vector<double> at;
   Call call(progress);
-  call.run([&] {
-    const markov::Survival survival(held.solver(), held.quasi_stationary(), launch);
-    // There the launch is a step of its own.
-    for (py::ssize_t i = 0; i < steps.size(); ++i) at.push_back(survival.at(steps.data()[i] + 1));
-  });
+  call.run([&] { at = markov::survival_after(held.chain(), from, after, held.threads()); });
   return array_of(std::move(at));
 }
 

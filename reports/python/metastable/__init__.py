@@ -12,6 +12,7 @@ computations a ComputationError (a RuntimeError).
 """
 
 import dataclasses
+import decimal
 import html
 import json
 import numbers
@@ -552,53 +553,90 @@ class Chain:
             return FirstPassage(**self._held.first_passage(tell))
 
     def quasi_stationary(self, *, progress=None):
-        """The quasi-stationary distribution, as QuasiStationary."""
+        """The quasi-stationary distribution, as QuasiStationary: the left eigenvector of the whole chain, which sums to
+        one (of a chain of period d, what walkers spread over all d classes look like). A ComputationError says where
+        there is more than one, or double precision does not tell."""
         with _progress.telling(progress, "quasi-stationary") as tell:
             return QuasiStationary(**self._held.quasi_stationary(tell))
 
     def committor(self, states, *, progress=None):
-        """First passage to `states`, a list of indices or n booleans, as Passage."""
-        states = numpy.asarray(states)
-        if states.dtype != bool:
-            marks = numpy.zeros(len(self), bool)
-            marks[states.astype(int, casting="same_kind")] = True
-            states = marks
+        """First passage to `states`, a list of indices or n booleans, as Passage. From states that can reach neither
+        these nor failure, both probabilities are 0; where neither need come, the steps are infinite."""
         with _progress.telling(progress, "committor") as tell:
-            return Passage(**self._held.committor(states, tell))
+            return Passage(**self._held.committor(self._marks(states), tell))
 
     def survival(self, start, steps, *, progress=None):
-        """P(no failure within n steps) for each n of `steps`, from a distribution `start` over the states (or the index
-        of one)."""
+        """P(no failure within n steps) for each n of `steps` (infinity: ever), from a distribution `start` over the
+        states (or the index of one)."""
         if numpy.ndim(start) == 0:
-            start = numpy.arange(len(self)) == int(start)
+            start = self._marks([start])
         with _progress.telling(progress, "survival") as tell:
-            return self._held.survival(numpy.asarray(start, float), numpy.atleast_1d(numpy.asarray(steps, float)), tell)
+            return self._held.survival(_numbers(start, "start"), _numbers(numpy.atleast_1d(steps), "steps"), tell)
+
+    def _marks(self, states):
+        states = numpy.asarray(states)
+        if states.dtype == bool and states.ndim == 1:
+            return states
+        if states.ndim != 1 or (states.size and states.dtype.kind not in "iu"):
+            raise InputError(f"states: a list of indices or {len(self)} booleans expected")
+        for state in states.tolist():
+            if not 0 <= state < len(self):
+                raise InputError(f"states: {state} is not one of 0 to {len(self) - 1}")
+        marks = numpy.zeros(len(self), bool)
+        marks[states.astype(int)] = True
+        return marks
 
     def __repr__(self):
         return f"<metastable.Chain: {len(self)} states, {self.entries} entries>"
+
+
+def _numbers(values, what):
+    """Real numbers as an array of doubles; what would lose something on the way is refused."""
+    if isinstance(values, numpy.ma.MaskedArray):
+        raise InputError(f"{what}: a masked array; fill in the numbers that are masked")
+    try:
+        given = numpy.asarray(values)
+    except ValueError:
+        raise InputError(f"{what}: an array of numbers expected, all its rows of one length") from None
+    if given.dtype.kind == "O" and not all(isinstance(one, (numbers.Real, decimal.Decimal)) for one in given.flat):
+        raise InputError(f"{what}: real numbers expected, not all of them are")
+    if given.dtype.kind not in "biufO":
+        raise InputError(f"{what}: real numbers expected, not {given.dtype}")
+    doubles = numpy.ascontiguousarray(given, float)
+    if doubles.shape != given.shape:  # a single number
+        doubles = doubles.reshape(given.shape)
+    if given.dtype.kind in "fO" and numpy.any((doubles == 0) & (given != 0)):
+        raise InputError(f"{what}: a number other than 0 is too small for double precision")
+    return doubles
 
 
 def chain(matrix, kill, *, threads=0):
     """A Markov chain of your own that may fail, as a Chain.
 
     matrix  transition probabilities, rows FROM: a NumPy array or any SciPy sparse matrix, n x n. The diagonal may be
-            left out; where it is given, each row and its kill rate have to sum to one (1e-9)
+            left out, all of it: zeros in an array, nothing stored in a sparse matrix. Where one of its entries is
+            given, every row and its kill rate have to sum to one (1e-9), also those whose diagonal is zero
     kill    n probabilities of failing in the next step. They are asked for because one minus a row's sum has lost the
             digits that matter where failures are rare
+
+    Both hold real numbers; complex ones, masked arrays, text and missing numbers are refused.
     """
-    kill = numpy.ascontiguousarray(kill, float)
+    kill = _numbers(kill, "kill")
     if kill.ndim != 1:
         raise InputError(f"kill: a vector expected, not an array of shape {kill.shape}")
-    if not hasattr(matrix, "tocsr"):
-        matrix = numpy.ascontiguousarray(matrix, float)
-    if matrix.ndim != 2 or matrix.shape != (len(kill), len(kill)):
+    sparse = hasattr(matrix, "tocsr")
+    if not sparse:
+        matrix = _numbers(matrix, "matrix")
+    if len(matrix.shape) != 2 or matrix.shape != (len(kill), len(kill)):
         raise InputError(f"matrix: shape {matrix.shape}, {(len(kill), len(kill))} expected for {len(kill)} kill rates")
-    if hasattr(matrix, "tocsr"):
-        rows = matrix.tocsr(copy=True)
+    if sparse:
+        if matrix.dtype.kind not in "biuf":
+            raise InputError(f"matrix: real numbers expected, not {matrix.dtype}")
+        stored = matrix.astype(float)  # first: duplicates are added up
+        rows = stored.tocsr(copy=stored is matrix)
         rows.sum_duplicates()  # columns ascend then
         starts, columns, values = rows.indptr, rows.indices, rows.data
     else:
         i, columns = matrix.nonzero()
         starts, values = numpy.searchsorted(i, numpy.arange(len(kill) + 1)), matrix[i, columns]
     return Chain(_metastable.Chain(starts, columns, values, kill, threads))
-

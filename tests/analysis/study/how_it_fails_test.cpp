@@ -69,8 +69,40 @@ TEST(MiddleNinety, IsThatOfWeights) {
   EXPECT_DOUBLE_EQ(middle.value, 2);
   EXPECT_DOUBLE_EQ(middle.lower, 1);
   EXPECT_DOUBLE_EQ(middle.upper, 3);
-  EXPECT_THROW(middle_90(values, std::vector<double>{1}), std::invalid_argument);
+  const std::vector<double> one{1};
+  EXPECT_THROW(middle_90(values, one), std::invalid_argument);
+  EXPECT_THROW(middle_90(values, weights, one), std::invalid_argument);
   EXPECT_THROW(middle_90(values, std::vector<double>{0, 0, 0}), std::invalid_argument);
+}
+
+// Of nodes that share a value, as the rows of a lattice do, each on its own would pull the quantile to it.
+TEST(MiddleNinety, OfEqualValuesInterpolatesBetweenThem) {
+  std::vector<double> values, weights;
+  for (const double node : {0.0, 1.0, 2.0, 3.0})
+    for (int k = 0; k < 100; ++k) {
+      values.push_back(node + 1e-15 * k);
+      weights.push_back(node + 1);
+    }
+  // Middles of weights at 0.05, 0.2, 0.45 and 0.8.
+  const Estimate middle = middle_90(values, weights);
+  EXPECT_NEAR(middle.value, 2 + 0.05 / 0.35, 1e-12);
+  EXPECT_NEAR(middle.lower, 0, 1e-12);
+  EXPECT_NEAR(middle.upper, 3, 1e-12);
+}
+
+// The nodes of a lattice with the weights of a distribution tell its quantiles to the square of the spacing.
+TEST(MiddleNinety, OfCellsIsThatOfTheirDistribution) {
+  for (const double spacing : {0.5, 0.25, 0.125}) {
+    std::vector<double> values, weights;
+    for (double x = -8.03; x < 8; x += spacing) {
+      values.push_back(x);
+      weights.push_back(0.5 * (std::erfc(-(x + spacing / 2) / std::sqrt(2)) - std::erfc(-(x - spacing / 2) / std::sqrt(2))));
+    }
+    const Estimate middle = middle_90(values, weights, std::vector<double>(values.size(), spacing));
+    EXPECT_NEAR(middle.lower, -1.6448536269514722, 0.15 * spacing * spacing);
+    EXPECT_NEAR(middle.upper, 1.6448536269514722, 0.15 * spacing * spacing);
+    EXPECT_NEAR(middle.value, 0, 0.1 * spacing * spacing);
+  }
 }
 
 }  // namespace

@@ -49,6 +49,36 @@ TEST(WalkerFalls, AreThoseOfWalksFollowed) {
   EXPECT_EQ(falls.moments.likeliest.size(), 6u);
 }
 
+// x' = a x + z and y' = x stands in the plane of two successive numbers: in the regime both are normal, sd 1 / sqrt(1 -
+// a^2), and the nodes' rows run along the axes of x + y and x - y, so that many share an x.
+TEST(WalkerFalls, QuantilesLieBetweenTheNodes) {
+  constexpr double a = 0.5, normal_95_score = 1.6448536269514722;
+  markov::BatchMap map;
+  map.dimension = 2;
+  map.step = [](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      next[2 * i] = a * states[2 * i] + scores[i];
+      next[2 * i + 1] = states[2 * i];
+      failed[i] = next[2 * i] < -4.5;
+    }
+  };
+  for (const double spacing : {0.5, 0.3}) {
+    markov::MeshStudy study;
+    study.sizes.resize(2);
+    study.sizes[1].spacing = spacing;
+    const std::vector<double> start{0, 0};
+    const WalkerFalls falls = how_it_falls(map, start, {{"z", 0, 1}}, study, {});
+    // A mesh adds a sixth of the spacing squared to the variance at every step, the even cells half of that.
+    const double sd = std::sqrt(1 / (1 - a * a)), wider = 1 + spacing * spacing / 4;
+    for (const Estimate& state : falls.moments.regime.state) {
+      EXPECT_NEAR(state.value, 0, 0.03 * sd) << spacing;
+      EXPECT_NEAR(state.lower, -normal_95_score * sd, (wider - 1) * 2 * sd) << spacing;
+      EXPECT_NEAR(state.upper, normal_95_score * sd, (wider - 1) * 2 * sd) << spacing;
+      EXPECT_NEAR(state.upper + state.lower, 0, 0.05 * sd) << spacing;
+    }
+  }
+}
+
 TEST(WalkerTrials, DoNotHangOnThreadsAndAgreeWithBatches) {
   const std::vector<Walk> one = simulate_walks(garcia, {.trials = 600, .longest = 100000, .seed = 3, .threads = 1});
   const std::vector<Walk> two = simulate_walks(garcia, {.trials = 600, .longest = 100000, .seed = 3, .threads = 2});

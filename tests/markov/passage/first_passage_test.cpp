@@ -321,5 +321,25 @@ TEST(FirstPassage, IllegalInputs) {
             "quantile: a probability between 0 and 1 is needed");
 }
 
+// A certain number of steps scatters by nothing, a geometric one by sqrt(1 - p) / p.
+TEST(FirstPassageSd, IsNoDifferenceOfSquares) {
+  constexpr std::size_t n = 2000;
+  std::vector<std::size_t> start{0};
+  std::vector<std::uint32_t> column;
+  for (std::size_t i = 0; i + 1 < n; ++i) {
+    column.push_back(static_cast<std::uint32_t>(i + 1));
+    start.push_back(column.size());
+  }
+  start.push_back(column.size());
+  std::vector<double> kill(n, 0.0);
+  kill.back() = 1;
+  const ChainSolver line(Chain(start, column, std::vector<double>(n - 1, 1.0), kill));
+  for (const double sd : first_passage_sd(line, mean_first_passage(line))) EXPECT_LT(sd, 1e-9);
+  for (const double p : {0.5, 1e-8, 1e-200, 1e-300}) {
+    const ChainSolver one(Chain::from_dense(1, std::vector<double>{0}, std::vector<double>{p}));
+    EXPECT_NEAR(first_passage_sd(one, mean_first_passage(one))[0] / (std::sqrt(1 - p) / p), 1, 1e-14) << p;
+  }
+}
+
 }  // namespace
 }  // namespace metastable::markov

@@ -6,10 +6,13 @@
 #include <numeric>
 
 #include "markov/passage/first_passage.h"
+#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
 
 namespace metastable::markov {
 namespace {
+
+using testing::message_of;
 
 /// Solves gambler's ruin: from i (0 is one above ruin), the chance of reaching `top` first, and of ruin first.
 double reaches(double i, double top, double ratio) {
@@ -37,6 +40,25 @@ void expect_ruin(std::size_t n, std::size_t top, double up, double down) {
 
 TEST(PassageTo, IsTheGamblersRuinByElimination) { expect_ruin(60, 40, 0.5, 0.3); }
 TEST(PassageTo, IsTheGamblersRuinByProducts) { expect_ruin(3600, 3200, 0.8, 0.1); }
+
+// 0 fails or gets to 1, 1 goes on to the set {4} or to the safe state 3; 2 is not met.
+TEST(PassageTo, IsToldBesideASafeState) {
+  const Chain chain({0, 1, 3, 3, 3, 3}, {1, 3, 4}, {0.5, 0.25, 0.5}, {0.5, 0.25, 1, 0, 0.5});
+  const PassageTo passage = passage_to(chain, std::vector<std::uint8_t>{0, 0, 0, 0, 1});
+  EXPECT_EQ(passage.reach, (std::vector<double>{0.25, 0.5, 0, 0, 1}));
+  EXPECT_EQ(passage.fail, (std::vector<double>{0.625, 0.25, 1, 0, 0}));
+  for (const std::size_t endless : {0u, 1u, 3u}) EXPECT_TRUE(std::isinf(passage.steps[endless])) << endless;
+  EXPECT_EQ(passage.steps[2], 1);
+  EXPECT_EQ(passage.steps[4], 0);
+}
+
+// The state that is left too rarely is the 4th of the chain and the 2nd outside of the set.
+TEST(PassageTo, NamesTheStateOfTheChain) {
+  const Chain chain({0, 0, 0, 1, 2}, {3, 2}, {0.5, 1e-320}, {0.5, 0.5, 0.25, 0});
+  const std::string message =
+      message_of<RestTooRare>([&] { passage_to(chain, std::vector<std::uint8_t>{1, 1, 0, 0}); });
+  EXPECT_NE(message.find("state 3 is left too rarely"), std::string::npos) << message;
+}
 
 TEST(PassageTo, KeepsTheDigitsOfWhatIsRare) {
   // Ruin is 30 states away with odds of 0.01 a step: 1e-60, and reaching is one minus nothing.

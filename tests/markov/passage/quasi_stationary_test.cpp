@@ -54,28 +54,31 @@ TEST(QuasiStationary, WalkOfPeriodTwo) {
   const QuasiStationary quasi = quasi_stationary(solver);
   EXPECT_NEAR(quasi.failure_rate / (2 * std::pow(std::sin(step / 2), 2)), 1, 1e-12);
   EXPECT_NEAR(quasi.revolution_failure_rate / std::pow(std::sin(step), 2), 1, 1e-12);
-  EXPECT_NEAR(sum(quasi.distribution), 2, 1e-13);
+  EXPECT_NEAR(sum(quasi.distribution), 1, 1e-13);
   EXPECT_NEAR(*std::max_element(quasi.survival_weight.begin(), quasi.survival_weight.end()), 1, 1e-15);
   for (std::size_t i = 0; i < n; ++i) {
     EXPECT_NEAR(quasi.survival_weight[i] / std::sin(step * static_cast<double>(i + 1)), 1, 1e-11);
   }
 }
 
-// Every class is pushed into the next one, and the last one into the first.
-TEST(QuasiStationary, ClassDistributionsFollowEachOther) {
-  const ChainSolver solver(reference::cyclic_chain(8, 3, 11, 0.3));
-  const QuasiStationary quasi = quasi_stationary(solver);
-  const Period& period = solver.period();
-  for (std::size_t c = 0; c < 8; ++c) {
-    std::vector<double> here(solver.chain().size(), 0.0);
-    double mass = 0;
-    for (const std::uint32_t i : period.classes[c]) mass += here[i] = quasi.distribution[i];
-    EXPECT_NEAR(mass, 1, 1e-14);
-    const std::vector<double> next = apply_left(solver.chain(), here);
-    for (const std::uint32_t j : period.classes[(c + 1) % 8]) {
-      EXPECT_NEAR(next[j] / sum(next), quasi.distribution[j], 1e-13);
+// y Q = lambda y for all classes at once; within each, shares sum to one.
+TEST(QuasiStationary, OfACyclicChainIsAnEigenvectorOfTheWhole) {
+  for (const double kill : {0.3, 0.999}) {
+    const ChainSolver solver(reference::cyclic_chain(8, 3, 11, kill));
+    const QuasiStationary quasi = quasi_stationary(solver);
+    EXPECT_NEAR(sum(quasi.distribution), 1, 1e-14);
+    const std::vector<double> next = apply_left(solver.chain(), quasi.distribution);
+    for (std::size_t j = 0; j < next.size(); ++j)
+      EXPECT_NEAR(next[j] / ((1 - quasi.failure_rate) * quasi.distribution[j]), 1, 1e-11) << kill;
+    const std::vector<double> shares = shares_in_classes(solver.period(), quasi.distribution);
+    for (const auto& states : solver.period().classes) {
+      double mass = 0;
+      for (const std::uint32_t i : states) mass += shares[i];
+      EXPECT_NEAR(mass, 1, 1e-14);
     }
   }
+  const ChainSolver solver(reference::cyclic_chain(8, 3, 11, 0.3));
+  const QuasiStationary quasi = quasi_stationary(solver);
   // It holds lambda x = Q x for all classes at once.
   const std::vector<double> image = markov::apply(solver.chain(), quasi.survival_weight);
   for (std::size_t i = 0; i < image.size(); ++i) {
@@ -127,6 +130,28 @@ TEST(QuasiStationary, EigenvaluesThatDifferInTheSixthDigit) {
   for (std::size_t i = n - 3; i < n; ++i) EXPECT_NEAR(quasi.distribution[i] / (left[i] / sum(left)), 1, 1e-8) << i;
   EXPECT_NEAR(quasi.survival_weight[0], 1, 1e-15);
   EXPECT_LT(quasi.iterations, 1000);
+}
+
+// Two groups of 60 states that mix at once and hardly change places: plain iterations of either look settled.
+TEST(QuasiStationary, TellsLargeGroupsApartThatFadeAlike) {
+  constexpr std::size_t half = 60, n = 2 * half;
+  for (const double apart : {0.0, 1e-14, 1e-10, 1e-3}) {
+    std::vector<double> matrix(n * n, 0.0), kill(n, 0.01);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i >= half) kill[i] += 0.01 * apart;
+      for (std::size_t j = 0; j < n; ++j)
+        if (i / half == j / half) matrix[i * n + j] = 0.5 / half;
+    }
+    const double over = 1e-15;
+    matrix[half] = over;              // 0 -> 60
+    matrix[half * n] = over;          // 60 -> 0
+    const QuasiStationary quasi = quasi_stationary(ChainSolver(Chain::from_dense(n, matrix, kill)));
+    // The groups as two states: exchange over / 60 either way, kill rates 0 and d.
+    const double d = (kill[half] - kill[0]) / (over / half), ratio = 2 / (d + std::sqrt(d * d + 4));
+    const double first = std::accumulate(quasi.distribution.begin(), quasi.distribution.begin() + half, 0.0);
+    EXPECT_NEAR((1 - first) / first / ratio, 1, 1e-6) << apart;
+    EXPECT_LT(quasi.residual, 1e-8) << apart;
+  }
 }
 
 TEST(Stationary, TwoStatesAndARing) {

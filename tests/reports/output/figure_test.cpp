@@ -2,10 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <string>
+#include <thread>
 #include <vector>
+
+#include "reports/output/interrupt.h"
 
 namespace metastable::reports {
 namespace {
@@ -164,6 +171,64 @@ TEST(Figure, MissingGnuplotIsSaid) {
   }
   setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(message, "gnuplot, which draws the figures, was not found: install the package gnuplot-nox");
+}
+
+/// Puts a gnuplot on the PATH that starts another program and never ends; both are in the file `group`.
+class HangingGnuplot : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::filesystem::create_directories(folder);
+    std::ofstream(folder / "gnuplot") << "#!/bin/sh\nsleep 1000 &\necho $$ $! > " << (folder / "group").string()
+                                      << "\nwait\n";
+    std::filesystem::permissions(folder / "gnuplot", std::filesystem::perms::owner_all);
+    setenv("PATH", (folder.string() + ":" + path).c_str(), 1);
+  }
+  void TearDown() override {
+    setenv("PATH", path.c_str(), 1);
+    std::filesystem::remove_all(folder);
+  }
+  /// Is true once neither runs any more; a zombie that waits for its parent does not.
+  bool all_ended() const {
+    for (int looks = 0; looks < 200; ++looks) {
+      std::ifstream in(folder / "group");
+      bool running = false;
+      for (long id = 0; in >> id;) {
+        std::ifstream status("/proc/" + std::to_string(id) + "/stat");
+        std::string line;
+        std::getline(status, line);
+        running = running || (!line.empty() && line.find(") Z ") == std::string::npos);
+      }
+      if (!running) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return false;
+  }
+
+  const std::string path = std::getenv("PATH");
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "hanging-gnuplot";
+};
+
+TEST_F(HangingGnuplot, IsEndedAtTheLimit) {
+  std::string message;
+  try {
+    render_svg(sample_figure(), std::chrono::milliseconds(300));
+  } catch (const std::runtime_error& error) {
+    message = error.what();
+  }
+  EXPECT_EQ(message, "figure 'map' was not drawn: gnuplot did not end within 0.3 s and was ended");
+  EXPECT_TRUE(all_ended());
+}
+
+TEST_F(HangingGnuplot, IsEndedByASignal) {
+  catch_interrupts();
+  std::thread signals([] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    std::raise(SIGINT);
+  });
+  EXPECT_THROW(render_svg(sample_figure()), Interrupted);
+  signals.join();
+  clear_interrupt();
+  EXPECT_TRUE(all_ended());
 }
 
 TEST(Figure, BarsAreNamedAndValuedTopDown) {

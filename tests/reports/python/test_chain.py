@@ -64,6 +64,89 @@ class Chains(unittest.TestCase):
             sparse = metastable.chain(scipy.sparse.coo_matrix(matrix).asformat(kind), kill)
             np.testing.assert_array_equal(sparse.first_passage().mean, dense)
 
+    def test_equal_kill_rates_leave_the_exchange_alone(self):
+        for stay in (np.array([[.98, .01], [.001, .989]]), np.array([[.98999, 1e-5], [1e-6, .989999]])):
+            quasi = metastable.chain(stay, [.01, .01]).quasi_stationary()
+            np.testing.assert_allclose(quasi.distribution, [1 / 11, 10 / 11], rtol=1e-9)
+            self.assertEqual(quasi.failure_rate, .01)
+
+    def test_a_cyclic_chain_has_the_eigenvector_of_the_whole(self):
+        matrix = np.array([[0, 1.], [.9, 0]])
+        quasi = metastable.chain(matrix, [0, .1]).quasi_stationary()
+        self.assertAlmostEqual(quasi.distribution.sum(), 1, 14)
+        np.testing.assert_allclose(quasi.distribution @ matrix, (1 - quasi.failure_rate) * quasi.distribution, rtol=1e-14)
+
+    def test_what_is_not_unique_is_said(self):
+        with self.assertRaisesRegex(metastable.ComputationError, "not unique"):
+            metastable.chain(np.diag([.9, .9]), [.1, .1]).quasi_stationary()
+
+    def test_a_safe_state_leaves_committor_and_survival(self):
+        chain = metastable.chain(np.diag([.5] * 5 + [1.]), [.5] * 5 + [0.])
+        passage = chain.committor([0, 1])
+        np.testing.assert_array_equal(passage.reach, [1, 1, 0, 0, 0, 0])
+        np.testing.assert_array_equal(passage.fail, [0, 0, 1, 1, 1, 0])
+        np.testing.assert_array_equal(passage.steps, [0, 0, 2, 2, 2, np.inf])
+        np.testing.assert_allclose(chain.survival(0, [1, 5]), [.5, .5**5], rtol=1e-14)
+        np.testing.assert_array_equal(chain.survival(5, [1, 5, np.inf]), 1)
+        with self.assertRaisesRegex(metastable.ComputationError, "state 5"):
+            chain.first_passage()
+        pair = metastable.chain(np.diag([.999, .999999]), [1e-3, 1e-6])
+        np.testing.assert_allclose(pair.survival(0, [1]), [.999], rtol=1e-15)
+
+    @unittest.skipIf(scipy is None, "SciPy is not there")
+    def test_a_diagonal_is_given_or_left_out_as_a_whole(self):
+        rows, kill = [[.6, .3, 0], [.2, .5, .2], [.5, .4, 0]], [.1, .1, 0]
+        for matrix in (rows, scipy.sparse.csr_matrix(rows)):
+            with self.assertRaisesRegex(metastable.InputError, "row 2 and its kill rate sum to 0.9, 1 expected where "
+                                                               "the diagonal is given, as it is in row 0"):
+                metastable.chain(matrix, kill)
+        stored = scipy.sparse.coo_matrix(([0., .5, .5], ([0, 0, 1], [0, 1, 0])), shape=(2, 2))
+        with self.assertRaisesRegex(metastable.InputError, "row 0 and its kill rate sum to 0.6"):
+            metastable.chain(stored, [.1, .5])
+        left_out = metastable.chain([[0, .5], [.5, 0]], [.1, .5]).first_passage().mean
+        np.testing.assert_allclose(left_out, metastable.chain([[.4, .5], [.5, 0]], [.1, .5]).first_passage().mean)
+
+    def test_numbers_are_right_or_refused(self):
+        kill, right = [.5, .5], metastable.chain([[.25, .25], [0, .5]], [.5, .5]).first_passage().mean
+        for matrix in (np.array([[.25, .25], [0, .5]], object), np.array([[.25, .25], [0, .5]], np.float32),
+                       np.asfortranarray([[.25, .25], [0, .5]]), np.matrix([[.25, .25], [0, .5]])):
+            np.testing.assert_array_equal(metastable.chain(matrix, kill).first_passage().mean, right)
+        for whole in (int, bool, np.uint8):
+            mean = metastable.chain(np.array([[0, 1], [0, 0]], whole), np.array([0, 1], whole)).first_passage().mean
+            np.testing.assert_array_equal(mean, [2, 1])
+        for matrix, sentence in (
+            (np.array([[.25, .25j], [0, .5]]), "matrix: real numbers expected, not complex128"),
+            (np.array([[.25, .25 + 0j], [0, .5]], object), "matrix: real numbers expected"),
+            (np.array([[".25", ".25"], ["0", ".5"]]), "matrix: real numbers expected"),
+            (np.array([[".25", .25], [0, .5]], object), "matrix: real numbers expected"),
+            (np.array([[None, .25], [0, .5]], object), "matrix: real numbers expected"),
+            (np.ma.masked_greater([[.25, .25], [0, .5]], .3), "matrix: a masked array"),
+            ([[.25, .25], [.5]], "matrix: an array of numbers expected"),
+            (np.array([[np.nan, .25], [0, .5]]), "row 0"),
+        ):
+            with self.assertRaisesRegex(metastable.InputError, sentence):
+                metastable.chain(matrix, kill)
+        with self.assertRaisesRegex(metastable.InputError, "kill: real numbers expected, not complex128"):
+            metastable.chain(np.zeros((2, 2)), [.5, .5j])
+        if np.finfo(np.longdouble).tiny < 1e-400:
+            with self.assertRaisesRegex(metastable.InputError, "kill: a number other than 0 is too small"):
+                metastable.chain(np.zeros((1, 1)), np.array(["1e-400"], np.longdouble))
+        if scipy is not None:
+            with self.assertRaisesRegex(metastable.InputError, "matrix: real numbers expected, not complex128"):
+                metastable.chain(scipy.sparse.csr_matrix([[.25, .25j], [0, .5]]), kill)
+
+    def test_states_are_those_of_the_chain(self):
+        chain = metastable.chain([[0, .5], [.5, 0]], [.5, .5])
+        for ask, sentence in ((lambda: chain.committor([2]), "states: 2 is not one of 0 to 1"),
+                              (lambda: chain.committor([-1]), "states: -1 is not one of 0 to 1"),
+                              (lambda: chain.committor([.5]), "states: a list of indices or 2 booleans"),
+                              (lambda: chain.survival(2, [1]), "states: 2 is not one of 0 to 1"),
+                              (lambda: chain.survival([1, 0], [-1]), "steps: -1 is below 0"),
+                              (lambda: chain.survival([1, 0], [1j]), "steps: real numbers expected"),
+                              (lambda: chain.survival([.5, 0], [1]), "start: probabilities sum to 0.5, 1 expected")):
+            with self.assertRaisesRegex(metastable.InputError, sentence):
+                ask()
+
     def test_no_chains_are_refused(self):
         for matrix, kill, sentence in (
             (np.ones((2, 3)), [0, 0], r"matrix: shape \(2, 3\), \(2, 2\) expected"),

@@ -1,0 +1,21 @@
+#pragma once
+// Finds the probability of surviving given numbers of steps, for any chain: reducible, undecided, never at rest.
+
+#include <span>
+#include <vector>
+
+#include "markov/chain/chain.h"
+
+namespace metastable::markov {
+
+/// Returns P(no rest within n steps) for each n of `steps`, from a distribution over the states. Up to 4096 steps, and
+/// as many as take 2e8 products, are followed one by one; further ones by doubling the chain, whose failure
+/// probabilities are sums of products throughout, O(states^3) a doubling; on more than 512 states by Survival.
+/// @param start  size n, >= 0, sums to one
+/// @param steps  >= 0, fractions cut; infinity: that of never coming to rest
+/// @throws std::invalid_argument for other arguments (interpolated chains too); std::domain_error and ConvergenceError
+/// as Survival and ChainSolver, for that many steps on so many states alone
+std::vector<double> survival_after(const Chain& chain, std::span<const double> start, std::span<const double> steps,
+                                   int threads = 1);
+
+}  // namespace metastable::markov
