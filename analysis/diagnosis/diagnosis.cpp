@@ -113,10 +113,7 @@ Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
   given.nuisance = nominal;
   given.evaluation = model.evaluate(nominal, {});
   given.log_likelihood = given.penalised = given.evaluation.total();
-  for (std::size_t p = 0; p < nominal.size(); ++p) {
-    const Nuisance& n = model.nuisances()[p];
-    given.penalised -= 0.5 * std::pow((nominal[p] - n.nominal) / n.prior_sd, 2);
-  }
+  for (std::size_t p = 0; p < nominal.size(); ++p) given.penalised -= model.nuisances()[p].cost(nominal[p]);
   return given;
 }
 

@@ -63,9 +63,10 @@ double recalibration_p_value(const TransitionModel& model, const Fit& as_given, 
     mean += weight;
     variance += 2 * weight * weight;
   }
-  if (!(mean > 0)) return 1;
-  // By Satterthwaite it is a chi-squared of the same mean and variance.
-  const double scale = variance / (2 * mean), degrees = mean / scale;
+  // By Satterthwaite it is a chi-squared of the same mean and variance. Where the model as given is so far off that its
+  // likelihood has no slope, no direction counts for more than one.
+  const double scale = mean > 0 ? variance / (2 * mean) : 1,
+               degrees = mean > 0 ? mean / scale : static_cast<double>(std::max<Eigen::Index>(1, size));
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), std::max(0.0, gain) / scale));
 }
 

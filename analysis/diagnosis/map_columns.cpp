@@ -192,7 +192,7 @@ EfficientColumns project(const std::vector<MapColumn>& columns, const Transition
   for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
     const Nuisance& n = model.nuisances()[p];
     const auto at = static_cast<Eigen::Index>(p);
-    gram(at, at) += 1 / (n.prior_sd * n.prior_sd);
+    gram(at, at) += n.information(fit.nuisance[p]);
     if (fit.nuisance[p] <= n.lower || fit.nuisance[p] >= n.upper) left[at] = 0;
   }
   auto at = static_cast<Eigen::Index>(fit.nuisance.size());

@@ -31,12 +31,15 @@ class Point {
     if (with_nuisances)
       for (std::size_t i = 0; i < nuisance_.size(); ++i) {
         const Nuisance& n = model.nuisances()[i];
-        slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n.nominal, n.prior_sd, true});
+        slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n, true});
       }
     for (EffectTerm& term : terms_)
       for (std::size_t i = 0; i < term.values.size(); ++i) {
         const FreeParameter& p = term.candidate->parameters[i];
-        slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, p.neutral, p.prior_sd, false});
+        Nuisance prior;
+        prior.nominal = p.neutral;
+        prior.prior_sd = p.prior_sd;
+        slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, prior, false});
       }
   }
   Point(const Point&) = delete;
@@ -44,7 +47,8 @@ class Point {
 
   struct Slot {
     double* value;
-    double step, largest_step, lower, upper, nominal, prior_sd;  // prior_sd 0: none
+    double step, largest_step, lower, upper;
+    Nuisance prior;  // of sd 0: there is none
     bool of_nuisance;
   };
   std::vector<Slot>& slots() { return slots_; }
@@ -54,7 +58,7 @@ class Point {
   double log_prior() const {
     double sum = 0;
     for (const Slot& s : slots_)
-      if (s.prior_sd > 0) sum -= 0.5 * std::pow((*s.value - s.nominal) / s.prior_sd, 2);
+      if (s.prior.prior_sd > 0) sum -= s.prior.cost(*s.value);
     return sum;
   }
 
@@ -156,9 +160,9 @@ Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen:
     if (resolved > 0) s.step = std::min(s.largest_step, difference_share / std::sqrt(resolved));
     // A forward difference is the slope half a step on: taken back by the curvature, which matters along ridges.
     gradient[p] += 0.5 * result.derivatives.steps[k] * resolved;
-    if (s.prior_sd > 0) {
-      gradient[p] -= (*s.value - s.nominal) / (s.prior_sd * s.prior_sd);
-      resolved += 1 / (s.prior_sd * s.prior_sd);
+    if (s.prior.prior_sd > 0) {
+      gradient[p] -= s.prior.pull(*s.value);
+      resolved += s.prior.information(*s.value);
     }
   }
   return gradient;
@@ -300,13 +304,9 @@ std::vector<double> given_values(const TransitionModel& model) {
     if (!n.assumed) continue;
     const auto cost = [&](double value) {
       values[p] = value;
-      const double off = (value - n.nominal) / n.prior_sd;
-      return 0.5 * off * off - model.evaluate(values, {}).total();
+      return n.cost(value) - model.evaluate(values, {}).total();
     };
-    const double reach = 3 * n.prior_sd;
-    values[p] = boost::math::tools::brent_find_minima(cost, std::max(n.lower, n.nominal - reach),
-                                                      std::min(n.upper, n.nominal + reach), bits)
-                    .first;
+    values[p] = boost::math::tools::brent_find_minima(cost, n.lower, n.upper, bits).first;
   }
   return values;
 }

@@ -1,9 +1,23 @@
 #include "analysis/diagnosis/transition_model.h"
 
+#include <cmath>
 #include <numeric>
 #include <utility>
 
 namespace metastable::analysis {
+
+double Nuisance::cost(double value) const {
+  const double off = (value - nominal) / prior_sd, square = off * off / 2;
+  return misstated > 0 ? -std::log((1 - misstated) * std::exp(-square) + misstated) : square;
+}
+
+double Nuisance::pull(double value) const { return (value - nominal) * information(value); }
+
+double Nuisance::information(double value) const {
+  const double off = (value - nominal) / prior_sd, stated = (1 - misstated) * std::exp(-off * off / 2);
+  const double belief = misstated > 0 ? stated / (stated + misstated) : 1;  // that it was stated rightly
+  return belief / (prior_sd * prior_sd);
+}
 
 double Evaluation::total() const { return std::accumulate(log_density.begin(), log_density.end(), 0.0); }
 

@@ -50,7 +50,9 @@ struct Evaluation {
   double total() const;
 };
 
-/// Is a parameter that is refitted with every hypothesis, held near its nominal value by a normal prior.
+/// Is a parameter that is refitted with every hypothesis, held near its nominal value by a normal prior. Where a stated
+/// number may be another one altogether, the prior is (1 - misstated) exp(-d^2/2) + misstated, d sds from it: far off it
+/// neither pulls nor lets an effect gain by bringing the parameter back.
 struct Nuisance {
   std::string name;
   double nominal = 0;
@@ -59,6 +61,14 @@ struct Nuisance {
   double lower = 0, upper = 0;
   bool assumed = false;  ///< nobody stated it: the model as given has it refitted
   double form_sd = 0;    ///< what errors of the model's form move a fitted one by; its reported interval knows of it
+  double misstated = 0;  ///< probability that the nominal value is not that of what was run at all, in [0, 1)
+
+  /// Returns minus the logarithm of the prior, 0 at the nominal value.
+  double cost(double value) const;
+  /// Returns by how much that rises with the value.
+  double pull(double value) const;
+  /// Returns the information that the prior adds there.
+  double information(double value) const;
 };
 
 /// Is a parameter of an effect that is fitted.

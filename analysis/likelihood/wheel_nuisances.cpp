@@ -4,6 +4,13 @@
 #include <cmath>
 
 namespace metastable::analysis {
+namespace {
+
+// Is the share of stated contact parameters that are those of another wheel or another unit altogether: an assumption.
+// It lets a fit leave them behind at a cost of 4.6 in log likelihood, and no effect gains more by bringing them back.
+constexpr double misstated_contact = 0.01;
+
+}  // namespace
 
 std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::optional<double> noise) {
   const Spread &eta = nominal.restitution, &mu = nominal.friction;
@@ -17,6 +24,9 @@ std::vector<Nuisance> wheel_nuisances(const NominalContact& nominal, std::option
   all[Slot::friction_mean] = {"friction_mean", mu.mean, 0.08, 1e-4, 0.02, 1.5};
   all[Slot::log_friction_sd] = {"log friction_sd", std::log(std::max(0.01, mu.sd)), 0.4, 1e-3, std::log(0.005),
                                 std::log(0.5)};
+  for (const std::size_t stated :
+       {Slot::restitution_mean, Slot::log_restitution_sd, Slot::friction_mean, Slot::log_friction_sd})
+    all[stated].misstated = misstated_contact;
   all[Slot::skew] = {"skew", 0, 0.06, 1e-3, -0.5, 0.5};
   all[Slot::tails] = {"tails", 0, 0.06, 1e-3, -0.4, 0.4};
   if (settled) {

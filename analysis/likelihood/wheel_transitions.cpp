@@ -77,6 +77,7 @@ class WheelTransitions : public TransitionModel {
   const std::vector<Variation>& variations() const override { return variations_; }
   const std::vector<std::string>& notes() const override { return measured_.notes; }
   Evaluation evaluate(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
+  std::vector<FitStart> starts(std::span<const EffectTerm> terms) const override;
   std::vector<double> rest_chances(std::span<const double> nuisance, std::span<const EffectTerm> terms) const override;
   std::unique_ptr<TransitionModel> simulate(std::span<const double> nuisance, std::span<const EffectTerm> terms,
                                             std::uint64_t seed) const override;
@@ -208,6 +209,32 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
   return wheel_likelihood(measured_, events_, hypothesis(nuisance, terms));
 }
 
+// A recalibration whose stated contact is far astray starts from a coarse lattice of means, too: there the likelihood is
+// flat, and no step from what is stated finds the way.
+std::vector<FitStart> WheelTransitions::starts(std::span<const EffectTerm> terms) const {
+  constexpr double astray = 2;  // mean square of the scores as given, of independent standard normals if it is right
+  constexpr double wide = 0.08;  // sds of either, with which a mean between two of the lattice still shows
+  if (!terms.empty()) return {};
+  std::vector<double> values = nominal_values(*this);
+  const Evaluation given = evaluate(values, {});
+  double squares = 0;
+  for (const double score : given.score) squares += score * score;
+  if (squares < astray * static_cast<double>(given.score.size())) return {};
+  FitStart best;
+  double most = given.total();
+  for (const double restitution : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85})
+    for (const double friction : {0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0, 1.3}) {
+      set_contact(values, {restitution, wide, friction, wide});
+      double reached = evaluate(values, {}).total();
+      for (std::size_t p = 0; p < values.size(); ++p) reached -= nuisances_[p].cost(values[p]);
+      if (!(reached > most)) continue;
+      most = reached;
+      best = {values, {}};
+    }
+  if (best.nuisance.empty()) return {};
+  return {best};
+}
+
 std::vector<double> WheelTransitions::rest_chances(std::span<const double> nuisance,
                                                    std::span<const EffectTerm> terms) const {
   return wheel_rest_chances(measured_, events_, hypothesis(nuisance, terms));
@@ -293,6 +320,7 @@ std::vector<NamedValue> WheelTransitions::report_nuisances(std::span<const doubl
                                 {"restitution_sd", contact.restitution_sd},
                                 {"friction_mean", contact.friction_mean},
                                 {"friction_sd", contact.friction_sd}};
+  if (measured_.law == dynamics::Law::plastic) named.clear();
   if (measured_.law == dynamics::Law::settled) {
     const dynamics::ContactModel model = dynamics::contact_model(measured_.wheel, measured_.law);
     named.emplace_back("hub_inertia_kg_m2", model.mass * model.radius_of_gyration * model.radius_of_gyration *
