@@ -293,6 +293,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     if (leaves_gap_held_out(d, chosen.bent, std::max(0.0, by_itself)))
       chosen.none = std::max(chosen.none, certain_odds);
   }
+  if (gap && trials_to_explain(d)) chosen.none = std::max(chosen.none, even_odds);
   const double share_of_effects = share_probabilities(d, model, ranking, ordered, candidates.size(), gap, chosen.none);
   give_verdict(d, gap, chosen.none, share_of_effects);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/diagnosis/evidence.h"
+#include "analysis/diagnosis/too_few.h"
 #include "analysis/diagnosis/verdict.h"
 #include "analysis/statistics/number_text.h"
 
@@ -115,6 +116,14 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
                         left, left == 1 ? "cell" : "cells", 100 * model_error));
       break;
     case Verdict::unexplained:
+      if (const auto would_do = trials_to_explain(d)) {
+        s.push_back(fmt::format(
+            "There is a gap as given, and {} {} with {} {} of a speed are too few to say what causes it: {} trials "
+            "like these would do.",
+            d.data.trials, d.data.trials == 1 ? "trial" : "trials", d.data.collisions,
+            d.data.collisions == 1 ? "transition" : "transitions", *would_do));
+        break;
+      }
       if (!d.causes.ranked.empty() && d.causes.ranked.front().probability > d.causes.p_none) {
         s.push_back(fmt::format(
             "There is a gap that recalibration does not remove. The nearest of the catalogue is {}; that it is "
@@ -219,6 +228,8 @@ std::string next_step(const Diagnosis& d) {
       return "Tell the causes apart before changing the model: with more trials, or with a column under “What missing "
              "columns hide”.";
     case Verdict::unexplained:
+      if (const auto would_do = trials_to_explain(d))
+        return fmt::format("Run {} trials like these, or longer ones, and diagnose them together.", *would_do);
       return "Check the measurement first where the gap shows most (units, leg numbers, sensor noise). If it holds, "
              "see "
              "what the cells that stay beyond chance have in common (--out DIR draws the map): no effect of the "

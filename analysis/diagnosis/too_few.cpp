@@ -20,10 +20,25 @@ std::optional<std::size_t> whole(double trials) {
 
 }  // namespace
 
+std::optional<std::size_t> trials_to_explain(const Diagnosis& d) {
+  if (d.data.trials >= least_trials_to_explain && d.data.collisions >= least_transitions_to_explain) return {};
+  const double each = static_cast<double>(std::max<std::size_t>(1, d.data.collisions)) /
+                      static_cast<double>(std::max<std::size_t>(1, d.data.trials));
+  return std::max(least_trials_to_explain,
+                  static_cast<std::size_t>(std::ceil(static_cast<double>(least_transitions_to_explain) / each - 1e-9)));
+}
+
 std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& d, const DiagnosisOptions& options) {
   std::vector<NotPossible> all;
   const auto trials = static_cast<double>(d.data.trials);
   const bool gap = d.verdict == Verdict::explained || d.verdict == Verdict::unexplained;
+  if (const auto would_do = trials_to_explain(d))
+    all.push_back({"what causes a gap",
+                   fmt::format("{} {} with {} {} of a speed; causes are named from {} trials and {} transitions on",
+                               d.data.trials, d.data.trials == 1 ? "trial" : "trials", d.data.collisions,
+                               d.data.collisions == 1 ? "transition" : "transitions", least_trials_to_explain,
+                               least_transitions_to_explain),
+                   would_do, true});
   if (d.data.trials < trials_for_folds(options.folds)) {
     all.push_back({"how far the gap shrinks, held out",
                    fmt::format("{} {} cannot fill {} folds with two each", d.data.trials,

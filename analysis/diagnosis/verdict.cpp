@@ -11,6 +11,7 @@
 #include "analysis/diagnosis/gap_map.h"
 #include "analysis/diagnosis/left_over.h"
 #include "analysis/diagnosis/parameter_estimates.h"
+#include "analysis/diagnosis/too_few.h"
 #include "dynamics/wheel/effect_catalogue.h"
 
 namespace metastable::analysis {
@@ -209,6 +210,11 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const Cau
 }
 
 void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) {
+  if (trials_to_explain(d)) {
+    const bool any = gap || d.gap.p_recalibration < recalibration_level;
+    d.verdict = any ? Verdict::unexplained : Verdict::no_gap;
+    return;
+  }
   if (!gap) {
     d.verdict = d.gap.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
     if (d.verdict == Verdict::recalibrate) d.causes.set = {std::string(dynamics::contact_distribution_id)};

@@ -13,6 +13,8 @@ struct Fit;
 
 inline constexpr double certain_odds = 1e6;  ///< of none, where a test decides against all that were fitted
 
+inline constexpr double even_odds = 1;  ///< of none, where too few trials cannot tell
+
 /// Says how likely something without a name is at first: odds to one effect where it acts alone; beside a hypothesis,
 /// to the hypothesis alone.
 inline constexpr double unnamed_alone = 4, unnamed_beside = 0.03;
@@ -44,7 +46,8 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const Cau
                            double none);
 
 /// Sets verdict, set, and what of it acts alike. A name is given only where the effects together are four times as
-/// likely as none of them. @param none  odds of none of the effects to all of them
+/// likely as none of them; of too few trials (trials_to_explain) neither an effect nor a recalibration is named: where
+/// they have a gap it is unexplained. @param none  odds of none of the effects to all of them
 void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects);
 
 }  // namespace metastable::analysis

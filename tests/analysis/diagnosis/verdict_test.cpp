@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis_sentences.h"
+#include "analysis/diagnosis/too_few.h"
 
 namespace metastable::analysis {
 namespace {
@@ -15,6 +16,8 @@ namespace {
 // One effect, and something without a name; the rest is recalibration's.
 Diagnosis with_odds_of_none(double none) {
   Diagnosis d;
+  d.data.trials = 50;
+  d.data.collisions = 500;
   Cause cause;
   cause.effects = {"friction_patch"};
   cause.parameters.emplace_back();
@@ -30,6 +33,33 @@ TEST(Verdict, ANameIsGivenWhereItIsFourTimesAsLikelyAsNone) {
   EXPECT_EQ(with_odds_of_none(0.2).causes.set, std::vector<std::string>{"friction_patch"});
   EXPECT_EQ(with_odds_of_none(0.3).verdict, Verdict::unexplained);
   EXPECT_TRUE(with_odds_of_none(0.3).causes.set.empty());
+}
+
+// Below so many trials, or transitions in all, neither an effect nor other contact parameters are named, and the answer
+// says how many would do.
+TEST(Verdict, TooFewTrialsAreNotExplained) {
+  for (const auto& [trials, collisions, would_do] :
+       {std::tuple<std::size_t, std::size_t, std::size_t>{2, 2, least_transitions_to_explain},
+        {least_trials_to_explain - 1, 500, least_trials_to_explain},
+        {10, least_transitions_to_explain - 1, 11}}) {
+    SCOPED_TRACE(trials);
+    for (const bool gap : {true, false}) {
+      Diagnosis d = with_odds_of_none(0.01);
+      d.causes.set.clear();
+      d.data.trials = trials;
+      d.data.collisions = collisions;
+      d.gap.p_recalibration = 1e-6;
+      give_verdict(d, gap, 0.01, d.causes.ranked[0].probability);
+      EXPECT_EQ(d.verdict, Verdict::unexplained);
+      EXPECT_TRUE(d.causes.set.empty());
+      ASSERT_TRUE(trials_to_explain(d));
+      EXPECT_EQ(*trials_to_explain(d), would_do);
+      EXPECT_NE(sentences(d)[0].find("too few to say what causes it: " + std::to_string(would_do) + " trials"),
+                std::string::npos)
+          << sentences(d)[0];
+    }
+  }
+  EXPECT_FALSE(trials_to_explain(with_odds_of_none(0.01)));
 }
 
 // What a likelihood leaves of data of its own is no gap.
