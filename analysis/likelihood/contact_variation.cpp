@@ -109,6 +109,7 @@ void ContactVariation::apply(const CollisionPlace& place, const EffectTerm& term
 }
 
 std::vector<ContactVariation> contact_variations(const WheelRuns& measured) {
+  if (measured.law == dynamics::Law::plastic) return {};  // it has no contact that could vary
   const double trials = static_cast<double>(std::max<std::size_t>(1, measured.runs.size()));
   const int legs = measured.legs_known ? measured.wheel.legs() : 0,
             conditions = static_cast<int>(measured.conditions.size());

@@ -68,7 +68,7 @@ SpeedFilter::Out SpeedFilter::collision(const ExtendedWheel& wheel, const StepCo
   const double seen = std::max(1e-3, reported - extension_.bias_after);
   const Before before{mean_, variance_};
   const Out out = transition(wheel, context, seen, 1, std::sqrt(noise2_ + square(seen / mean_) * variance_));
-  update(out, seen);
+  update(wheel, out, seen);
   if (wheel.settles()) before_ = before;
   return out;
 }
@@ -107,7 +107,7 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
   const double beyond = (*plus - wheel.barrier(context)) / std::max(1e-3, std::sqrt(noise2_ + slack2_) * rate);
   if (beyond < 8)
     out.log_density = std::max(least_log_density, out.log_density + std::log(std::max(1e-300, normal_cdf(beyond))));
-  update(out, seen);
+  update(wheel, out, seen);
   return out;
 }
 
@@ -141,9 +141,13 @@ SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const Ste
 }
 
 double SpeedFilter::chance_below(const ExtendedWheel& wheel, const StepContext& context, double bound) const {
-  if (wheel.settles())
-    return before_ ? std::clamp(wheel.rest_share(context, before_->mean, mean_), 1e-300, 1.0)
-                   : conditional(tilt_.below(wheel.rest_share(context, mean_, std::nullopt)));
+  if (before_) return std::clamp(wheel.rest_share(context, before_->mean, mean_), 1e-300, 1.0);
+  if (wheel.settles() && bound >= wheel.barrier(context))
+    return conditional(tilt_.below(wheel.rest_share(context, mean_, std::nullopt)));
+  if (wheel.certain()) {
+    const double plus = wheel.omega_plus(context, mean_, {}, false).value_or(0);
+    return std::max(1e-300, normal_cdf((bound - plus) / std::sqrt(noise2_ + square(plus / mean_) * variance_)));
+  }
   return conditional(tilt_.below(wheel.after_collision(context, mean_, bound).below));
 }
 
@@ -177,8 +181,18 @@ double SpeedFilter::conditional(double below) const {
   return std::max(1e-300, normal_cdf((score_of_probability(below) - mean) / sd));
 }
 
+// What is seen of a certain omega+ differs by the errors of both speeds.
+SpeedFilter::Out SpeedFilter::certain_transition(const ExtendedWheel& wheel, const StepContext& context, double plus,
+                                                 double rate, double blur) const {
+  const auto expected = wheel.omega_plus(context, mean_, {}, false);
+  if (!expected) return {least_log_density, -8, 0.1};
+  const double z = std::clamp((plus - *expected) / blur, -1e3, 1e3);
+  return {std::max(least_log_density, log_normal(z) - std::log(blur / rate)), std::clamp(z, -8.0, 8.0), blur / rate};
+}
+
 SpeedFilter::Out SpeedFilter::transition(const ExtendedWheel& wheel, const StepContext& context, double plus,
                                          double rate, double blur) {
+  if (wheel.certain()) return certain_transition(wheel, context, plus, rate, blur);
   double density = 0, below = 0;
   const auto add = [&](double at, double weight) {
     if (at <= 0) return;
@@ -210,9 +224,11 @@ SpeedFilter::Out SpeedFilter::weighed(double density, double below, double rate)
   return out;
 }
 
-// Applies the prior that the transition gives, taken as normal around what was seen.
-void SpeedFilter::update(const Out& out, double seen) {
-  const double prior = out.unit * out.unit, gain = noise2_ / (noise2_ + prior);
+// Applies the prior that the transition gives, taken as normal around what was seen. The unit of a certain one is that
+// of what is seen, noise included.
+void SpeedFilter::update(const ExtendedWheel& wheel, const Out& out, double seen) {
+  const double prior = std::max(0.0, out.unit * out.unit - (wheel.certain() ? noise2_ : 0)),
+               gain = noise2_ / (noise2_ + prior);
   mean_ = std::max(1e-2, seen - gain * std::clamp(out.score, -4.0, 4.0) * out.unit);
   variance_ = gain * prior;
 }

@@ -53,7 +53,8 @@ class SpeedFilter {
   Out stance(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, const Touch& touch);
   /// Only the next omega- is seen: this is collision and stance together.
   Out step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, const Touch& touch);
-  /// After the last measured speed omega+ was below `bound` (or there was none, the foot jammed), or it was not.
+  /// After the last measured speed omega+ was below `bound` (or there was none, the foot jammed), or it was not. Under
+  /// `settled` the barrier stands for the law's own threshold, and a bound below it is that of a foot that jammed.
   Out rest(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound, bool rested);
   /// Says how likely omega+ is to be below `bound` after the last measured speed.
   double chance_below(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double bound) const;
@@ -62,11 +63,13 @@ class SpeedFilter {
   std::pair<double, double> foreseen() const;
   void remember(double score);
   double conditional(double below) const;
+  Out certain_transition(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus,
+                         double rate, double blur) const;
   Out transition(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, double plus, double rate,
                  double blur);
   Out weighed(double density, double below, double rate);
   Out settled_step(const dynamics::ExtendedWheel& wheel, const dynamics::StepContext& context, const Touch& touch);
-  void update(const Out& out, double seen);
+  void update(const dynamics::ExtendedWheel& wheel, const Out& out, double seen);
 
   const dynamics::Extension& extension_;
   const ScoreTilt& tilt_;

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
+#include <string_view>
 #include <utility>
 
 namespace metastable::analysis {
@@ -309,10 +311,13 @@ WheelCandidate slip_reversal(const WheelDesign& design) {
 }  // namespace
 
 std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
+  constexpr std::string_view of_contacts[] = {"leg_contact",    "speed_dependent_restitution", "speed_dependent_friction",
+                                              "contact_memory", "friction_patch",              "trial_drift",
+                                              "trial_spread",   "contact_outliers",            "bounce"};
   constexpr const char* after_another = "collisions with one before them in their trial";
   constexpr const char* away = "collisions away from the start";
   // It needs a mean and a spread, or a trend, and as many again to judge them by.
-  return {
+  std::vector<WheelCandidate> all{
       needing(5, design.launches, "launches where a launch speed is stated", initial_speed(design)),
       leg_lengths(design),
       leg_contact(design),
@@ -339,6 +344,11 @@ std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
       needing(2, design.successive, after_another, ramp_vibration()),
       slip_reversal(design),
   };
+  if (design.law == dynamics::Law::plastic)
+    for (WheelCandidate& effect : all)
+      if (std::ranges::find(of_contacts, effect.candidate.id) != std::end(of_contacts))
+        effect.candidate.undecidable = "under `plastic` nothing depends on restitution or friction";
+  return all;
 }
 
 }  // namespace metastable::analysis

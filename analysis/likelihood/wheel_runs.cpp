@@ -24,9 +24,12 @@ using dynamics::ExtendedWheel;
 
 constexpr double assumed_noise = 0.01;     // sd of reported speeds where neither text nor stances say it [rad/s]
 constexpr std::size_t least_stances = 20;  // to take the noise from them
+constexpr std::size_t least_exact = 2;     // to say that they repeat the model: by chance one in 1e5 of two does
 constexpr double two_speeds = 1.2;         // sd of a stance's residual, in noises: of two speeds, one damped to 0.65
 constexpr double rounding = 1e-5;          // residuals below are those of printed digits [rad/s]
 constexpr double finest_noise = 1e-5;      // finer, and the model's own numbers would have to be exact [rad/s]
+constexpr const char* repeat_the_model =
+    "the stances repeat the model to rounding, as simulated ones do: they are left out";
 constexpr double chance_of_deviation = 4;  // in shares of a median deviation times root n: three and a half of its sds
 
 std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
@@ -224,6 +227,30 @@ void blur_digits(WheelRuns& measured, double digits) {
                   added, measured.noise));
 }
 
+// Under `plastic` nothing scatters but what is seen: where that repeats the model to rounding, a normal error is added,
+// against which the model's collisions can be held.
+void blur_exact(WheelRuns& measured) {
+  constexpr double added = 1e-4;  // [rad/s], ten times what counts as rounding
+  const std::uint64_t seed = word_of(measured);
+  std::uint64_t draw = 0;
+  for (auto& [where, landings] : landings_by_number(measured)) {
+    const std::vector<double> before = even_normals(seed, draw++, landings.size());
+    const std::vector<double> after = even_normals(seed, draw++, landings.size());
+    for (std::size_t i = 0; i < landings.size(); ++i) {
+      landings[i]->before = std::max(1e-3, landings[i]->before + added * before[i]);
+      if (std::optional<double>& plus = landings[i]->after; plus && *plus > 0)
+        *plus = std::max(1e-3 * *plus, *plus + added * after[i]);
+    }
+  }
+  measured.noise = added;
+  measured.noise_stated = true;
+  measured.exact_stances = false;
+  measured.notes.back() = fmt::format(
+      "collisions and stances repeat the model to rounding, as simulated ones do: a normal error of {:.2g} rad/s is added "
+      "to every speed",
+      added);
+}
+
 // A stated noise is that of the sensor, the digits' comes to it, and a stated 0 means as good as the digits. Where
 // nobody stated it, or the stances are more exact than was said, they tell it.
 void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
@@ -239,7 +266,15 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
   if (measured.speeds_after) groups = stance_residuals(measured);
   std::vector<double> residual;
   for (const std::vector<double>& group : groups) residual.insert(residual.end(), group.begin(), group.end());
-  if (residual.size() < least_stances) {
+  const auto is_exact = [](double value) { return std::abs(value) < rounding; };
+  const bool few = residual.size() < least_stances;
+  if (few && residual.size() >= least_exact && stated.value_or(0) < rounding && std::ranges::all_of(residual, is_exact)) {
+    measured.exact_stances = true;
+    measured.noise = measured.noise_seen = least;
+    measured.notes.push_back(repeat_the_model);
+    return;
+  }
+  if (few) {
     if (stated) return;
     measured.noise = assumed_noise;
     measured.notes.push_back(fmt::format("no sensor noise is stated: {} rad/s assumed", assumed_noise));
@@ -261,7 +296,7 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
   measured.exact_stances = stated.value_or(0) < rounding && std::abs(middle) < rounding && overall < rounding;
   if (measured.exact_stances) {
     measured.noise = seen;
-    measured.notes.push_back("the stances repeat the model to rounding, as simulated ones do: they are left out");
+    measured.notes.push_back(repeat_the_model);
   } else if (!stated) {
     measured.noise = seen;
     measured.notes.push_back(
@@ -293,13 +328,14 @@ void blur(WheelRuns& measured) {
 // Takes slides from the feet's places; next speeds are blurred to what the law is good for.
 void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
   const std::vector<ExtendedWheel> wheels = wheels_on_ramps(measured, measured.contact, {});
-  std::size_t all = 0, left_out = 0;
+  std::size_t all = 0, left_out = 0, stances_left_out = 0;
   measured.slides_seen = experiment.columns.position == Presence::all && measured.legs_known;
   for (WheelRun& run : measured.runs)
     for (std::size_t k = 0; k < run.collisions.size(); ++k) {
       RunCollision& m = run.collisions[k];
       ++all;
       left_out += !m.counted;
+      stances_left_out += m.counted && !m.stands;
       if (measured.slides_seen && k + 1 < run.collisions.size())
         m.slide =
             run.collisions[k + 1].context.position - m.context.position - wheels[run.condition].advance(m.context.leg);
@@ -309,6 +345,11 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
         "{} of {} collisions are left out: at their speed the foot does not stand before the next one touches, and "
         "`settled` holds for landings on feet that stand",
         left_out, all));
+  if (stances_left_out > 0)
+    measured.notes.push_back(
+        fmt::format("of {} more the first impact alone is judged: with its restitution the foot may not have come to "
+                    "stand",
+                    stances_left_out));
   // Where stances scatter more than that, the law may know less of this machine.
   const double root = std::sqrt(std::max(1.0, static_cast<double>(all - left_out))), known = settled_precision * root;
   measured.law_error = std::clamp(3 * measured.noise_seen, known, std::max(known, 0.03));
@@ -324,6 +365,22 @@ void prepare_settled(WheelRuns& measured, const Experiment& experiment) {
     measured.memory = memory_of_scores(wheels.front(), measured.contact, median(speeds),
                                        measured.speeds_after ? std::nullopt : std::optional(measured.law_error));
   blur(measured);
+}
+
+}  // namespace
+
+namespace {
+
+bool stands_at_any_restitution(const WheelRuns& measured, const WheelRun& run, const RunCollision& m) {
+  const dynamics::LandingShares& landings = *measured.landings[run.condition];
+  return m.before < landings.legs[static_cast<std::size_t>(m.context.leg)].settles_below;
+}
+
+bool stands_by_its_plus(const WheelRuns& measured, const WheelRun& run, const RunCollision& m) {
+  if (!measured.stands_by_plus || !m.after || !(*m.after > 0)) return false;
+  const dynamics::LandingShares& landings = *measured.landings[run.condition];
+  const double lost = 1 - std::sqrt(landings.legs[static_cast<std::size_t>(m.context.leg)].plastic);
+  return *m.after >= m.before * (1 - (1 + landings.settling_restitution(m.context.leg, m.before)) * lost);
 }
 
 }  // namespace
@@ -351,26 +408,41 @@ void tabulate_landings(WheelRuns& measured) {
     }
   low = std::clamp((1 - margin) * low, slowest, fastest - 1);
   high = std::clamp((1 + margin) * high, low + 1, fastest);
-  for (std::size_t c = 0; c < measured.conditions.size(); ++c) {
-    const double slope = measured.conditions[c].slope_deg;
-    const auto same = std::find_if(measured.conditions.begin(), measured.conditions.begin() + static_cast<long>(c),
-                                   [&](const Condition& other) { return other.slope_deg == slope; });
-    const auto before = static_cast<std::size_t>(same - measured.conditions.begin());
-    measured.landings.push_back(before < c
-                                    ? measured.landings[before]
-                                    : dynamics::share_grid(dynamics::settled_wheel(measured.wheel, slope * degree), low,
-                                                           high, measured.contact));
-  }
+  constexpr double enough = 0.5;  // share of the collisions that are slow enough for any restitution
+  measured.stands_by_plus = false;
+  const auto tabulate = [&] {
+    measured.landings.clear();
+    for (std::size_t c = 0; c < measured.conditions.size(); ++c) {
+      const double slope = measured.conditions[c].slope_deg;
+      const auto same = std::find_if(measured.conditions.begin(), measured.conditions.begin() + static_cast<long>(c),
+                                     [&](const Condition& other) { return other.slope_deg == slope; });
+      const auto before = static_cast<std::size_t>(same - measured.conditions.begin());
+      measured.landings.push_back(
+          before < c ? measured.landings[before]
+                     : dynamics::share_grid(dynamics::settled_wheel(measured.wheel, slope * degree), low, high,
+                                            measured.contact, {}, measured.stands_by_plus));
+    }
+  };
+  tabulate();
+  if (!measured.speeds_after) return;
+  double all = 0, slow = 0;
+  for (const WheelRun& run : measured.runs)
+    for (const RunCollision& m : run.collisions) {
+      ++all;
+      slow += stands_at_any_restitution(measured, run, m);
+    }
+  measured.stands_by_plus = slow < enough * all;
+  if (measured.stands_by_plus) tabulate();
 }
 
 void mark_counted(const WheelRuns& measured, WheelRun& run) {
   if (measured.landings.empty()) return;
-  const dynamics::LandingShares& landings = *measured.landings[run.condition];
   constexpr int forgotten = 3;  // steps after which a foot that did not stand is forgotten
   int stood = forgotten;
   for (RunCollision& m : run.collisions) {
-    const bool stands = m.before < landings.legs[static_cast<std::size_t>(m.context.leg)].settles_below;
-    m.counted = stands && stood >= forgotten;
+    const bool stands = stands_at_any_restitution(measured, run, m) || stands_by_its_plus(measured, run, m);
+    m.counted = stood >= forgotten && (stands || (measured.stands_by_plus && m.after));
+    m.stands = stands && m.counted;
     stood = stands ? stood + 1 : 0;
   }
 }
@@ -378,10 +450,6 @@ void mark_counted(const WheelRuns& measured, WheelRun& run) {
 WheelRuns wheel_runs(const Experiment& experiment) {
   if (experiment.system != System::rimless_wheel)
     throw std::invalid_argument("wheel_runs: the experiment is a coast-down");
-  if (experiment.contact.law == dynamics::Law::plastic)
-    throw std::invalid_argument(
-        "contact.law: plastic has no restitution and no friction, hence no spread to compare trials with "
-        "(published, coulomb or settled is needed)");
   WheelRuns measured;
   measured.wheel = experiment.wheel;
   measured.law = experiment.contact.law;
@@ -421,6 +489,8 @@ WheelRuns wheel_runs(const Experiment& experiment) {
   estimate_noise(measured, experiment.sensor);
   if (measured.law == dynamics::Law::settled)
     prepare_settled(measured, experiment);
+  else if (measured.law == dynamics::Law::plastic && measured.exact_stances)
+    blur_exact(measured);
   else
     blur_digits(measured, experiment.sensor.last_digit.value_or(0) / std::sqrt(12.0));
   for (WheelRun& run : measured.runs) mark_jam(measured, run);
@@ -471,6 +541,8 @@ std::vector<Event> wheel_events(const WheelRuns& measured) {
       // Of a trial whose end is not known only those collisions that went on are, which says nothing of their share.
       if (run.outcome) event.rested = last && *run.outcome == dynamics::Outcome::rest;
       if (after) add(EventKind::collision);
+      const bool jammed = m.after && !after && last && event.rested.value_or(false);
+      if (!m.stands && !jammed) continue;
       if (!last) {
         if (after) event.speed = *m.after;
         if (after) event.rested.reset();

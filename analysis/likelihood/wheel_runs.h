@@ -23,6 +23,7 @@ struct RunCollision {
   std::optional<double> slide;  ///< of the foot, from its place and the next one's [m]; `settled` only
   double law_error = 0;         ///< added to `before` where the law foretells it [rad/s]; `settled` only
   bool counted = true;          ///< false: the law does not hold for it, and it is left out
+  bool stands = true;           ///< false: nor for what follows its first impact, which is left out
 };
 
 /// One trial is a run of collisions.
@@ -50,6 +51,7 @@ struct WheelRuns {
   bool legs_known = true;          ///< by the column, or found
   bool speeds_after = false;       ///< omega+ is there
   bool slides_seen = false;        ///< the feet's places are there; `settled` only
+  bool stands_by_plus = false;     ///< whether a foot stands is judged by its omega+; `settled` only
   bool exact_stances = false;      ///< they repeat the model to rounding, and say nothing
   bool times_judge = true;         ///< false: times are so much more exact than speeds that they tell the speeds' noise
   std::vector<std::string> notes;  ///< what was assumed, a sentence each
@@ -72,13 +74,16 @@ inline constexpr double settled_slide_precision = 0.0002;
 void tabulate_landings(WheelRuns& measured);
 
 /// Marks the collisions for which the law `settled` holds: slow enough that the landed foot stands before the next one
-/// touches, as the one before was. Under other laws all count.
+/// touches, as the one before was. Where restitution varies so much that few are, omega+ tells: a foot stands if it does
+/// with the largest restitution that can have left it so fast, that of a foot that sticks. A first impact then counts if
+/// the foot before stood, and what follows it if its own does, too. Both go by what was seen before, so that they choose
+/// no outcomes. Under other laws all count.
 void mark_counted(const WheelRuns& measured, WheelRun& run);
 
 /// Reads an experiment. A missing leg is found from the stances where omega_plus is there, else legs of mean length are
 /// taken; missing positions and times follow from the geometry. Where digits are most of the noise a normal error is
 /// added to the reported speeds, as the notes say.
-/// @throws std::invalid_argument for a coast-down and for `plastic`
+/// @throws std::invalid_argument for a coast-down
 WheelRuns wheel_runs(const Experiment& experiment);
 
 /// Returns the bound [rad/s] for which an omega+ below it is that of a foot that jammed, seen through the noise.

@@ -58,6 +58,23 @@ double settles_below(const SettledMap& map, int leg, double eta, double low, dou
   return fine;
 }
 
+// Finds by speed the largest restitution with which a sticking foot settles.
+void fill_settling(LandingShares& grid, const SettledMap& map) {
+  constexpr int looks = 38;
+  const double width = most_settled_restitution / looks;
+  for (int leg = 0; leg < static_cast<int>(grid.legs.size()); ++leg) {
+    const double mu = map.sticking_friction(leg) + clear_of_sticking;
+    for (int i = 0; i < grid.speed.count; ++i) {
+      double settles = 0;
+      for (int k = 1; k <= looks; ++k) {
+        if (map.motion().land(leg, grid.speed.at(i), {k * width, mu}).end == LandingEnd::unsettled) break;
+        settles = k * width;
+      }
+      grid.settling.push_back(static_cast<float>(settles));
+    }
+  }
+}
+
 // Finds it by landings of a sticking foot with small torques; none where it does not get on.
 LandingShares::Drag drag_of(const SettledMotion& motion, int leg, double omega, double eta) {
   const Contact contact{eta, sticking_friction(motion.wheel(), leg) + clear_of_sticking};
@@ -133,7 +150,8 @@ void fill_rates(LandingShares& grid, const LandingShares& heavier, int leg) {
 
 std::shared_ptr<const LandingShares> share_grid(
     const SettledWheel& wheel, double slowest, double fastest, const ContactSpread& contact,
-    const std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>& executor) {
+    const std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>& executor,
+    bool every_speed) {
   SettledMapOptions options;
   options.direct = true;
   const std::shared_ptr<const SettledMap> map = SettledMap::of(wheel, options);
@@ -152,8 +170,9 @@ std::shared_ptr<const LandingShares> share_grid(
         drag_of(map->motion(), leg, (slowest + one.settles_below) / 2, std::clamp(mean, 0.0, most_settled_restitution));
     grid->legs.push_back(one);
   }
-  grid->speed = {slowest, std::max(settles, slowest + (fastest - slowest) / 10), speeds};
+  grid->speed = {slowest, every_speed ? fastest : std::max(settles, slowest + (fastest - slowest) / 10), speeds};
   grid->resize();
+  if (every_speed) fill_settling(*grid, *map);
   SettledWheel more = wheel;
   more.radius_of_gyration *= std::sqrt(more_inertia);
   const std::shared_ptr<const SettledMap> map_of_more = SettledMap::of(more, options);

@@ -27,7 +27,7 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
       slope_(slope + extension.slope_offset_rad),
       model_(contact_model(stated, extension.law.value_or(law))),
       contact_(contact),
-      density_(model_, contact),
+      density_(certain() ? std::nullopt : std::optional<CollisionDensity>(std::in_place, model_, contact)),
       landings_(std::move(landings)) {
   Wheel wheel = changed(stated, extension);
   if (model_.law == Law::settled) {  // feet are discs about points that much nearer to the hub
@@ -240,11 +240,12 @@ SpeedDensity ExtendedWheel::after_collision(const StepContext& context, double o
     first.density /= extension_.plus_ratio;
     return first;
   }
+  if (certain()) return {0, omega_plus > this->omega_plus(context, omega, {}, false).value_or(0) ? 1.0 : 0.0};
   const Collision at = collision(context, omega);
-  SpeedDensity result = density_.at(at, leg.before, leg.inertia, usual, omega_plus);
+  SpeedDensity result = density_->at(at, leg.before, leg.inertia, usual, omega_plus);
   if (extension_.outlier_share > 0) {
     usual.friction_ratio *= extension_.outlier_friction;
-    const SpeedDensity rare = density_.at(at, leg.before, leg.inertia, usual, omega_plus);
+    const SpeedDensity rare = density_->at(at, leg.before, leg.inertia, usual, omega_plus);
     result.density += extension_.outlier_share * (rare.density - result.density);
     result.below += extension_.outlier_share * (rare.below - result.below);
   }

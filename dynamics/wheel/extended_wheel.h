@@ -78,6 +78,8 @@ class ExtendedWheel {
   /// Says whether a landing is a motion of its own (`settled`): omega+ is then that after its first impact, and the
   /// next three say the rest.
   bool settles() const { return landings_ != nullptr; }
+  /// Says whether omega+ follows from omega- without chance (`plastic`).
+  bool certain() const { return model_.law == Law::plastic; }
   /// Finds the next omega-, and the slide where that was seen.
   /// @param blur  sd of its error [rad/s]
   NextTouch at_next_touch(const StepContext& context, double omega, const SeenOfLanding& seen, double blur,
@@ -93,7 +95,8 @@ class ExtendedWheel {
   /// Returns the speed up to which the foot of a landing stands before the next one touches [rad/s].
   double settles_below(int leg) const { return landings_->legs[index(leg)].settles_below; }
 
-  /// Gives density of omega+ and probability of less, for a collision at speed omega [rad/s].
+  /// Gives density of omega+ and probability of less, for a collision at speed omega [rad/s]. Of a certain one the
+  /// density is not given.
   SpeedDensity after_collision(const StepContext& context, double omega, double omega_plus) const;
   /// Returns omega+ of that collision with a drawn contact (before the extension's changes) [rad/s]; nothing: no energy
   /// left.
@@ -140,7 +143,7 @@ class ExtendedWheel {
   double slope_;
   ContactModel model_;
   ContactSpread contact_;
-  CollisionDensity density_;
+  std::optional<CollisionDensity> density_;  // none under `plastic`, of which every collision is certain
   std::shared_ptr<const LandingShares> landings_;
   double tip_radius_ = 0;
   std::vector<Leg> geometry_;

@@ -34,6 +34,13 @@ void LandingShares::resize() {
   displacement.resize(kept.size());
 }
 
+double LandingShares::settling_restitution(int leg, double omega) const {
+  if (settling.empty()) return 1;
+  const auto [below, weight] = between_nodes(speed, omega);
+  const auto at = static_cast<std::size_t>(leg * speed.count + below);
+  return (1 - weight) * static_cast<double>(settling[at]) + weight * static_cast<double>(settling[at + 1]);
+}
+
 std::size_t LandingShares::cell(int leg, int at_speed, int at_restitution) const {
   return static_cast<std::size_t>((leg * speed.count + at_speed) * restitution.count + at_restitution);
 }

@@ -46,6 +46,12 @@ struct LandingShares {
   /// Are the changes of these with ln J, by straight lines; a grid without them is not read at another J.
   std::vector<float> resting_rate, kept_rate, displacement_rate;
 
+  /// By leg and speed: the largest restitution with which a sticking foot stands before the next leg touches. Empty: it
+  /// was not asked for.
+  std::vector<float> settling;
+
+  /// Returns it at a speed, by straight lines; 1 where it was not asked for. @param omega omega- [rad/s]
+  double settling_restitution(int leg, double omega) const;
   /// Sizes the lists for `legs`, but for the changes.
   void resize();
   std::size_t cell(int leg, int speed, int restitution) const;
