@@ -48,8 +48,14 @@ markov::BatchMap batch_map(const dynamics::WalkerMap& map) {
   markov::BatchMap batch;
   batch.dimension = map.dimension();
   batch.names = map.names();
-  batch.step = [map](int, auto states, auto scores, auto next, auto failed) { map.step(states, scores, next, failed); };
-  batch.inside = [](int, auto state) { return state[0] > 0 && state[0] < std::numbers::pi / 2; };
+  const auto inside = [](std::span<const double> state) { return state[0] > 0 && state[0] < std::numbers::pi / 2; };
+  batch.step = [map, inside](int, auto states, auto scores, auto next, auto failed) {
+    map.step(states, scores, next, failed);
+    const std::size_t d = states.size() / failed.size();
+    for (std::size_t i = 0; i < failed.size(); ++i)
+      if (!failed[i] && !inside(next.subspan(i * d, d))) failed[i] = 1;
+  };
+  batch.inside = [inside](int, auto state) { return inside(state); };
   return batch;
 }
 

@@ -38,7 +38,8 @@ const char* terrain_name(dynamics::Terrain terrain);
 Walker walker_from_name(const std::string& name);
 dynamics::Terrain terrain_from_name(const std::string& name);
 
-/// Returns the walker's map in batches. States: as WalkerMap's. Section: 0 < half angle < pi/2.
+/// Returns the walker's map in batches. States: as WalkerMap's. Section: 0 < half angle < pi/2; a
+/// step that leads out of it, legs crossed or in line, is a fall.
 markov::BatchMap batch_map(const dynamics::WalkerMap& map);
 
 struct WalkerStudy {
@@ -50,7 +51,7 @@ struct WalkerStudy {
 std::vector<double> gait_state(const WalkerSetting& setting, const dynamics::Gait& gait);
 
 /// @throws std::invalid_argument for a setting out of range; std::domain_error where there is no gait;
-///         markov::MapError where it is unstable or never fails; as markov::mesh_study
+///         markov::MapError where it is unstable or no failure is found; as markov::mesh_study
 WalkerStudy study_walker(const WalkerSetting& setting, const markov::MeshStudyOptions& options = {});
 
 }  // namespace metastable::analysis

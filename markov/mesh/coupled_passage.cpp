@@ -13,10 +13,13 @@ namespace {
 
 constexpr int kProducts = 20000;      // of all rounds together
 constexpr int kSmoothing = 20;        // products between two solutions of the small chain
-constexpr double kStill = 1e-8;       // what a round may change of the expected steps,
+constexpr double kStill = 1e-8;       // what a round may change of the expected steps
+constexpr double kBalanced = 1e-6;    // and of any class's visits, beyond what leaves it,
 constexpr int kInARow = 3;            // so many rounds running
 constexpr int kInverseRounds = 200;   // of the small chain's inverse iteration
 constexpr double kSettledRate = 1e-12;
+constexpr double kSettled = 1e-9;  // of survivors in the first gait: what their failures change by in a revolution,
+constexpr int kHead = 4000;        // followed for so many steps if they do not settle
 
 /// Returns where each node's largest entry leads; itself where it has none.
 std::vector<std::uint32_t> likeliest_steps(const Mesh& mesh) {
@@ -78,6 +81,16 @@ class Aggregation {
     std::vector<double> visits(classes_, 0.0);
     for (std::size_t a = 0; a < met.size(); ++a) visits[met[a]] = solved[a];
     return visits;
+  }
+
+  /// Returns whether solving would change no class: one that fills up by a factor in every round is not yet seen in the
+  /// sum of them all.
+  bool balanced(const std::vector<double>& visits) const {
+    for (std::size_t c = 0; c < classes_; ++c)
+      if (mass_[c] > 0 &&
+          std::abs(visits[c] / mass_[c] - 1) > kBalanced + static_cast<double>(kSmoothing) * leave_[c] / mass_[c])
+        return false;
+    return true;
   }
 
   void scale(std::span<double> visits, const std::vector<double>& to) const {
@@ -169,7 +182,7 @@ std::vector<std::uint32_t> gait_classes(const Mesh& mesh, const std::vector<std:
 
 CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, const std::vector<std::uint32_t>& gait,
                                std::size_t gaits) {
-  CoupledPassage found{.passage = mesh_passage(mesh, start)};
+  CoupledPassage found{.passage = mesh_passage(mesh, start, kSettled, kHead, true)};
   MeshPassage& passage = found.passage;
   found.first_rate = passage.failure_rate;
   std::vector<double> b(mesh.size(), 0.0), led(mesh.size());
@@ -191,7 +204,7 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
     aggregation.scale(y, visits);
     const double steps = std::accumulate(visits.begin(), visits.end(), 0.0);
     change = std::abs(steps - last) / steps;
-    still = change <= kStill ? still + 1 : 0;
+    still = change <= kStill && aggregation.balanced(visits) ? still + 1 : 0;
     last = steps;
   }
   const std::vector<double> lower = aggregation.solve(start_by_class, true);

@@ -20,14 +20,15 @@ std::vector<std::uint32_t> gait_classes(const Mesh& mesh, const std::vector<std:
 /// (ChainSolver), and y is smoothed by products. What is left falls in a round as the classes mix within themselves,
 /// however seldom they are left (Koury, McAllister, Stewart 1984; Takahashi 1975).
 ///
-/// Failure rate: of those that have walked on for ever. Survival: that of mesh_passage until survivors keep the form
-/// they have in the first gait; mixing: towards that form. `first_rate` is the chance of failing in a step there.
+/// Failure rate: of those that have walked on for ever. Survival and mixing: those of mesh_passage until survivors keep
+/// the form they have in the first gait, or over 4000 steps where they do not. `first_rate` is the chance of failing in a
+/// step after that.
 /// @param gait  of each node, below `gaits`
 /// @throws ConvergenceError if visits still change after 20000 products; std::domain_error where some class never fails
 struct CoupledPassage {
   MeshPassage passage;
   double first_rate = 0;
-  std::vector<double> share;  ///< of the expected steps that are taken in each gait
+  std::vector<double> share = {};  ///< of the expected steps that are taken in each gait
 };
 CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, const std::vector<std::uint32_t>& gait,
                                std::size_t gaits);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -34,6 +35,7 @@ struct MeshOptions {
   double score_spacing = 0.6;  ///< of places on a curve in the first score, and of the lattice of the others
   double score_reach = 8.5;
   std::size_t most_bytes = std::size_t{3} << 30;  ///< for rows and nodes; more is refused
+  std::function<void()> on_batch = {};            ///< is called after every few nodes; may throw to stop
   std::vector<MeshSource> sources = {};           ///< other gaits (OtherGaits)
   double start_action = 0;                        ///< of the start and its orbit
   double limit = 0;                               ///< > 0: nodes as far as this action, wherever failures are

@@ -301,6 +301,7 @@ void MeshGrowth::expand_wave(std::vector<std::uint32_t>& wave) {
       const int phase = NodeLattice::phase(key_[wave[first]]);
       while (last < wave.size() && last - first < together && NodeLattice::phase(key_[wave[last]]) == phase) ++last;
       expand(std::span(wave).subspan(first, last - first));
+      if (options_.on_batch) options_.on_batch();
       first = last;
     }
   } catch (const MapError& error) {

@@ -4,18 +4,19 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <string>
 #include <utility>
 
 namespace metastable::markov {
 namespace {
 
-constexpr int kProducts = 20000;
 constexpr double kStill = 1e-6;  // distance between distributions a revolution apart
 constexpr int kInARow = 3;
 
 }  // namespace
 
-MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double settled_change) {
+MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double settled_change,
+                             int most_products, bool or_stop) {
   const std::size_t n = rows.kill.size();
   const int phases = rows.phases;
   std::vector<double> y(n), before;
@@ -33,8 +34,9 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
     for (std::size_t i = 0; i < n; ++i) passage.visits[i] += times * met[i];
   };
   while (settled < kInARow) {
-    if (passage.products >= kProducts)
-      throw ConvergenceError("mesh", last_failures, "survivors still change after 20000 products");
+    if (passage.products >= most_products && !or_stop)
+      throw ConvergenceError("mesh", last_failures,
+                             "survivors still change after " + std::to_string(most_products) + " products");
     // Of those alive at the beginning of a revolution this finds which fail in it, and how many steps they take.
     before = x;
     std::fill(met.begin(), met.end(), 0.0);
@@ -75,6 +77,7 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
     distances.push_back(distance);
     const bool still = std::abs(failures - last_failures) <= settled_change * failures && distance <= kStill;
     settled = still ? settled + 1 : 0;
+    if (or_stop && passage.products >= most_products) settled = kInARow;
     last_failures = failures;
     if (settled == kInARow) {
       passage.steps_upper = passage.steps + alive * taken / failures;
@@ -99,14 +102,15 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
   return passage;
 }
 
-MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change) {
+MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change, int most_products,
+                         bool or_stop) {
   std::vector<double> x(mesh.size(), 0.0);
   const Mesh::Corners corners = mesh.corners(0, start);
   for (int c = 0; c < corners.count; ++c)
     x[corners.node[static_cast<std::size_t>(c)]] += corners.weight[static_cast<std::size_t>(c)];
   return follow_survivors(
       {mesh.phases(), mesh.kill(), mesh.leave(), [&](auto from, auto to) { mesh.apply_left(from, to); }}, std::move(x),
-      settled_change);
+      settled_change, most_products, or_stop);
 }
 
 std::vector<std::vector<double>> failure_in_step(const Mesh& mesh, int window) {

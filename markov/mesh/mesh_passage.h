@@ -31,11 +31,15 @@ struct MassRows {
 
 /// Follows the distribution of survivors, from one over the nodes of phase 0 (`start`, own nodes), until it keeps its
 /// form: until the failures of a revolution change by no more than `settled_change` of themselves, three times running.
-/// @throws ConvergenceError if it does not within 20000 products
-MeshPassage follow_survivors(const MassRows& rows, std::vector<double> start, double settled_change = 1e-9);
+/// Survivors that do not within `most_products` are an error, or are followed no further if `or_stop`: they then fail on
+/// as they last did.
+/// @throws ConvergenceError in the first case
+MeshPassage follow_survivors(const MassRows& rows, std::vector<double> start, double settled_change = 1e-9,
+                             int most_products = 20000, bool or_stop = false);
 
 /// Does the same from a state at phase 0 of one mesh.
-MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change = 1e-9);
+MeshPassage mesh_passage(const Mesh& mesh, std::span<const double> start, double settled_change = 1e-9,
+                         int most_products = 20000, bool or_stop = false);
 
 /// Returns u[n][i], n = 0 .. window: the probability that a walker at node i fails in exactly its (n+1)-th step.
 std::vector<std::vector<double>> failure_in_step(const Mesh& mesh, int window);

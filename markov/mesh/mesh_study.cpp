@@ -9,9 +9,11 @@
 #include <stdexcept>
 
 #include "markov/mesh/batch_simulation.h"
+#include "markov/mesh/coupled_passage.h"
 #include "markov/mesh/guided_sampling.h"
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/noise_frame.h"
+#include "markov/mesh/other_gaits.h"
 #include "markov/normal_95.h"
 #include "markov/parallel.h"
 
@@ -23,6 +25,9 @@ constexpr double kSampledWindows = 3;  // of guided samples: within one, failure
 constexpr int kLongestWindow = 200;    // of guided samples [steps]
 constexpr double kEven = 0.5;          // effective samples a sample: below, their own scatter tells too small an error
 constexpr double kSampledFrom = 100;   // expected steps above which guided samples settle before they fail
+constexpr double kWidest = 4;          // of the interval: its end over its beginning, beyond which it is no answer
+constexpr double kMostBlind = 0.1;     // of the failures, in blind spots: beyond, bands are stepped over
+constexpr double kFarReach = 12;       // scores on meshes of several gaits, of which some are left very rarely: 1e-32
 constexpr double kLeast = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double kRows = 5e-4;         // what reading rows off curves may leave, about so much
 constexpr std::size_t kFewestTrials = 100;
@@ -135,10 +140,15 @@ class Run {
     foresee_memory();
     parallel_for(sizes_ * shifts_ - 1, threads_, [&](std::size_t task) {
       // The long ones come first; the very last, the first shift of the coarsest size, has been made.
-      solve(sizes_ - 1 - task / shifts_, shifts_ - 1 - task % shifts_);
+      const std::size_t size = sizes_ - 1 - task / shifts_, shift = shifts_ - 1 - task % shifts_;
+      solve(Mesh(map_, frames_, start_, mesh_options(size, shift)), size, shift);
     });
     join();
-    simulate();
+    if (study_.steps.upper > kWidest * study_.steps.lower)
+      study_.disagreement = fmt::format("the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}): no number is given",
+                                        study_.steps.value, study_.steps.lower, study_.steps.upper);
+    if (study_.disagreement.empty()) simulate();
+    if (study_.disagreement.empty()) see_blind_spots();
     if (!study_.disagreement.empty()) return std::move(study_);
     sample();
     if (study_.disagreement.empty() && study_.guided)
@@ -147,21 +157,45 @@ class Run {
   }
 
  private:
-  MeshOptions mesh_options(std::size_t size, std::size_t shift) const {
+  MeshOptions mesh_options(std::size_t size, std::size_t shift) {
     const double coarse = options_.spacing > 0 ? options_.spacing : coarsest(map_.dimension);
-    return {.spacing = coarse / std::pow(std::sqrt(2.0), static_cast<double>(size)),
-            .seed = options_.seed,
-            .shift = static_cast<std::uint32_t>(shift),
-            .margin = options_.margin > 0 ? options_.margin
-                      : map_.scores == 1  ? 12.0
-                                          : 16.0,
-            .score_spacing = study_score_spacing(map_),
-            .most_bytes = options_.most_bytes / static_cast<std::size_t>(threads_)};
+    MeshOptions one{.spacing = coarse / std::pow(std::sqrt(2.0), static_cast<double>(size)),
+                    .seed = options_.seed,
+                    .shift = static_cast<std::uint32_t>(shift),
+                    .margin = options_.margin > 0 ? options_.margin
+                              : map_.scores == 1  ? 12.0
+                                                  : 16.0,
+                    .score_spacing = study_score_spacing(map_),
+                    .most_bytes = options_.most_bytes / static_cast<std::size_t>(threads_)};
+    if (options_.progress)
+      one.on_batch = [this] {
+        const std::lock_guard lock(mutex_);
+        options_.progress(done_ / all_work());
+      };
+    if (!several_gaits()) return one;
+    one.score_reach = kFarReach;
+    one.sources = gaits_.sources;
+    one.start_action = gaits_.start_action;
+    one.limit = gaits_.limit;
+    return one;
+  }
+
+  bool several_gaits() const { return gaits_.states.size() > 1; }
+
+  /// Looks for other gaits around the coarsest mesh, and solves that, grown anew where there are some. Returns its bytes.
+  std::size_t begin() {
+    const MeshOptions alone = mesh_options(0, 0);
+    const Mesh mesh(map_, frames_, start_, alone);
+    gaits_ = find_other_gaits(map_, frames_, start_, mesh, alone);
+    if (!gaits_.trap.empty()) throw Disagreement("mesh study: " + gaits_.trap + ": no number is given");
+    if (!several_gaits()) return solve(mesh, 0, 0);
+    study_.other_gaits.assign(gaits_.states.begin() + 1, gaits_.states.end());
+    return solve(Mesh(map_, frames_, start_, mesh_options(0, 0)), 0, 0);
   }
 
   void foresee_memory() {
     // Nodes grow by the spacing's power at most, entries of a row by that of as many dimensions as landings fill.
-    const double coarse = static_cast<double>(solve(0, 0));
+    const double coarse = static_cast<double>(begin());
     const double growth = std::pow(std::sqrt(2.0), static_cast<double>(sizes_ - 1));
     const double finest = coarse * std::pow(growth, map_.dimension + std::min(map_.scores, map_.dimension));
     study_.expected_bytes = finest * threads_;
@@ -174,21 +208,28 @@ class Run {
   }
 
   /// Returns the mesh's bytes.
-  std::size_t solve(std::size_t size, std::size_t shift) {
-    const Mesh mesh(map_, frames_, start_, mesh_options(size, shift));
-    MeshPassage passage = mesh_passage(mesh, start_);
+  std::size_t solve(const Mesh& mesh, std::size_t size, std::size_t shift) {
+    CoupledPassage coupled;
+    if (several_gaits())
+      coupled = coupled_passage(mesh, start_, gait_classes(mesh, gaits_.states, frames_), gaits_.states.size());
+    else
+      coupled.passage = mesh_passage(mesh, start_);
+    MeshPassage& passage = coupled.passage;
     steps_[shift][size] = std::log(passage.steps);
     rates_[shift][size] = std::log(passage.failure_rate);
     brackets_[shift][size] = 0.5 * std::log(passage.steps_upper / passage.steps_lower);
     const std::lock_guard lock(mutex_);
     done_ += mesh_work(size);
     if (options_.progress) options_.progress(done_ / all_work());
+    if (size == 0 && shift == 0)
+      study_.blind_spots = find_blind_spots(map_, frames_, mesh, passage.visits, mesh_options(0, 0));
     if (shift > 0) return mesh.bytes();
     study_.sizes[size] = {mesh_options(size, 0).spacing, mesh.size(), mesh.entries(), {}};
     if (size + 1 < sizes_) return mesh.bytes();
     study_.mixing_steps = passage.mixing_steps;
     study_.survival = std::move(passage.survival);
-    tail_rate_ = passage.failure_rate;
+    tail_rate_ = several_gaits() ? coupled.first_rate : passage.failure_rate;
+    if (several_gaits()) study_.other_gait_share.assign(coupled.share.begin() + 1, coupled.share.end());
     study_.cheapest_failure = mesh.cheapest_failure();
     return mesh.bytes();
   }
@@ -220,6 +261,23 @@ class Run {
                                  std::hypot(by_rate.shift_error, by_rate.discretization_error) + study_.bracket);
   }
 
+  /// Widens the intervals by what the mesh may not have seen, or says that it is too much.
+  void see_blind_spots() {
+    const BlindSpots& blind = study_.blind_spots;
+    if (blind.missed > kMostBlind || blind.imagined > kMostBlind)
+      study_.disagreement = fmt::format(
+          "the mesh ({:.4g} steps) and random steps ({} of {} at random places end otherwise than those around them, and "
+          "stand for {}) disagree: no number is given",
+          study_.steps.value, blind.hits, blind.probes,
+          blind.missed > blind.imagined
+              ? fmt::format("up to {:.2g} times as many failures as the mesh foretells, beside these", blind.missed)
+              : fmt::format("up to {:.2g} times the failures that the mesh foretells, which are none", blind.imagined));
+    study_.steps.lower /= 1 + blind.missed;
+    study_.steps.upper *= 1 + blind.imagined;
+    study_.failure_rate.upper *= 1 + blind.missed;
+    study_.failure_rate.lower /= 1 + blind.imagined;
+  }
+
   ForetoldHazard hazard() const {
     return {study_.survival, tail_rate_, std::exp(steps_[0][sizes_ - 1]) / study_.steps.value,
             half_width(study_.steps)};
@@ -233,7 +291,7 @@ class Run {
     study_.walks = count_failures(walked, steps, hazard());
     if (study_.walks->refutes(hazard()))
       study_.disagreement =
-          fmt::format("the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation disagree: {}: no number is given",
+          fmt::format("the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation ({}) disagree: no number is given",
                       study_.steps.value, study_.steps.lower, study_.steps.upper, count_text(*study_.walks));
     return walked;
   }
@@ -245,10 +303,11 @@ class Run {
       study_.no_simulated = "not asked for";
       return;
     }
-    if (trials < kFewestTrials) {
+    if (trials < kFewestTrials || several_gaits()) {
       const std::size_t walks = std::clamp<std::size_t>(options_.simulated_steps, 2, kWalks);
       count(walks, std::floor(allowed / static_cast<double>(walks)));
-      study_.no_simulated = "too few trials would fail; " + count_text(*study_.walks);
+      study_.no_simulated =
+          (several_gaits() ? "it would know one gait; " : "too few trials would fail; ") + count_text(*study_.walks);
       return;
     }
     count(std::clamp(trials / kPilotShare, kPilotLeast, kPilotMost), kPilotSteps * expected);
@@ -266,6 +325,7 @@ class Run {
     if (options_.guided_samples == 0) study_.no_guided = "not asked for";
     if (options_.guided_samples > 0 && study_.steps.value <= kSampledFrom)
       study_.no_guided = "failures are too frequent for it";
+    if (several_gaits()) study_.no_guided = "its samples would know one gait";
     if (!study_.no_guided.empty()) return;
     const Mesh mesh(map_, frames_, start_, mesh_options(1, 0));
     // It goes from the start to where failures keep their share: the time to forget the start, some times over. A
@@ -301,6 +361,7 @@ class Run {
   std::span<const double> start_;
   const MeshStudyOptions& options_;
   std::vector<NoiseFrame> frames_;
+  OtherGaits gaits_;
   std::size_t sizes_, shifts_;
   int threads_;
   std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]

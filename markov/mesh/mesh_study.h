@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "markov/mesh/batch_map.h"
+#include "markov/mesh/blind_spots.h"
 #include "markov/mesh/failure_count.h"
 #include "markov/mesh/mesh.h"
 
@@ -47,9 +48,13 @@ struct MeshStudy {
   double mixing_steps = 0;
   std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
   double cheapest_failure = 0;
+  /// Are states of phase 0 of other gaits that the noise leads to, and the shares of the expected steps taken there.
+  std::vector<std::vector<double>> other_gaits;
+  std::vector<double> other_gait_share;
   /// Holds the relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization,
   /// and what leaves the mesh.
   double shift_error = 0, discretization_error = 0, bracket = 0;
+  BlindSpots blind_spots;  ///< of the coarsest mesh
   std::vector<MeshSize> sizes;
   double expected_bytes = 0;                             ///< of all meshes held at once, as foreseen from the coarsest
   std::optional<MeshEstimate> guided, simulated;         ///< expected steps in the two other ways, where they reach
@@ -73,7 +78,7 @@ class Disagreement : public std::runtime_error {
 
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
-/// discretization error; the bracket of what leaves the mesh is added. The discretization error is the difference from
+/// discretization error; the bracket of what leaves the mesh is added, and on its side what blind spots may hold. The discretization error is the difference from
 /// the extrapolation without the coarsest size; with four sizes, at least that between the two triples'. Meshes coarser
 /// than the default count it by the square of the ratio of their spacings: the sizes show less and less of it.
 ///
@@ -83,6 +88,10 @@ class Disagreement : public std::runtime_error {
 /// until the samples' weights are even; where they stay uneven, the interval is widened in proportion, and beyond a
 /// factor of about two not given. Two ways disagree when they lie further apart than 1.7 times (99.9 %) their joint 95
 /// % half-width, and a count of failures when the mesh foretells one so far off with a chance below refutation_level.
+/// Where the noise leads to other gaits (OtherGaits), meshes grow from those too and are solved by coupled_passage();
+/// failures are then counted only, and no samples are guided: both would start in one gait and know nothing of the
+/// others. No number is given either where a gait is a trap, where blind spots may hold more than a tenth of the
+/// failures, or where the interval is wider than a factor of four.
 /// The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries
 /// with them, is foreseen from it.
 /// @throws Disagreement where meshes find no failure and simulation does; std::length_error before the other meshes are

@@ -12,10 +12,10 @@ namespace metastable::markov {
 /// Holds the noise-free orbits that the noise can lead to within an action of 60, by a state at phase 0 each.
 struct OtherGaits {
   std::vector<std::vector<double>> states;  ///< the start's own first; alone: there is no other
-  std::vector<MeshSource> sources;          ///< for MeshOptions: of all but the start's own
+  std::vector<MeshSource> sources = {};     ///< for MeshOptions: of all but the start's own
   double start_action = 0, limit = 0;       ///< for MeshOptions; limit 0: there is no other gait
   /// Is empty, or names a gait that can be slipped into and from which neither a failure nor another gait is found.
-  std::string trap;
+  std::string trap = {};
 };
 
 /// Follows, without noise, states of a mesh and states that walks under two and four times the noise come through, until

@@ -190,6 +190,14 @@ void ScoreCurve::answer(std::span<const Landing> landings, double unit) {
     if (place_[i].open) asked_.push_back(0.5 * (place_[i].score + place_[i + 1].score));
 }
 
+std::optional<ScoreCurve::Fate> ScoreCurve::fate(double score) const {
+  const auto right =
+      std::upper_bound(place_.begin(), place_.end(), score, [](double z, const Place& place) { return z < place.score; });
+  if (right == place_.begin() || right == place_.end()) return std::nullopt;
+  const Fate before = (right - 1)->landing.fate;
+  return before == right->landing.fate ? std::optional(before) : std::nullopt;
+}
+
 ScoreCurve::Shares ScoreCurve::share(const NodeLattice& lattice, int phase, double weight,
                                      std::vector<std::pair<std::uint64_t, double>>& parts) const {
   constexpr double infinity = std::numeric_limits<double>::infinity();

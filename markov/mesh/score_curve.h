@@ -2,6 +2,7 @@
 // Reads where a state leads as a smooth curve in the one score of its noise: a few steps of the map, interpolated.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -36,6 +37,10 @@ class ScoreCurve {
   /// Takes the landings of the scores asked for.
   /// @param unit  of the lattice's coordinates, in stationary sds
   void answer(std::span<const Landing> landings, double unit);
+
+  /// Returns what happens at a score between two places at which the same happens; nothing where different things do, in
+  /// the narrow gaps in which failures begin, and beyond the places.
+  std::optional<Fate> fate(double score) const;
 
   /// Adds to `parts` what each corner of the cells around all landings gets, in proportion to nearness on every axis
   /// and times `weight`; corners may come again. The shares returned are of this curve alone.

@@ -1,7 +1,9 @@
 #include "reports/study/walker_text.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -37,6 +39,9 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
   for (const markov::MeshSize& size : s.sizes)
     sizes.push_back(
         {{"spacing", size.spacing}, {"nodes", size.nodes}, {"entries", size.entries}, {"steps", size.steps}});
+  WalkerJson gaits = WalkerJson::array();
+  for (std::size_t g = 0; g < s.other_gaits.size(); ++g)
+    gaits.push_back({{"state", s.other_gaits[g]}, {"share_of_steps", s.other_gait_share[g]}});
   return {{"setting", name},
           {"status", walker_status(s)},
           {"expected_steps", mesh_estimate_json(s.steps)},
@@ -44,7 +49,9 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
           {"survival", survival_json(s)},
           {"mixing_steps", s.mixing_steps},
           {"relative_errors",
-           {{"shifts", s.shift_error}, {"discretization", s.discretization_error}, {"leaving_mesh", s.bracket}}},
+           {{"shifts", s.shift_error}, {"discretization", s.discretization_error}, {"leaving_mesh", s.bracket},
+            {"missed_failures", s.blind_spots.missed}, {"imagined_failures", s.blind_spots.imagined}}},
+          {"other_gaits", gaits},
           {"guided_sampling", s.guided ? mesh_estimate_json(*s.guided) : WalkerJson(nullptr)},
           {"direct_simulation", s.simulated ? mesh_estimate_json(*s.simulated) : WalkerJson(nullptr)},
           {"no_guided_sampling", s.guided ? WalkerJson(nullptr) : WalkerJson(s.no_guided)},
@@ -83,6 +90,8 @@ std::string with_interval(const MeshEstimate& e) {
                      plain_text(text.upper));
 }
 
+constexpr double negligible_blind = 1e-4;  // of the failures: less is not told
+
 Lines head_lines(const markov::MeshStudy& s) {
   return {{"expected steps before failure", with_interval(s.steps)},
           {"  by guided sampling", s.guided ? with_interval(*s.guided) : s.no_guided},
@@ -94,8 +103,15 @@ Lines head_lines(const markov::MeshStudy& s) {
 }
 
 Lines mesh_lines(const markov::MeshStudy& s) {
-  Lines lines{{"relative errors", fmt::format("shifts {:.2g}, discretization {:.2g}, leaving the mesh {:.2g}",
-                                              s.shift_error, s.discretization_error, s.bracket)}};
+  Lines lines;
+  for (std::size_t g = 0; g < s.other_gaits.size(); ++g)
+    lines.emplace_back("another gait",
+                       fmt::format("at {:.6g}: {:.3g} of the steps", fmt::join(s.other_gaits[g], ", "),
+                                   s.other_gait_share[g]));
+  lines.emplace_back("relative errors", fmt::format("shifts {:.2g}, discretization {:.2g}, leaving the mesh {:.2g}",
+                                                    s.shift_error, s.discretization_error, s.bracket));
+  const double blind = std::max(s.blind_spots.missed, s.blind_spots.imagined);
+  if (blind > negligible_blind) lines.back().second += fmt::format(", blind spots {:.2g}", blind);
   for (const markov::MeshSize& size : s.sizes)
     lines.emplace_back(fmt::format("mesh of spacing {:.3g} sd", size.spacing),
                        fmt::format("{} nodes, {} entries", size.nodes, size.entries));

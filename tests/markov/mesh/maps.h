@@ -66,4 +66,52 @@ inline double linear_steps(double sd, double x) {
   return 1 + std::inner_product(mean.begin(), mean.end(), row.after.begin(), 0.0);
 }
 
+/// Maps x' = x / 2 + z, failed where |x'| > 6 or `also` says so of x, z and x'.
+template <class Also>
+BatchMap damped_batch(Also also) {
+  BatchMap map;
+  map.step = [also](int, auto states, auto scores, auto next, auto failed) {
+    for (std::size_t i = 0; i < failed.size(); ++i) {
+      next[i] = states[i] / 2 + scores[i];
+      failed[i] = std::abs(next[i]) > 6 || also(states[i], scores[i], next[i]);
+    }
+  };
+  return map;
+}
+
+/// Has gaits near -1 and `high`, and fails below -1 - far.
+struct TwoGaits {
+  double high = 1, sd = 0.12, far = 0.85;
+  double mean(double x) const { return (high - 1) / 2 + (high + 1) / 2 * std::tanh(3 * x); }
+  BatchMap batch() const {
+    BatchMap map;
+    map.step = [*this](int, auto states, auto scores, auto next, auto failed) {
+      for (std::size_t i = 0; i < failed.size(); ++i) {
+        next[i] = mean(states[i]) + sd * scores[i];
+        failed[i] = next[i] < -1 - far;
+      }
+    };
+    return map;
+  }
+  /// Returns the expected steps from -1: fine cells, their probabilities from tails, eliminated.
+  double steps(std::size_t cells = 700) const {
+    const double low = -1 - far, top = high + 14 * sd, width = (top - low) / static_cast<double>(cells);
+    const auto mass = [](double a, double b) {
+      const auto tail = [](double z) { return 0.5 * std::erfc(z / std::sqrt(2)); };
+      return a > 0 ? tail(a) - tail(b) : tail(-b) - tail(-a);
+    };
+    std::vector<double> matrix(cells * cells), kill(cells);
+    for (std::size_t i = 0; i < cells; ++i)
+      for (const double aside : {-0.5 / std::sqrt(3), 0.5 / std::sqrt(3)}) {  // Gauss's two points of the cell
+        const double to = mean(low + width * (static_cast<double>(i) + 0.5 + aside));
+        kill[i] += 0.5 * mass(-INFINITY, (low - to) / sd);
+        for (std::size_t j = 0; j < cells; ++j)
+          matrix[i * cells + j] += 0.5 * mass((low + width * static_cast<double>(j) - to) / sd,
+                                              (low + width * static_cast<double>(j + 1) - to) / sd);
+      }
+    const std::vector<double> steps = mean_first_passage(ChainSolver(Chain::from_dense(cells, matrix, kill)));
+    return steps[static_cast<std::size_t>(far / width)];
+  }
+};
+
 }  // namespace metastable::markov::testing

@@ -81,6 +81,79 @@ TEST(MeshStudy, SaysWhereTheWaysDisagree) {
   EXPECT_NE(study.disagreement.find("no number is given"), std::string::npos);
 }
 
+TEST(MeshStudy, SimulationRefutesFailuresThatAreSteppedOver) {
+  const std::vector<double> start{0};
+  const auto said = [&](const BatchMap& map) { return mesh_study(map, start, quick()).disagreement; };
+  // 11.8, 645 and 2196 steps by simulation, where meshes alone say 4.9e6 and more.
+  const std::string wide = said(damped_batch([](double, double z, double) { return z > 0.9 && z < 1.3; })),
+                    narrow = said(damped_batch([](double, double z, double) { return z > 2 && z < 2.03; })),
+                    hole = said(damped_batch([](double, double, double x) { return std::abs(x - 1) < 0.001; }));
+  for (const std::string& text : {wide, narrow, hole}) {
+    EXPECT_NE(text.find("simulated walks failed within 195 steps, where the mesh foretells"), std::string::npos) << text;
+    EXPECT_NE(text.find("no number is given"), std::string::npos) << text;
+  }
+  const BatchMap by_state = damped_batch([](double s, double, double) { return s > 1.9 && s < 1.95; });
+  try {  // its nodes may or may not meet the band
+    EXPECT_NE(mesh_study(by_state, start, quick()).disagreement, "");
+  } catch (const Disagreement& error) {
+    EXPECT_NE(std::string(error.what()).find("512 simulated walks"), std::string::npos) << error.what();
+  }
+}
+
+TEST(MeshStudy, RandomStepsRefuteBandsThatSimulationCannotSee) {
+  const std::vector<double> start{0};
+  for (const BatchMap& map : {damped_batch([](double, double z, double) { return z > 4.75 && z < 4.8; }),
+                              damped_batch([](double s, double, double) { return s > 4 && s < 4.05; })}) {
+    const MeshStudy study = mesh_study(map, start, quick());
+    EXPECT_NE(study.disagreement, "") << study.steps.value;
+  }
+  const MeshStudy smooth = mesh_study(damped_batch([](double, double, double) { return false; }), start, quick());
+  EXPECT_EQ(smooth.disagreement, "");
+  EXPECT_EQ(smooth.blind_spots.hits, 0u);
+}
+
+TEST(MeshStudy, FollowsSlipsToAnotherGaitHoweverRare) {
+  const std::vector<double> start{-1};
+  for (const TwoGaits gaits : {TwoGaits{1.2, 0.13, 0.9}, TwoGaits{1, 0.12, 0.85}, TwoGaits{1, 0.2, 0.9}}) {
+    const double exact = gaits.steps();  // 5.0e19, 4.07e12, 7.2e5
+    const MeshStudy study = mesh_study(gaits.batch(), start, quick());
+    EXPECT_EQ(study.disagreement, "");
+    EXPECT_LE(study.steps.lower, 1.003 * exact);
+    EXPECT_GE(study.steps.upper, 0.997 * exact);
+    EXPECT_LT(study.steps.upper / study.steps.lower, 1.05);
+    ASSERT_EQ(study.other_gaits.size(), 1u);
+    EXPECT_FALSE(study.simulated || study.guided);  // they would start in one gait
+  }
+}
+
+TEST(MeshStudy, GivesNoNumberWhereAGaitIsATrap) {
+  const std::vector<double> start{-1};
+  EXPECT_THROW(mesh_study(TwoGaits{3, 0.12, 0.85}.batch(), start, quick()), Disagreement);
+}
+
+TEST(MeshStudy, SaysOnlyWhatWasFound) {
+  const std::vector<double> start{0};
+  const auto text = [&](const BatchMap& map) {
+    try {
+      mesh_study(map, start, quick());
+    } catch (const std::exception& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string at_once = text(damped_batch([](double, double, double) { return true; }));
+  EXPECT_NE(at_once.find("even without noise it fails"), std::string::npos) << at_once;
+  EXPECT_NE(at_once.find("512 walks fail after 1 steps in the mean"), std::string::npos) << at_once;
+  const std::string beside = text(damped_batch([](double, double z, double) { return z > 0.005 && z < 0.5; }));
+  EXPECT_NE(beside.find("a noise of 0.01 sd makes it fail"), std::string::npos) << beside;
+  EXPECT_EQ(beside.find("even without noise"), std::string::npos) << beside;
+  MeshStudyOptions none = quick();
+  none.guided_samples = none.simulated_steps = 0;
+  const MeshStudy study = mesh_study(linear_batch(0.6), std::vector<double>{2}, none);
+  EXPECT_EQ(study.no_simulated, "not asked for");
+  EXPECT_EQ(study.no_guided, "not asked for");
+}
+
 TEST(MeshStudy, SameSeedSameBitsOnAnyNumberOfThreads) {
   const std::vector<double> start{2};
   MeshStudyOptions options = quick();

@@ -98,6 +98,30 @@ class Steps(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "step: a function expected, not int"):
             metastable.walker(3, 1, 1, start=[0])
 
+    def test_failures_that_the_meshes_step_over_give_no_number(self):
+        def band(state, noise):  # simulation says 11.8 steps, the meshes 4.9e6
+            following = 0.5 * state + noise
+            return following, (np.abs(following[:, 0]) > 6) | ((noise[:, 0] > 0.9) & (noise[:, 0] < 1.3))
+
+        with self.assertRaisesRegex(metastable.Contradiction, r"a line: the mesh \(4\.92.* walks failed within \d+ steps, "
+                                    "where the mesh foretells .*disagree: no number is given"):
+            line(band).study(simulated_steps=100000)
+
+    def test_slips_to_another_gait_count(self):
+        def gaits(state, noise):  # 7.207e5 steps by elimination of fine cells
+            following = np.tanh(3 * state) + 0.2 * noise
+            return following, following[:, 0] < -1.9
+
+        study = metastable.walker(gaits, 1, 1, start=[-1]).study(simulated_steps=20000)
+        self.assertLess(abs(study.expected_steps.value / 7.207e5 - 1), 0.005)
+        self.assertEqual(study.status, "mesh_alone")
+        self.assertAlmostEqual(study.other_gaits[0].share_of_steps, 0.5, delta=0.01)
+
+    def test_what_was_not_asked_for_is_called_so(self):
+        study = line(drift).study(spacing=0.4, simulated_steps=0)
+        self.assertEqual(study.no_direct_simulation, "not asked for")
+        self.assertIn("not asked for", str(study))
+
     @staticmethod
     def interrupting(state, noise):
         raise KeyboardInterrupt

@@ -1,0 +1,206 @@
+#include "markov/mesh/blind_spots.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "markov/mesh/mesh_growth.h"
+#include "markov/mesh/score_curve.h"
+#include "markov/mesh/score_lattice.h"
+#include "markov/rows/draws.h"
+
+namespace metastable::markov {
+namespace {
+
+constexpr std::uint64_t kStates = 0x9000, kScores = 0xa000, kPlaces = 0xb000;
+constexpr std::size_t kLines = 3000, kOnALine = 16, kBatch = 64;
+constexpr double kLeastReach = 6, kReach = 8.5;         // of a line [sds]: places of a curve hang on it
+constexpr double kHeat = 2;                             // of the scores but the first
+constexpr double kAboveNodes = 2;                       // of one score: a line fails so much oftener than any node around,
+constexpr double kLineFails = 0.3, kNodesFail = 0.03;   // of several: more than the first where no node does the second,
+                                                        // nor the first under the line's other scores
+constexpr double kErrors = 2;                           // standard errors
+
+/// Sums contributions of lines, each with its probability.
+struct Sum {
+  double sum = 0, squares = 0;
+  void add(double x) {
+    sum += x;
+    squares += x * x;
+  }
+  double bound() const {
+    const auto n = static_cast<double>(kLines);
+    const double mean = sum / n;
+    return mean + kErrors * std::sqrt(std::max(0.0, squares / n - mean * mean) / n);
+  }
+};
+
+class Probing {
+ public:
+  Probing(const BatchMap& map, const std::vector<NoiseFrame>& frames, const Mesh& mesh, std::span<const double> visits,
+          const MeshOptions& options)
+      : map_(map), mesh_(mesh), options_(options), lattice_(mesh_lattice(map, frames, options)),
+        d_(static_cast<std::size_t>(map.dimension)), s_(static_cast<std::size_t>(map.scores)), visits_(visits) {
+    const double all = std::accumulate(visits.begin(), visits.end(), 0.0);
+    double failing = 0;
+    for (std::size_t i = 0; i < mesh.size(); ++i) failing += visits[i] * mesh.kill()[i];
+    for (std::size_t i = 0; i < mesh.size(); ++i)
+      share_.push_back(0.5 / static_cast<double>(mesh.size()) + 0.25 * visits[i] / all +
+                       0.25 * visits[i] * mesh.kill()[i] / failing);
+    std::partial_sum(share_.begin(), share_.end(), std::back_inserter(up_to_));
+  }
+
+  BlindSpots find() {
+    std::vector<std::vector<Line>> of_phase(static_cast<std::size_t>(map_.phases));
+    for (std::size_t n = 0; n < kLines; ++n) {
+      Line line = draw(n);
+      if (map_.inside && !map_.inside(line.phase, line.state)) continue;
+      auto& waiting = of_phase[static_cast<std::size_t>(line.phase)];
+      waiting.push_back(std::move(line));
+      if (waiting.size() == kBatch) probe(waiting);
+    }
+    for (auto& waiting : of_phase)
+      if (!waiting.empty()) probe(waiting);
+    found_.missed = missed_.bound();
+    found_.imagined = imagined_.bound();
+    return found_;
+  }
+
+ private:
+  struct Line {
+    std::size_t number = 0;
+    int phase = 0;
+    std::vector<double> state, others;
+    double reach = 0;
+    double weight = 0;  ///< expected visits over the density with which it is drawn
+    double nodes_fail = 1;
+  };
+
+  std::vector<double> numbers(std::uint64_t stream, std::size_t number, std::size_t count) const {
+    std::vector<double> all;
+    for (std::size_t k = 0; k < count; k += 4) {
+      const auto u = uniforms(options_.seed, stream + k / 4, number, 0);
+      all.insert(all.end(), u.begin(), u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, count - k)));
+    }
+    return all;
+  }
+
+  Line draw(std::size_t number) const {
+    Line line;
+    line.number = number;
+    const std::vector<double> u = numbers(kStates, number, 2 + 2 * d_);
+    const auto place = std::upper_bound(up_to_.begin(), up_to_.end(), u[0] * up_to_.back()) - up_to_.begin();
+    const std::size_t node = std::min(static_cast<std::size_t>(place), mesh_.size() - 1);
+    line.phase = mesh_.phase(node);
+    line.state = mesh_.state(node);
+    const NoiseFrame& frame = lattice_.frame(line.phase);
+    for (std::size_t k = 0; k < d_; ++k) {  // the sum of two evenly spread numbers: as the mesh interpolates
+      const double by = options_.spacing * (u[2 + 2 * k] + u[3 + 2 * k] - 1);
+      for (std::size_t i = 0; i < d_; ++i) line.state[i] += frame.axes[i * d_ + k] * by;
+    }
+    line.reach = kLeastReach + (kReach - kLeastReach) * u[1];
+    line.weight = visits_[node] / share_[node];
+    for (const double v : numbers(kScores, number, s_ - 1)) {
+      const double z = kHeat * normal_score(v);
+      line.others.push_back(z);
+      line.weight *= kHeat * std::exp(-0.5 * z * z * (1 - 1 / (kHeat * kHeat)));
+    }
+    const Mesh::Corners corners = mesh_.corners(line.phase, line.state);
+    if (static_cast<std::size_t>(corners.count) <= d_) return line;  // at the edge of the mesh
+    line.nodes_fail = 0;
+    for (int c = 0; c < corners.count; ++c)
+      line.nodes_fail = std::max(line.nodes_fail, mesh_.kill()[corners.node[static_cast<std::size_t>(c)]]);
+    return line;
+  }
+
+  void probe(std::vector<Line>& lines) {
+    ScoreLines along;
+    for (const Line& line : lines) {
+      along.states.insert(along.states.end(), line.state.begin(), line.state.end());
+      along.others.insert(along.others.end(), line.others.begin(), line.others.end());
+      along.reach.push_back(line.reach);
+    }
+    const std::vector<ScoreCurve> curves =
+        follow_curves(map_, lattice_, lines.front().phase, along, options_.score_spacing, options_.spacing);
+    std::vector<double> states, scores;
+    for (const Line& line : lines) {
+      const std::vector<double> at = numbers(kPlaces, line.number, kOnALine);
+      for (std::size_t j = 0; j < kOnALine; ++j) {
+        states.insert(states.end(), line.state.begin(), line.state.end());
+        scores.push_back(line.reach * (2 * (static_cast<double>(j) + at[j]) / kOnALine - 1));
+        scores.insert(scores.end(), line.others.begin(), line.others.end());
+      }
+    }
+    std::vector<double> next(states.size());
+    std::vector<std::uint8_t> failed(lines.size() * kOnALine, 0);
+    checked_step(map_, lines.front().phase, states, scores, next, failed);
+    for (std::size_t n = 0; n < lines.size(); ++n)
+      judge(lines[n], curves[n], std::span(scores).subspan(n * kOnALine * s_, kOnALine * s_),
+            std::span(failed).subspan(n * kOnALine, kOnALine));
+    found_.probes += failed.size();
+    lines.clear();
+  }
+
+  void judge(const Line& line, const ScoreCurve& curve, std::span<const double> scores,
+             std::span<const std::uint8_t> failed) {
+    double missed = 0, imagined = 0;
+    for (std::size_t j = 0; j < kOnALine; ++j) {
+      const double z = scores[j * s_];
+      const auto fate = curve.fate(z);
+      if (!fate || *fate == ScoreCurve::Fate::leaves || (*fate == ScoreCurve::Fate::fails) == (failed[j] != 0)) continue;
+      ++found_.hits;
+      (failed[j] ? missed : imagined) += 2 * line.reach / kOnALine * std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi);
+    }
+    parts_.clear();
+    const double fails = curve.share(lattice_, (line.phase + 1) % map_.phases, 1, parts_).fails;
+    const bool alone = s_ == 1 ? fails > kAboveNodes * line.nodes_fail
+                               : fails > kLineFails && line.nodes_fail < kNodesFail && !fails_around(line);
+    if (alone) {
+      ++found_.hits;
+      missed += fails;
+    }
+    missed_.add(line.weight * missed);
+    imagined_.add(line.weight * imagined);
+  }
+
+  /// Returns whether the same other scores make one of the nodes around fail as often.
+  bool fails_around(const Line& line) {
+    const Mesh::Corners corners = mesh_.corners(line.phase, line.state);
+    ScoreLines along;
+    for (int c = 0; c < corners.count; ++c) {
+      const std::vector<double> state = mesh_.state(corners.node[static_cast<std::size_t>(c)]);
+      if (map_.inside && !map_.inside(line.phase, state)) return true;
+      along.states.insert(along.states.end(), state.begin(), state.end());
+      along.others.insert(along.others.end(), line.others.begin(), line.others.end());
+      along.reach.push_back(line.reach);
+    }
+    const std::vector<ScoreCurve> curves =
+        follow_curves(map_, lattice_, line.phase, along, options_.score_spacing, options_.spacing);
+    return std::any_of(curves.begin(), curves.end(), [&](const ScoreCurve& curve) {
+      parts_.clear();
+      return curve.share(lattice_, (line.phase + 1) % map_.phases, 1, parts_).fails > kLineFails;
+    });
+  }
+
+  const BatchMap& map_;
+  const Mesh& mesh_;
+  const MeshOptions& options_;
+  NodeLattice lattice_;
+  std::size_t d_, s_;
+  std::span<const double> visits_;
+  std::vector<double> share_, up_to_;
+  std::vector<std::pair<std::uint64_t, double>> parts_;
+  Sum missed_, imagined_;
+  BlindSpots found_;
+};
+
+}  // namespace
+
+BlindSpots find_blind_spots(const BatchMap& map, const std::vector<NoiseFrame>& frames, const Mesh& mesh,
+                            std::span<const double> visits, const MeshOptions& options) {
+  return Probing(map, frames, mesh, visits, options).find();
+}
+
+}  // namespace metastable::markov
