@@ -21,17 +21,16 @@ constexpr Extended same_vector = 1e-10L;
 /// Of the rate, so much is taken for its rounding: sums of a few entries, some ten eliminations.
 constexpr Extended rate_rounding = 16 * rounding;
 /// A vector whose error may be larger than this is not given.
-constexpr Extended undecided = 1e-7L;
+constexpr Extended undecided = 1e-8L;
 
 Extended total(const Row& v) { return std::accumulate(v.begin(), v.end(), Extended{0}); }
 
-/// Holds the leading pair of one communicating class, its rate in two parts: the smallest kill rate and the excess.
+/// Holds the leading pair of one communicating class, the rate without its base (see Classes).
 struct ClassPair {
-  Extended common = 0, excess = 0;
+  Extended rate = 0;
   Row left, right;
   int iterations = 0;
   double error = 0;
-  Extended rate() const { return common + excess; }
 };
 
 /// Returns how long, at most, walkers of the killed-free generator take to its most visited state, forwards or
@@ -69,16 +68,18 @@ Extended move_up(Generator& scaled, const Row& steps, Extended longest) {
   return 1 / longest;
 }
 
-ClassPair pair_of_class(Generator scaled, const States& states) {
+/// @param base  what has been taken off all kill rates
+ClassPair pair_of_class(Generator scaled, const States& states, Extended base) {
   const std::size_t n = scaled.size();
   ClassPair pair;
   if (n == 1) {
-    pair.common = scaled.kill[0];
+    pair.rate = scaled.kill[0];
     pair.left = pair.right = {1};
     return pair;
   }
-  pair.common = *std::min_element(scaled.kill.begin(), scaled.kill.end());
-  for (Extended& kill : scaled.kill) kill -= pair.common;
+  const Extended common = *std::min_element(scaled.kill.begin(), scaled.kill.end());
+  Extended excess = 0;
+  for (Extended& kill : scaled.kill) kill -= common;
   pair.right.assign(n, 1);
   Extended change = 0;
   for (Extended before = 1;; before = change) {
@@ -91,16 +92,17 @@ ClassPair pair_of_class(Generator scaled, const States& states) {
       throw ConvergenceError("Noda's iteration", static_cast<double>(change),
                              fmt::format("still changing after {} iterations", pair.iterations));
     for (std::size_t i = 0; i < n; ++i) pair.right[i] *= steps[i] / most;
-    pair.excess += move_up(scaled, steps, most);
+    excess += move_up(scaled, steps, most);
     if (change <= same_vector && before <= same_vector) break;
   }
   const Row stationary = stationary_vector(scaled);
-  pair.excess += std::inner_product(stationary.begin(), stationary.end(), scaled.kill.begin(), Extended{0});
+  excess += std::inner_product(stationary.begin(), stationary.end(), scaled.kill.begin(), Extended{0});
+  pair.rate = common + excess;
   const auto most_visited =
       static_cast<std::uint32_t>(std::max_element(stationary.begin(), stationary.end()) - stationary.begin());
   const auto [time, from] = slowest_return(scaled, stationary, most_visited);
-  const Extended error = std::max(change <= same_vector ? change * change : 0, rate_rounding * pair.excess * time);
-  if (!(error <= undecided)) throw NotUnique(states[most_visited], states[from], static_cast<double>(pair.rate()), false);
+  const Extended error = std::max(change <= same_vector ? change * change : 0, rate_rounding * excess * time);
+  if (!(error <= undecided)) throw NotUnique(states[most_visited], states[from], static_cast<double>(base + pair.rate), false);
   pair.error = static_cast<double>(error);
   for (std::size_t i = 0; i < n; ++i) pair.left.push_back(stationary[i] / pair.right[i]);
   const Extended sum = total(pair.left);
@@ -108,16 +110,22 @@ ClassPair pair_of_class(Generator scaled, const States& states) {
   return pair;
 }
 
-/// Holds a chain by its classes, those that may lead solved.
+/// Holds a chain by its classes, those that may lead solved. From the kill rates in a class their smallest, its base, is
+/// taken off before the rates of leaving the class are added, which may be far smaller.
 class Classes {
  public:
   explicit Classes(const Generator& generator)
       : all_(generator), states_(communicating_classes(generator)), class_of_(generator.size()) {
     std::vector<std::uint32_t> scratch(generator.size(), Generator::outside);
     for (std::size_t c = 0; c < states_.size(); ++c) {
-      for (const std::uint32_t i : states_[c]) class_of_[i] = c;
+      Extended base = std::numeric_limits<Extended>::infinity();
+      for (const std::uint32_t i : states_[c]) base = std::min(base, all_.kill[i]);
+      for (const std::uint32_t i : states_[c]) {
+        class_of_[i] = c;
+        all_.kill[i] -= base;
+      }
+      base_.push_back(base);
       parts_.push_back(all_.restricted_to(states_[c], scratch));
-      least_.push_back(*std::min_element(parts_[c].kill.begin(), parts_[c].kill.end()));
     }
     solve_those_that_may_lead();
   }
@@ -125,9 +133,9 @@ class Classes {
   LeadingPair lead() const {
     std::vector<std::size_t> tied;
     for (std::size_t c = 0; c < pairs_.size(); ++c)
-      if (pairs_[c] && pairs_[c]->rate() - lowest_ <= rate_rounding * lowest_) tied.push_back(c);
+      if (pairs_[c] && beyond_lowest(c, pairs_[c]->rate) <= tolerance(pairs_[c]->rate)) tied.push_back(c);
     const std::size_t left = only(tied, true), right = only(tied, false);
-    LeadingPair lead{spread(left, true), spread(right, false), lowest_, 0, 0};
+    LeadingPair lead{spread(left, true), spread(right, false), lowest(), 0, 0};
     for (const auto& pair : pairs_)
       if (pair) lead.iterations += pair->iterations;
     lead.error = std::max(pairs_[left]->error, pairs_[right]->error);
@@ -135,19 +143,40 @@ class Classes {
   }
 
  private:
+  Extended lowest() const { return base_[lowest_] + lowest_rate_; }
+  /// Returns how far a rate of class c, without its base, lies above the lowest.
+  Extended beyond_lowest(std::size_t c, Extended rate) const {
+    return (base_[c] - base_[lowest_]) + (rate - lowest_rate_);
+  }
+
+  /// Returns what rounding leaves open of that: bases are exact.
+  Extended tolerance(Extended rate) const { return rate_rounding * (rate + lowest_rate_); }
+
   /// The rate of a class lies between its least kill rate and its least rate of leaving a state.
   void solve_those_that_may_lead() {
     pairs_.resize(states_.size());
+    std::vector<Extended> least;
+    for (std::size_t c = 0; c < states_.size(); ++c) {
+      const Generator& part = parts_[c];
+      least.push_back(*std::min_element(part.kill.begin(), part.kill.end()));
+      for (std::size_t i = 0; i < part.size(); ++i) {
+        const Extended leaving = part.exit(i);
+        if ((c == 0 && i == 0) || beyond_lowest(c, leaving) < 0) {
+          lowest_ = c;
+          lowest_rate_ = leaving;
+        }
+      }
+    }
     std::vector<std::size_t> order(states_.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return least_[a] < least_[b]; });
-    lowest_ = std::numeric_limits<Extended>::infinity();
-    for (const Generator& part : parts_)
-      for (std::size_t i = 0; i < part.size(); ++i) lowest_ = std::min(lowest_, part.exit(i));
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return base_[a] + least[a] < base_[b] + least[b]; });
     for (const std::size_t c : order) {
-      if (least_[c] - lowest_ > rate_rounding * lowest_) break;
-      pairs_[c] = pair_of_class(parts_[c], states_[c]);
-      lowest_ = std::min(lowest_, pairs_[c]->rate());
+      if (beyond_lowest(c, least[c]) > tolerance(least[c])) continue;
+      pairs_[c] = pair_of_class(parts_[c], states_[c], base_[c]);
+      if (beyond_lowest(c, pairs_[c]->rate) > 0) continue;
+      lowest_ = c;
+      lowest_rate_ = pairs_[c]->rate;
     }
   }
 
@@ -184,8 +213,10 @@ class Classes {
       if (std::none_of(tied.begin(), tied.end(), [&](std::size_t d) { return d != c && marked[d]; }))
         ends.push_back(c);
     }
-    if (ends.size() > 1)
-      throw NotUnique(states_[ends[0]].front(), states_[ends[1]].front(), static_cast<double>(lowest_), true);
+    if (ends.size() > 1) {
+      const auto [one, other] = std::minmax(states_[ends[0]].front(), states_[ends[1]].front());
+      throw NotUnique(one, other, static_cast<double>(lowest()), true);
+    }
     return ends.front();
   }
 
@@ -208,11 +239,11 @@ class Classes {
     if (left) {
       push(c);
       for (std::size_t d = c + 1; d < states_.size(); ++d)
-        if (follow(d, c, arriving, true, vector)) push(d);
+        if (follow(d, arriving, true, vector)) push(d);
     } else {
       for (std::size_t d = c; d-- > 0;) {
         pull(d);
-        follow(d, c, arriving, false, vector);
+        follow(d, arriving, false, vector);
       }
     }
     const Extended scale = left ? total(vector) : *std::max_element(vector.begin(), vector.end());
@@ -221,7 +252,7 @@ class Classes {
   }
 
   /// Solves y (G_d - rate) = arriving, or (G_d - rate) x = arriving, in class d; false where nothing arrives.
-  bool follow(std::size_t d, std::size_t leader, const Row& arriving, bool left, Row& vector) const {
+  bool follow(std::size_t d, const Row& arriving, bool left, Row& vector) const {
     const States& states = states_[d];
     Row rhs;
     for (const std::uint32_t i : states) rhs.push_back(arriving[i]);
@@ -229,15 +260,14 @@ class Classes {
     Generator shifted = parts_[d];
     Row scale(states.size(), 1);
     if (pairs_[d]) {  // its own right vector makes all kill rates the distance of the rates
-      const ClassPair &own = *pairs_[d], &lead = *pairs_[leader];
-      scale = own.right;
+      scale = pairs_[d]->right;
       for (std::size_t i = 0; i < states.size(); ++i) {
-        shifted.kill[i] = (own.common - lead.common) + (own.excess - lead.excess);
+        shifted.kill[i] = beyond_lowest(d, pairs_[d]->rate);
         for (std::size_t e = shifted.start[i]; e < shifted.start[i + 1]; ++e)
           shifted.rate[e] *= scale[shifted.column[e]] / scale[i];
       }
     } else {
-      for (Extended& kill : shifted.kill) kill -= lowest_;
+      for (Extended& kill : shifted.kill) kill = beyond_lowest(d, kill);
     }
     for (std::size_t i = 0; i < rhs.size(); ++i) rhs[i] = left ? rhs[i] * scale[i] : rhs[i] / scale[i];
     const GeneratorFactors factors(shifted);
@@ -247,13 +277,14 @@ class Classes {
     return true;
   }
 
-  const Generator& all_;
+  Generator all_;  ///< without the bases
   std::vector<States> states_;
   std::vector<std::size_t> class_of_;
+  std::vector<Extended> base_;
   std::vector<Generator> parts_;
-  std::vector<Extended> least_;
   std::vector<std::optional<ClassPair>> pairs_;
-  Extended lowest_ = 0;
+  std::size_t lowest_ = 0;  ///< class of the lowest rate, which is this and its base
+  Extended lowest_rate_ = 0;
 };
 
 }  // namespace

@@ -19,7 +19,7 @@ namespace {
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr double kFollowedSteps = 4096;      // that are always followed one by one
-constexpr double kFollowedProducts = 2e8;    // entries times steps that are
+constexpr double kFollowedProducts = 2e8;    // entries times steps that are on more states than can be doubled
 constexpr std::size_t kDoubledStates = 512;  // of a chain that is doubled
 constexpr double kStartTolerance = 1e-9;
 
@@ -41,7 +41,7 @@ void check(const Chain& chain, std::span<const double> start, std::span<const do
 /// Follows survivors for up to `last` steps; returns P(steps > n) for n = 0 .. last.
 std::vector<double> followed(const Chain& chain, std::span<const double> start, std::size_t last) {
   std::vector<double> at{1}, survivors(start.begin(), start.end());
-  double log_survival = 0;
+  long double log_survival = 0;
   for (std::size_t n = 1; n <= last; ++n) {
     const double all = sum_of(survivors);
     if (all == 0) {
@@ -53,7 +53,7 @@ std::vector<double> followed(const Chain& chain, std::span<const double> start, 
     for (std::size_t i = 0; i < survivors.size(); ++i) failing += survivors[i] * chain.kill(i);
     survivors = apply_left(chain, survivors);
     log_survival += failing < 0.5 ? std::log1p(-failing) : std::log(sum_of(survivors));
-    at.push_back(std::exp(log_survival));
+    at.push_back(static_cast<double>(std::exp(log_survival)));
   }
   return at;
 }
@@ -134,7 +134,8 @@ std::vector<double> survival_after(const Chain& chain, std::span<const double> s
                                    int threads) {
   check(chain, start, steps);
   const double entries = static_cast<double>(chain.entries() + chain.size());
-  const double most = std::max(kFollowedSteps, std::floor(kFollowedProducts / entries));
+  const bool doubles = chain.size() <= kDoubledStates;
+  const double most = doubles ? kFollowedSteps : std::max(kFollowedSteps, std::floor(kFollowedProducts / entries));
   std::vector<double> far, at(steps.size());
   double last = 0;
   for (const double n : steps)
@@ -143,7 +144,7 @@ std::vector<double> survival_after(const Chain& chain, std::span<const double> s
   for (const double n : steps)
     if (n > most && std::isfinite(n)) far.push_back(std::floor(n));
   std::vector<double> beyond;
-  if (!far.empty() && chain.size() <= kDoubledStates) {
+  if (!far.empty() && doubles) {
     beyond = doubled(chain, start, far);
   } else if (!far.empty()) {
     const ChainSolver solver(chain, threads);
