@@ -111,9 +111,17 @@ WheelTransitions::WheelTransitions(const Experiment& experiment)
     : experiment_(experiment), measured_(runs_with_legs(experiment)), events_(wheel_events(measured_)) {
   if (events_.size() < 2 || std::none_of(events_.begin(), events_.end(), [](const Event& e) {
         return e.kind == EventKind::collision || e.kind == EventKind::step;
-      }))
+      })) {
+    if (!measured_.landings.empty() &&
+        std::ranges::any_of(measured_.runs, [](const WheelRun& run) { return run.collisions.size() > 1; }))
+      throw std::invalid_argument(fmt::format(
+          "contact.restitution: mean {} + 2 sd of {} leaves feet moving when the next one touches, at nearly every speed of "
+          "collisions.csv; `settled` holds for landings on feet that stand{}",
+          measured_.contact.restitution_mean, measured_.contact.restitution_sd,
+          measured_.speeds_after ? "" : " (omega_plus_rad_s would tell which do)"));
     throw std::invalid_argument(
         "collisions.csv: no trial has two collisions or omega_plus_rad_s: there is no transition");
+  }
   set_up_parameters();
 }
 

@@ -7,6 +7,7 @@
 #include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/left_over.h"
 #include "analysis/diagnosis/model_fit.h"
+#include "tests/analysis/line.h"
 
 namespace metastable::analysis {
 namespace {
@@ -21,6 +22,17 @@ Diagnosis::Gap tests_of(const std::vector<LeftInFacet>& facets) {
   ranking.p_value = 0.5;
   test_for_gap(d, ranking, 20, {});
   return d.gap;
+}
+
+// A model as given that is so far off that its likelihood has no slope gains all the same.
+TEST(GapTests, ARecalibrationCountsWhereTheModelAsGivenHasNoSlope) {
+  const test::Line line({1, 2, 3, 4}, {0, 0, 0, 0});
+  Fit as_given;
+  as_given.information = Eigen::MatrixXd::Zero(2, 2);
+  for (Eigen::Index p = 0; p < 2; ++p)
+    as_given.information(p, p) = line.nuisances()[static_cast<std::size_t>(p)].information(0);
+  EXPECT_LT(recalibration_p_value(line, as_given, 100), 1e-12);
+  EXPECT_NEAR(recalibration_p_value(line, as_given, 0), 1, 1e-12);
 }
 
 TEST(GapTests, AFitThatDidNotSettleLeavesNoFacetToJudge) {

@@ -35,6 +35,24 @@ Squares least_squares(const Line& model) {  // by the textbook
   return s;
 }
 
+// The prior of a number that may be misstated altogether is the normal one nearby, lets go far away, and costs no more
+// than that chance.
+TEST(Nuisance, APriorLetsGoOfANumberThatIsAnotherAltogether) {
+  Nuisance stated;
+  stated.nominal = 0.3;
+  stated.prior_sd = 0.08;
+  Nuisance normal = stated;
+  stated.misstated = 0.01;
+  EXPECT_EQ(stated.cost(0.3), 0);
+  EXPECT_NEAR(stated.cost(0.38), normal.cost(0.38), 0.01);
+  EXPECT_NEAR(stated.cost(1.2), -std::log(0.01), 1e-9);
+  EXPECT_NEAR(stated.pull(1.2), 0, 1e-9);
+  EXPECT_NEAR(normal.cost(0.46), 2, 1e-12);
+  for (const Nuisance& prior : {stated, normal})
+    for (const double value : {0.2, 0.35, 0.5, 0.6})
+      EXPECT_NEAR((prior.cost(value + 1e-6) - prior.cost(value - 1e-6)) / 2e-6, prior.pull(value), 1e-5) << value;
+}
+
 TEST(ModelFit, IsLeastSquaresOnALine) {
   const Line model = line(0.1, 1);
   const Squares s = least_squares(model);

@@ -116,6 +116,25 @@ TEST(OwnData, UnderSettledHasTransitionsWhateverRestitutionDoes) {
   }
 }
 
+// Without omega+ nothing tells which of them stood, and that is what is said.
+TEST(OwnData, UnderSettledWithoutOmegaPlusFeetThatNeverSurelyStandAreRefused) {
+  Experiment own = own_experiment({.law = dynamics::Law::settled, .trials = 4});
+  own.columns.omega_plus = Presence::none;
+  for (MeasuredTrial& trial : own.trials)
+    for (MeasuredCollision& collision : trial.collisions) {
+      collision.omega_plus.reset();
+      collision.omega_minus = std::max(6.0, collision.omega_minus);
+    }
+  try {
+    wheel_transitions(own);
+    ADD_FAILURE() << "taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "contact.restitution: mean 0.4 + 2 sd of 0.1 leaves feet moving when the next one touches, at nearly every "
+              "speed of collisions.csv; `settled` holds for landings on feet that stand (omega_plus_rad_s would tell which do)");
+  }
+}
+
 // Of a certain law speeds scatter by what is seen of them alone. A slope that is misread is found, and no contact blamed.
 TEST(OwnData, UnderPlasticIsNoGapAndAMisreadSlopeIsOne) {
   Experiment own = own_experiment({.law = dynamics::Law::plastic, .trials = 20, .seed = 2});
