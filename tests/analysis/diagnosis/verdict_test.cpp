@@ -102,6 +102,8 @@ TEST(Verdict, SaysThatTheNearestIsTooUnsureForAName) {
 // A drift beside one of three, two of which the design hardly tells apart.
 Diagnosis with_pairs(double share) {
   Diagnosis d;
+  d.data.trials = 50;
+  d.data.collisions = 500;
   for (const auto& [effects, gain, probability] :
        {std::tuple{std::vector<std::string>{"trial_drift", "inertia"}, 100.0, 0.5},
         {std::vector<std::string>{"slope_offset", "trial_drift"}, 99.0, 0.3},
