@@ -3,7 +3,7 @@
 # module is, if it is. `build.sh --needs` only says what is missing, in one line. `./run docs` calls both.
 set -euo pipefail
 
-missing=$(/usr/bin/python3 - <<'CHECK' || echo ' python3'
+missing=$(/usr/bin/python3 - 2>/dev/null <<'CHECK' || echo ' python3'
 import importlib
 for module, package in (("sphinx", "python3-sphinx"), ("myst_parser", "python3-myst-parser"), ("furo", "furo"),
                         ("breathe", "python3-breathe"), ("nbconvert", "jupyter-nbconvert"),
