@@ -15,28 +15,23 @@ namespace {
 
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
-// Reads the whole text as a finite number.
-bool parse(std::string_view text, double& value) {
-  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
-}
-
 }  // namespace
 
 CsvReader::CsvReader(std::string file, std::string_view text, std::span<const CsvColumn> columns, Defects& defects,
-                     char separator)
+                     const CsvForm& form)
     : file_(std::move(file)),
       text_(text),
       columns_(columns),
       defects_(defects),
-      separator_(separator),
+      form_(form),
       position_(columns.size()) {
   if (text_.starts_with(byte_order_mark)) text_.remove_prefix(byte_order_mark.size());
+  for (std::size_t row = 0; row < form_.skip_rows && at_ < text_.size(); ++row) skip_line();
   if (!record()) {
-    defects_.add(file_, {1, 1}, "the file is empty; a header with the names of the columns is expected");
+    defects_.add(file_, {next_line_, 1}, "the file is empty; a header with the names of the columns is expected");
     return;
   }
+  if (form_.units_row && !fields_.empty()) read_units();
   if (fields_.empty()) return;
   usable_ = true;
   width_ = fields_.size();
@@ -60,9 +55,41 @@ CsvReader::CsvReader(std::string file, std::string_view text, std::span<const Cs
   }
 }
 
-std::vector<std::string> CsvReader::names(std::string_view text, char separator) {
+// Gives the header's fields the units that the row behind it names: "w" and "deg/s" make "w [deg/s]".
+void CsvReader::read_units() {
+  std::vector<std::string> names;
+  for (const Field& field : fields_) names.emplace_back(field.text);
+  const std::vector<Field> header = fields_;
+  if (!record()) return report(begin_, "a row of units is expected behind the header");
+  if (fields_.empty()) return;
+  std::vector<std::string_view> units;
+  for (const Field& field : fields_) units.push_back(field.text);
+  std::vector<Field> named = header;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    std::string_view unit = i < units.size() ? units[i] : std::string_view();
+    while (unit.starts_with(' ') || unit.starts_with('[') || unit.starts_with('(')) unit.remove_prefix(1);
+    while (unit.ends_with(' ') || unit.ends_with(']') || unit.ends_with(')')) unit.remove_suffix(1);
+    named[i].text = named_.emplace_back(unit.empty() || unit == "-" || names[i].empty()
+                                            ? names[i]
+                                            : fmt::format("{} [{}]", names[i], unit));
+  }
+  fields_ = named;
+}
+
+std::vector<CsvReader::Record> CsvReader::first_records(std::string_view text, char separator, std::size_t most) {
+  Defects unknown;
+  CsvReader csv("", text, {}, unknown, {.separator = separator});
+  std::vector<Record> records;
+  do {
+    Record& one = records.emplace_back(Record{csv.line_, {}});
+    for (const Field& field : csv.fields_) one.fields.emplace_back(field.text);
+  } while (records.size() < most && csv.record());
+  return records;
+}
+
+std::vector<std::string> CsvReader::names(std::string_view text, const CsvForm& form) {
   Defects unknown;  // all of them are
-  const CsvReader header("", text, {}, unknown, separator);
+  const CsvReader header("", text, {}, unknown, form);
   std::vector<std::string> names;
   for (const Field& field : header.fields_) names.emplace_back(field.text);
   return names;
@@ -71,7 +98,8 @@ std::vector<std::string> CsvReader::names(std::string_view text, char separator)
 bool CsvReader::next() {
   complete_ = complete_ && usable_;
   while (usable_ && record()) {
-    if (fields_.size() == width_) return true;
+    if (fields_.size() == width_ || fits()) return true;
+    if (form_.ragged && fields_.size() == 1 && fields_.front().text.empty()) continue;
     complete_ = false;
     if (fields_.empty()) continue;
     if (fields_.size() == 1 && fields_.front().text.empty())
@@ -81,6 +109,27 @@ bool CsvReader::next() {
              fmt::format("{} field{} where the header has {}", fields_.size(), fields_.size() == 1 ? "" : "s", width_));
   }
   return false;
+}
+
+bool CsvReader::fits() {
+  if (!form_.ragged || fields_.size() < 2) return false;
+  while (fields_.size() > width_ && fields_.back().text.empty()) fields_.pop_back();
+  while (fields_.size() < width_) fields_.push_back({.text = {}, .offset = fields_.back().offset});
+  return fields_.size() == width_;
+}
+
+// Reads the whole text as a finite number.
+bool CsvReader::parse(std::string_view text, double& value) const {
+  std::string pointed;
+  if (form_.decimal != '.') {
+    if (text.find('.') != std::string_view::npos) return false;  // of thousands, or a date
+    pointed = text;
+    std::ranges::replace(pointed, form_.decimal, '.');
+    text = pointed;
+  }
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
 }
 
 bool CsvReader::record() {
@@ -99,10 +148,10 @@ bool CsvReader::record() {
     Field field{.text = {}, .offset = at_};
     if (at_ < text_.size() && text_[at_] == '"') {
       if (!quoted_field(field)) return true;
-      if (at_ < text_.size() && text_[at_] != separator_ && text_[at_] != '\n' && text_[at_] != '\r')
+      if (at_ < text_.size() && text_[at_] != form_.separator && text_[at_] != '\n' && text_[at_] != '\r')
         return give_up(at_, "text after a closing quote");
     } else {
-      while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) >= ' ' && text_[at_] != separator_ &&
+      while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) >= ' ' && text_[at_] != form_.separator &&
              text_[at_] != '"')
         ++at_;
       field.text = text_.substr(field.offset, at_ - field.offset);
@@ -110,7 +159,7 @@ bool CsvReader::record() {
     fields_.push_back(field);
     if (at_ >= text_.size()) return true;
     const char stop = text_[at_];
-    if (stop == separator_) {
+    if (stop == form_.separator) {
       ++at_;
       continue;
     }

@@ -20,6 +20,15 @@ struct CsvColumn {
   bool required = false;  ///< must be in the header, and filled in every row
 };
 
+/// Says how a file differs from the CSV of an experiment folder.
+struct CsvForm {
+  char separator = ',';       ///< between fields
+  char decimal = '.';         ///< of numbers: a point or a comma
+  std::size_t skip_rows = 0;  ///< lines before the header
+  bool units_row = false;     ///< a row of units behind the header: columns are called "name [unit]"
+  bool ragged = false;        ///< rows may be short of their last fields, or have empty ones beyond; so may lines
+};
+
 /// Walks through the records of a CSV text once, in order. Line ends LF or CRLF, an optional byte order mark, an
 /// optional line end after the last record; fields in double quotes may hold commas, line ends and doubled quotes.
 /// Defects: a quote inside an unquoted field, text after a closing quote, an unclosed quote, control characters, a
@@ -29,13 +38,18 @@ class CsvReader {
  public:
   /// Reads the header. @param file name for messages; @param text, defects must outlive the reader
   /// @param columns  all columns the file may have; members below name them by their index
-  /// @param separator  between fields
   CsvReader(std::string file, std::string_view text, std::span<const CsvColumn> columns, Defects& defects,
-            char separator = ',');
+            const CsvForm& form = {});
 
   /// Returns the names in the header of a file whose columns are not known; empty where the constructor finds a defect
   /// in the record.
-  static std::vector<std::string> names(std::string_view text, char separator);
+  static std::vector<std::string> names(std::string_view text, const CsvForm& form);
+  /// Returns the fields of a file's first records, whatever they are, each with its line; of defective ones none.
+  struct Record {
+    std::size_t line = 0;
+    std::vector<std::string> fields;
+  };
+  static std::vector<Record> first_records(std::string_view text, char separator, std::size_t most);
 
   bool has(std::size_t column) const { return position_[column].has_value(); }
   /// Goes to the next record that has as many fields as the header; defective ones are reported and skipped. False at
@@ -62,6 +76,9 @@ class CsvReader {
 
   bool record();  // false: nothing left. fields_ empty: defective, reported
   bool quoted_field(Field& field);
+  void read_units();
+  bool fits();  // has the record as many fields as the header, or is made to
+  bool parse(std::string_view text, double& value) const;
   void skip_line();
   TextPosition place(std::size_t offset) const;
   void report(std::size_t offset, std::string_view what) { defects_.add(file_, place(offset), what); }
@@ -70,7 +87,8 @@ class CsvReader {
   std::string_view text_;
   std::span<const CsvColumn> columns_;
   Defects& defects_;
-  char separator_;
+  CsvForm form_;
+  std::deque<std::string> named_;  // columns with the units of their row
   std::vector<std::optional<std::size_t>> position_;  // of each column among the fields
   std::size_t width_ = 0;
   bool usable_ = false, complete_ = true;

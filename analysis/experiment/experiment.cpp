@@ -11,6 +11,7 @@
 #include "analysis/experiment/csv_reader.h"
 #include "analysis/experiment/experiment_notes.h"
 #include "analysis/experiment/experiment_toml.h"
+#include "analysis/experiment/plausibility.h"
 #include "analysis/experiment/trial_index.h"
 
 namespace metastable::analysis {
@@ -59,6 +60,7 @@ class CollisionRows {
     experiment_.columns.position = presence(filled_[position_m]);
     experiment_.columns.omega_plus = presence(filled_[omega_plus]);
   }
+  const CollisionLines& lines() const { return lines_; }
 
  private:
   void read_row() {
@@ -102,6 +104,8 @@ class CollisionRows {
       csv_.refuse(collision, fmt::format("trial {} goes on after an omega_plus_rad_s of {}: a wheel that turned back",
                                          roll.number, *roll.collisions.back().omega_plus));
     roll.collisions.push_back(c);
+    lines_.resize(experiment_.trials.size());
+    lines_[*at].push_back(csv_.line());
   }
 
   void compare(const MeasuredCollision& last, const MeasuredCollision& next) {
@@ -120,6 +124,7 @@ class CollisionRows {
   int legs_;
   std::size_t rows_ = 0;
   std::size_t filled_[std::size(collision_columns)] = {};
+  CollisionLines lines_;
 };
 
 // Returns the step of the last digit that the speeds have; 0 where they have more than seven or are too few to say.
@@ -242,7 +247,9 @@ Experiment parse_experiment(const ExperimentSource& source) {
   }
   TrialIndex collisions(experiment, TrialIndex::Rows::several, described);
   CsvReader rows(collisions_file, *source.collisions_csv, collision_columns, defects);
-  CollisionRows(experiment, collisions, rows, described ? experiment.legs() : 0).read();
+  CollisionRows collision_rows(experiment, collisions, rows, described ? experiment.legs() : 0);
+  collision_rows.read();
+  const bool readable = defects.empty();
   if (experiment.trials.empty() && defects.empty()) defects.add(collisions_file, {}, "holds no collision");
   if (source.trials_csv) {
     constexpr CsvColumn columns[] = {{"condition"}, {"trial", true}, {"outcome", true}};
@@ -256,9 +263,12 @@ Experiment parse_experiment(const ExperimentSource& source) {
       outcomes.report_missing(collisions, trials_file, collisions_file, defects);
     }
   }
+  experiment.sensor.last_digit = last_digit(experiment);
+  if (readable && experiment.system == System::rimless_wheel)
+    check_plausible(experiment, collisions_file, collision_rows.lines(), defects);
+  if (readable) check_copies(experiment, collisions_file, collision_rows.lines(), defects);
   defects.check();
   std::ranges::sort(experiment.trials, {}, &MeasuredTrial::number);
-  experiment.sensor.last_digit = last_digit(experiment);
   experiment.notes = notes_on(experiment);
   return experiment;
 }

@@ -4,7 +4,36 @@
 
 #include <string_view>
 
+#include "analysis/experiment/rolling_speeds.h"
+
 namespace metastable::analysis {
+namespace {
+
+constexpr double beyond_lifting = 1.2;  // landings of engines reach 1.0
+
+// Names speeds that a wheel on this ramp hardly has; those that none has are refused before.
+void note_odd_speeds(const Experiment& experiment, std::size_t condition, std::vector<std::string>& notes) {
+  const RollingSpeeds bounds = rolling_speeds(experiment, condition);
+  std::size_t slow = 0, fast = 0;
+  for (const MeasuredTrial& roll : experiment.trials) {
+    if (roll.condition != condition) continue;
+    for (const MeasuredCollision& c : roll.collisions) {
+      slow += c.number > 1 && c.omega_minus < bounds.slowest;
+      fast += c.omega_minus > beyond_lifting * bounds.lifting;
+    }
+  }
+  const std::string& id = experiment.conditions[condition].id;
+  if (slow > 0)
+    notes.push_back(fmt::format(
+        "Condition '{}': {} speeds from collision 2 on are below {:.3g} rad/s, where a wheel that has come over a leg "
+        "reaches {:.3g} rad/s.",
+        id, slow, bounds.slowest, bounds.slowest / RollingSpeeds::room));
+  if (fast > 0)
+    notes.push_back(fmt::format("Condition '{}': {} speeds are above {:.3g} rad/s, where feet lift off at {:.3g} rad/s.",
+                                id, fast, beyond_lifting * bounds.lifting, bounds.lifting));
+}
+
+}  // namespace
 
 std::vector<std::string> notes_on(const Experiment& experiment) {
   std::vector<std::string> notes;
@@ -19,6 +48,7 @@ std::vector<std::string> notes_on(const Experiment& experiment) {
   if (!experiment.columns.outcomes) notes.push_back("There is no trials.csv: how the trials ended is not known.");
   for (std::size_t c = 0; c < experiment.conditions.size(); ++c) {
     const Condition& condition = experiment.conditions[c];
+    if (experiment.system == System::rimless_wheel) note_odd_speeds(experiment, c, notes);
     std::size_t trials = 0, others = 0;
     for (const MeasuredTrial& roll : experiment.trials) {
       if (roll.condition != c) continue;

@@ -17,6 +17,19 @@ enum Column { condition, trial, time_s, angle_rad };
 constexpr CsvColumn angle_columns[] = {{"condition"}, {"trial", true}, {"time_s", true}, {"angle_rad", true}};
 constexpr CsvColumn trial_columns[] = {{"condition"}, {"trial", true}, {"outcome", true}};
 
+bool even(const std::vector<double>& values, double room) {
+  const double step = (values.back() - values.front()) / static_cast<double>(values.size() - 1);
+  for (std::size_t i = 1; i < values.size(); ++i)
+    if (!(std::abs(values[i] - values[i - 1] - step) < room * std::abs(step))) return false;
+  return step > 0;
+}
+
+// Says whether the angle is what only a clock shows, over enough frames, and the time is not.
+bool exchanged(const AngleRecording& recording) {
+  constexpr std::size_t enough = 20;
+  return recording.time.size() >= enough && even(recording.angle_rad, 0.02) && !even(recording.time, 0.25);
+}
+
 // Frames that are missing or doubled would bend the derivative where nothing happened.
 void check_frames(const MeasuredAngle& angle, const std::vector<std::size_t>& lines, const std::string& file,
                   Defects& defects) {
@@ -28,6 +41,12 @@ void check_frames(const MeasuredAngle& angle, const std::vector<std::size_t>& li
   std::vector<double> interval(time.size() - 1);
   for (std::size_t i = 0; i + 1 < time.size(); ++i) interval[i] = time[i + 1] - time[i];
   const double frame = median(interval);
+  if (exchanged(angle.recording)) {
+    defects.add(file, {lines.front(), 1},
+                fmt::format("trial {}: time_s is uneven and angle_rad rises in even steps: the columns are exchanged",
+                            angle.number));
+    return;
+  }
   for (std::size_t i = 0; i < interval.size(); ++i) {
     if (interval[i] <= 0)
       defects.add(file, {lines[i + 1], 1},

@@ -5,16 +5,32 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <span>
 #include <stdexcept>
 
+#include "analysis/motion_capture/angle_mending.h"
 #include "analysis/motion_capture/savitzky_golay.h"
+#include "analysis/statistics/median.h"
 
 namespace metastable::analysis {
 namespace {
 
-constexpr double slowest_rate = 60, fastest_rate = 1000;  // [Hz]
 constexpr double default_span = 0.05;                     // of the filter's window [s]
+// A wider window than a share of the time that a leg takes at the speed sqrt(g / L) would level whole steps.
+constexpr double widest_share = 1.2;
+// A difference of two smoothed speeds exceeds six of their sds by chance in one of 5e4 pairs (Phi(-6/sqrt 2)).
+constexpr double noise_rise = 6;
+// A collision lies this share of a leg angle from the others' raster at most: at 60 Hz a wheel of eight legs turns an
+// eighth of one between two frames, and smoothing moves the steepest fall by as much.
+constexpr double raster_width = 0.25;
+// Two fitted collisions are a leg angle apart to this share of one, beside what the noise makes of the fits.
+constexpr double step_tolerance = 0.08, noise_of_fit = 5;
+// A fit further off the raster is tried again near it: legs are known to a hundredth of the angle between them, and the
+// fit's own angle to about half the noise of a frame.
+constexpr double near_raster = 0.01, noise_off_raster = 2.5;
+constexpr double known_angle_sd = 0.003;  // of a raster that many fits have made [rad]
 constexpr double flight_span = 0.04;                      // behind a collision in which a foot flies [s]
 constexpr std::size_t most_tries = 12;                    // of where it began to stand
 constexpr double noise_error = 1.7;                       // ratio by which the noise's square is known
@@ -23,6 +39,8 @@ constexpr double noise_level = 0.99;                      // share of fits to no
 struct Peak {
   std::size_t at = 0;      // sample of the largest speed
   std::size_t trough = 0;  // of the smallest one behind it, before the next peak
+  std::size_t fall = 0;    // before the steepest fall in between
+  bool shown = true;       // by the speed; otherwise the angle says that a leg lands there
 };
 
 // Finds the peaks that rise by `rise` above the troughs on both sides.
@@ -48,18 +66,6 @@ std::vector<Peak> peaks(std::span<const double> speed, double rise) {
   return all;
 }
 
-// Estimates the white noise of the samples [rad], by the smaller ones of their third differences: most stretches are
-// smooth over four samples.
-double noise_of(const std::vector<double>& angle) {
-  constexpr double share = 0.25, normal_quantile = 0.3186, of_third_difference = 4.4721;  // sqrt(20)
-  std::vector<double> differences;
-  for (std::size_t i = 3; i < angle.size(); ++i)
-    differences.push_back(std::abs(angle[i] - 3 * angle[i - 1] + 3 * angle[i - 2] - angle[i - 3]));
-  const auto at = differences.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(differences.size()));
-  std::nth_element(differences.begin(), at, differences.end());
-  return *at / (normal_quantile * of_third_difference);
-}
-
 class Search {
  public:
   Search(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg,
@@ -69,41 +75,242 @@ class Search {
     const double rate = time.size() < 2 ? 0 : static_cast<double>(time.size() - 1) / (time.back() - time.front());
     if (!(rate >= slowest_rate * 0.99 && rate <= fastest_rate * 1.01))
       throw std::invalid_argument(
-          fmt::format("the rate of {:.6g} Hz is outside {}..{} Hz", rate, slowest_rate, fastest_rate));
-    const SavitzkyGolay smooth(smoothing_window(options, rate), 3, 0), slope(smooth.window(), 3, 1);
-    angle_ = smooth.apply(recording.angle_rad, 1 / rate);
-    speed_ = slope.apply(recording.angle_rad, 1 / rate);
-    noise_ = noise_of(recording.angle_rad);
+          fmt::format("the rate of {:.6g} Hz is outside {}..{} Hz{}", rate, slowest_rate, fastest_rate,
+                      std::abs(rate - 1) < 1e-6 ? ": frame numbers are suspected in time_s; divide by the camera's rate"
+                      : 1000 * rate >= slowest_rate && 1000 * rate <= fastest_rate
+                          ? ": milliseconds are suspected in time_s; divide by 1000, or let 'metastable import' do it "
+                            "(time=NAME[ms])"
+                          : ""));
+    noise_ = angle_noise(recording.angle_rad);
+    const dynamics::Wheel& wheel = map.wheel();
+    const double slowest_step = wheel.leg_angle() / std::sqrt(wheel.gravity / wheel.mean_leg_length());
+    SavitzkyGolay slope(smoothing_window(options, rate), 3, 1);
+    const auto speed_noise = [&] {
+      double squares = 0;
+      for (const double weight : slope.weights(slope.window() / 2)) squares += weight * weight;
+      return noise_ * rate * std::sqrt(squares);
+    };
+    // Noise makes peaks of its own: the window grows until they stay below the rise that is asked for.
+    while (options.window == 0 && noise_rise * speed_noise() > options.rise &&
+           slope.window() + 2 <= widest_share * slowest_step * rate)
+      slope = SavitzkyGolay(slope.window() + 2, 3, 1);
+    half_window_ = static_cast<std::size_t>(slope.window() / 2);
+    rise_ = std::max(options.rise, noise_rise * speed_noise());
+    const std::vector<double> even = evenly(recording);
+    angle_ = SavitzkyGolay(slope.window(), 3, 0).apply(even, 1 / rate);
+    speed_ = slope.apply(even, 1 / rate);
   }
 
   FoundTrial run() {
-    const std::vector<Peak> all = peaks(speed_, options_.rise);
+    std::vector<Peak> all = peaks(speed_, rise_);
     FoundTrial found;
     if (all.empty()) {
-      found.stopped = fmt::format("no peak rises {} rad/s above both sides", options_.rise);
+      found.stopped = fmt::format("no peak rises {:.3g} rad/s above both sides", rise_);
       return found;
     }
-    const double leg_angle = map_.wheel().leg_angle();
-    std::vector<std::size_t> chosen{0};
-    while (chosen.size() < static_cast<std::size_t>(options_.collisions)) {
-      const double due = angle_[all[chosen.back()].at] + leg_angle;
-      std::size_t best = all.size();
-      double distance = leg_angle / 2;
-      for (std::size_t k = chosen.back() + 1; k < all.size(); ++k) {
-        const double off = std::abs(angle_[all[k].at] - due);
-        if (off < distance) distance = off, best = k;
-      }
-      if (best == all.size()) {
-        found.stopped = fmt::format("no peak near the leg angle behind collision {}", chosen.size());
-        break;
-      }
-      chosen.push_back(best);
+    for (Peak& peak : all) {
+      peak.fall = peak.at;
+      for (std::size_t i = peak.at; i < peak.trough; ++i)
+        if (speed_[i] - speed_[i + 1] > speed_[peak.fall] - speed_[peak.fall + 1]) peak.fall = i;
     }
-    for (std::size_t n = 0; n < chosen.size(); ++n) found.collisions.push_back(collision(all, chosen, n));
+    std::erase_if(all, [this](const Peak& peak) { return !slows(peak.fall); });
+    if (all.empty()) {
+      found.stopped = "the wheel slows down at none of its peaks";
+      return found;
+    }
+    std::vector<std::size_t> chosen = on_raster(all);
+    for (std::size_t dropped = 1; dropped > 0;) {
+      found.collisions.clear();
+      for (std::size_t n = 0; n < chosen.size(); ++n) found.collisions.push_back(collision(all, chosen, n));
+      fit_again(all, chosen, found.collisions);
+      dropped = keep_shown(all, chosen, found.collisions);
+      chosen.erase(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(dropped));  // legs count from the first
+    }
+    check_steps(found.collisions);
+    if (found.collisions.size() < static_cast<std::size_t>(options_.collisions))
+      found.stopped = fmt::format("no peak near the leg angle behind collision {}", found.collisions.size());
     return found;
   }
 
  private:
+  double turned(const Peak& peak) const { return angle_[peak.fall] / map_.wheel().leg_angle(); }  // [leg angles]
+
+  // Says whether the wheel is slower behind a fall than before it: smoothing also rings where a wheel is let go at speed.
+  bool slows(std::size_t fall) const {
+    const std::vector<double>& time = recording_.time;
+    const auto mean_speed = [&](std::size_t from, std::size_t to) {
+      return (recording_.angle_rad[to] - recording_.angle_rad[from]) / (time[to] - time[from]);
+    };
+    const std::size_t span = std::max<std::size_t>(2, half_window_), begin = fall > span ? fall - span : 0,
+                      end = std::min(fall + 1 + span, time.size() - 1);
+    return begin == fall || end == fall + 1 || mean_speed(fall + 1, end) < mean_speed(begin, fall);
+  }
+
+  // Returns the phase of the raster, in leg angles, on which most of the falls lie, the deep ones before all.
+  double raster_phase(const std::vector<Peak>& all) const {
+    const auto off = [](double turned, double phase) { return turned - phase - std::round(turned - phase); };
+    double best = 0, most = -1;
+    for (const Peak& one : all) {
+      double weight = 0;
+      for (const Peak& peak : all)
+        weight += (speed_[peak.at] - speed_[peak.trough]) *
+                  std::max(0.0, 1 - std::abs(off(turned(peak), turned(one))) / raster_width);
+      if (weight > most) most = weight, best = turned(one);
+    }
+    double sum = 0, moved = 0;
+    for (const Peak& peak : all) {
+      const double depth = speed_[peak.at] - speed_[peak.trough], from = off(turned(peak), best);
+      if (std::abs(from) < raster_width) sum += depth, moved += depth * from;
+    }
+    return best + moved / sum;
+  }
+
+  // Returns the frame before the smoothed angle first passes one, of those in [begin, end); `end` if none is.
+  std::size_t passing(double angle, std::size_t begin, std::size_t end) const {
+    for (std::size_t i = begin; i + 1 < end; ++i)
+      if (angle_[i] < angle && angle_[i + 1] >= angle) return i;
+    return end;
+  }
+
+  // Adds what the speed does not show: a wheel that turns on past the angle of a collision has had it. Between peaks,
+  // and outwards as far as a third of a step is recorded beyond.
+  void complete(std::map<long, Peak>& at, double phase) const {
+    const double leg_angle = map_.wheel().leg_angle();
+    const auto [least, most] = std::ranges::minmax(angle_);
+    const auto first = static_cast<long>(std::ceil(least / leg_angle - phase + 1.0 / 3)),
+               last = static_cast<long>(std::floor(most / leg_angle - phase - 1.0 / 3));
+    const long begin = std::min(first, at.begin()->first), end = std::max(last, at.rbegin()->first);
+    std::size_t from = 0;
+    for (long k = begin; k <= end; ++k) {
+      if (const auto place = at.find(k); place != at.end()) {
+        from = place->second.trough;
+        continue;
+      }
+      const std::size_t fall = passing((phase + static_cast<double>(k)) * leg_angle, from, speed_.size());
+      if (fall >= speed_.size()) continue;
+      const std::size_t reach = half_window_ + 1, low = fall > reach ? fall - reach : 0,
+                        high = std::min(fall + 1 + reach, speed_.size() - 1);
+      Peak peak{.at = fall, .trough = fall + 1, .fall = fall, .shown = false};
+      for (std::size_t i = low; i <= fall; ++i)
+        if (speed_[i] > speed_[peak.at]) peak.at = i;
+      for (std::size_t i = fall + 1; i <= high; ++i)
+        if (speed_[i] < speed_[peak.trough]) peak.trough = i;
+      at.emplace(k, peak);
+      from = fall + 1;
+    }
+  }
+
+  // Chooses the collisions, as indices of `all`, which gets those that the speed does not show: a wheel collides once a
+  // leg angle, always at the same angle of its legs. Of several peaks at one of these angles the fastest is the
+  // collision, for what follows it (bounces, rocking) is slower.
+  std::vector<std::size_t> on_raster(std::vector<Peak>& all) const {
+    const double phase = raster_phase(all);
+    std::map<long, Peak> at;  // by leg angles turned
+    for (const Peak& peak : all) {
+      const double step = turned(peak) - phase;
+      if (std::abs(step - std::round(step)) > raster_width) continue;
+      const auto [place, fresh] = at.emplace(std::lround(step), peak);
+      if (!fresh && speed_[peak.at] > speed_[place->second.at]) place->second = peak;
+    }
+    complete(at, phase);
+    std::vector<std::size_t> falls, chosen;
+    for (const auto& [step, peak] : at) {
+      if (!falls.empty() && peak.fall <= falls.back())
+        throw std::invalid_argument(
+            fmt::format("at {:.6g} s the wheel collides where it collided before ({:.6g} s)",
+                        recording_.time[peak.fall], recording_.time[falls.back()]));
+      if (!peak.shown) all.push_back(peak);
+      falls.push_back(peak.fall);
+    }
+    std::ranges::sort(all, {}, &Peak::fall);
+    for (const std::size_t fall : falls)
+      chosen.push_back(static_cast<std::size_t>(std::ranges::lower_bound(all, fall, {}, &Peak::fall) - all.begin()));
+    return chosen;
+  }
+
+  // Returns how far the wheel has turned from collision 1 to collision n + 1, by its legs [rad].
+  double due(std::size_t n) const {
+    double angle = 0;
+    for (std::size_t i = 1; i <= n; ++i) angle += stance(i).end_angle_rad - stance(i).start_angle_rad;
+    return angle;
+  }
+  double tolerance() const { return step_tolerance * map_.wheel().leg_angle() + noise_of_fit * noise_; }
+
+  bool near(const StanceFit& fit, double angle) const {
+    return std::abs(fit.angle_rad - angle) <= near_raster * map_.wheel().leg_angle() + noise_off_raster * noise_;
+  }
+
+  // Fits anew, near the angle that the other collisions say, what is not fitted or lies off their raster.
+  void fit_again(const std::vector<Peak>& all, const std::vector<std::size_t>& chosen,
+                 std::vector<FoundCollision>& collisions) const {
+    std::vector<double> origins;
+    for (std::size_t n = 0; n < collisions.size(); ++n)
+      if (collisions[n].fit) origins.push_back(collisions[n].fit->angle_rad - due(n));
+    if (origins.size() < 3) return;
+    const double origin = median(origins);
+    for (std::size_t n = 0; n < collisions.size(); ++n) {
+      std::optional<StanceFit>& fit_now = collisions[n].fit;
+      const double angle = origin + due(n);
+      if (fit_now && near(*fit_now, angle)) continue;
+      Peak peak = all[chosen[n]];
+      const std::size_t begin = n > 0 ? all[chosen[n - 1]].trough : 0,
+                        end = n + 1 < chosen.size() ? all[chosen[n + 1]].at : speed_.size();
+      peak.fall = passing(angle, begin, end);
+      if (peak.fall + 1 >= end) continue;
+      const double from = begin > 0 ? recording_.time[(begin + peak.fall) / 2] : recording_.time.front(),
+                   to = recording_.time[end - 1];
+      const std::optional<StanceFit> again =
+          fit(peak, from, to, n, KnownAngle{angle, std::min(1.0, noise_ / known_angle_sd)});
+      if (again && near(*again, angle)) fit_now = again;
+    }
+  }
+
+  // Drops at both ends what only the angle says and no fall of the speed bears out; in between that is refused. Returns
+  // how many are dropped before the first.
+  std::size_t keep_shown(const std::vector<Peak>& all, const std::vector<std::size_t>& chosen,
+                  std::vector<FoundCollision>& collisions) const {
+    std::vector<double> residuals;
+    for (const FoundCollision& c : collisions)
+      if (c.fit) residuals.push_back(c.fit->residual_sd_rad);
+    const double usual = residuals.empty() ? 0 : median(residuals);
+    const auto borne_out = [&](const FoundCollision& c) {
+      return all[chosen[static_cast<std::size_t>(c.number) - 1]].shown ||
+             (c.fit && c.fit->omega_minus - c.fit->omega_plus >= options_.rise &&
+              c.fit->residual_sd_rad <= 2 * std::max(usual, noise_));
+    };
+    while (!collisions.empty() && !borne_out(collisions.back())) collisions.pop_back();
+    const auto dropped = std::ranges::find_if(collisions, borne_out) - collisions.begin();
+    if (dropped > 0) return static_cast<std::size_t>(dropped);
+    for (const FoundCollision& c : collisions)
+      if (!borne_out(c))
+        throw std::invalid_argument(
+            fmt::format("at {:.6g} s a leg lands, and no fall of the speed shows, though it does before and behind; the "
+                        "noise of the angle is about {:.2g} rad",
+                        reported_time(c), noise_));
+    if (const auto most = static_cast<std::size_t>(options_.collisions); collisions.size() > most)
+      collisions.resize(most);
+    return 0;
+  }
+
+  // Holds what was found against what a wheel can do: from landing to landing it turns by the angle between its legs.
+  void check_steps(const std::vector<FoundCollision>& collisions) const {
+    for (std::size_t n = 1; n < collisions.size(); ++n) {
+      const FoundCollision &last = collisions[n - 1], &next = collisions[n];
+      if (reported_time(next) <= reported_time(last))
+        throw std::invalid_argument(fmt::format("collision {} at {:.6g} s is not after the one before ({:.6g} s)",
+                                                next.number, reported_time(next), reported_time(last)));
+      if (!last.fit || !next.fit) continue;
+      const dynamics::Stance& between = stance(n);
+      const double turned = next.fit->angle_rad - last.fit->angle_rad,
+                   due = between.end_angle_rad - between.start_angle_rad;
+      if (std::abs(turned - due) > tolerance())
+        throw std::invalid_argument(
+            fmt::format("between the collisions at {:.6g} and {:.6g} s the wheel turns by {:.4g} rad, where its legs "
+                        "are {:.4g} rad apart; the noise of the angle is about {:.2g} rad",
+                        last.fit->time, next.fit->time, turned, due, noise_));
+    }
+  }
+
   const dynamics::Stance& stance(std::size_t number) const {  // that begins at collision `number`; 0: before the first
     const auto legs = static_cast<std::size_t>(map_.wheel().legs());
     const std::size_t leg = (static_cast<std::size_t>(first_leg_) + number + legs - 1) % legs;
@@ -135,21 +342,23 @@ class Search {
   }
 
   std::optional<StanceFit> fit(const std::vector<Peak>& all, std::size_t k, std::size_t n) const {
-    const std::vector<double>& time = recording_.time;
-    const Peak& peak = all[k];
-    // The collision lies in the steepest fall of the smoothed speed.
-    std::size_t fall = peak.at;
-    for (std::size_t i = peak.at; i < peak.trough; ++i)
-      if (speed_[i] - speed_[i + 1] > speed_[fall] - speed_[fall + 1]) fall = i;
-    const double at = (time[fall] + time[fall + 1]) / 2;
     // It keeps away from the neighbouring peaks: half way to the fall behind the last one, and up to the next one.
-    double from = at - options_.fit_span, to = at + options_.fit_span;
-    if (k > 0) from = std::max(from, (time[all[k - 1].trough] + time[all[k - 1].at]) / 2);
-    if (k + 1 < all.size()) to = std::min(to, time[all[k + 1].at]);
+    const std::vector<double>& time = recording_.time;
+    return fit(all[k], k > 0 ? (time[all[k - 1].trough] + time[all[k - 1].at]) / 2 : time.front(),
+               k + 1 < all.size() ? time[all[k + 1].at] : time.back(), n, {});
+  }
+
+  // Fits the collision at a fall to the frames at times [from, to] at most.
+  std::optional<StanceFit> fit(const Peak& peak, double from, double to, std::size_t n,
+                               std::optional<KnownAngle> known) const {
+    const std::vector<double>& time = recording_.time;
+    const std::size_t fall = peak.fall;
+    const double at = (time[fall] + time[fall + 1]) / 2;
+    from = std::max(from, at - options_.fit_span), to = std::min(to, at + options_.fit_span);
     const StanceFit guess{.time = at,
                           .angle_rad = (recording_.angle_rad[fall] + recording_.angle_rad[fall + 1]) / 2,
                           .omega_minus = speed_[peak.at],
-                          .omega_plus = speed_[std::min(peak.trough, fall + (fall - peak.at) + 1)],
+                          .omega_plus = speed_[std::min(peak.trough, fall + (fall - std::min(fall, peak.at)) + 1)],
                           .residual_sd_rad = 0};
     const auto first = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), from) - time.begin());
     const auto end_at = [&](double last) {
@@ -158,7 +367,7 @@ class Search {
     const auto fitted = [&](std::size_t begin, std::size_t end, AfterCollision then) {
       return fit_collision(std::span(time).subspan(begin, end - begin),
                            std::span(recording_.angle_rad).subspan(begin, end - begin), stance(n), stance(n + 1), guess,
-                           then);
+                           then, known);
     };
     const std::optional<StanceFit> whole = fitted(first, end_at(to), AfterCollision::stands);
     if (whole && noise_alone(*whole, end_at(to) - first)) return whole;
@@ -186,6 +395,8 @@ class Search {
   const FinderOptions& options_;
   std::vector<double> angle_, speed_;  // smoothed
   double noise_ = 0;                   // of the samples, about [rad]
+  double rise_ = 0;                    // of a peak [rad/s]
+  std::size_t half_window_ = 0;        // of the smoothing [samples]
 };
 
 }  // namespace

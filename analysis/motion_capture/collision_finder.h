@@ -12,7 +12,9 @@
 namespace metastable::analysis {
 
 struct FinderOptions {
-  int window = 0;          ///< of the Savitzky-Golay filter [samples], odd, 5..10001; 0: 50 ms, at least 5 samples
+  /// Is that of the Savitzky-Golay filter [samples], odd, 5..10001; 0: 50 ms, at least 5 samples, and as many more as
+  /// keep the noise's own peaks below `rise`, up to 1.2 of the time of a leg angle at sqrt(g/L).
+  int window = 0;
   double rise = 0.4;       ///< of a peak above both sides [rad/s], > 0
   int collisions = 16;     ///< most collisions of a trial, >= 1
   double fit_span = 0.08;  ///< of the stance fit on either side of a collision [s], > 0
@@ -43,16 +45,19 @@ struct FoundTrial {
   std::string stopped;
 };
 
-/// Differentiates with a third-degree Savitzky-Golay filter, takes all peaks that rise by `rise` above both sides, the
-/// first as the first collision, then the one whose angle is closest to each further leg angle (within half a leg angle
-/// of it); other peaks in between are bounces. The search ends where no peak lies there.
+/// Differentiates with a third-degree Savitzky-Golay filter, takes all peaks that rise by `rise` (or six sds of the
+/// noise's own speed) above both sides, finds the raster of leg angles on which their falls lie, and takes on each of its
+/// angles the fastest peak for the collision; others are bounces. Where the wheel turns on past such an angle and no peak
+/// shows, the collision is sought by the fit. Fits that lie off the raster are made anew beside it.
 /// @param map  wheel and slope, for the stance motion; the contact law matters only through its inertia
 /// @param first_landing_leg  that lands at collision 1
-/// @throws std::invalid_argument for rates outside 60..1000 Hz or fewer samples than the window; options out of range
+/// @throws std::invalid_argument for rates outside 60..1000 Hz or fewer samples than the window; options out of range;
+///         collisions that cannot be vouched for, with the time: a landing without a fall of the speed between others, or
+///         steps that are no leg angle
 FoundTrial find_collisions(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg,
                            const FinderOptions& options);
 
-/// Returns the window that `options` mean at a sampling rate [Hz].
+/// Returns the window that `options` mean at a sampling rate [Hz], without noise.
 int smoothing_window(const FinderOptions& options, double rate);
 
 }  // namespace metastable::analysis

@@ -16,11 +16,12 @@ using Parameters = Eigen::Vector4d;  // time, angle, omega_minus, omega_plus
 class Residuals {
  public:
   Residuals(std::span<const double> time, std::span<const double> angle, const dynamics::Stance& before,
-            const dynamics::Stance& after, AfterCollision then)
-      : time_(time), angle_(angle), before_(before), after_(after), then_(then) {}
+            const dynamics::Stance& after, AfterCollision then, std::optional<KnownAngle> known)
+      : time_(time), angle_(angle), before_(before), after_(after), then_(then), known_(known) {}
 
   Eigen::VectorXd operator()(const Parameters& p) const {
-    Eigen::VectorXd residual(static_cast<Eigen::Index>(time_.size()));
+    Eigen::VectorXd residual(static_cast<Eigen::Index>(time_.size() + (known_ ? 1 : 0)));
+    if (known_) residual(residual.size() - 1) = known_->weight * (p(1) - known_->angle_rad);
     // It goes outwards from the collision, each sample from its neighbour, so that every stretch is integrated once.
     const auto first_after =
         static_cast<std::size_t>(std::upper_bound(time_.begin(), time_.end(), p(0)) - time_.begin());
@@ -49,6 +50,7 @@ class Residuals {
   std::span<const double> time_, angle_;
   const dynamics::Stance &before_, &after_;
   AfterCollision then_;
+  std::optional<KnownAngle> known_;
 };
 
 // Fits from one guess; the second number is the sum of squares.
@@ -96,12 +98,12 @@ std::optional<std::pair<StanceFit, double>> descend(const Residuals& residuals, 
 
 std::optional<StanceFit> fit_collision(std::span<const double> time, std::span<const double> angle,
                                        const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess,
-                                       AfterCollision then) {
+                                       AfterCollision then, std::optional<KnownAngle> known) {
   constexpr std::size_t least = 3;
   if (time.size() < 2 * least) return std::nullopt;
   const double earliest = time[least - 1], latest = time[time.size() - least];
   if (!(guess.time >= earliest && guess.time <= latest)) return std::nullopt;
-  const Residuals residuals(time, angle, before, after, then);
+  const Residuals residuals(time, angle, before, after, then, known);
   // A wheel that falls back has minima of its own: one for stopping dead, one for a small hop.
   std::optional<std::pair<StanceFit, double>> best;
   for (const double omega_plus : {guess.omega_plus, 0.6, 0.1}) {

@@ -22,14 +22,22 @@ enum class AfterCollision {
   flies    ///< the foot hops: nothing changes the spin
 };
 
+/// Is the wheel's angle at a collision as the other collisions of its trial have it.
+struct KnownAngle {
+  double angle_rad = 0;
+  double weight = 0;  ///< of its residual beside those of the samples
+};
+
 /// Fits by least squares time, angle, omega_minus and omega_plus: before the collision the stance motion of `before`
 /// backwards from its end, after it that of `after` onwards from its start, or a flight; a wheel that falls back lies
 /// still on both feet (omega_plus is 0 where it never left them). Levenberg-Marquardt from `guess` and from small
 /// omega_plus, the best of them; nothing if fewer than three samples lie on either side, the time leaves the samples,
 /// or it does not settle within 50 steps.
+/// @param known  holds the collision near an angle where the samples alone leave it open
 /// @param time, angle  samples around one collision and no other [s], [rad]
 std::optional<StanceFit> fit_collision(std::span<const double> time, std::span<const double> angle,
                                        const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess,
-                                       AfterCollision then = AfterCollision::stands);
+                                       AfterCollision then = AfterCollision::stands,
+                                       std::optional<KnownAngle> known = {});
 
 }  // namespace metastable::analysis

@@ -11,8 +11,11 @@
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/input_error.h"
+#include "analysis/experiment/rolling_speeds.h"
 #include "analysis/motion_capture/angle_file.h"
+#include "analysis/motion_capture/angle_mending.h"
 #include "analysis/motion_capture/collision_comparison.h"
+#include "analysis/statistics/median.h"
 #include "markov/parallel.h"
 #include "reports/output/answer.h"
 #include "reports/output/output_file.h"
@@ -72,6 +75,29 @@ void say_comparison(Answer& answer, const analysis::CollisionComparison& c) {
   answer.say("  omega_plus, stance fit:  {}", text(c.fit_after));
 }
 
+// Refuses speeds that no wheel keeps up on such a ramp: times or angles are in another unit then.
+void check_speeds(const analysis::Experiment& experiment, const std::vector<analysis::MeasuredAngle>& angles,
+                  const std::vector<FoundTrial>& found, const std::string& file) {
+  constexpr std::size_t enough = 3;
+  constexpr double beyond_lifting = 1.25;
+  for (std::size_t condition = 0; condition < experiment.conditions.size(); ++condition) {
+    std::vector<double> speeds;
+    for (std::size_t t = 0; t < angles.size(); ++t)
+      for (const FoundCollision& c : found[t].collisions)
+        if (angles[t].condition == condition && c.number > 1) speeds.push_back(analysis::reported_speed(c, false));
+    if (speeds.size() < enough) continue;
+    const analysis::RollingSpeeds bounds = analysis::rolling_speeds(experiment, condition);
+    const double middle = analysis::median(speeds);
+    if (middle >= bounds.slowest && middle <= beyond_lifting * bounds.lifting) continue;
+    throw std::invalid_argument(fmt::format(
+        "{}: condition '{}': half of the speeds before a collision are {} {:.3g} rad/s, where a wheel that comes over its "
+        "legs on this ramp has {:.3g} at least and lifts its feet at {:.3g}: is time_s in seconds, is angle_rad in radians, "
+        "and is the slope right?",
+        file, experiment.conditions[condition].id, middle < bounds.slowest ? "below" : "above", middle,
+        bounds.slowest / analysis::RollingSpeeds::room, bounds.lifting));
+  }
+}
+
 // Names trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two
 // files would put the rest too early.
 void say_cut_rests(Answer& answer, const analysis::ExperimentSource& source, const std::string& collisions,
@@ -111,7 +137,8 @@ void run_collisions(const CollisionsRequest& request) {
   analysis::Experiment experiment = analysis::parse_description(source);
   if (experiment.system != analysis::System::rimless_wheel)
     throw std::invalid_argument(fmt::format("{}: a coast-down has no collisions to find", request.folder));
-  const std::vector<analysis::MeasuredAngle> angles = analysis::parse_angles(source, experiment);
+  const std::string angle_file = (folder / "angle.csv").string();
+  const auto [angles, mended] = analysis::mend_angles(analysis::parse_angles(source, experiment), experiment, angle_file);
   std::optional<analysis::Experiment> known;
   if (source.collisions_csv) known = analysis::parse_experiment(source);
   const fs::path out = !request.out.empty() ? fs::path(request.out)
@@ -146,7 +173,8 @@ void run_collisions(const CollisionsRequest& request) {
   const auto limit = static_cast<std::size_t>(finder.collisions++);
   std::vector<FoundTrial> found(angles.size());
   std::vector<char> cut(angles.size());
-  markov::parallel_for(angles.size(), request.threads, [&](std::size_t t) {
+  std::vector<std::string> refused(angles.size());
+  markov::parallel_for(angles.size(), request.threads, [&, &angles = angles](std::size_t t) {
     const auto& [number, condition, recording] = angles[t];
     try {
       found[t] = analysis::find_collisions(recording, maps[condition],
@@ -154,11 +182,15 @@ void run_collisions(const CollisionsRequest& request) {
       cut[t] = found[t].collisions.size() > limit;
       if (cut[t]) found[t].collisions.resize(limit);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(
-          fmt::format("{}: trial {}: {}", (folder / "angle.csv").string(), number, error.what()));
+      refused[t] = fmt::format("trial {}: {}", number, error.what());
     }
   });
+  analysis::Defects defects;
+  for (const std::string& why : refused)
+    if (!why.empty()) defects.add(angle_file, {}, why);
+  defects.check();
 
+  check_speeds(experiment, angles, found, angle_file);
   const Files files = write_files(experiment, angles, found, maps, request.peak);
   collisions_file.stream() << files.collisions;
   if (details_file) {
@@ -180,6 +212,7 @@ void run_collisions(const CollisionsRequest& request) {
   }
   answer.say("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}", out.string(), count,
              angles.size(), bounces, details.string());
+  for (const std::string& sentence : mended) answer.say("mended: {}", sentence);
   answer.say("omega_minus is the {}", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
                                                    : "stance motion extrapolated to the collision");
   if (unfitted > 0)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "analysis/experiment/experiment_folder.h"
@@ -86,6 +87,36 @@ TEST(CollisionFinder, WorksFrom60To1000HertzAndForOtherLaws) {
     EXPECT_LT(s.sd, 0.008) << rate;
     EXPECT_LT(s.plus_sd, 0.008) << rate;
   }
+}
+
+// Peaks of the noise were taken for collisions: at 3 mrad 89 of 192 were found where none is.
+TEST(CollisionFinder, NoiseMakesNoCollisions) {
+  Setting setting = paper_setting(9.59, false);
+  setting.law = dynamics::Law::coulomb;
+  const auto trials = simulate_trials(setting, {.trials = 8, .collisions = 16, .seed = 11});
+  const dynamics::WheelMap map = setting.map();
+  for (const double rate : {60.0, 120.0, 240.0})
+    for (const double noise : {0.001, 0.003, 0.005}) {
+      int found = 0, others = 0, refused = 0;
+      for (std::size_t t = 0; t < trials.size(); ++t) {
+        const AngleRecording recording =
+            record_angle(map, trials[t], {.rate = rate, .noise_sd_rad = noise, .seed = 2, .threads = 1}, t);
+        try {
+          for (const FoundCollision& c : find_collisions(recording, map, 0, {}).collisions) {
+            const auto i = static_cast<std::size_t>(c.number) - 1;
+            const bool true_one = i < trials[t].collisions.size() &&
+                                  std::abs(reported_time(c) - trials[t].collisions[i].time) < 0.05;
+            ++(true_one ? found : others);
+          }
+        } catch (const std::invalid_argument& error) {
+          EXPECT_NE(std::string(error.what()).find("noise of the angle is about"), std::string::npos) << error.what();
+          ++refused;
+        }
+      }
+      EXPECT_EQ(others, 0) << rate << " Hz, " << noise;
+      EXPECT_LE(refused, noise < 0.004 ? 1 : 8) << rate << " Hz, " << noise;
+      EXPECT_GE(found, 16 * (8 - refused) - 2) << rate << " Hz, " << noise;
+    }
 }
 
 TEST(CollisionFinder, StopsAtTheNumberAskedForAndFindsTheApex) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -86,6 +87,28 @@ TEST_F(CollisionsCommandTest, LeavesNothingBehindWhenTheInputIsBad) {
   EXPECT_THROW(run(), std::invalid_argument);  // 1 Hz
   EXPECT_FALSE(fs::exists(folder_ / "collisions.csv"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 2);
+}
+
+// Times of half the camera's rate gave speeds that no wheel keeps up, and exit code 0.
+TEST_F(CollisionsCommandTest, RefusesSpeedsThatNoWheelKeepsUp) {
+  simulate();
+  std::istringstream lines(read(folder_ / "angle.csv"));
+  std::string slowed, line;
+  std::getline(lines, line);
+  slowed = line + "\n";
+  while (std::getline(lines, line)) {
+    const std::size_t second = line.find(',', line.find(',') + 1) + 1, third = line.find(',', second);
+    slowed += line.substr(0, second) + std::to_string(2 * std::stod(line.substr(second, third - second))) +
+              line.substr(third) + "\n";
+  }
+  std::ofstream(folder_ / "angle.csv") << slowed;
+  try {
+    run();
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("is time_s in seconds"), std::string::npos) << error.what();
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "collisions-from-angle.csv"));
 }
 
 }  // namespace

@@ -1,0 +1,231 @@
+#include "analysis/experiment/plausibility.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "analysis/experiment/rolling_speeds.h"
+#include "analysis/statistics/median.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double turn = 2 * std::numbers::pi;
+
+// The mean speed of a step over the speed at its end is 0.56 to 0.72 in the middle of what engines and the virtual
+// laboratory roll, at most 0.96, and falls as a wheel comes slowly over its foot; a step is a chord, up to 1.4 where feet
+// slide. Units differ by more.
+constexpr double least_time_share = 0.15, most_time_share = 1.5, least_step_share = 0.4, most_step_share = 2.5;
+constexpr double ramp_room = 1.02;  // a ramp is measured to two per cent
+constexpr double chance_of_copy = 1e-6;
+
+struct Unit {
+  std::string_view name;
+  double too_large;  // by how much a number in it is
+};
+constexpr Unit speed_units[] = {{"degrees per second", 360 / turn},
+                                {"revolutions per minute", 60 / turn},
+                                {"revolutions per second", 1 / turn}};
+constexpr Unit time_units[] = {
+    {"milliseconds", 1e3}, {"microseconds", 1e6}, {"minutes", 1.0 / 60}, {"nanoseconds", 1e9}};
+constexpr Unit length_units[] = {{"millimetres", 1e3}, {"centimetres", 1e2}, {"inches", 1 / 0.0254}, {"kilometres", 1e-3}};
+
+// Names the units that would make a number plausible.
+std::string suspected(std::span<const Unit> units, double number, double least, double most) {
+  std::string names;
+  for (const Unit& unit : units)
+    if (number / unit.too_large >= least && number / unit.too_large <= most)
+      names += fmt::format("{}{}", names.empty() ? "" : " or ", unit.name);
+  return names.empty() ? "" : fmt::format(": {} are suspected", names);
+}
+
+// Holds the worst of the values that are not plausible, and where the first stands.
+struct Odd {
+  std::size_t count = 0, line = 0;
+  double worst = 0;
+  void add(std::size_t at, double value) {
+    if (count++ == 0 || at < line) line = at;
+    if (count == 1 || std::abs(value) > std::abs(worst)) worst = value;
+  }
+};
+
+class Plausible {
+ public:
+  Plausible(const Experiment& experiment, const std::string& file, const CollisionLines& lines, Defects& defects)
+      : experiment_(experiment), file_(file), lines_(lines), defects_(defects) {}
+
+  void speeds() {
+    Odd fast;
+    std::vector<double> later;
+    double slowest = 0, fastest = 0;
+    each([&](std::size_t t, std::size_t i, const MeasuredCollision& c) {
+      const RollingSpeeds bounds = rolling_speeds(experiment_, experiment_.trials[t].condition);
+      for (const std::optional<double>& speed : {std::optional(c.omega_minus), c.omega_plus})
+        if (speed && std::abs(*speed) > bounds.fastest) fast.add(lines_[t][i], *speed), fastest = bounds.fastest;
+      if (i > 0) later.push_back(c.omega_minus), slowest = std::max(slowest, bounds.slowest);
+    });
+    if (fast.count > 0)
+      return report(fast, fmt::format("a speed of {:.4g} rad/s, where a wheel of these legs rolls at {:.3g} rad/s at "
+                                      "most (three times the speed at which its feet lift off){}",
+                                      fast.worst, fastest,
+                                      suspected(speed_units, typical_speed(), slowest, fastest / 3)));
+    if (later.size() < 3) return;
+    const double middle = median(later);
+    if (middle >= slowest) return;
+    defects_.add(file_, {1, 1},
+                 fmt::format("omega_minus_rad_s: half of the speeds from collision 2 on lie below {:.3g} rad/s, where a "
+                             "wheel that has come over a leg on this ramp reaches {:.3g} rad/s{}",
+                             middle, slowest / RollingSpeeds::room,
+                             suspected(speed_units, middle, slowest, rolling_speeds(experiment_, 0).fastest)));
+  }
+
+  // A wheel turns by a leg angle from collision to collision, at speeds below those before and behind.
+  void times() {
+    std::vector<double> share;
+    steps([&](std::size_t, std::size_t, const MeasuredCollision& last, const MeasuredCollision& next) {
+      if (last.time && next.time && next.omega_minus > 0)
+        share.push_back(experiment_.wheel.leg_angle() / (*next.time - *last.time) / next.omega_minus);
+    });
+    if (share.empty()) return;
+    const double middle = median(share);
+    if (middle >= least_time_share && middle <= most_time_share) return;
+    defects_.add(file_, {1, 1},
+                 fmt::format("time_s: half of the steps would turn the wheel at {:.3g} of its speed before the next "
+                             "collision, where 0.5 to 1 of it is usual{}",
+                             middle, suspected(time_units, 0.75 / middle, least_time_share, most_time_share)));
+  }
+
+  void positions() {
+    const double leg = experiment_.wheel.mean_leg_length(), chord = 2 * leg * std::sin(experiment_.wheel.leg_angle() / 2);
+    std::vector<double> share;
+    steps([&](std::size_t, std::size_t, const MeasuredCollision& last, const MeasuredCollision& next) {
+      if (last.position && next.position) share.push_back((*next.position - *last.position) / chord);
+    });
+    if (const double middle = share.empty() ? 1 : median(share); middle < least_step_share || middle > most_step_share)
+      defects_.add(file_, {1, 1},
+                   fmt::format("position_m: half of the steps are {:.4g} m or longer, where the feet of this wheel are "
+                               "{:.4g} m apart{}",
+                               middle * chord, chord,
+                               suspected(length_units, middle, least_step_share, most_step_share)));
+    Odd beyond;
+    double end = 0;
+    each([&](std::size_t t, std::size_t i, const MeasuredCollision& c) {
+      const double ramp = experiment_.conditions[experiment_.trials[t].condition].ramp_length;
+      if (!c.position || *c.position <= ramp_room * ramp + most_step_share * chord) return;
+      beyond.add(lines_[t][i], *c.position);
+      end = ramp;
+    });
+    if (beyond.count > 0)
+      report(beyond, fmt::format("position_m: goes up to {:.4g} m, where the ramp ends at {:.4g} m{}", beyond.worst, end,
+                                 suspected(length_units, beyond.worst, 0, ramp_room * end + most_step_share * chord)));
+  }
+
+ private:
+  void each(const std::function<void(std::size_t, std::size_t, const MeasuredCollision&)>& look) const {
+    for (std::size_t t = 0; t < experiment_.trials.size(); ++t)
+      for (std::size_t i = 0; i < experiment_.trials[t].collisions.size(); ++i)
+        look(t, i, experiment_.trials[t].collisions[i]);
+  }
+  void steps(const std::function<void(std::size_t, std::size_t, const MeasuredCollision&, const MeasuredCollision&)>&
+                 look) const {
+    each([&](std::size_t t, std::size_t i, const MeasuredCollision& c) {
+      if (i > 0) look(t, i, experiment_.trials[t].collisions[i - 1], c);
+    });
+  }
+  double typical_speed() const {
+    std::vector<double> all;
+    each([&](std::size_t, std::size_t, const MeasuredCollision& c) { all.push_back(c.omega_minus); });
+    return median(all);
+  }
+  void report(const Odd& odd, const std::string& what) {
+    defects_.add(file_, {odd.line, 1},
+                 odd.count == 1 ? what : fmt::format("{} ({} rows from this one on)", what, odd.count));
+  }
+
+  const Experiment& experiment_;
+  const std::string& file_;
+  const CollisionLines& lines_;
+  Defects& defects_;
+};
+
+// Returns for each condition and collision the chance that two trials have the same speed there by chance: the step of
+// the last digit over 2 sqrt(pi) sds, for normal speeds. Trials that all begin alike are simulated ones, which may go
+// on alike too: theirs is 1.
+std::map<std::pair<std::size_t, std::size_t>, double> chances(const Experiment& experiment) {
+  const double digit = std::max(experiment.sensor.last_digit.value_or(0), 1e-7);
+  struct Sums {
+    double count = 0, mean = 0, squares = 0;
+    std::map<double, std::size_t> times;  // of each speed, at collision 1
+  };
+  std::map<std::pair<std::size_t, std::size_t>, Sums> sums;
+  for (const MeasuredTrial& trial : experiment.trials)
+    for (std::size_t i = 0; i < trial.collisions.size(); ++i) {
+      Sums& of = sums[{trial.condition, i}];
+      if (i == 0) ++of.times[trial.collisions[i].omega_minus];
+      const double step = trial.collisions[i].omega_minus - of.mean;
+      of.mean += step / ++of.count;
+      of.squares += step * (trial.collisions[i].omega_minus - of.mean);
+    }
+  std::map<std::pair<std::size_t, std::size_t>, double> chance;
+  for (const auto& [at, of] : sums) {
+    const auto& launches = sums.at({at.first, 0}).times;
+    if (std::ranges::any_of(launches, [&](const auto& one) {
+          return one.second > 2 && 2 * static_cast<double>(one.second) > sums.at({at.first, 0}).count;
+        })) {
+      chance[at] = 1;
+      continue;
+    }
+    const double sd = of.count > 1 ? std::sqrt(of.squares / (of.count - 1)) : 0;
+    chance[at] = sd > 0 ? std::min(1.0, digit / (2 * std::sqrt(std::numbers::pi) * sd)) : 1;
+  }
+  return chance;
+}
+
+}  // namespace
+
+void check_plausible(const Experiment& experiment, const std::string& file, const CollisionLines& lines,
+                     Defects& defects) {
+  if (experiment.trials.empty() || !defects.empty()) return;
+  Plausible plausible(experiment, file, lines, defects);
+  plausible.speeds();
+  if (defects.empty()) plausible.times();
+  plausible.positions();
+}
+
+void check_copies(const Experiment& experiment, const std::string& file, const CollisionLines& lines,
+                  Defects& defects) {
+  const auto chance = chances(experiment);
+  const double pairs = static_cast<double>(experiment.trials.size()) * static_cast<double>(experiment.trials.size()) / 2;
+  std::map<std::vector<double>, std::size_t> first;  // trial with these speeds
+  std::size_t copies = 0, copy = 0, original = 0;
+  for (std::size_t t = 0; t < experiment.trials.size(); ++t) {
+    const MeasuredTrial& trial = experiment.trials[t];
+    std::vector<double> speeds;
+    double by_chance = pairs;
+    for (std::size_t i = 0; i < trial.collisions.size(); ++i) {
+      speeds.push_back(trial.collisions[i].omega_minus);
+      by_chance *= chance.at({trial.condition, i});
+    }
+    const auto [at, fresh] = first.emplace(std::move(speeds), t);
+    if (fresh || by_chance > chance_of_copy) continue;
+    if (copies++ == 0) copy = t, original = at->second;
+  }
+  if (copies == 0) return;
+  const std::string one = fmt::format("trial {} has the speeds of trial {}, all {} of them to the last digit",
+                                      experiment.trials[copy].number, experiment.trials[original].number,
+                                      experiment.trials[copy].collisions.size());
+  defects.add(file, {lines[copy].front(), 1},
+              copies == 1 ? one + ": a copy; take one of them out"
+                          : fmt::format("{}, and so have {} more trials those of others: copies; take them out", one,
+                                        copies - 1));
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,100 @@
+#include "analysis/experiment/plausibility.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "analysis/experiment/experiment.h"
+#include "analysis/experiment/experiment_folder.h"
+#include "tests/analysis/settings.h"
+
+namespace metastable::analysis {
+namespace {
+
+class PlausibilityTest : public testing::Test {
+ protected:
+  PlausibilityTest() {
+    setting_.law = dynamics::Law::coulomb;
+    trials_ = simulate_trials(setting_, {.trials = 10, .seed = 3});
+  }
+  // Returns the lines that refuse the trials, spoilt.
+  std::vector<std::string> refused(const std::function<void(dynamics::TrialCollision&)>& spoil) const {
+    std::vector<dynamics::Trial> trials = trials_;
+    for (dynamics::Trial& trial : trials)
+      for (dynamics::TrialCollision& c : trial.collisions) spoil(c);
+    return refused(trials);
+  }
+  std::vector<std::string> refused(const std::vector<dynamics::Trial>& trials) const {
+    try {
+      parse_experiment(source_of(experiment_files(setting_, trials, "t", {}), ""));
+    } catch (const InputError& error) {
+      return error.lines();
+    }
+    return {};
+  }
+  void expect_suspected(const std::string& unit, const std::function<void(dynamics::TrialCollision&)>& spoil) const {
+    const std::vector<std::string> lines = refused(spoil);
+    ASSERT_FALSE(lines.empty()) << unit;
+    EXPECT_LE(lines.size(), 2u) << unit;
+    EXPECT_NE(lines.front().find(unit), std::string::npos) << lines.front();
+    EXPECT_NE(lines.front().find("suspected"), std::string::npos) << lines.front();
+  }
+  Setting setting_ = paper_setting(9.59, false);
+  std::vector<dynamics::Trial> trials_;
+};
+
+TEST_F(PlausibilityTest, TakesWhatAWheelDoes) {
+  EXPECT_TRUE(refused(trials_).empty());
+  for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::plastic, dynamics::Law::settled}) {
+    PlausibilityTest::setting_.law = law;
+    EXPECT_TRUE(refused(simulate_trials(setting_, {.trials = 5, .seed = 3})).empty()) << static_cast<int>(law);
+  }
+}
+
+TEST_F(PlausibilityTest, SuspectsOtherUnits) {
+  using C = dynamics::TrialCollision;
+  const auto speeds = [](double by) { return [by](C& c) { c.omega_minus *= by, c.omega_plus *= by; }; };
+  expect_suspected("degrees per second", speeds(180 / std::numbers::pi));
+  expect_suspected("revolutions per minute", speeds(30 / std::numbers::pi));
+  expect_suspected("revolutions per second", speeds(0.5 / std::numbers::pi));
+  expect_suspected("milliseconds", [](C& c) { c.time *= 1000; });
+  expect_suspected("millimetres", [](C& c) { c.position *= 1000; });
+  expect_suspected("centimetres", [](C& c) { c.position *= 100; });
+  expect_suspected("inches", [](C& c) { c.position /= 0.0254; });
+}
+
+TEST_F(PlausibilityTest, NamesTheFirstPositionBeyondTheRamp) {
+  std::vector<dynamics::Trial> trials = trials_;
+  trials[2].collisions.back().position = 5;
+  const std::vector<std::string> lines = refused(trials);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_NE(lines.front().find("position_m: goes up to 5 m, where the ramp ends at 3.66 m"), std::string::npos)
+      << lines.front();
+}
+
+TEST_F(PlausibilityTest, NoticesCopies) {
+  std::vector<dynamics::Trial> twice = trials_;
+  twice.push_back(trials_[3]);
+  ASSERT_EQ(refused(twice).size(), 1u);
+  EXPECT_NE(refused(twice).front().find("trial 11 has the speeds of trial 4"), std::string::npos);
+  twice = trials_;
+  twice.insert(twice.end(), trials_.begin(), trials_.end());
+  ASSERT_EQ(refused(twice).size(), 1u);
+  EXPECT_NE(refused(twice).front().find("so have 9 more trials"), std::string::npos) << refused(twice).front();
+}
+
+// Trials that chance has no part in are alike, and those of a short list of contacts often.
+TEST_F(PlausibilityTest, TakesSimulatedTrialsThatAreAlike) {
+  setting_.initial_speed.sd = 0;
+  setting_.restitution.sd = setting_.friction.sd = 0;
+  EXPECT_TRUE(refused(simulate_trials(setting_, {.trials = 5, .seed = 3})).empty());
+  setting_.pairs = {{0.4, 0.4}, {0.5, 0.4}};
+  EXPECT_TRUE(refused(simulate_trials(setting_, {.trials = 30, .collisions = 3, .seed = 3})).empty());
+}
+
+}  // namespace
+}  // namespace metastable::analysis
