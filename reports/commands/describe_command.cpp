@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "reports/description/describe_figures.h"
@@ -64,9 +65,10 @@ void run_describe(const DescribeRequest& request) {
         {}, {tests_table(description, provenance)});
   std::vector<Figure> maps;
   for (const analysis::ConditionDescription& c : description.conditions)
-    if (c.trials > 0) maps.push_back(measured_map_figure(c, provenance));
-  pages->section("return-maps", "Return maps", "Each dot is one step; a steady state is a cloud on the diagonal.", maps,
-                 {});
+    if (auto figure = measured_map_figure(c, provenance)) maps.push_back(std::move(*figure));
+  if (!maps.empty())
+    pages->section("return-maps", "Return maps", "Each dot is one step; a steady state is a cloud on the diagonal.",
+                   maps, {});
   if (const auto figure = legs_figure(description, provenance))
     pages->section("legs", "Leg by leg", "Legs of one length and one contact would give one level.", {*figure},
                    {legs_table(description, provenance)});

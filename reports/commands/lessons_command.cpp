@@ -245,7 +245,7 @@ class Lessons {
             std::move(figures), std::move(tables));
   }
 
-  void finish(Answer& answer) const {
+  void finish(Answer& answer) {
     pages_.write_index();
     pages_.finish(answer);
   }

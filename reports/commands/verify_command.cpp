@@ -148,7 +148,9 @@ Table coverage_table(const std::vector<Checked>& rows, const VerifyRequest& requ
   return table;
 }
 
-void export_chain(const Checked& checked, const std::filesystem::path& folder) {
+void export_chain(const Checked& checked, const std::filesystem::path& target) {
+  OutputFolder whole(target);
+  const std::filesystem::path& folder = whole.path();
   const markov::SampledChain& chain = checked.verified.chain;
   const markov::ChainFiles files = markov::chain_files(chain.chain, chain.launch);
   write_file(folder / "chain.tra", files.transitions);
@@ -158,6 +160,7 @@ void export_chain(const Checked& checked, const std::filesystem::path& folder) {
   write_file(folder / "expected-steps.txt",
              fmt::format("{}\nfrom the launch: {:.17g}\n1 - lambda_1: {:.17g}\n", checked.benchmark.name,
                          checked.verified.from_start, checked.verified.failure_rate));
+  whole.commit("expected-steps.txt");
 }
 
 }  // namespace
@@ -196,16 +199,19 @@ void run_verify(const VerifyRequest& request) {
                               "settled: the paper's legs, r_g = 0.0424094 m",
                               1, version()};
   answer.say("{}", wrapped(peers, "", terminal_width()));
+  std::optional<OutputFolder> whole;
+  if (out) whole.emplace(out->path());
   for (Table& table : tables) {
     answer.show(table);
-    if (request.out.empty()) continue;
+    if (!whole) continue;
     table.notes.emplace_back(peers);  // a file stands alone
     table.provenance = provenance;
-    const std::filesystem::path file = std::filesystem::path(request.out) / table.id;
+    const std::filesystem::path file = whole->path() / table.id;
     write_file(file.string() + ".csv", to_csv(table));
     write_file(file.string() + ".md", to_markdown(table));
     write_file(file.string() + ".tex", to_latex(table));
   }
+  if (whole) whole->commit(tables.back().id + ".tex");
   for (const std::string& line : provenance_lines(provenance)) answer.say("{}", line);
   answer.finish(provenance);
 }

@@ -68,7 +68,7 @@ std::optional<Figure> survival_curves_figure(const analysis::Description& descri
   return figure;
 }
 
-Figure measured_map_figure(const analysis::ConditionDescription& condition, const Provenance& provenance) {
+std::optional<Figure> measured_map_figure(const analysis::ConditionDescription& condition, const Provenance& provenance) {
   Figure figure;
   figure.id = "return-map-" + condition.id;
   for (char& c : figure.id)
@@ -88,6 +88,7 @@ Figure measured_map_figure(const analysis::ConditionDescription& condition, cons
     }
   for (Series* series : {&early, &late})
     if (!series->x.empty()) figure.series.push_back(std::move(*series));
+  if (figure.series.empty()) return std::nullopt;
   return figure;
 }
 

@@ -19,7 +19,9 @@ Figure profile_figure(const std::string& id, const std::string& title, const Pro
 Figure profiles_figure(const analysis::Description& description, const Provenance& provenance);
 /// Returns nothing where no outcome is known.
 std::optional<Figure> survival_curves_figure(const analysis::Description& description, const Provenance& provenance);
-Figure measured_map_figure(const analysis::ConditionDescription& condition, const Provenance& provenance);
+/// Returns nothing where no trial has a second collision.
+std::optional<Figure> measured_map_figure(const analysis::ConditionDescription& condition,
+                                          const Provenance& provenance);
 /// Returns nothing where no leg is known.
 std::optional<Figure> legs_figure(const analysis::Description& description, const Provenance& provenance);
 

@@ -145,8 +145,14 @@ OutputFolder::OutputFolder(const fs::path& target) : target_(target) {
   }
   if (target_.has_parent_path()) make_folder(target_.parent_path());
   remove_left_behind(target_);
-  const fs::path temporary = temporary_name(target_);
-  if (!fs::create_directory(temporary, error)) throw OutputError(target, error.message());
+  fs::path temporary = temporary_name(target_);
+  if (!fs::create_directory(temporary, error) && fs::is_directory(target_)) {
+    // Only the target itself may be writable (a mounted folder).
+    remove_left_behind(target_ / target_.filename());
+    temporary = target_ / temporary.filename();
+    fs::create_directory(temporary, error);
+  }
+  if (error) throw OutputError(target, error.message());
   temporary_ = temporary;
 }
 
@@ -162,13 +168,15 @@ void OutputFolder::commit(const fs::path& last) {
     temporary_.clear();
     return;
   }
-  const auto move = [&](const fs::path& file) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(temporary_))
+    if (!entry.is_directory()) files.push_back(fs::relative(entry.path(), temporary_));
+  std::ranges::stable_partition(files, [&](const fs::path& file) { return file != last; });
+  for (const fs::path& file : files) {
+    make_folder((target_ / file).parent_path());
     fs::rename(temporary_ / file, target_ / file, error);
     if (error) throw OutputError(target_ / file, error.message());
-  };
-  for (const fs::directory_entry& entry : fs::directory_iterator(temporary_))
-    if (entry.path().filename() != last) move(entry.path().filename());
-  move(last);
+  }
 }
 
 FolderIfFilled::FolderIfFilled(const fs::path& folder) : path_(folder) {

@@ -51,7 +51,8 @@ class OutputFolder {
   OutputFolder& operator=(const OutputFolder&) = delete;
 
   const std::filesystem::path& path() const { return temporary_; }  ///< where to write
-  /// A target that holds files keeps them and gets these beside them, each whole, `last` as the last one.
+  /// A target that holds files keeps them and gets these, also those in folders, beside them, each whole, `last` as the
+  /// last one.
   /// @throws OutputError if it cannot. Call once.
   void commit(const std::filesystem::path& last);
 

@@ -26,17 +26,20 @@ void PageFolder::section(const std::string& id, const std::string& heading, cons
   page_.sections.push_back(std::move(section));
 }
 
-void PageFolder::write_index() const { write_file(folder_.path() / "index.html", render_page(page_)); }
+void PageFolder::write_index() {
+  write_file(folder_.path() / "index.html", render_page(page_));
+  folder_.commit("index.html");
+}
 
 void PageFolder::finish(Answer& answer) const {
-  const std::string index = (folder_.path() / "index.html").string();
+  const std::string index = (made_.path() / "index.html").string();
   answer.say("{}", index);
   answer.file(index);
   for (const PageSection& section : page_.sections) {
     for (const PageFigure& figure : section.figures)
-      answer.file((folder_.path() / "figures" / (figure.id + ".svg")).string());
+      answer.file((made_.path() / "figures" / (figure.id + ".svg")).string());
     for (const PageTable& table : section.tables) {
-      for (const PageLink& link : table.files) answer.file((folder_.path() / link.href).string());
+      for (const PageLink& link : table.files) answer.file((made_.path() / link.href).string());
       answer.table(table.table);
     }
   }

@@ -56,6 +56,23 @@ TEST_F(DescribeCommandTest, AFolderWithEverythingTheSameTwice) {
   }
 }
 
+// A figure without a point could not be drawn, and half of the folder was left.
+TEST_F(DescribeCommandTest, TrialsOfOneCollision) {
+  SimulateRequest request;
+  request.setting = analysis::stand_in_setting();
+  request.trials = 3;
+  request.collisions = 1;
+  fs::remove_all(folder_ / "in");
+  request.out = path("in");
+  printed([&] { run_simulate(request); });
+  DescribeRequest described;
+  described.folder = path("in");
+  described.out = path("out");
+  printed([&] { run_describe(described); });
+  EXPECT_TRUE(fs::exists(folder_ / "out/index.html"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/tables/conditions.csv"));
+}
+
 TEST_F(DescribeCommandTest, BadFolder) {
   fs::remove(folder_ / "in/collisions.csv");
   EXPECT_THROW(run(""), analysis::InputError);

@@ -2,11 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <exception>
+#include <filesystem>
+#include <iterator>
 #include <regex>
 #include <set>
 #include <string>
 
 #include "reports/output/figure.h"
+#include "reports/output/page_folder.h"
+#include "tests/reports/support.h"
 
 namespace metastable::reports {
 namespace {
@@ -60,6 +65,34 @@ TEST(Page, RefusesWhatIsNoSvg) {
   Page page = sample_page();
   page.sections[0].figures[0].svg = "gnuplot: error";
   EXPECT_THROW(render_page(page), std::invalid_argument);
+}
+
+class PageFolderTest : public test::InFolder {
+ protected:
+  Figure figure_{.id = "a", .title = "", .x = {"x"}, .y = {"y"}, .series = {{.x = {0, 1}, .y = {0, 1}}}};
+  Figure empty_{.id = "b", .title = "", .x = {"x"}, .y = {"y"}, .series = {{.x = {0, 1}, .y = {0}}}};
+  Table table_{.id = "t", .title = "Numbers", .columns = {{"x"}}, .rows = {{1}}};
+};
+
+// A figure that could not be drawn left the tables before it behind.
+TEST_F(PageFolderTest, IsWholeOrNotThere) {
+  const std::filesystem::path target = folder_ / "deep" / "out";
+  EXPECT_THROW(
+      {
+        PageFolder pages(target);
+        pages.section("one", "One", "Read.", {figure_}, {table_});
+        pages.section("two", "Two", "Read.", {empty_}, {});
+      },
+      std::exception);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+  for (int again = 0; again < 2; ++again) {
+    PageFolder pages(target);
+    pages.section("one", "One", "Read.", {figure_}, {table_});
+    pages.write_index();
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(target.parent_path()), {}), 1);
+    for (const char* file : {"index.html", "tables/t.csv", "figures/a.svg"})
+      EXPECT_TRUE(std::filesystem::exists(target / file)) << file;
+  }
 }
 
 }  // namespace
