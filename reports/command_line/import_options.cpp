@@ -17,7 +17,7 @@ namespace metastable::reports {
 namespace {
 
 constexpr const char* details = R"(What it needs
-  FILE: a CSV with a header, long (a row a collision) or wide (a row a trial), or a MAT file (version 5, or 7.3).
+  FILE: a CSV with a header, long (a row a collision) or wide (a row a trial), or a MAT file (versions 4 to 7.3).
   --columns WHAT=NAME or WHAT=NAME[UNIT], with commas between. WHAT is one of
     trial        its number in the order the trials were run (or a name, with --number-trials)
     collision    its number within the trial (default: counted in the order of the rows)
@@ -26,10 +26,12 @@ constexpr const char* details = R"(What it needs
     leg          the leg that lands            time      in s, ms, us or min
     position     of the foot, in m, cm or mm   condition, outcome
     angle        instead of speeds: the wheel's angle over time, in rad, deg or rev ('metastable collisions' goes on)
-  A unit may end the name (omega_deg_s, 'omega [deg/s]'); where it is told nowhere the column is refused.
+  A unit may end the name (omega_deg_s, 'omega [deg/s]') or stand in a row of its own behind the header; where it is
+  told nowhere the column is refused. A time may be counted in frames: time=frame[1/120 s].
   Columns named as in an experiment folder (trial, omega_minus_rad_s, ...) need no entry.
+  Separator, decimal commas, lines before the header and a row of units are found where they are plain, and said.
   Wide: a * stands for the collision's number: omega_minus=w_*[deg/s]. A trial ends at the row's last value.
-  MAT: struct arrays (omega_minus=trials.w[deg/s]), cell arrays, matrices padded with NaN (with --trials-in), or
+  MAT: struct arrays (omega_minus=trials.w[deg/s], or lab.trials.w of a struct in a struct), cell arrays, matrices padded with NaN (with --trials-in), or
   vectors with one that tells the trials.
   What data cannot tell: --description with an experiment.toml, or --slope (or --conditions), --legs, --mass,
   --ramp-length, --law and, unless the law is plastic, --restitution and --friction.
@@ -44,7 +46,10 @@ constexpr const char* stated[] = {"legs", "mass", "ramp-length", "law", "restitu
 void declare_import(Options& o) {
   o.add_place("FILE", "CSV or MAT file");
   o.add("columns", "WHAT=NAME,...", "", "Which column or variable tells what, see below");
-  o.add("separator", "','|';'|tab", ",", "Between the fields of a CSV");
+  o.add("separator", "','|';'|tab", "", "Between the fields of a CSV (default: found)");
+  o.add("decimal", "point|comma", "", "Before the decimals of a CSV's numbers (default: found)");
+  o.add("skip-rows", "N", "", "Lines of a CSV before its header, 0..1000000 (default: found)");
+  o.add_flag("units-row", "A row of units follows the CSV's header (default: found)");
   o.add("trials-in", "columns|rows", "", "Of a matrix in a MAT file: each column, or each row, is a trial");
   o.add("collisions-from", "0|1", "1", "What the file calls the first collision");
   o.add("legs-from", "0|1", "0", "What the file calls the first leg");
@@ -124,7 +129,13 @@ void import_as_asked(const Options& o, const std::string& line) {
   request.json = o.text("json");
   request.command = line;
   request.columns = column_requests(o.text("columns"));
-  request.separator = separator_value(o.text("separator"));
+  if (o.given("separator")) request.form.separator = separator_value(o.text("separator"));
+  if (o.given("decimal")) {
+    analysis::require_word("--decimal", o.text("decimal"), {"point", "comma"});
+    request.form.decimal = o.text("decimal") == "comma" ? ',' : '.';
+  }
+  if (o.given("skip-rows")) request.form.skip_rows = static_cast<std::size_t>(o.count("skip-rows", 0, 1000000));
+  request.form.units_row = o.flag("units-row");
   const std::string lie = o.text("trials-in");
   request.orientation = lie.empty() ? TrialsIn::not_told : lie == "columns" ? TrialsIn::columns : TrialsIn::rows;
   request.number_trials = o.flag("number-trials");

@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "reports/import/mat_rows.h"
+#include "reports/import/mat_file.h"
 #include "reports/output/answer.h"
 #include "reports/output/version.h"
 

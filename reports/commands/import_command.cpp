@@ -14,6 +14,7 @@
 #include "reports/commands/experiment_output.h"
 #include "reports/import/csv_rows.h"
 #include "reports/import/imported_experiment.h"
+#include "reports/import/mat_file.h"
 #include "reports/output/input_file.h"
 #include "reports/output/standard_output.h"
 #include "reports/output/table.h"
@@ -27,6 +28,7 @@ struct ForeignFile {
   std::vector<ImportedRow> rows;
   std::vector<MappedColumn> map;
   std::vector<std::string> names;
+  std::vector<std::string> found = {};  // of its layout, a sentence each
 };
 
 ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
@@ -34,18 +36,22 @@ ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
     throw std::invalid_argument("--trials-in: has a meaning for matrices of a MAT file only");
   ForeignFile file;
   analysis::Defects defects;
-  file.names = analysis::CsvReader::names(text, request.separator);
-  if (file.names.size() == 1)
-    for (const auto& [separator, name] : {std::pair(';', "';'"), std::pair('\t', "tab"), std::pair(',', "','")})
-      if (separator != request.separator && file.names.front().find(separator) != std::string::npos)
-        throw std::invalid_argument(
-            fmt::format("{}:1: one column, which holds a {}; say --separator {}", request.file, name, name));
+  auto [form, found] = csv_form(text, request.form, [&](const std::vector<std::string>& names) {
+    try {
+      const std::vector<MappedColumn> map = map_columns(request.columns, names, request.file, request.collisions_from);
+      return column_of(map, Role::omega_minus) != nullptr || column_of(map, Role::angle) != nullptr;
+    } catch (const std::invalid_argument&) {
+      return false;
+    }
+  });
+  file.found = std::move(found);
+  file.names = analysis::CsvReader::names(text, form);
   if (!file.names.empty()) file.map = map_columns(request.columns, file.names, request.file, request.collisions_from);
   if (!file.names.empty() && column_of(file.map, Role::omega_minus) == nullptr &&
       column_of(file.map, Role::angle) == nullptr)
     throw std::invalid_argument(fmt::format("--columns: which column of {} is omega_minus (or angle)? It has {}",
                                             request.file, fmt::join(file.names, ", ")));
-  file.rows = csv_rows(request.file, text, request.separator, file.map, request.collisions_from, defects);
+  file.rows = csv_rows(request.file, text, form, file.map, request.collisions_from, defects);
   defects.check();
   return file;
 }
@@ -53,8 +59,11 @@ ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
 ForeignFile read_foreign(const ImportRequest& request) {
   const std::string text = read_file(request.file);
   if (!is_mat_file(text)) return read_csv(request, text);
-  MatRows read = mat_rows(request.file, request.columns, request.orientation, request.collisions_from);
-  return {std::move(read.rows), std::move(read.map), std::move(read.names)};
+  if (request.form.separator || request.form.decimal || request.form.skip_rows || request.form.units_row)
+    throw std::invalid_argument(
+        fmt::format("{}: is a MAT file; --separator, --decimal, --skip-rows and --units-row are for a CSV", request.file));
+  MatRows read = mat_rows(request.file, text, request.columns, request.orientation, request.collisions_from);
+  return {std::move(read.rows), std::move(read.map), std::move(read.names), std::move(read.found)};
 }
 
 // What of the map tells of angles is not told of collisions, and the other way round.
@@ -127,6 +136,7 @@ std::string import_json(const ImportRequest& request, const ForeignFile& file, c
   for (const MappedColumn& column : file.map)
     json["columns"][std::string(role_name(column.role))] = {{"name", column.name}, {"unit", column.unit}};
   json["unused"] = unused(file);
+  json["found"] = file.found;
   json["assumed"] = imported.assumed;
   json["notes"] = imported.experiment.notes;
   json["provenance"] = provenance_lines(provenance);
@@ -142,6 +152,7 @@ void print_import(const ImportRequest& request, const ForeignFile& file, const I
   for (const MappedColumn& column : file.map)
     say("  {:<12} {}{}\n", role_name(column.role), column.name,
         column.unit.empty() ? "" : fmt::format(" in {}", column.unit));
+  for (const std::string& sentence : file.found) say("found: {}\n", sentence);
   for (const std::string& sentence : imported.assumed) say("assumed: {}\n", sentence);
   if (const std::vector<std::string> names = unused(file); !names.empty())
     say("not used: {}\n", fmt::join(names, ", "));

@@ -9,6 +9,7 @@
 
 #include "analysis/study/setting.h"
 #include "reports/import/column_map.h"
+#include "reports/import/csv_form.h"
 #include "reports/import/mat_rows.h"
 
 namespace metastable::reports {
@@ -19,7 +20,7 @@ struct ImportRequest {
   std::string json;  ///< file, "-" for standard output, "" for none
   std::string command;
   std::vector<RequestedColumn> columns;
-  char separator = ',';
+  AskedForm form = {};  ///< of a CSV
   TrialsIn orientation = TrialsIn::not_told;
   bool number_trials = false;
   int collisions_from = 1, legs_from = 0;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -56,12 +57,22 @@ std::string known(std::span<const std::string> names) {
                      names.size() > most ? ", ..." : "");
 }
 
+// Writes "deg" for a degree sign.
+std::string with_deg(std::string_view text) {
+  std::string spelled(text);
+  for (std::size_t at; (at = spelled.find("\xC2\xB0")) != std::string::npos;) spelled.replace(at, 2, "deg");
+  return spelled;
+}
+
 // Returns the unit that a name ends with.
 const Unit* unit_of(std::string_view name, std::span<const Unit> units) {
   if (const std::size_t star = name.rfind('*'); star != std::string_view::npos && star + 1 == name.size()) {
     name.remove_suffix(1);
     if (name.ends_with('_')) name.remove_suffix(1);
   }
+  const std::string spelled = with_deg(name);
+  const std::string_view all = spelled;
+  name = all;
   const auto ends = [&](const Unit& unit) {
     return name.ends_with(fmt::format("[{}]", unit.name)) || name.ends_with(fmt::format("({})", unit.name)) ||
            name.ends_with(fmt::format("_{}", unit.ending));
@@ -113,6 +124,23 @@ std::vector<std::size_t> numbered_columns(std::string_view pattern, std::span<co
   return columns;
 }
 
+// Reads "1/120 s", the time of a frame, as 120; 0: it is none.
+double frame_rate(std::string_view unit) {
+  double rate = 0;
+  if (!unit.starts_with("1/") || !unit.ends_with(" s")) return 0;
+  const auto [end, error] = std::from_chars(unit.data() + 2, unit.data() + unit.size() - 2, rate);
+  return error == std::errc() && end == unit.data() + unit.size() - 2 && rate > 0 && std::isfinite(rate) ? rate : 0;
+}
+
+// Returns the column of that name, or those that it numbers.
+std::vector<std::size_t> columns_called(const std::string& name, std::span<const std::string> names,
+                                        int first_collision) {
+  if (name.find('*') != std::string::npos) return numbered_columns(name, names, first_collision);
+  const auto at = std::ranges::find(names, name);
+  if (at == names.end()) return {};
+  return {static_cast<std::size_t>(at - names.begin())};
+}
+
 MappedColumn found_column(const RequestedColumn& request, std::span<const std::string> names, const std::string& file,
                           int first_collision) {
   const RoleInfo& role = info(request.role);
@@ -126,10 +154,18 @@ MappedColumn found_column(const RequestedColumn& request, std::span<const std::s
       unit = parts.unit;
     }
     column.numbered = column.name.find('*') != std::string::npos;
-    if (column.numbered)
-      column.columns = numbered_columns(column.name, names, first_collision);
-    else if (const auto at = std::ranges::find(names, column.name); at != names.end())
-      column.columns = {static_cast<std::size_t>(at - names.begin())};
+    column.columns = columns_called(column.name, names, first_collision);
+  }
+  std::string in_file = column.columns.empty() || column.numbered ? column.name : names[column.columns.front()];
+  if (column.columns.empty()) {
+    // Names may have their unit behind them, which the request leaves out or tells apart.
+    std::vector<std::string> bare;
+    for (const std::string& name : names) bare.emplace_back(split_unit(name).name);
+    column.columns = columns_called(column.name, bare, first_collision);
+    if (!column.columns.empty()) in_file = names[column.columns.front()];
+    for (const std::size_t i : column.columns)
+      if (split_unit(names[i]).unit != split_unit(in_file).unit)
+        throw std::invalid_argument(fmt::format("--columns: {}: '{}' and '{}' have two units", role.name, in_file, names[i]));
   }
   if (column.columns.empty())
     throw std::invalid_argument(
@@ -140,7 +176,12 @@ MappedColumn found_column(const RequestedColumn& request, std::span<const std::s
     if (!unit.empty()) throw std::invalid_argument(fmt::format("--columns: {}: has no unit", role.name));
     return column;
   }
-  const Unit* chosen = unit_of(column.name, role.units);
+  const Unit* chosen = unit_of(in_file, role.units);
+  if (const double rate = frame_rate(unit); rate > 0 && role.role == Role::time) {
+    column.unit = unit;
+    column.scale = 1 / rate;
+    return column;
+  }
   if (!unit.empty()) {
     const auto named = std::ranges::find(role.units, unit, &Unit::name);
     if (named == role.units.end())
@@ -148,7 +189,7 @@ MappedColumn found_column(const RequestedColumn& request, std::span<const std::s
           fmt::format("--columns: {}: '{}' is none of the units {}", role.name, unit, fmt::join(of_role, ", ")));
     if (chosen != nullptr && chosen != &*named)
       throw std::invalid_argument(
-          fmt::format("--columns: {}: the name '{}' says {}, not {}", role.name, column.name, chosen->name, unit));
+          fmt::format("--columns: {}: the name '{}' says {}, not {}", role.name, in_file, chosen->name, unit));
     chosen = &*named;
   }
   if (chosen == nullptr)
@@ -202,6 +243,15 @@ std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& reques
     take(found_column({role.role, *at}, names, file, first_collision));
   }
   return map;
+}
+
+bool is_unit(std::string_view text) {
+  while (text.starts_with(' ') || text.starts_with('[') || text.starts_with('(')) text.remove_prefix(1);
+  while (text.ends_with(' ') || text.ends_with(']') || text.ends_with(')')) text.remove_suffix(1);
+  const std::string spelled = with_deg(text);
+  return std::ranges::any_of(roles, [&](const RoleInfo& role) {
+    return std::ranges::find(role.units, std::string_view(spelled), &Unit::name) != role.units.end();
+  });
 }
 
 const MappedColumn* column_of(const std::vector<MappedColumn>& map, Role role) {

@@ -36,12 +36,16 @@ struct MappedColumn {
 };
 
 /// Finds what was requested among the names of a file, and beside it what bears the names of an experiment folder
-/// (trial, omega_minus_rad_s, ...). A unit stands in the request, or ends the name: omega_deg_s, "omega [deg/s]".
+/// (trial, omega_minus_rad_s, ...). A unit stands in the request, or ends the name: omega_deg_s, "omega [deg/s]", which
+/// may be requested without it. Times may be in frames: frame[1/120 s].
 /// @param first_collision  number that * stands for at first, 0 or 1
 /// @throws std::invalid_argument for a name that is not there, a unit that is not told or of another kind, a role or a
 ///         column asked for twice, numbers behind * that skip or repeat
 std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& requests, std::span<const std::string> names,
                                       const std::string& file, int first_collision);
+
+/// Says whether a text is one of the units, as it is or in brackets ("deg/s", "[m]").
+bool is_unit(std::string_view text);
 
 /// Returns what tells the role, or nullptr.
 const MappedColumn* column_of(const std::vector<MappedColumn>& map, Role role);

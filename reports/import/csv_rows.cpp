@@ -4,8 +4,6 @@
 
 #include <stdexcept>
 
-#include "analysis/experiment/csv_reader.h"
-
 namespace metastable::reports {
 namespace {
 
@@ -67,18 +65,20 @@ class CsvRows {
 
 }  // namespace
 
-std::vector<ImportedRow> csv_rows(const std::string& file, std::string_view text, char separator,
+std::vector<ImportedRow> csv_rows(const std::string& file, std::string_view text, const analysis::CsvForm& form,
                                   const std::vector<MappedColumn>& map, int first_collision,
                                   analysis::Defects& defects) {
-  const std::vector<std::string> names = analysis::CsvReader::names(text, separator);
+  const std::vector<std::string> names = analysis::CsvReader::names(text, form);
   const std::vector<analysis::CsvColumn> columns = [&] {
     std::vector<analysis::CsvColumn> all;
     for (const std::string& name : names) all.push_back({name});
     return all;
   }();
-  analysis::CsvReader csv(file, text, columns, defects, separator);
   const MappedColumn* speed = column_of(map, Role::omega_minus);
   const bool wide = speed != nullptr && speed->numbered;
+  analysis::CsvForm lenient = form;
+  lenient.ragged = wide;  // a trial ends where its row does
+  analysis::CsvReader csv(file, text, columns, defects, lenient);
   for (const MappedColumn& column : map) {
     if (column.numbered && !wide)
       throw std::invalid_argument(

@@ -171,6 +171,10 @@ Imported imported_experiment(const std::string& file, std::vector<ImportedRow> r
   if (rows.empty()) defects.add(file, {}, "holds no row");
   defects.check();
   Imported imported;
+  if (angles && std::ranges::none_of(rows, [](const ImportedRow& row) { return row.trial.has_value(); })) {
+    for (ImportedRow& row : rows) row.trial = "1";
+    imported.assumed.push_back("all frames are of one trial");
+  }
   const std::vector<long> numbers = trial_numbers(rows, options.number_trials, defects);
   defects.check();
   if (options.number_trials)

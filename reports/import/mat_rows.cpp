@@ -3,137 +3,17 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <stdexcept>
-
-#ifdef METASTABLE_MATIO
-#include <matio.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <memory>
 #include <optional>
+#include <stdexcept>
+#include <utility>
 
 #include "analysis/experiment/input_error.h"
-#include "reports/import/mat_whole.h"
-#include "reports/output/input_file.h"
-#endif
+#include "reports/import/mat_file.h"
 
 namespace metastable::reports {
-
-bool is_mat_file(std::string_view text) {
-  return text.starts_with("MATLAB 5.0 MAT-file") || text.starts_with("MATLAB 7.3 MAT-file");
-}
-
-#ifndef METASTABLE_MATIO
-
-std::string mat_library() { return ""; }
-
-MatRows mat_rows(const std::string& file, const std::vector<RequestedColumn>&, TrialsIn, int) {
-  throw std::invalid_argument(fmt::format(
-      "{}: this metastable was built without libmatio, which reads MAT files: install libmatio-dev and build again "
-      "(./run install), or save a CSV (writetable, writematrix)",
-      file));
-}
-
-#else
-
-std::string mat_library() {
-  int major = 0, minor = 0, release = 0;
-  Mat_GetLibraryVersion(&major, &minor, &release);
-  return fmt::format("libmatio {}.{}.{}", major, minor, release);
-}
-
 namespace {
-
-constexpr const char* nothing_there =
-    "is empty, or compressed in a way that libmatio does not read (save('-v6', ...) does without)";
-
-struct MatClose {
-  void operator()(mat_t* file) const { Mat_Close(file); }
-  void operator()(matvar_t* variable) const { Mat_VarFree(variable); }
-};
-using Variable = std::unique_ptr<matvar_t, MatClose>;
-
-std::size_t elements(const matvar_t& v) {
-  std::size_t count = 1;
-  for (int d = 0; d < v.rank; ++d) count *= v.dims[d];
-  return count;
-}
-
-template <typename T>
-std::vector<double> as_doubles(const matvar_t& v) {
-  const T* const data = static_cast<const T*>(v.data);
-  if (data == nullptr) return {};
-  return {data, data + elements(v)};
-}
-
-// Returns the numbers in the order of MATLAB's linear index; nothing where they are none.
-std::optional<std::vector<double> > numbers_of(const matvar_t& v) {
-  if (v.isComplex) return std::nullopt;
-  switch (v.class_type) {
-    case MAT_C_EMPTY:
-      return std::vector<double>();
-    case MAT_C_DOUBLE:
-      return as_doubles<double>(v);
-    case MAT_C_SINGLE:
-      return as_doubles<float>(v);
-    case MAT_C_INT8:
-      return as_doubles<std::int8_t>(v);
-    case MAT_C_UINT8:
-      return as_doubles<std::uint8_t>(v);
-    case MAT_C_INT16:
-      return as_doubles<std::int16_t>(v);
-    case MAT_C_UINT16:
-      return as_doubles<std::uint16_t>(v);
-    case MAT_C_INT32:
-      return as_doubles<std::int32_t>(v);
-    case MAT_C_UINT32:
-      return as_doubles<std::uint32_t>(v);
-    case MAT_C_INT64:
-      return as_doubles<std::int64_t>(v);
-    case MAT_C_UINT64:
-      return as_doubles<std::uint64_t>(v);
-    default:
-      return std::nullopt;
-  }
-}
-
-// Returns a text of one row; nothing where it is none.
-std::optional<std::string> text_of(const matvar_t& v) {
-  if (v.class_type != MAT_C_CHAR || v.rank != 2 || v.dims[0] > 1) return std::nullopt;
-  std::string text;
-  for (std::size_t i = 0; v.data != nullptr && i < elements(v); ++i)
-    text += v.data_size == 2 ? static_cast<char>(static_cast<const std::uint16_t*>(v.data)[i])
-                             : static_cast<const char*>(v.data)[i];
-  return text;
-}
-
-std::string shape(const matvar_t& v) {
-  std::string text;
-  for (int d = 0; d < v.rank; ++d) text += fmt::format("{}{}", d > 0 ? " x " : "", v.dims[d]);
-  return text;
-}
-
-std::string kind(const matvar_t& v) {
-  switch (v.class_type) {
-    case MAT_C_CELL:
-      return "a cell array";
-    case MAT_C_STRUCT:
-      return "a struct";
-    case MAT_C_CHAR:
-      return "a text";
-    case MAT_C_SPARSE:
-      return "a sparse matrix";
-    case MAT_C_OBJECT:
-    case MAT_C_OPAQUE:
-      return "an object (a table, a timetable, a string): save its columns as arrays, e.g. omega = T.omega";
-    case MAT_C_FUNCTION:
-      return "a function";
-    default:
-      return v.isComplex ? "complex" : "numeric";
-  }
-}
 
 // Is one array of numbers or one text, with the name that MATLAB would give it.
 struct Piece {
@@ -151,20 +31,8 @@ struct Found {
 
 class MatFile {
  public:
-  explicit MatFile(const std::string& path) : path_(path) {
-    const std::unique_ptr<mat_t, MatClose> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
-    if (!file) throw std::invalid_argument(fmt::format("{}: cannot be read as a MAT file", path));
-    while (matvar_t* const read = Mat_VarReadNext(file.get())) {
-      Variable variable(read);
-      if (variable->name != nullptr) variables_.push_back(std::move(variable));
-    }
-    for (const Variable& v : variables_) {
-      names_.emplace_back(v->name);
-      if (v->class_type != MAT_C_STRUCT) continue;
-      char* const* const fields = Mat_VarGetStructFieldnames(v.get());
-      for (unsigned f = 0; f < Mat_VarGetNumberOfFields(v.get()); ++f)
-        names_.push_back(fmt::format("{}.{}", v->name, fields[f]));
-    }
+  MatFile(const std::string& path, std::vector<MatValue> variables) : path_(path), variables_(std::move(variables)) {
+    for (const MatValue& v : variables_) name(v.name, v);
   }
 
   const std::vector<std::string>& names() const { return names_; }
@@ -174,25 +42,9 @@ class MatFile {
   Found at(const std::string& path) const {
     const std::size_t dot = path.find('.');
     const std::string name = path.substr(0, dot);
-    const auto variable = std::ranges::find_if(variables_, [&](const Variable& v) { return v->name == name; });
-    matvar_t* const v = variable->get();
     Found found;
-    if (dot == std::string::npos) {
-      add(found, path, *v);
-      return found;
-    }
-    const std::string field = path.substr(dot + 1);
-    const std::size_t count = elements(*v);
-    found.each = count != 1;
-    for (std::size_t i = 0; i < count; ++i) {
-      matvar_t* const value = Mat_VarGetStructFieldByName(v, field.c_str(), i);
-      const std::string place = count == 1 ? path : fmt::format("{}({}).{}", name, i + 1, field);
-      if (value == nullptr) refuse(place, nothing_there);
-      if (count == 1)
-        add(found, place, *value);
-      else
-        found.pieces.push_back(piece(place, *value));
-    }
+    follow(found, name, *std::ranges::find(variables_, name, &MatValue::name),
+           dot == std::string::npos ? "" : path.substr(dot + 1));
     return found;
   }
 
@@ -201,31 +53,72 @@ class MatFile {
   }
 
  private:
-  Piece piece(const std::string& place, const matvar_t& v) const {
-    Piece piece{.place = place, .numbers = {}, .text = text_of(v)};
-    if (const auto numbers = numbers_of(v))
-      piece.numbers = *numbers;
-    else if (!piece.text)
-      refuse(place, fmt::format("is {} ({}), where numbers or a text are expected", kind(v), shape(v)));
-    if (v.rank > 2) refuse(place, fmt::format("has {} dimensions ({})", v.rank, shape(v)));
-    piece.rows = v.rank > 0 ? v.dims[0] : 0;
-    piece.columns = v.rank > 1 ? v.dims[1] : 0;
-    return piece;
-  }
-
-  void add(Found& found, const std::string& place, matvar_t& v) const {
-    if (v.class_type != MAT_C_CELL) return found.pieces.push_back(piece(place, v));
-    found.each = true;
-    for (std::size_t i = 0; i < elements(v); ++i) {
-      const matvar_t* const cell = Mat_VarGetCell(&v, static_cast<int>(i));
-      const std::string at = fmt::format("{}{{{}}}", place, i + 1);
-      if (cell == nullptr) refuse(at, nothing_there);
-      found.pieces.push_back(piece(at, *cell));
+  // Names a variable or field, and its fields; those of a struct array's elements by its first.
+  void name(const std::string& path, const MatValue& v) {
+    names_.push_back(path);
+    for (std::size_t f = 0; f < v.fields.size(); ++f) {
+      const MatValue* const first = v.parts.empty() ? nullptr : &v.parts[f];
+      if (first != nullptr)
+        name(path + "." + v.fields[f], *first);
+      else
+        names_.push_back(path + "." + v.fields[f]);
     }
   }
 
-  std::string path_;
-  std::vector<Variable> variables_;
+  void follow(Found& found, const std::string& place, const MatValue& v, const std::string& rest) const {
+    if (rest.empty()) {
+      if (v.kind == MatValue::Kind::cells && found.pieces.empty()) {
+        found.each = true;
+        for (std::size_t i = 0; i < v.parts.size(); ++i)
+          found.pieces.push_back(piece(fmt::format("{}{{{}}}", place, i + 1), v.parts[i]));
+      } else {
+        found.pieces.push_back(piece(place, v));
+      }
+      return;
+    }
+    const std::size_t dot = rest.find('.');
+    const std::string field = rest.substr(0, dot), behind = dot == std::string::npos ? "" : rest.substr(dot + 1);
+    const auto at = std::ranges::find(v.fields, field);
+    if (at == v.fields.end()) refuse(place, fmt::format("has no field '{}'", field));
+    const std::size_t f = static_cast<std::size_t>(at - v.fields.begin()),
+                      count = v.parts.size() / v.fields.size();
+    if (count == 1) return follow(found, place + "." + field, v.parts[f], behind);
+    if (found.each) refuse(place, fmt::format("is a struct array ({}) in a struct array", v.shape()));
+    found.each = true;
+    for (std::size_t e = 0; e < count; ++e)
+      follow(found, fmt::format("{}({}).{}", place, e + 1, field), v.parts[e * v.fields.size() + f], behind);
+  }
+
+  Piece piece(const std::string& place, const MatValue& v) const {
+    Piece piece{.place = place, .numbers = v.numbers, .text = {}};
+    switch (v.kind) {
+      case MatValue::Kind::numbers:
+        break;
+      case MatValue::Kind::text:
+        piece.text = v.text;
+        break;
+      case MatValue::Kind::cells:
+        refuse(place, fmt::format("is a cell array ({}), where numbers or a text are expected", v.shape()));
+      case MatValue::Kind::structure:
+        refuse(place, fmt::format("is a struct ({}) with the fields {}; name one of them", v.shape(),
+                                  fmt::join(v.fields, ", ")));
+      case MatValue::Kind::other:
+        refuse(place, fmt::format("is {}{}", v.what,
+                                  v.dims.empty() ? "" : fmt::format(" ({}), where numbers or a text are expected",
+                                                                    v.shape())));
+    }
+    if (v.dims.size() > 2) refuse(place, fmt::format("has {} dimensions ({})", v.dims.size(), v.shape()));
+    piece.rows = v.dims.empty() ? 0 : v.dims[0];
+    piece.columns = v.dims.size() > 1 ? v.dims[1] : 0;
+    if (!piece.text && piece.numbers.size() != piece.rows * piece.columns)
+      refuse(place, fmt::format("has {} numbers where its size ({}) asks for more: it is damaged, or compressed in a way "
+                                "that is not read (save('-v6', ...) does without)",
+                                piece.numbers.size(), v.shape()));
+    return piece;
+  }
+
+  const std::string& path_;
+  std::vector<MatValue> variables_;
   std::vector<std::string> names_;
 };
 
@@ -284,7 +177,8 @@ bool is_vector(const Piece& piece) { return piece.rows <= 1 || piece.columns <= 
 
 class MatTrials {
  public:
-  MatTrials(const MatFile& file, const std::vector<MappedColumn>& map, TrialsIn orientation) : file_(file) {
+  MatTrials(const MatFile& file, const std::vector<MappedColumn>& map, TrialsIn orientation, bool hdf5)
+      : file_(file) {
     const Told* trial = nullptr;
     for (const MappedColumn& column : map) {
       Told& told = told_.emplace_back(Told{column, file.at(column.name)});
@@ -309,7 +203,17 @@ class MatTrials {
         file.refuse(main_->column.name,
                     fmt::format("is {} x {}: say --trials-in columns or --trials-in rows{}", first.rows, first.columns,
                                 is_vector(first) ? ", or map trial to a vector of as many" : ""));
-      shape_ = orientation == TrialsIn::columns ? Shape::columns : Shape::rows;
+      bool in_columns = orientation == TrialsIn::columns;
+      if (hdf5 && !is_vector(first)) {
+        const bool turned = !padded(first, in_columns) && padded(first, !in_columns);
+        in_columns = in_columns != turned;
+        found_.push_back(fmt::format("{} is {} x {} as MATLAB has it, and {} x {} as HDF5 stores it; each of MATLAB's {} "
+                                     "is taken for a trial{}",
+                                     main_->column.name, first.rows, first.columns, first.columns, first.rows,
+                                     in_columns ? "columns" : "rows",
+                                     turned ? ", for they are padded at their ends and the others are not" : ""));
+      }
+      shape_ = in_columns ? Shape::columns : Shape::rows;
       trials_ = shape_ == Shape::columns ? first.columns : first.rows;
     }
   }
@@ -321,8 +225,20 @@ class MatTrials {
     return rows;
   }
 
+  const std::vector<std::string>& found() const { return found_; }
+
  private:
   enum class Shape { each, columns, rows, vectors };
+
+  // Says whether no number follows a NaN in any column, or row.
+  static bool padded(const Piece& piece, bool columns) {
+    for (std::size_t i = 0; i < piece.rows; ++i)
+      for (std::size_t k = 0; k < piece.columns; ++k)
+        if ((columns ? i : k) > 0 && !std::isnan(piece.numbers[i + k * piece.rows]) &&
+            std::isnan(piece.numbers[columns ? i - 1 + k * piece.rows : i + (k - 1) * piece.rows]))
+          return false;
+    return true;
+  }
 
   // Returns one trial's numbers. @param length  of the main role's, padding included; 0 while that is not known
   Series series(const Told& told, std::size_t trial, std::size_t length) const {
@@ -410,22 +326,22 @@ class MatTrials {
   const Told* main_ = nullptr;
   Shape shape_ = Shape::each;
   std::size_t trials_ = 0;  // not of vectors
+  std::vector<std::string> found_;
 };
 
 }  // namespace
 
-MatRows mat_rows(const std::string& path, const std::vector<RequestedColumn>& requests, TrialsIn orientation,
-                 int first_collision) {
-  check_mat_whole(path, read_file(path));
-  const MatFile file(path);
-  MatRows read{.rows = {}, .map = map_columns(requests, file.names(), path, first_collision), .names = file.names()};
+MatRows mat_rows(const std::string& path, std::string_view text, const std::vector<RequestedColumn>& requests,
+                 TrialsIn orientation, int first_collision) {
+  const MatFile file(path, mat_variables(path, text));
+  MatRows read{.rows = {}, .map = map_columns(requests, file.names(), path, first_collision), .names = file.names(), .found = {}};
   for (const MappedColumn& column : read.map)
     if (column.numbered)
       throw std::invalid_argument(fmt::format("--columns: {}: a * is for columns of a CSV", role_name(column.role)));
-  read.rows = MatTrials(file, read.map, orientation).rows();
+  const MatTrials trials(file, read.map, orientation, is_hdf5_file(text));
+  read.rows = trials.rows();
+  read.found = trials.found();
   return read;
 }
-
-#endif
 
 }  // namespace metastable::reports

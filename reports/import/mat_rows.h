@@ -1,5 +1,5 @@
 #pragma once
-// Reads rows of a MAT file (MATLAB): structs, cells, matrices or vectors. libmatio stays inside the .cpp.
+// Makes rows of the variables of a MAT file (MATLAB): structs, cells, matrices or vectors.
 
 #include <string>
 #include <string_view>
@@ -13,25 +13,23 @@ namespace metastable::reports {
 /// Says which way a matrix lies.
 enum class TrialsIn { not_told, columns, rows };
 
-/// Says what this build can do with MAT files: the library and its version, or "" where it was built without.
-std::string mat_library();
-
-/// Is this how a MAT file begins?
-bool is_mat_file(std::string_view text);
-
 struct MatRows {
   std::vector<ImportedRow> rows;
   std::vector<MappedColumn> map;
   std::vector<std::string> names;  ///< all variables, and fields as "trials.omega"
+  std::vector<std::string> found;  ///< of how a matrix lies, a sentence
 };
 
-/// Each trial may be an element of a struct array (trials.omega), a cell of a cell array, or a column (row) of a matrix
+/// Fields are named behind points, also those of structs in structs ("lab.trials.omega"). Each trial may be an element of a struct array (trials.omega), a cell of a cell array, or a column (row) of a matrix
 /// padded with NaN at its end; or all collisions stand in vectors, with one that tells their trials. What is told once
 /// a trial (trial, condition, outcome) is a vector or cell array of as many; a vector as long as a trial of a matrix is
 /// of all trials.
-/// @throws std::invalid_argument where this build is without the library, for a file that cannot be read, a variable
-///         that is not there or of another shape, naming it; analysis::InputError
-MatRows mat_rows(const std::string& file, const std::vector<RequestedColumn>& requests, TrialsIn orientation,
+/// Programs other than MATLAB write the dimensions of HDF5 as they come: where the padding shows that the trials lie the
+/// other way than told, they are taken so, and it is said.
+/// @param text  all of the file
+/// @throws std::invalid_argument as mat_variables(), and for a variable that is not there or of another shape, naming
+///         it; analysis::InputError
+MatRows mat_rows(const std::string& file, std::string_view text, const std::vector<RequestedColumn>& requests, TrialsIn orientation,
                  int first_collision);
 
 }  // namespace metastable::reports

@@ -16,6 +16,7 @@
 #include "tests/reports/program.h"
 #include "tests/reports/support.h"
 #ifdef METASTABLE_MATIO
+#include <hdf5.h>
 #include <matio.h>
 #endif
 
@@ -259,11 +260,67 @@ TEST_F(Import, NamesWhatIsMissingOrAmbiguous) {
   expect_refused(import({hole, "--columns", "omega_minus=w_*[rad/s]"}),
                  hole + ":2:3: w_1: no speed, although the trial goes on or other columns tell of this collision");
   const std::string semicolons = file("e.csv", "trial;w\n1;5\n");
-  expect_refused(import({semicolons, "--columns", "omega_minus=w[rad/s]"}),
+  expect_refused(import({semicolons, "--separator", ",", "--columns", "omega_minus=w[rad/s]"}),
                  semicolons + ":1: one column, which holds a ';'; say --separator ';'");
+  expect_refused(import({semicolons, "--columns", "omega_minus=speed[rad/s]"}),
+                 "--columns: " + semicolons + " has no 'speed' for omega_minus (it has trial, w)");
   expect_refused(import({csv, "--columns", "omega_minus=w[rad/s]", "--trials-in", "rows"}),
                  "--trials-in: has a meaning for matrices of a MAT file only");
   EXPECT_EQ(import({path("none.csv"), "--columns", "omega_minus=w[rad/s]"}).code, 2);
+}
+
+// A table as a German spreadsheet saves it, with lines before the header, a row of units, and rows that end early.
+TEST_F(Import, FindsTheLayoutAndSaysIt) {
+  forget_course();
+  for (MeasuredTrial& trial : known_.trials) {
+    trial.outcome.reset();
+    for (MeasuredCollision& c : trial.collisions) c.leg.reset(), c.omega_plus.reset();
+  }
+  std::string rows;
+  for (const MeasuredTrial& trial : known_.trials) {
+    rows += fmt::format("{};12.03.2024;\"{}\"", trial.number, known_.conditions[trial.condition].id);
+    for (const MeasuredCollision& c : trial.collisions) {
+      std::string speed = fmt::format("{}", c.omega_minus * 180 / std::numbers::pi);
+      std::ranges::replace(speed, '.', ',');
+      rows += ";" + speed;
+    }
+    rows += trial.number == 1 ? ";;\n" : "\n";
+  }
+  const std::string columns = "trial=Versuch,condition=Start,omega_minus=Omega *";
+  const std::string plain = "\xEF\xBB\xBFVersuch;Datum;Start;Omega 1 [deg/s];Omega 2 [deg/s];Omega 3 [deg/s]\n" + rows;
+  const Ran ran = import({file("de.csv", plain), "--columns", columns});
+  expect_same(ran, 1e-15);
+  for (const char* found : {"found: fields are separated by ';'\n", "found: numbers have decimal commas\n"})
+    EXPECT_NE(ran.out.find(found), std::string::npos) << ran.out;
+  const std::string before = "Messung 3\nam Hang\nVersuch;Datum;Start;Omega 1;Omega 2;Omega 3\n";
+  for (const char* degrees : {"[deg/s]", "\xC2\xB0/s"}) {
+    const std::string units = fmt::format("-;;;{0};{0};{0}\n", degrees);
+    const Ran units_found = import({file("units.csv", before + units + rows), "--columns", columns});
+    expect_same(units_found, 1e-15);
+    for (const char* found : {"found: the header is line 3;", "found: line 4 holds units\n"})
+      EXPECT_NE(units_found.out.find(found), std::string::npos) << units_found.out;
+  }
+  const Ran told = import({path("units.csv"), "--columns", columns, "--separator", ";", "--decimal", "comma",
+                           "--skip-rows", "2", "--units-row"});
+  expect_same(told, 1e-15);
+  EXPECT_EQ(told.out.find("found:"), std::string::npos) << told.out;
+  expect_refused(import({path("units.csv"), "--columns", columns + "[rad/s]"}),
+                 "--columns: omega_minus: the name 'Omega 1 [deg/s]' says deg/s, not rad/s");
+  EXPECT_EQ(import({path("de.csv"), "--decimal", "no", "--columns", columns}).code, 2);
+}
+
+TEST_F(Import, FramesOfOneTrialBehindAPreamble) {
+  std::string csv = "Trajectories\n120\nFrame,Sub Frame,hub:ang\n,,deg\n";
+  for (int frame = 0; frame < 30; ++frame) csv += fmt::format("{},0,{}\n", frame, 2.5 * frame);
+  std::string one = known_toml;
+  const std::string description = file("one.toml", one.substr(0, one.rfind("[[")));
+  const Ran ran = metastable({"import", file("vicon.csv", csv), "--columns", "time=Frame[1/120 s],angle=hub:ang",
+                              "--description", description, "--out", path("out")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_NE(ran.out.find("assumed: all frames are of one trial\n"), std::string::npos) << ran.out;
+  EXPECT_NE(ran.out.find("  time         Frame in 1/120 s\n"), std::string::npos) << ran.out;
+  EXPECT_NE(test::read(folder_ / "out/angle.csv").find("\n1,0.025,0.1308"), std::string::npos)
+      << test::read(folder_ / "out/angle.csv");
 }
 
 TEST_F(Import, AnglesOfACamera) {
@@ -401,6 +458,77 @@ TEST_F(ImportMat, VectorsAndWhatIsWrongWithThem) {
                  mat +
                      ": w_deg_s: is 6 x 1: say --trials-in columns or --trials-in rows, or map trial to a vector of as "
                      "many");
+}
+
+matvar_t* struct_of(const char* name, const char* field, matvar_t* value) {
+  std::size_t dims[] = {1, 1};
+  const char* fields[] = {field};
+  matvar_t* const whole = Mat_VarCreateStruct(name, 2, dims, fields, 1);
+  Mat_VarSetStructFieldByName(whole, field, 0, value);
+  return whole;
+}
+
+TEST_F(ImportMat, StructsInStructsAndVersion4) {
+  forget();
+  expect_same(import({save({struct_of("lab", "run", struct_of(nullptr, "w", matrix(true))), conditions(),
+                            array("n", {1, 2, 4}, 1, 3)}),
+                      "--trials-in", "columns", "--columns", "trial=n,condition=start,omega_minus=lab.run.w[deg/s]"}),
+              1e-15);
+  expect_refused(import({path("lab.mat"), "--columns", "trial=n,condition=start,omega_minus=lab.run[deg/s]"}),
+                 path("lab.mat") + ": lab.run: is a struct (1 x 1) with the fields w; name one of them");
+  mat_t* const mat = Mat_CreateVer(path("v4.mat").c_str(), nullptr, MAT_FT_MAT4);
+  for (matvar_t* const v : {matrix(true), array("n", {1, 2, 4}, 1, 3)}) {
+    Mat_VarWrite(mat, v, MAT_COMPRESSION_NONE);
+    Mat_VarFree(v);
+  }
+  Mat_Close(mat);
+  for (MeasuredTrial& trial : known_.trials) trial.condition = 0;
+  const std::string one = file("one.toml", std::string(known_toml).substr(0, std::string(known_toml).rfind("[[")));
+  expect_same(metastable({"import", path("v4.mat"), "--trials-in", "columns", "--columns",
+                          "trial=n,omega_minus=w[deg/s]", "--description", one, "--out", path("out")}),
+              1e-15);
+}
+
+// HDF5 as other programs write it, without MATLAB's header and attributes, which brought libmatio down; and the same
+// file cut short or spoilt, byte by byte.
+TEST_F(ImportMat, Hdf5OfOtherPrograms) {
+  forget();
+  for (MeasuredTrial& trial : known_.trials) trial.condition = 0;
+  const std::string one = file("one.toml", std::string(known_toml).substr(0, std::string(known_toml).rfind("[[")));
+  const std::string mat = path("other.mat");
+  {
+    const hid_t to = H5Fcreate(mat.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
+                group = H5Gcreate2(to, "lab", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    const auto write = [&](const char* name, const std::vector<double>& values, std::vector<hsize_t> sizes) {
+      const hid_t space = H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr),
+                  data = H5Dcreate2(group, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+      H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+      H5Dclose(data), H5Sclose(space);
+    };
+    std::vector<double> values(9, std::nan(""));
+    for (std::size_t t = 0; t < 3; ++t)
+      for (std::size_t i = 0; i < known_.trials[t].collisions.size(); ++i)
+        values[i + 3 * t] = speeds(known_.trials[t])[i];
+    write("w", values, {3, 3});
+    write("n", {1, 2, 4}, {3});
+    H5Gclose(group), H5Fclose(to);
+  }
+  const auto run = [&](const std::string& from) {
+    std::filesystem::remove_all(folder_ / "out");
+    return metastable({"import", from, "--trials-in", "columns", "--columns", "trial=lab.n,omega_minus=lab.w[deg/s]",
+                       "--description", one, "--out", path("out")});
+  };
+  expect_same(run(mat), 1e-15);
+  const std::string whole = test::read(mat);
+  for (std::size_t k = 0; k < 60; ++k) {
+    std::string spoilt = whole;
+    if (k % 3 == 0) spoilt.resize(whole.size() * (k + 1) / 61);
+    else spoilt[(k * 7919) % std::min<std::size_t>(whole.size(), 2400)] ^= static_cast<char>(1 + k * 37 % 255);
+    const Ran ran = run(file("spoilt.mat", spoilt));
+    EXPECT_TRUE(ran.code == 0 || ran.code == 2) << k << ran.err;
+    EXPECT_EQ(ran.code == 2, ran.err.starts_with("metastable: ")) << ran.err;
+    EXPECT_EQ(ran.code == 0, std::filesystem::exists(folder_ / "out")) << k;
+  }
 }
 
 // What libmatio itself would read as other numbers.
