@@ -69,9 +69,8 @@ void CsvReader::read_units() {
     std::string_view unit = i < units.size() ? units[i] : std::string_view();
     while (unit.starts_with(' ') || unit.starts_with('[') || unit.starts_with('(')) unit.remove_prefix(1);
     while (unit.ends_with(' ') || unit.ends_with(']') || unit.ends_with(')')) unit.remove_suffix(1);
-    named[i].text = named_.emplace_back(unit.empty() || unit == "-" || names[i].empty()
-                                            ? names[i]
-                                            : fmt::format("{} [{}]", names[i], unit));
+    named[i].text = named_.emplace_back(
+        unit.empty() || unit == "-" || names[i].empty() ? names[i] : fmt::format("{} [{}]", names[i], unit));
   }
   fields_ = named;
 }

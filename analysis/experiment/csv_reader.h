@@ -88,7 +88,7 @@ class CsvReader {
   std::span<const CsvColumn> columns_;
   Defects& defects_;
   CsvForm form_;
-  std::deque<std::string> named_;  // columns with the units of their row
+  std::deque<std::string> named_;                     // columns with the units of their row
   std::vector<std::optional<std::size_t>> position_;  // of each column among the fields
   std::size_t width_ = 0;
   bool usable_ = false, complete_ = true;

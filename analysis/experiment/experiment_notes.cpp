@@ -29,8 +29,9 @@ void note_odd_speeds(const Experiment& experiment, std::size_t condition, std::v
         "reaches {:.3g} rad/s.",
         id, slow, bounds.slowest, bounds.slowest / RollingSpeeds::room));
   if (fast > 0)
-    notes.push_back(fmt::format("Condition '{}': {} speeds are above {:.3g} rad/s, where feet lift off at {:.3g} rad/s.",
-                                id, fast, beyond_lifting * bounds.lifting, bounds.lifting));
+    notes.push_back(
+        fmt::format("Condition '{}': {} speeds are above {:.3g} rad/s, where feet lift off at {:.3g} rad/s.", id, fast,
+                    beyond_lifting * bounds.lifting, bounds.lifting));
 }
 
 }  // namespace

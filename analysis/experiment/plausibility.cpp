@@ -21,8 +21,8 @@ namespace {
 constexpr double turn = 2 * std::numbers::pi;
 
 // The mean speed of a step over the speed at its end is 0.56 to 0.72 in the middle of what engines and the virtual
-// laboratory roll, at most 0.96, and falls as a wheel comes slowly over its foot; a step is a chord, up to 1.4 where feet
-// slide. Units differ by more.
+// laboratory roll, at most 0.96, and falls as a wheel comes slowly over its foot; a step is a chord, up to 1.4 where
+// feet slide. Units differ by more.
 constexpr double least_time_share = 0.15, most_time_share = 1.5, least_step_share = 0.4, most_step_share = 2.5;
 constexpr double ramp_room = 1.02;  // a ramp is measured to two per cent
 constexpr double chance_of_copy = 1e-6;
@@ -31,12 +31,12 @@ struct Unit {
   std::string_view name;
   double too_large;  // by how much a number in it is
 };
-constexpr Unit speed_units[] = {{"degrees per second", 360 / turn},
-                                {"revolutions per minute", 60 / turn},
-                                {"revolutions per second", 1 / turn}};
+constexpr Unit speed_units[] = {
+    {"degrees per second", 360 / turn}, {"revolutions per minute", 60 / turn}, {"revolutions per second", 1 / turn}};
 constexpr Unit time_units[] = {
     {"milliseconds", 1e3}, {"microseconds", 1e6}, {"minutes", 1.0 / 60}, {"nanoseconds", 1e9}};
-constexpr Unit length_units[] = {{"millimetres", 1e3}, {"centimetres", 1e2}, {"inches", 1 / 0.0254}, {"kilometres", 1e-3}};
+constexpr Unit length_units[] = {
+    {"millimetres", 1e3}, {"centimetres", 1e2}, {"inches", 1 / 0.0254}, {"kilometres", 1e-3}};
 
 // Names the units that would make a number plausible.
 std::string suspected(std::span<const Unit> units, double number, double least, double most) {
@@ -73,18 +73,19 @@ class Plausible {
       if (i > 0) later.push_back(c.omega_minus), slowest = std::max(slowest, bounds.slowest);
     });
     if (fast.count > 0)
-      return report(fast, fmt::format("a speed of {:.4g} rad/s, where a wheel of these legs rolls at {:.3g} rad/s at "
-                                      "most (three times the speed at which its feet lift off){}",
-                                      fast.worst, fastest,
-                                      suspected(speed_units, typical_speed(), slowest, fastest / 3)));
+      return report(fast,
+                    fmt::format("a speed of {:.4g} rad/s, where a wheel of these legs rolls at {:.3g} rad/s at "
+                                "most (three times the speed at which its feet lift off){}",
+                                fast.worst, fastest, suspected(speed_units, typical_speed(), slowest, fastest / 3)));
     if (later.size() < 3) return;
     const double middle = median(later);
     if (middle >= slowest) return;
-    defects_.add(file_, {1, 1},
-                 fmt::format("omega_minus_rad_s: half of the speeds from collision 2 on lie below {:.3g} rad/s, where a "
-                             "wheel that has come over a leg on this ramp reaches {:.3g} rad/s{}",
-                             middle, slowest / RollingSpeeds::room,
-                             suspected(speed_units, middle, slowest, rolling_speeds(experiment_, 0).fastest)));
+    defects_.add(
+        file_, {1, 1},
+        fmt::format("omega_minus_rad_s: half of the speeds from collision 2 on lie below {:.3g} rad/s, where a "
+                    "wheel that has come over a leg on this ramp reaches {:.3g} rad/s{}",
+                    middle, slowest / RollingSpeeds::room,
+                    suspected(speed_units, middle, slowest, rolling_speeds(experiment_, 0).fastest)));
   }
 
   // A wheel turns by a leg angle from collision to collision, at speeds below those before and behind.
@@ -104,17 +105,18 @@ class Plausible {
   }
 
   void positions() {
-    const double leg = experiment_.wheel.mean_leg_length(), chord = 2 * leg * std::sin(experiment_.wheel.leg_angle() / 2);
+    const double leg = experiment_.wheel.mean_leg_length(),
+                 chord = 2 * leg * std::sin(experiment_.wheel.leg_angle() / 2);
     std::vector<double> share;
     steps([&](std::size_t, std::size_t, const MeasuredCollision& last, const MeasuredCollision& next) {
       if (last.position && next.position) share.push_back((*next.position - *last.position) / chord);
     });
     if (const double middle = share.empty() ? 1 : median(share); middle < least_step_share || middle > most_step_share)
-      defects_.add(file_, {1, 1},
-                   fmt::format("position_m: half of the steps are {:.4g} m or longer, where the feet of this wheel are "
-                               "{:.4g} m apart{}",
-                               middle * chord, chord,
-                               suspected(length_units, middle, least_step_share, most_step_share)));
+      defects_.add(
+          file_, {1, 1},
+          fmt::format("position_m: half of the steps are {:.4g} m or longer, where the feet of this wheel are "
+                      "{:.4g} m apart{}",
+                      middle * chord, chord, suspected(length_units, middle, least_step_share, most_step_share)));
     Odd beyond;
     double end = 0;
     each([&](std::size_t t, std::size_t i, const MeasuredCollision& c) {
@@ -124,8 +126,9 @@ class Plausible {
       end = ramp;
     });
     if (beyond.count > 0)
-      report(beyond, fmt::format("position_m: goes up to {:.4g} m, where the ramp ends at {:.4g} m{}", beyond.worst, end,
-                                 suspected(length_units, beyond.worst, 0, ramp_room * end + most_step_share * chord)));
+      report(beyond,
+             fmt::format("position_m: goes up to {:.4g} m, where the ramp ends at {:.4g} m{}", beyond.worst, end,
+                         suspected(length_units, beyond.worst, 0, ramp_room * end + most_step_share * chord)));
   }
 
  private:
@@ -203,7 +206,8 @@ void check_plausible(const Experiment& experiment, const std::string& file, cons
 void check_copies(const Experiment& experiment, const std::string& file, const CollisionLines& lines,
                   Defects& defects) {
   const auto chance = chances(experiment);
-  const double pairs = static_cast<double>(experiment.trials.size()) * static_cast<double>(experiment.trials.size()) / 2;
+  const double pairs =
+      static_cast<double>(experiment.trials.size()) * static_cast<double>(experiment.trials.size()) / 2;
   std::map<std::vector<double>, std::size_t> first;  // trial with these speeds
   std::size_t copies = 0, copy = 0, original = 0;
   for (std::size_t t = 0; t < experiment.trials.size(); ++t) {

@@ -21,9 +21,9 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double turn = 2 * std::numbers::pi;
-constexpr double speed_span = 0.025;   // over which a speed is taken to judge the unit by [s]
-constexpr double most_mended = 0.1;    // share of a trial's frames
-constexpr std::size_t most_in_row = 3; // frames lost, repeated or stray one after the other
+constexpr double speed_span = 0.025;    // over which a speed is taken to judge the unit by [s]
+constexpr double most_mended = 0.1;     // share of a trial's frames
+constexpr std::size_t most_in_row = 3;  // frames lost, repeated or stray one after the other
 // A frame is stray by ten sds of the noise or three tenths of what the wheel turns in a frame: a collision bends the
 // motion by 1.5 rad/s of 5, which moves the frame beside it by less.
 constexpr double stray_noise = 10, stray_share = 0.3;
@@ -102,8 +102,8 @@ class Mending {
   // Angles that fit no wheel by being too slow, judged while it moves and by no jump.
   void check_slow() const {
     const double furthest = speeds_.fastest * frame_of(time_);
-    const auto stride = std::clamp<std::size_t>(
-        static_cast<std::size_t>(std::lround(speed_span / frame_of(time_))), 1, angle_.size() - 1);
+    const auto stride = std::clamp<std::size_t>(static_cast<std::size_t>(std::lround(speed_span / frame_of(time_))), 1,
+                                                angle_.size() - 1);
     std::vector<double> speeds;
     double path = 0;
     for (std::size_t i = stride; i < angle_.size(); i += stride) {
@@ -147,7 +147,8 @@ class Mending {
       }
       // Jumps of half a turn or of a leg angle may be a marker that was taken for another: wraps come again, one way.
       const bool whole_turn = period == turn;
-      if (wraps < (whole_turn ? 1 : 3) || (!whole_turn && (others > 0 || std::abs(balance) != static_cast<std::ptrdiff_t>(wraps))))
+      if (wraps < (whole_turn ? 1 : 3) ||
+          (!whole_turn && (others > 0 || std::abs(balance) != static_cast<std::ptrdiff_t>(wraps))))
         continue;
       double moved = 0, last = angle_.front();
       for (std::size_t i = 1; i < angle_.size(); ++i) {
@@ -413,8 +414,7 @@ std::vector<double> evenly(const AngleRecording& recording) {
     const double at = time.front() + static_cast<double>(i) * frame;
     while (next + 1 < time.size() && time[next] < at) ++next;
     const double share = (at - time[next - 1]) / (time[next] - time[next - 1]);
-    even.push_back(recording.angle_rad[next - 1] +
-                   share * (recording.angle_rad[next] - recording.angle_rad[next - 1]));
+    even.push_back(recording.angle_rad[next - 1] + share * (recording.angle_rad[next] - recording.angle_rad[next - 1]));
   }
   return even;
 }
@@ -424,8 +424,7 @@ MendedAngles mend_angles(std::vector<MeasuredAngle> angles, const Experiment& de
   std::vector<Mended> mended(angles.size());
   std::vector<Mending> mending;
   for (MeasuredAngle& angle : angles)
-    mending.emplace_back(angle.recording, description.wheel.leg_angle(),
-                         rolling_speeds(description, angle.condition));
+    mending.emplace_back(angle.recording, description.wheel.leg_angle(), rolling_speeds(description, angle.condition));
   const auto each = [&](const auto& work) {
     for (std::size_t t = 0; t < angles.size(); ++t) {
       try {

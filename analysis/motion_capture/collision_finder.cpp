@@ -17,7 +17,7 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double default_span = 0.05;                     // of the filter's window [s]
+constexpr double default_span = 0.05;  // of the filter's window [s]
 // A wider window than a share of the time that a leg takes at the speed sqrt(g / L) would level whole steps.
 constexpr double widest_share = 1.2;
 // A difference of two smoothed speeds exceeds six of their sds by chance in one of 5e4 pairs (Phi(-6/sqrt 2)).
@@ -31,10 +31,10 @@ constexpr double step_tolerance = 0.08, noise_of_fit = 5;
 // fit's own angle to about half the noise of a frame.
 constexpr double near_raster = 0.01, noise_off_raster = 2.5;
 constexpr double known_angle_sd = 0.003;  // of a raster that many fits have made [rad]
-constexpr double flight_span = 0.04;                      // behind a collision in which a foot flies [s]
-constexpr std::size_t most_tries = 12;                    // of where it began to stand
-constexpr double noise_error = 1.7;                       // ratio by which the noise's square is known
-constexpr double noise_level = 0.99;                      // share of fits to noise alone that pass for it
+constexpr double flight_span = 0.04;      // behind a collision in which a foot flies [s]
+constexpr std::size_t most_tries = 12;    // of where it began to stand
+constexpr double noise_error = 1.7;       // ratio by which the noise's square is known
+constexpr double noise_level = 0.99;      // share of fits to noise alone that pass for it
 
 struct Peak {
   std::size_t at = 0;      // sample of the largest speed
@@ -135,7 +135,8 @@ class Search {
  private:
   double turned(const Peak& peak) const { return angle_[peak.fall] / map_.wheel().leg_angle(); }  // [leg angles]
 
-  // Says whether the wheel is slower behind a fall than before it: smoothing also rings where a wheel is let go at speed.
+  // Says whether the wheel is slower behind a fall than before it: smoothing also rings where a wheel is let go at
+  // speed.
   bool slows(std::size_t fall) const {
     const std::vector<double>& time = recording_.time;
     const auto mean_speed = [&](std::size_t from, std::size_t to) {
@@ -216,9 +217,8 @@ class Search {
     std::vector<std::size_t> falls, chosen;
     for (const auto& [step, peak] : at) {
       if (!falls.empty() && peak.fall <= falls.back())
-        throw std::invalid_argument(
-            fmt::format("at {:.6g} s the wheel collides where it collided before ({:.6g} s)",
-                        recording_.time[peak.fall], recording_.time[falls.back()]));
+        throw std::invalid_argument(fmt::format("at {:.6g} s the wheel collides where it collided before ({:.6g} s)",
+                                                recording_.time[peak.fall], recording_.time[falls.back()]));
       if (!peak.shown) all.push_back(peak);
       falls.push_back(peak.fall);
     }
@@ -268,7 +268,7 @@ class Search {
   // Drops at both ends what only the angle says and no fall of the speed bears out; in between that is refused. Returns
   // how many are dropped before the first.
   std::size_t keep_shown(const std::vector<Peak>& all, const std::vector<std::size_t>& chosen,
-                  std::vector<FoundCollision>& collisions) const {
+                         std::vector<FoundCollision>& collisions) const {
     std::vector<double> residuals;
     for (const FoundCollision& c : collisions)
       if (c.fit) residuals.push_back(c.fit->residual_sd_rad);
@@ -283,10 +283,10 @@ class Search {
     if (dropped > 0) return static_cast<std::size_t>(dropped);
     for (const FoundCollision& c : collisions)
       if (!borne_out(c))
-        throw std::invalid_argument(
-            fmt::format("at {:.6g} s a leg lands, and no fall of the speed shows, though it does before and behind; the "
-                        "noise of the angle is about {:.2g} rad",
-                        reported_time(c), noise_));
+        throw std::invalid_argument(fmt::format(
+            "at {:.6g} s a leg lands, and no fall of the speed shows, though it does before and behind; the "
+            "noise of the angle is about {:.2g} rad",
+            reported_time(c), noise_));
     if (const auto most = static_cast<std::size_t>(options_.collisions); collisions.size() > most)
       collisions.resize(most);
     return 0;

@@ -46,14 +46,14 @@ struct FoundTrial {
 };
 
 /// Differentiates with a third-degree Savitzky-Golay filter, takes all peaks that rise by `rise` (or six sds of the
-/// noise's own speed) above both sides, finds the raster of leg angles on which their falls lie, and takes on each of its
-/// angles the fastest peak for the collision; others are bounces. Where the wheel turns on past such an angle and no peak
-/// shows, the collision is sought by the fit. Fits that lie off the raster are made anew beside it.
+/// noise's own speed) above both sides, finds the raster of leg angles on which their falls lie, and takes on each of
+/// its angles the fastest peak for the collision; others are bounces. Where the wheel turns on past such an angle and
+/// no peak shows, the collision is sought by the fit. Fits that lie off the raster are made anew beside it.
 /// @param map  wheel and slope, for the stance motion; the contact law matters only through its inertia
 /// @param first_landing_leg  that lands at collision 1
 /// @throws std::invalid_argument for rates outside 60..1000 Hz or fewer samples than the window; options out of range;
-///         collisions that cannot be vouched for, with the time: a landing without a fall of the speed between others, or
-///         steps that are no leg angle
+///         collisions that cannot be vouched for, with the time: a landing without a fall of the speed between others,
+///         or steps that are no leg angle
 FoundTrial find_collisions(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg,
                            const FinderOptions& options);
 

@@ -122,7 +122,9 @@ Command collisions() {
       "collisions", "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
       [](Options& o) {
         o.add_place("DIR", "Experiment folder with experiment.toml and angle.csv");
-        o.add("window", "N", "", "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples, more where noise asks it)");
+        o.add("window", "N", "",
+              "Savitzky-Golay window [samples], odd, 5..10001 (default: 50 ms, at least 5 samples, more where noise "
+              "asks it)");
         o.add("collisions", "N", "16", "Most collisions of a trial, 1..100000");
         o.add("rise", "RAD/S", "0.4", "Least rise of a peak of the speed above both sides, > 0");
         o.add("omega-minus", "fit|peak", "fit",

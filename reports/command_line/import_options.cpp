@@ -31,8 +31,8 @@ constexpr const char* details = R"(What it needs
   Columns named as in an experiment folder (trial, omega_minus_rad_s, ...) need no entry.
   Separator, decimal commas, lines before the header and a row of units are found where they are plain, and said.
   Wide: a * stands for the collision's number: omega_minus=w_*[deg/s]. A trial ends at the row's last value.
-  MAT: struct arrays (omega_minus=trials.w[deg/s], or lab.trials.w of a struct in a struct), cell arrays, matrices padded with NaN (with --trials-in), or
-  vectors with one that tells the trials.
+  MAT: struct arrays (omega_minus=trials.w[deg/s], or lab.trials.w of a struct in a struct), cell arrays,
+  matrices padded with NaN (with --trials-in), or vectors with one that tells the trials.
   What data cannot tell: --description with an experiment.toml, or --slope (or --conditions), --legs, --mass,
   --ramp-length, --law and, unless the law is plastic, --restitution and --friction.
 Examples

@@ -89,12 +89,14 @@ void check_speeds(const analysis::Experiment& experiment, const std::vector<anal
     const analysis::RollingSpeeds bounds = analysis::rolling_speeds(experiment, condition);
     const double middle = analysis::median(speeds);
     if (middle >= bounds.slowest && middle <= beyond_lifting * bounds.lifting) continue;
-    throw std::invalid_argument(fmt::format(
-        "{}: condition '{}': half of the speeds before a collision are {} {:.3g} rad/s, where a wheel that comes over its "
-        "legs on this ramp has {:.3g} at least and lifts its feet at {:.3g}: is time_s in seconds, is angle_rad in radians, "
-        "and is the slope right?",
-        file, experiment.conditions[condition].id, middle < bounds.slowest ? "below" : "above", middle,
-        bounds.slowest / analysis::RollingSpeeds::room, bounds.lifting));
+    throw std::invalid_argument(
+        fmt::format("{}: condition '{}': half of the speeds before a collision are {} {:.3g} rad/s, where a wheel that "
+                    "comes over its "
+                    "legs on this ramp has {:.3g} at least and lifts its feet at {:.3g}: is time_s in seconds, is "
+                    "angle_rad in radians, "
+                    "and is the slope right?",
+                    file, experiment.conditions[condition].id, middle < bounds.slowest ? "below" : "above", middle,
+                    bounds.slowest / analysis::RollingSpeeds::room, bounds.lifting));
   }
 }
 
@@ -138,7 +140,8 @@ void run_collisions(const CollisionsRequest& request) {
   if (experiment.system != analysis::System::rimless_wheel)
     throw std::invalid_argument(fmt::format("{}: a coast-down has no collisions to find", request.folder));
   const std::string angle_file = (folder / "angle.csv").string();
-  const auto [angles, mended] = analysis::mend_angles(analysis::parse_angles(source, experiment), experiment, angle_file);
+  const auto [angles, mended] =
+      analysis::mend_angles(analysis::parse_angles(source, experiment), experiment, angle_file);
   std::optional<analysis::Experiment> known;
   if (source.collisions_csv) known = analysis::parse_experiment(source);
   const fs::path out = !request.out.empty() ? fs::path(request.out)

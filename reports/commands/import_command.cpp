@@ -60,8 +60,8 @@ ForeignFile read_foreign(const ImportRequest& request) {
   const std::string text = read_file(request.file);
   if (!is_mat_file(text)) return read_csv(request, text);
   if (request.form.separator || request.form.decimal || request.form.skip_rows || request.form.units_row)
-    throw std::invalid_argument(
-        fmt::format("{}: is a MAT file; --separator, --decimal, --skip-rows and --units-row are for a CSV", request.file));
+    throw std::invalid_argument(fmt::format(
+        "{}: is a MAT file; --separator, --decimal, --skip-rows and --units-row are for a CSV", request.file));
   MatRows read = mat_rows(request.file, text, request.columns, request.orientation, request.collisions_from);
   return {std::move(read.rows), std::move(read.map), std::move(read.names), std::move(read.found)};
 }

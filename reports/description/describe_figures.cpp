@@ -68,7 +68,8 @@ std::optional<Figure> survival_curves_figure(const analysis::Description& descri
   return figure;
 }
 
-std::optional<Figure> measured_map_figure(const analysis::ConditionDescription& condition, const Provenance& provenance) {
+std::optional<Figure> measured_map_figure(const analysis::ConditionDescription& condition,
+                                          const Provenance& provenance) {
   Figure figure;
   figure.id = "return-map-" + condition.id;
   for (char& c : figure.id)

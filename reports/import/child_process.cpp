@@ -108,8 +108,7 @@ std::string in_child_process(const std::function<std::string()>& work, const std
   ::close(ends[1]);
   int status = 0;
   const std::string said = read_child(ends[0], child, status);
-  if (WIFSIGNALED(status))
-    throw std::invalid_argument(fmt::format("{} ({})", died, ::strsignal(WTERMSIG(status))));
+  if (WIFSIGNALED(status)) throw std::invalid_argument(fmt::format("{} ({})", died, ::strsignal(WTERMSIG(status))));
   if (WEXITSTATUS(status) != 0 || said.empty())
     throw std::invalid_argument(fmt::format("{} (code {})", died, WEXITSTATUS(status)));
   if (said.front() == 'E') throw std::invalid_argument(said.substr(1));

@@ -165,7 +165,8 @@ MappedColumn found_column(const RequestedColumn& request, std::span<const std::s
     if (!column.columns.empty()) in_file = names[column.columns.front()];
     for (const std::size_t i : column.columns)
       if (split_unit(names[i]).unit != split_unit(in_file).unit)
-        throw std::invalid_argument(fmt::format("--columns: {}: '{}' and '{}' have two units", role.name, in_file, names[i]));
+        throw std::invalid_argument(
+            fmt::format("--columns: {}: '{}' and '{}' have two units", role.name, in_file, names[i]));
   }
   if (column.columns.empty())
     throw std::invalid_argument(

@@ -57,8 +57,7 @@ bool find_header(std::string_view text, const AskedForm& asked, CsvForm& form,
                  const std::function<bool(const std::vector<std::string>&)>& usable) {
   const std::vector<char> separators = asked.separator ? std::vector{*asked.separator} : std::vector{',', ';', '\t'};
   std::vector<std::vector<Record>> records;
-  for (const char separator : separators)
-    records.push_back(CsvReader::first_records(text, separator, most_before + 2));
+  for (const char separator : separators) records.push_back(CsvReader::first_records(text, separator, most_before + 2));
   for (std::size_t row = 0; row <= most_before; ++row)
     for (std::size_t s = 0; s < separators.size(); ++s) {
       if (row >= records[s].size()) continue;
@@ -81,7 +80,8 @@ FoundForm csv_form(std::string_view text, const AskedForm& asked,
   CsvForm& form = found.form;
   if (!find_header(text, asked, form, usable)) {
     // It is for the caller to say what its first line lacks.
-    form = {.separator = asked.separator.value_or(','), .skip_rows = asked.skip_rows.value_or(0),
+    form = {.separator = asked.separator.value_or(','),
+            .skip_rows = asked.skip_rows.value_or(0),
             .units_row = asked.units_row};
     if (!asked.separator)
       for (const char separator : {';', '\t'})
@@ -91,16 +91,15 @@ FoundForm csv_form(std::string_view text, const AskedForm& asked,
           if (CsvReader::names(text, other).size() > 1) form = other;
         }
   }
-  form.decimal = asked.decimal ? *asked.decimal
+  form.decimal = asked.decimal                                                                   ? *asked.decimal
                  : has_decimal_commas(CsvReader::first_records(text, form.separator, looked_at)) ? ','
-                                                                                                  : '.';
+                                                                                                 : '.';
   if (!asked.separator && form.separator != ',')
     found.found.push_back(fmt::format("fields are separated by {}", shown(form.separator)));
   if (!asked.decimal && form.decimal == ',') found.found.emplace_back("numbers have decimal commas");
   if (!asked.skip_rows && form.skip_rows > 0)
     found.found.push_back(fmt::format("the header is line {}; what is before it is skipped", form.skip_rows + 1));
-  if (!asked.units_row && form.units_row)
-    found.found.push_back(fmt::format("line {} holds units", form.skip_rows + 2));
+  if (!asked.units_row && form.units_row) found.found.push_back(fmt::format("line {} holds units", form.skip_rows + 2));
   return found;
 }
 

@@ -11,7 +11,7 @@
 namespace metastable::reports {
 namespace {
 
-constexpr std::size_t deepest_group = 32;           // of structs in structs
+constexpr std::size_t deepest_group = 32;     // of structs in structs
 constexpr std::size_t most_parts = 10000000;  // of cells and fields
 constexpr hsize_t most_elements = hsize_t{1} << 28;
 
@@ -48,8 +48,7 @@ class Handle {
 
 class Reader {
  public:
-  explicit Reader(const std::string& path)
-      : path_(path), file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT)) {
+  explicit Reader(const std::string& path) : path_(path), file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT)) {
     if (file_ < 0)
       throw std::invalid_argument(fmt::format(
           "{}: cannot be read as a MAT file of version 7.3: the HDF5 library finds it cut short or damaged", path));
@@ -131,9 +130,8 @@ class Reader {
     bool array = !value.fields.empty();
     for (const std::string& field : value.fields) {
       const Handle member(H5Oopen(group, field.c_str(), H5P_DEFAULT));
-      array = array && member >= 0 && H5Iget_type(member) == H5I_DATASET &&
-              attribute(member, "MATLAB_class").empty() && H5Aexists(member, "MATLAB_empty") <= 0 &&
-              H5Tget_class(Handle(H5Dget_type(member))) == H5T_REFERENCE;
+      array = array && member >= 0 && H5Iget_type(member) == H5I_DATASET && attribute(member, "MATLAB_class").empty() &&
+              H5Aexists(member, "MATLAB_empty") <= 0 && H5Tget_class(Handle(H5Dget_type(member))) == H5T_REFERENCE;
       members.push_back(object(member, place + "." + field, depth + 1));
     }
     for (const MatValue& member : members) array = array && member.dims == members.front().dims;
@@ -160,9 +158,12 @@ class Reader {
     }
     value.dims.assign(sizes.rbegin(), sizes.rend());
     while (value.dims.size() < 2) value.dims.insert(value.dims.begin(), 1);
-    const bool empty = H5Aexists(data, "MATLAB_empty") > 0 || count == 0 || H5Sget_simple_extent_type(space) == H5S_NULL;
+    const bool empty =
+        H5Aexists(data, "MATLAB_empty") > 0 || count == 0 || H5Sget_simple_extent_type(space) == H5S_NULL;
     if (empty) {
-      value.kind = kind == "char" ? MatValue::Kind::text : kind == "cell" ? MatValue::Kind::cells : MatValue::Kind::numbers;
+      value.kind = kind == "char"   ? MatValue::Kind::text
+                   : kind == "cell" ? MatValue::Kind::cells
+                                    : MatValue::Kind::numbers;
       value.dims = {0, 0};
       return;
     }
@@ -205,7 +206,8 @@ class Reader {
       return;
     }
     value.kind = MatValue::Kind::text;
-    for (const double letter : value.numbers) value.text += letter >= 0 && letter < 256 ? static_cast<char>(static_cast<unsigned char>(letter)) : '?';
+    for (const double letter : value.numbers)
+      value.text += letter >= 0 && letter < 256 ? static_cast<char>(static_cast<unsigned char>(letter)) : '?';
     value.numbers.clear();
   }
 

@@ -33,7 +33,8 @@ bool is_version_4(std::string_view text) {
     for (std::size_t k = 0; k < 5; ++k) {
       word[k] = 0;
       for (std::size_t i = 0; i < 4; ++i)
-        word[k] |= static_cast<std::uint32_t>(static_cast<unsigned char>(text[4 * k + i])) << 8 * (big_endian ? 3 - i : i);
+        word[k] |= static_cast<std::uint32_t>(static_cast<unsigned char>(text[4 * k + i]))
+                   << 8 * (big_endian ? 3 - i : i);
     }
     const std::uint32_t order = word[0] / 1000, zero = word[0] / 100 % 10, precision = word[0] / 10 % 10,
                         kind = word[0] % 10, length = word[4];
@@ -84,7 +85,7 @@ struct MatClose {
   void operator()(matvar_t* variable) const { Mat_VarFree(variable); }
 };
 
-constexpr std::size_t deepest_struct = 64;           // of structs in structs
+constexpr std::size_t deepest_struct = 64;  // of structs in structs
 constexpr const char* nothing_there =
     "nothing that libmatio reads: it is empty, or compressed in its own way (save('-v6', ...) does without)";
 
@@ -167,7 +168,8 @@ MatValue value_of(matvar_t* v, std::size_t depth) {
   const std::size_t count = value.elements();
   if (v->class_type == MAT_C_CHAR && value.dims.size() == 2 && value.dims[0] <= 1) {
     value.kind = MatValue::Kind::text;
-    for (std::size_t i = 0; v->data != nullptr && i < count && (i + 1) * static_cast<std::size_t>(v->data_size) <= v->nbytes; ++i)
+    for (std::size_t i = 0;
+         v->data != nullptr && i < count && (i + 1) * static_cast<std::size_t>(v->data_size) <= v->nbytes; ++i)
       value.text += v->data_size == 2 ? static_cast<char>(static_cast<const std::uint16_t*>(v->data)[i])
                                       : static_cast<const char*>(v->data)[i];
   } else if (v->class_type == MAT_C_CELL) {
@@ -177,7 +179,8 @@ MatValue value_of(matvar_t* v, std::size_t depth) {
   } else if (v->class_type == MAT_C_STRUCT) {
     value.kind = MatValue::Kind::structure;
     char* const* const fields = Mat_VarGetStructFieldnames(v);
-    for (unsigned f = 0; fields != nullptr && f < Mat_VarGetNumberOfFields(v); ++f) value.fields.emplace_back(fields[f]);
+    for (unsigned f = 0; fields != nullptr && f < Mat_VarGetNumberOfFields(v); ++f)
+      value.fields.emplace_back(fields[f]);
     for (std::size_t e = 0; e < count; ++e)
       for (std::size_t f = 0; f < value.fields.size(); ++f)
         value.parts.push_back(value_of(Mat_VarGetStructFieldByIndex(v, f, e), depth + 1));

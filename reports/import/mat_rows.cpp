@@ -80,8 +80,7 @@ class MatFile {
     const std::string field = rest.substr(0, dot), behind = dot == std::string::npos ? "" : rest.substr(dot + 1);
     const auto at = std::ranges::find(v.fields, field);
     if (at == v.fields.end()) refuse(place, fmt::format("has no field '{}'", field));
-    const std::size_t f = static_cast<std::size_t>(at - v.fields.begin()),
-                      count = v.parts.size() / v.fields.size();
+    const std::size_t f = static_cast<std::size_t>(at - v.fields.begin()), count = v.parts.size() / v.fields.size();
     if (count == 1) return follow(found, place + "." + field, v.parts[f], behind);
     if (found.each) refuse(place, fmt::format("is a struct array ({}) in a struct array", v.shape()));
     found.each = true;
@@ -103,17 +102,18 @@ class MatFile {
         refuse(place, fmt::format("is a struct ({}) with the fields {}; name one of them", v.shape(),
                                   fmt::join(v.fields, ", ")));
       case MatValue::Kind::other:
-        refuse(place, fmt::format("is {}{}", v.what,
-                                  v.dims.empty() ? "" : fmt::format(" ({}), where numbers or a text are expected",
-                                                                    v.shape())));
+        refuse(place, fmt::format(
+                          "is {}{}", v.what,
+                          v.dims.empty() ? "" : fmt::format(" ({}), where numbers or a text are expected", v.shape())));
     }
     if (v.dims.size() > 2) refuse(place, fmt::format("has {} dimensions ({})", v.dims.size(), v.shape()));
     piece.rows = v.dims.empty() ? 0 : v.dims[0];
     piece.columns = v.dims.size() > 1 ? v.dims[1] : 0;
     if (!piece.text && piece.numbers.size() != piece.rows * piece.columns)
-      refuse(place, fmt::format("has {} numbers where its size ({}) asks for more: it is damaged, or compressed in a way "
-                                "that is not read (save('-v6', ...) does without)",
-                                piece.numbers.size(), v.shape()));
+      refuse(place,
+             fmt::format("has {} numbers where its size ({}) asks for more: it is damaged, or compressed in a way "
+                         "that is not read (save('-v6', ...) does without)",
+                         piece.numbers.size(), v.shape()));
     return piece;
   }
 
@@ -177,8 +177,7 @@ bool is_vector(const Piece& piece) { return piece.rows <= 1 || piece.columns <= 
 
 class MatTrials {
  public:
-  MatTrials(const MatFile& file, const std::vector<MappedColumn>& map, TrialsIn orientation, bool hdf5)
-      : file_(file) {
+  MatTrials(const MatFile& file, const std::vector<MappedColumn>& map, TrialsIn orientation, bool hdf5) : file_(file) {
     const Told* trial = nullptr;
     for (const MappedColumn& column : map) {
       Told& told = told_.emplace_back(Told{column, file.at(column.name)});
@@ -207,11 +206,11 @@ class MatTrials {
       if (hdf5 && !is_vector(first)) {
         const bool turned = !padded(first, in_columns) && padded(first, !in_columns);
         in_columns = in_columns != turned;
-        found_.push_back(fmt::format("{} is {} x {} as MATLAB has it, and {} x {} as HDF5 stores it; each of MATLAB's {} "
-                                     "is taken for a trial{}",
-                                     main_->column.name, first.rows, first.columns, first.columns, first.rows,
-                                     in_columns ? "columns" : "rows",
-                                     turned ? ", for they are padded at their ends and the others are not" : ""));
+        found_.push_back(fmt::format(
+            "{} is {} x {} as MATLAB has it, and {} x {} as HDF5 stores it; each of MATLAB's {} "
+            "is taken for a trial{}",
+            main_->column.name, first.rows, first.columns, first.columns, first.rows, in_columns ? "columns" : "rows",
+            turned ? ", for they are padded at their ends and the others are not" : ""));
       }
       shape_ = in_columns ? Shape::columns : Shape::rows;
       trials_ = shape_ == Shape::columns ? first.columns : first.rows;
@@ -334,7 +333,10 @@ class MatTrials {
 MatRows mat_rows(const std::string& path, std::string_view text, const std::vector<RequestedColumn>& requests,
                  TrialsIn orientation, int first_collision) {
   const MatFile file(path, mat_variables(path, text));
-  MatRows read{.rows = {}, .map = map_columns(requests, file.names(), path, first_collision), .names = file.names(), .found = {}};
+  MatRows read{.rows = {},
+               .map = map_columns(requests, file.names(), path, first_collision),
+               .names = file.names(),
+               .found = {}};
   for (const MappedColumn& column : read.map)
     if (column.numbered)
       throw std::invalid_argument(fmt::format("--columns: {}: a * is for columns of a CSV", role_name(column.role)));

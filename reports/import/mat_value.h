@@ -21,8 +21,8 @@ struct MatValue {
   /// Holds the cells, or the fields of a structure's elements: field f of element e at e * fields.size() + f.
   std::vector<MatValue> parts;
 
-  std::size_t elements() const;       ///< the product of the dimensions
-  std::string shape() const;          ///< "3 x 2"
+  std::size_t elements() const;  ///< the product of the dimensions
+  std::string shape() const;     ///< "3 x 2"
 };
 
 /// Lie values in one text, as one process hands them to another.

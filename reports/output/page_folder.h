@@ -13,15 +13,16 @@
 
 namespace metastable::reports {
 
-/// Writes index.html, tables/<id>.csv, .md and .tex, figures/<id>.svg in one folder, all of them or none: they are there
-/// once the page is written. A folder that gets none is gone again.
+/// Writes index.html, tables/<id>.csv, .md and .tex, figures/<id>.svg in one folder, all of them or none: they are
+/// there once the page is written. A folder that gets none is gone again.
 class PageFolder {
  public:
   /// Creates the folder (those of tables and figures come with the first of them). @throws OutputError
   explicit PageFolder(const std::filesystem::path& folder) : made_(folder), folder_(folder) {}
 
   Page& page() { return page_; }  ///< for title, intro and provenance
-  /// Adds a section, its tables and figures written beside the folder until the page is there. @throws as the renderings and write_file() do
+  /// Adds a section, its tables and figures written beside the folder until the page is there. @throws as the
+  /// renderings and write_file() do
   void section(const std::string& id, const std::string& heading, const std::string& reading,
                const std::vector<Figure>& figures, std::vector<Table> tables);
   /// Writes the page, with which everything takes its place. Call once.

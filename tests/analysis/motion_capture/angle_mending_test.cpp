@@ -102,7 +102,8 @@ TEST_F(AngleMending, UnwrapsAndTurns) {
     expect_mended(rate, wrap(0, 2 * pi), "is wrapped every 6.283 rad");
     expect_mended(rate, wrap(0, pi), "is wrapped every 3.142 rad");
     expect_mended(rate, wrap(0, pi / 4), "is wrapped every 0.7854 rad");
-    expect_mended(rate, [](AngleRecording& r) { scale(r, -1); }, "its sign was turned");
+    expect_mended(
+        rate, [](AngleRecording& r) { scale(r, -1); }, "its sign was turned");
   }
 }
 
@@ -159,8 +160,7 @@ TEST_F(AngleMending, TakesNoReleaseForACollision) {
         [rate](AngleRecording& r) {
           const auto held = static_cast<std::size_t>(0.5 * rate);
           std::vector<double> time;
-          for (std::size_t k = 0; k < held; ++k)
-            time.push_back(r.time.front() - static_cast<double>(held - k) / rate);
+          for (std::size_t k = 0; k < held; ++k) time.push_back(r.time.front() - static_cast<double>(held - k) / rate);
           r.time.insert(r.time.begin(), time.begin(), time.end());
           r.angle_rad.insert(r.angle_rad.begin(), held, r.angle_rad.front());
         },

@@ -104,8 +104,8 @@ TEST(CollisionFinder, NoiseMakesNoCollisions) {
         try {
           for (const FoundCollision& c : find_collisions(recording, map, 0, {}).collisions) {
             const auto i = static_cast<std::size_t>(c.number) - 1;
-            const bool true_one = i < trials[t].collisions.size() &&
-                                  std::abs(reported_time(c) - trials[t].collisions[i].time) < 0.05;
+            const bool true_one =
+                i < trials[t].collisions.size() && std::abs(reported_time(c) - trials[t].collisions[i].time) < 0.05;
             ++(true_one ? found : others);
           }
         } catch (const std::invalid_argument& error) {

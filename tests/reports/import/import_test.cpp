@@ -522,8 +522,10 @@ TEST_F(ImportMat, Hdf5OfOtherPrograms) {
   const std::string whole = test::read(mat);
   for (std::size_t k = 0; k < 60; ++k) {
     std::string spoilt = whole;
-    if (k % 3 == 0) spoilt.resize(whole.size() * (k + 1) / 61);
-    else spoilt[(k * 7919) % std::min<std::size_t>(whole.size(), 2400)] ^= static_cast<char>(1 + k * 37 % 255);
+    if (k % 3 == 0)
+      spoilt.resize(whole.size() * (k + 1) / 61);
+    else
+      spoilt[(k * 7919) % std::min<std::size_t>(whole.size(), 2400)] ^= static_cast<char>(1 + k * 37 % 255);
     const Ran ran = run(file("spoilt.mat", spoilt));
     EXPECT_TRUE(ran.code == 0 || ran.code == 2) << k << ran.err;
     EXPECT_EQ(ran.code == 2, ran.err.starts_with("metastable: ")) << ran.err;
