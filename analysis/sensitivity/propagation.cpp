@@ -59,13 +59,15 @@ Propagated propagate(double steps, const Sensitivities& sensitivities, const std
   return from_variances(steps, std::move(variances));
 }
 
-Propagated propagate_ratio(double ratio, const Sensitivities& of, const Sensitivities& against,
+Propagated propagate_ratio(double ratio, const RatioSide& of, const RatioSide& against,
                            const std::vector<StandardError>& errors) {
   std::vector<Propagated::VarianceShare> variances;
   for (const StandardError& error : errors) {
-    const double a = derivative(against, error.parameter) * error.value,
-                 b = derivative(of, error.parameter) * error.value;
-    variances.push_back({error.parameter, error.parameter == Parameter::slope ? a * a + b * b : (b - a) * (b - a)});
+    const double a = derivative(against.sensitivities, error.parameter) * error.value,
+                 b = derivative(of.sensitivities, error.parameter) * error.value;
+    const bool apart =
+        parameter_value(of.setting, error.parameter) != parameter_value(against.setting, error.parameter);
+    variances.push_back({error.parameter, apart ? a * a + b * b : (b - a) * (b - a)});
   }
   return from_variances(ratio, std::move(variances));
 }

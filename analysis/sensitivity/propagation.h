@@ -35,9 +35,15 @@ struct Propagated {
 /// trust it while the interval is not much wider than a factor of two.
 Propagated propagate(double steps, const Sensitivities& sensitivities, const std::vector<StandardError>& errors);
 
-/// Does the same for the ratio `of` / `against` of two settings' expected steps. The slopes were measured one by one;
-/// all other parameters are the same wheel and contact on both ramps, and what they do to both cancels.
-Propagated propagate_ratio(double ratio, const Sensitivities& of, const Sensitivities& against,
+/// Holds one side of a ratio.
+struct RatioSide {
+  const Setting& setting;
+  const Sensitivities& sensitivities;
+};
+/// Does the same for the ratio `of` / `against` of two settings' expected steps. What has another value in the other
+/// setting was measured for itself; what has the same value is the same ramp, wheel or contact, and its error counts by
+/// the difference of the two derivatives.
+Propagated propagate_ratio(double ratio, const RatioSide& of, const RatioSide& against,
                            const std::vector<StandardError>& errors);
 
 }  // namespace metastable::analysis

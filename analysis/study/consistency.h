@@ -22,6 +22,13 @@ class StatesTooCoarse : public markov::ConvergenceError {
   explicit StatesTooCoarse(const std::string& what) : ConvergenceError("not known: " + what) {}
 };
 
+/// Says that landings under `settled` cannot be tabulated.
+class NotTabulated : public markov::ConvergenceError {
+ public:
+  explicit NotTabulated(const std::string& why)
+      : ConvergenceError("not known: law settled: " + why + "; simulate follows trials") {}
+};
+
 /// Survival starts at 1, does not rise, and sums to no more than the expected steps; every interval holds its value;
 /// expected steps are at least 1, rates lie in [0, 1]; and all of Metastability::agreements hold.
 /// study() asks this of every result. @throws Contradiction

@@ -526,6 +526,14 @@ bool without_noise(const Problem& problem) {
   return true;
 }
 
+bool rests_at_once(const Problem& problem) {
+  for (const double score : {-reach, -2.0, 0.0, 2.0, reach}) {
+    const auto range = problem.map.landing_range(problem.launch.state(score), problem.launch.phase);
+    if (!range || range->second != markov::rest_landing) return false;
+  }
+  return true;
+}
+
 Metastability followed_study(const Problem& problem, const StudyOptions& options) {
   if (options.progress) options.progress(0, "following launches");
   Launches launches = LaunchCutter(problem).cut();
@@ -544,9 +552,9 @@ Metastability followed_study(const Problem& problem, const StudyOptions& options
   result.spectrum.moduli = {1 - failing};
   const double after = rests ? 1 : no_end;
   result.steps.from_quasi_stationary = {after, after, after};
-  result.steps.worst_start = rests ? worst_start(problem) : result.steps.from_quasi_stationary;
+  result.steps.worst_start = rests && without_noise(problem) ? worst_start(problem) : result.steps.from_quasi_stationary;
   describe_cycle(problem, rests ? std::vector<double>() : cycle, result);
-  result.steps.safe_state = safe_state(problem);
+  if (without_noise(problem)) result.steps.safe_state = safe_state(problem);
   if (options.progress) options.progress(0.9, "summary");
   Beside beside(problem);
   const bool one = problem.launch.state(-reach) == problem.launch.state(reach);

@@ -12,7 +12,10 @@ namespace metastable::analysis {
 /// (AnyReturnMap::landing_range); a map without scores has no noise, one that does not tell its range counts as noisy.
 bool without_noise(const Problem& problem);
 
-/// Follows a problem without noise: the steps are whole, or without end.
+/// Does every launch rest at its first event, whatever the noise?
+bool rests_at_once(const Problem& problem);
+
+/// Follows a problem without noise, or one that rests_at_once(): the steps are whole, or without end.
 ///
 /// A launch is followed until it rests or until it is known never to. That is known once a whole number of revolutions
 /// leads an interval of states around the orbit, or around the limit that its last changes point at, into itself (nine

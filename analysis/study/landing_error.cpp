@@ -152,11 +152,15 @@ LandingError landing_error(const Problem& problem, int phases, std::span<const d
   return error;
 }
 
+LandingReach landing_reach(const StepsToRest& steps) {
+  return {steps.landing_error - std::min(0.0, steps.memory.lower),
+          steps.landing_error + std::max(0.0, steps.memory.upper)};
+}
+
 void add_landing_error(Metastability& result, const LandingError& error, double tolerance) {
   result.steps.landing_error = error.table;
   result.steps.memory = error.memory;
-  const double less = error.table - std::min(0.0, error.memory.lower),
-               more = error.table + std::max(0.0, error.memory.upper);
+  const auto [less, more] = landing_reach(result.steps);
   const double memory = std::max(std::abs(error.memory.lower), std::abs(error.memory.upper));
   if (less == 0 && more == 0) return;
   for (Estimate* steps : {&result.steps.from_start, &result.steps.from_quasi_stationary, &result.steps.worst_start}) {

@@ -23,6 +23,13 @@ struct LandingError {
 LandingError landing_error(const Problem& problem, int phases, std::span<const double> states,
                            const markov::SampledChain& sampled, const SolvedChain& solved, const StudyOptions& options);
 
+/// Says by how much the logarithm of the expected steps may be less, and more, than a study's value by both; each at
+/// least 0.
+struct LandingReach {
+  double less = 0, more = 0;
+};
+LandingReach landing_reach(const StepsToRest& steps);
+
 /// Takes them into the intervals of the expected steps and of the failure rate, and into the status. The values stay
 /// the chain's; the intervals reach to what `memory` makes of them.
 void add_landing_error(Metastability& result, const LandingError& error, double tolerance);

@@ -345,10 +345,33 @@ void check_setting(const Setting& setting, Method method) {
                         name, sd, narrowest_integrated));
 }
 
+namespace {
+
+// Does a launch faster than most rest under `settled` although its foot sticks? One landing tells.
+bool fast_launch_rests(const Setting& setting) {
+  constexpr double sticks = 100;  // mu
+  const double omega = setting.launch().at_score(2);
+  const double eta = setting.pairs.empty() ? setting.noise().restitution().truncated_mean()
+                                           : setting.pairs.front().restitution;
+  const dynamics::LandingEnd end = setting.motion().land(setting.first_landing_leg, omega, {eta, sticks}).end;
+  return end == dynamics::LandingEnd::rest || end == dynamics::LandingEnd::given_up;
+}
+
+}  // namespace
+
 Metastability study(const Setting& setting, const StudyOptions& options) {
   check_setting(setting, options.method);
   // A table of landings takes part of the time.
-  const bool by_table = setting.law == dynamics::Law::settled && !options.direct && options.progress;
+  const bool tabulates = setting.law == dynamics::Law::settled && !options.direct && !setting.noise_free();
+  if (tabulates && fast_launch_rests(setting)) {  // a table is not worth its time where no launch passes
+    const Problem direct = setting.problem({.direct = true});
+    if (rests_at_once(direct)) {
+      Metastability result = followed_study(direct, options);
+      result.setting = setting;
+      return result;
+    }
+  }
+  const bool by_table = tabulates && options.progress;
   constexpr double of_table = 0.3;
   StudyOptions own = options;
   std::function<void(double)> table_progress;

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/study/consistency.h"
 #include "dynamics/return_map/settled_return_map.h"
 #include "dynamics/return_map/trials.h"
 #include "dynamics/wheel/ranges.h"
@@ -146,8 +147,18 @@ Problem Setting::problem(const LandingOptions& landings) const {
   options.direct = landings.direct || noise_free();  // few landings are asked for then
   options.progress = landings.progress;
   options.executor = markov::on_threads(landings.threads);
-  Problem problem = problem_of(dynamics::SettledReturnMap(wheel, slope_deg * std::numbers::pi / 180.0, noise(),
-                                                          speed.at_score(launch_reach), std::move(options)));
+  Problem problem = problem_of([&] {
+    try {
+      dynamics::SettledReturnMap map(wheel, slope_deg * std::numbers::pi / 180.0, noise(), speed.at_score(launch_reach),
+                                     std::move(options));
+      if (const std::optional<int> leg = map.landings().untabulated())
+        throw NotTabulated(fmt::format("at some restitution leg {} rests from every speed up to {} rad/s", *leg,
+                                       map.landings().range().omega_high));
+      return map;
+    } catch (const dynamics::TableTooLong& error) {
+      throw NotTabulated(error.what());
+    }
+  }());
   problem.follow = [=, motion = motion(), noise = noise(), leg = first_landing_leg](auto seed, auto index, auto most) {
     return dynamics::steps_to_rest(motion, noise, speed, leg, seed, index, most);
   };

@@ -62,6 +62,11 @@ SettledReturnMap::SettledReturnMap(const Wheel& wheel, double slope, ContactNois
     : geometry_(wheel, slope, Law::settled, std::move(noise)) {
   options = widened(std::move(options), highest_speed);
   landings_ = SettledMap::of(settled_wheel(wheel, slope), options);
+  // A small wheel rests up to high speeds.
+  if (landings_->untabulated() && options.range.omega_high < most_speed) {
+    options.range.omega_high = most_speed;
+    landings_ = SettledMap::of(settled_wheel(wheel, slope), options);
+  }
   highest_state_ = landings_->range().omega_high * landings_->range().omega_high;
   for (int p = 0; p < phases(); ++p) advance_.push_back(landings_->motion().foot(p).pace() + mean_slide(p));
 }
@@ -69,6 +74,12 @@ SettledReturnMap::SettledReturnMap(const Wheel& wheel, double slope, ContactNois
 std::pair<double, double> SettledReturnMap::state_interval(int phase) const {
   const StandingFoot& before = landings_->motion().foot(phase - 1);
   return {before.next_squared(before.barrier_squared()), std::numeric_limits<double>::infinity()};
+}
+
+double SettledReturnMap::duration(double next_state, int phase) const {
+  // A round tip rolls: its barrier is another than that of a point, for which there is a closed form.
+  return landings_->motion().wheel().tip_radius > 0 ? landings_->motion().foot(phase).duration(next_state)
+                                                    : geometry_.duration(next_state, phase);
 }
 
 double SettledReturnMap::arrival(int phase, const MappedLanding& landed) const {
@@ -291,7 +302,9 @@ double SettledReturnMap::mean_slide(int phase) const {
   const bool listed = noise().is_empirical();
   double state = 0.5 * (state_interval(phase).first + highest_state_);
   const double usual = listed ? noise().pairs()[0].restitution : noise().restitution().truncated_mean();
-  for (int k = 0; k < 50 * phases(); ++k) {
+  // Landings that are followed cost more, and halve what is left of the start at every step.
+  const int revolutions = landings_->direct() ? std::max(1, 24 / phases()) : 50;
+  for (int k = 0; k < revolutions * phases(); ++k) {
     const int p = (phase + k) % phases();
     const double next = next_state(p, std::sqrt(state), {usual, landings_->sticking_friction(p)});
     if (next == rests) return 0;

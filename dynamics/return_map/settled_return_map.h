@@ -47,7 +47,7 @@ class SettledReturnMap {
   /// for rest.
   std::pair<double, double> landing_range(double state, int phase) const;
   /// Returns the time of the stance as if the foot stood from the collision on [s].
-  double duration(double next_state, int phase) const { return geometry_.duration(next_state, phase); }
+  double duration(double next_state, int phase) const;
   /// Measures from this touch to the next one, the mean slide of the foot at its usual speed included [m].
   double advance(int phase) const { return advance_[static_cast<std::size_t>(phase)]; }
   /// Takes one draw of E[f(landing that is followed)] - E[f(landing)], with f(rest) = 0: its mean over the scores is

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <deque>
 #include <future>
 #include <limits>
@@ -19,6 +20,11 @@ constexpr double never = std::numeric_limits<double>::infinity();
 constexpr double smooth_restitution = 0.6;  // above it feet hop on to the next touch
 constexpr double rough_step = 0.05;         // between rows there
 constexpr std::size_t most_kept = 32;       // maps, of some 8 MB
+// Of a processor: the table of the paper's wheel takes 8 s of its landings of 20 us, and 10000 s were waited for in vain
+// at a radius of gyration of 5 mm.
+constexpr double longest_build = 3600;  // [s]
+constexpr int foreseen_from = 96;       // landings
+constexpr double landings_a_node = 2;   // beside those kept, mu_r and the kinks are solved for
 
 // Says how far a landing gets beyond the barrier: the settled foot's omega_eq^2 less the barrier's; its sign says rest.
 double beyond_barrier(const Landing& landing, double barrier) {
@@ -196,6 +202,7 @@ std::shared_ptr<const SettledMap> SettledMap::of(const SettledWheel& wheel, cons
     const std::shared_ptr<SettledMap> map(new SettledMap(SettledMotion(wheel), options));
     if (!options.direct) {
       const auto began = std::chrono::steady_clock::now();
+      map->foresee();
       map->build();
       map->check();
       map->seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
@@ -386,6 +393,36 @@ void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
   }
 }
 
+void SettledMap::foresee() const {
+  const auto processor_seconds = [] {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  };
+  constexpr double enough = 5;  // [s] for a first guess
+  const SettledRange& range = options_.range;
+  const std::vector<double>& length = motion_.wheel().leg_length;
+  const bool alike = std::all_of(length.begin(), length.end(), [&](double one) { return one == length.front(); });
+  const double rows = options_.restitutions + (range.eta_high - smooth_restitution) / rough_step;
+  const double landings = (alike ? 1 : legs()) * landings_a_node * rows * options_.speeds *
+                          (options_.frictions + SettledTable::stops * SettledTable::piece);
+  const double from = processor_seconds();
+  for (std::size_t i = 0; i < foreseen_from; ++i) {
+    const int leg = static_cast<int>(i % static_cast<std::size_t>(legs()));
+    const double eta = range.eta_low + (range.eta_high - range.eta_low) * spread(i, 0);
+    const double still = std::sqrt(std::max(0.0, motion_.foot(leg).barrier_squared()));
+    const double omega = still + (range.omega_high - still) * std::max(0.05, spread(i, 1));
+    if (!(omega > 0)) return;
+    motion_.land(leg, omega, {eta, sticking_[static_cast<std::size_t>(leg)] * (0.6 + 0.4 * spread(i, 2))});
+    const double spent = processor_seconds() - from, each = spent / static_cast<double>(i + 1);
+    if (each * landings > longest_build && (spent > enough || i + 1 == foreseen_from))
+      throw TableTooLong(
+          fmt::format("the table of landings would take about {:.2g} h of a processor, as one landing of this wheel "
+                      "takes {:.2g} ms",
+                      each * landings / 3600, 1e3 * each));
+  }
+}
+
 void SettledMap::build() {
   const SettledRange& range = options_.range;
   SettledTable empty;
@@ -419,6 +456,11 @@ void SettledMap::build() {
     ++rows_done;
     if (options_.progress) options_.progress(static_cast<double>(rows_done) / static_cast<double>(rows));
   });
+}
+
+std::optional<int> SettledMap::untabulated() const {
+  const auto found = std::ranges::find(table_, false, &SettledTable::usable);
+  return found == table_.end() ? std::nullopt : std::optional(static_cast<int>(found - table_.begin()));
 }
 
 std::optional<SettledSlice> SettledMap::slice(int leg, double eta) const {

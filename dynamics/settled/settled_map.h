@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "dynamics/settled/settled_motion.h"
@@ -47,13 +48,21 @@ struct SettledMapErrors {
   SettledMapError rough;
 };
 
+/// Says that a table would take too long to build; the message says how long.
+class TableTooLong : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// Reads landings by table. Const members may be called from any thread.
 class SettledMap {
  public:
   /// Returns the map of this wheel on its slope: built at the first call and kept for the life of the process (the last
   /// 32 of them; a map with other options is another map, executor and progress do not count). The table of the paper's
   /// wheel takes some 4 s on two cores.
-  /// @throws std::invalid_argument as SettledWheel::validate(), and for a range that is empty or out of bounds
+  /// @throws std::invalid_argument as SettledWheel::validate(), and for a range that is empty or out of bounds;
+  /// TableTooLong where landings (feet that chatter, a wheel of hardly any inertia that slides) take so long that the
+  /// table would take more than an hour of a processor: foreseen from some landings, before it is begun
   static std::shared_ptr<const SettledMap> of(const SettledWheel& wheel, const SettledMapOptions& options = {});
 
   const SettledMotion& motion() const { return motion_; }
@@ -78,11 +87,15 @@ class SettledMap {
   std::optional<SettledSlice> slice(int leg, double eta) const;
   /// Returns omega-^2 at the next touch [rad^2/s^2], for a landing that does not rest.
   double next_squared(int leg, double carried_squared) const { return motion_.foot(leg).next_squared(carried_squared); }
+  /// Returns the first leg of which there is no table although one was asked for, since even a foot that sticks rests
+  /// up to the highest speed of the range at some restitution; nothing if there is none.
+  std::optional<int> untabulated() const;
   const SettledMapErrors& error() const { return error_; }
   double seconds() const { return seconds_; }  ///< that it took to build
 
  private:
   SettledMap(SettledMotion motion, SettledMapOptions options);
+  void foresee() const;
   void build();
   void find_edges(SettledTable& table, int leg, int row) const;
   void tabulate(SettledTable& table, int leg, int row) const;

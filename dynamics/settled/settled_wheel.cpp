@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -103,6 +104,32 @@ double StandingFoot::next_squared(double omega_eq_squared) const {
 
 double StandingFoot::landing_squared(double next_squared) const {
   return (next_inertia_ * next_squared - 2 * fall_) / landing_inertia_;
+}
+
+double StandingFoot::duration(double next_squared) const {
+  using Rule = boost::math::quadrature::gauss<double, 40>;
+  constexpr double least_left = 1e-14;
+  const double energy = next_inertia_ * next_squared / 2 + potential(next_);
+  const double left = std::max(2 * (energy - potential(apex_)), apex_ > landing_ ? least_left * next_squared : 0);
+  if (!(left > 0)) {  // on a slope without barrier, from a slow start: omega^2 rises with the angle
+    return Rule::integrate(
+        [&](double root) {
+          const double angle = landing_ + root * root;
+          return 2 * root / std::sqrt(std::max(spin_squared(angle, energy), least_left * next_squared));
+        },
+        0.0, std::sqrt(next_ - landing_));
+  }
+  // Around the top 2 (E - V) is left + bend (a - apex)^2: sinh makes 1 / omega smooth there.
+  const double bend = gravity_ * length_ * std::cos(apex_ + std::atan2(sine_, cosine_)), width = std::sqrt(left / bend);
+  const auto smooth = [&](double u) {
+    const double angle = apex_ + width * std::sinh(u);
+    const double squared = std::max(spin_squared(angle, energy), left * (1 + std::sinh(u) * std::sinh(u)) / 2 /
+                                                                     inertia(angle));
+    return width * std::cosh(u) / std::sqrt(squared);
+  };
+  const double from = std::asinh((landing_ - apex_) / width), to = std::asinh((next_ - apex_) / width);
+  const double middle = std::clamp(0.0, from, to);
+  return Rule::integrate(smooth, from, middle) + Rule::integrate(smooth, middle, to);
 }
 
 double sticking_friction(const SettledWheel& wheel, int leg) {

@@ -60,6 +60,10 @@ class StandingFoot {
   /// Returns omega-^2 at the next touch of a foot with omega_eq^2 at its landing angle, and back. No drag.
   double next_squared(double omega_eq_squared) const;
   double landing_squared(double next_squared) const;
+  /// Returns the time from its landing angle to the next touch, with omega-^2 there [s]: Gauss-Legendre in the variable
+  /// in which passing the barrier is smooth, to 1e-9. A wheel that only just passes takes longest, however little it
+  /// has left (1e-14 of the energy at the next touch). No drag.
+  double duration(double next_squared) const;
   /// Returns the least omega_eq^2 that passes the barrier [rad^2/s^2].
   double barrier_squared() const { return barrier_; }
   /// Measures from touch to touch of two standing feet [m]: chord of the next landing plus what the tip rolls.

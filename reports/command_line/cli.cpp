@@ -52,7 +52,7 @@ Command steps() {
 }
 
 Command compare() {
-  return {"compare", "Expected steps of two or more slopes on common random numbers", declare_compare,
+  return {"compare", "Expected steps of two or more settings on common random numbers", declare_compare,
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) {
               const WalkerRequest walker = walker_request(o, line);
@@ -60,8 +60,12 @@ Command compare() {
                 throw std::invalid_argument("--slopes, --slope-sd: two slopes or two sds at least");
               return run_walker_compare(walker);
             }
-            run_compare(compare_request(o, several_settings(o, 2), line));
-          }};
+            run_compare(compare_request(o, compared_settings(o), line));
+          },
+          "Every option of wheel, contact, course and launch takes several values: with commas between them (--law "
+          "published,settled, --mass 1,2), or, where commas have a meaning of their own, given again (--legs 0.15 "
+          "--legs 0.16; likewise --restitution, --friction, --contact-list, --initial-speed). All combinations are "
+          "studied; the first values together are the setting that every other one is compared with."};
 }
 
 }  // namespace

@@ -125,6 +125,18 @@ std::string Options::text(const std::string& name) const {
   return fallback == fallback_.end() ? "" : fallback->second;
 }
 
+std::vector<std::string> Options::values(const std::string& name) const {
+  if (!given(name)) return {text(name)};
+  if (!several_.contains(name)) return all(name);
+  std::vector<std::string> parts;
+  for (const std::string& text : all(name)) {
+    std::istringstream stream(text);
+    for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+    if (text.ends_with(',')) parts.emplace_back();
+  }
+  return parts;
+}
+
 bool Options::flag(const std::string& name) const {
   const std::string value = text(name);
   if (value != "true" && value != "false")
@@ -138,7 +150,7 @@ void Options::check_given() const {
       throw std::invalid_argument(fmt::format("{}: what is given is empty", named(name)));
     if (texts.empty()) continue;
     const std::vector<std::string> words = words_of(value(name));
-    for (const std::string& text : texts)
+    for (const std::string& text : values(name))
       if (!words.empty()) analysis::require_word(named(name), text, words);
   }
 }

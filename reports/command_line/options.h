@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,6 +38,8 @@ class Options {
   void add_json();
   /// Takes the default off an option that was added: what it says must be given, or is not said.
   void drop_default(const std::string& name);
+  /// Lets options that were added hold several values, with commas between them: values().
+  void take_several(const std::vector<std::string>& names) { several_.insert(names.begin(), names.end()); }
   /// Adds what the command is about, given by its place on the command line, which is required. `words` are all it may
   /// be, "a|b", or "" for anything.
   void add_place(const std::string& name, const std::string& help, const std::string& words = "");
@@ -62,6 +65,9 @@ class Options {
   std::string value(const std::string& name) const;
   /// Returns the one value of an option: given once, or its default ("" if it has none).
   std::string text(const std::string& name) const;
+  /// Returns all values of an option: as often as it was given, and each with commas in it where it may hold several;
+  /// its default where it was not given.
+  std::vector<std::string> values(const std::string& name) const;
   bool flag(const std::string& name) const;
   double number(const std::string& name) const;
   std::uint64_t whole(const std::string& name, std::uint64_t least, std::uint64_t most) const;
@@ -79,6 +85,7 @@ class Options {
   std::map<std::string, std::string> fallback_;
   std::map<std::string, std::string> places_;  ///< "file:line: " of what a file gave
   std::map<std::string, dynamics::Range> ranges_;
+  std::set<std::string> several_;
 };
 
 /// Are options that no command line gives, but give().

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "reports/command_line/option_values.h"
@@ -39,10 +40,13 @@ StepsRequest steps_request(const Options& o, const analysis::Setting& setting, c
 void declare_compare(Options& o) {
   o.add("slopes", "DEG,DEG,...", "7.02,9.59",
         "Ramp slopes [deg], each from 0.001 to below half the angle between legs; later ones are compared "
-        "with the first");
+        "with the first (default: 7.02 alone where something else is compared)");
+  add_slope(o);
   o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
         dynamics::range::speed);
   add_wheel(o), add_contact(o), add_course(o), add_study(o);
+  add_compared(o);
+  o.add_flag("direct", "Follow every landing instead of reading a table, hundreds of times slower (settled)");
   o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
   add_standard_errors(o);
   o.add_json();
@@ -52,7 +56,11 @@ void declare_compare(Options& o) {
 CompareRequest compare_request(const Options& o, const std::vector<analysis::Setting>& settings,
                                const std::string& line) {
   CompareRequest request{settings, study_options(o), o.count("collisions", 1, 63), o.text("json"), line};
-  request.standard_errors = standard_errors(o, request.settings.front());
+  const auto follows = [](const analysis::Setting& one) { return one.law == dynamics::Law::settled; };
+  request.study.direct = o.flag("direct");
+  if (request.study.direct && std::none_of(settings.begin(), settings.end(), follows))
+    throw std::invalid_argument("--direct: has a meaning under --law settled only");
+  for (const analysis::Setting& one : settings) request.standard_errors = standard_errors(o, one);
   return request;
 }
 

@@ -46,6 +46,10 @@ constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
     {"friction", dynamics::LawQuantity::friction},
     {"correlation", dynamics::LawQuantity::friction},
     {"contact-list", dynamics::LawQuantity::friction},
+    {"restitution-mean", dynamics::LawQuantity::restitution},
+    {"restitution-sd", dynamics::LawQuantity::restitution},
+    {"friction-mean", dynamics::LawQuantity::friction},
+    {"friction-sd", dynamics::LawQuantity::friction},
     {"rebound-lost", dynamics::LawQuantity::rebound_lost},
     {"radius-of-gyration", dynamics::LawQuantity::radius_of_gyration},
     {"tip-radius", dynamics::LawQuantity::tip_radius},
@@ -55,6 +59,7 @@ constexpr std::pair<const char*, dynamics::LawQuantity> of_some_laws[] = {
 void check_law(const Options& options, dynamics::Law law) {
   for (const auto& [name, quantity] : of_some_laws) {
     if (!options.has(name) || !options.given(name) || dynamics::uses(law, quantity)) continue;
+    if (options.value(name) == "RANGE") continue;  // an axis of a sweep is refused where it is read
     // A folder states the wheel's r_g under any law: the effect slip_reversal takes it.
     if (quantity == dynamics::LawQuantity::radius_of_gyration && options.has("reality")) continue;
     throw std::invalid_argument(
@@ -184,10 +189,10 @@ analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& 
   return *paper;
 }
 
-analysis::Setting one_setting(const Options& options, const Pairs& pairs) {
+analysis::Setting one_setting(const Options& options, const Pairs& pairs, const char* slope_option) {
   analysis::Setting setting = common_setting(options, pairs);
   setting.slope_deg = options.number("slope");
-  check_slope("slope", setting);
+  check_slope(slope_option, setting);
   std::optional<std::string> launch;
   if (options.given("initial-speed")) launch = options.text("initial-speed");
   setting.initial_speed = launch_for(setting.slope_deg, launch);
@@ -211,6 +216,118 @@ std::vector<analysis::Setting> several_settings(const Options& options, std::siz
     check_slope("slopes", setting);
     setting.initial_speed = launch_for(slopes[i], launches.empty() ? std::nullopt : std::optional(launches[i]));
     settings.push_back(checked(std::move(setting)));
+  }
+  return settings;
+}
+
+namespace {
+
+constexpr std::size_t most_compared = 100;  // settings
+
+// Are the options of which several values make several settings, the first varying slowest; the others of the wheel
+// are given once more for a further value.
+const std::vector<std::string> compared_by_commas{
+    "slope",      "law",          "leg-count",       "mass",           "inertia",      "radius-of-gyration",
+    "tip-radius", "gravity",      "ramp-stiffness",  "contact-mass",   "rebound-lost", "correlation",
+    "ramp-length", "first-leg",   "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"};
+const std::vector<std::string> compared_by_repetition{"legs", "restitution", "friction", "contact-list",
+                                                      "initial-speed"};
+
+// Holds the values of one option.
+struct Varied {
+  std::string name;
+  std::vector<std::string> values;
+};
+
+// Puts a mean or an sd into the spread that it belongs to.
+void put_moment(const std::string& name, Options& one) {
+  if (!one.given(name)) return;
+  const std::string spread = name.substr(0, name.find('-'));
+  if (one.given("contact-list"))
+    throw std::invalid_argument(fmt::format("--{}: cannot vary with --contact-list", name));
+  const double value = one.number(name);
+  analysis::Spread both = one.spread(spread);
+  (name.ends_with("-mean") ? both.mean : both.sd) = value;
+  one.give(spread, {fmt::format("{},{}", both.mean, both.sd)});
+}
+
+// Takes off what this law does not know where another of the laws does. @returns whether that leaves a setting that no
+// other combination stands for
+bool drop_unknown(const std::vector<Varied>& varied, const std::vector<std::size_t>& at, Options& one) {
+  const dynamics::Law law = dynamics::law_from_name(one.text("law"));
+  for (const auto& [name, quantity] : of_some_laws) {
+    if (dynamics::uses(law, quantity)) continue;
+    one.give(name, {});
+    for (std::size_t v = 0; v < varied.size(); ++v)
+      if (varied[v].name == name && at[v] > 0) return false;
+  }
+  return true;
+}
+
+std::vector<Varied> varied_options(const Options& options) {
+  std::vector<Varied> varied;
+  const auto add = [&](const std::string& name, std::vector<std::string> values) {
+    if (values.size() > 1) varied.push_back({name, std::move(values)});
+  };
+  for (const std::string& name : compared_by_commas)
+    if (name != "slope") add(name, options.values(name));
+  for (const std::string& name : compared_by_repetition)
+    if (name != "initial-speed") add(name, options.values(name));
+  return varied;
+}
+
+// Returns the slopes that are compared; the two of the paper where nothing else is.
+std::vector<std::string> compared_slopes(const Options& options, bool alone) {
+  if (options.given("slope") && options.given("slopes"))
+    throw std::invalid_argument("--slope: is one of --slopes; give one of the two");
+  if (options.given("slope")) return options.values("slope");
+  if (!options.given("slopes") && !alone) return {options.text("slope")};
+  std::vector<std::string> slopes;
+  for (const double slope : list_value("slopes", options.text("slopes"))) slopes.push_back(fmt::format("{}", slope));
+  return slopes;
+}
+
+}  // namespace
+
+void add_compared(Options& options) {
+  options.add("restitution-mean", "MEAN", "", "Mean of eta, in the place of that of --restitution",
+              range::restitution);
+  options.add("restitution-sd", "SD", "", "Sd of eta, likewise", range::restitution);
+  options.add("friction-mean", "MEAN", "", "Mean of mu, in the place of that of --friction", range::friction);
+  options.add("friction-sd", "SD", "", "Sd of mu, likewise", range::friction);
+  options.take_several(compared_by_commas);
+}
+
+std::vector<analysis::Setting> compared_settings(const Options& options) {
+  std::vector<Varied> varied = varied_options(options);
+  const std::vector<std::string>& launches = options.all("initial-speed");
+  const std::vector<std::string> slopes = compared_slopes(options, varied.empty() && launches.size() < 2);
+  if (slopes.size() < 2 && varied.empty() && launches.size() < 2)
+    throw std::invalid_argument(
+        fmt::format("--{}: {} given where at least 2 are needed, or several values of another option",
+                    options.given("slope") ? "slope" : "slopes", slopes.size()));
+  if (slopes.size() > 1 && !launches.empty() && launches.size() != slopes.size())
+    throw std::invalid_argument(fmt::format("--initial-speed: {} values for {} slopes (give it once a slope, in order)",
+                                            launches.size(), slopes.size()));
+  varied.insert(varied.begin(), {"slope", slopes});
+  if (slopes.size() == 1 && launches.size() > 1) varied.push_back({"initial-speed", launches});
+  std::size_t size = 1;
+  for (const Varied& one : varied)
+    if ((size *= one.values.size()) > most_compared)
+      throw std::invalid_argument(fmt::format("compare: more than {} combinations of values", most_compared));
+  const bool laws = options.values("law").size() > 1;
+  std::vector<analysis::Setting> settings;
+  for (std::size_t index = 0; index < size; ++index) {
+    Options one = options;
+    std::vector<std::size_t> at(varied.size());
+    for (std::size_t v = varied.size(), left = index; v-- > 0; left /= varied[v].values.size())
+      one.give(varied[v].name, {varied[v].values[at[v] = left % varied[v].values.size()]});
+    if (slopes.size() > 1 && !launches.empty()) one.give("initial-speed", {launches[at.front()]});
+    if (laws && !drop_unknown(varied, at, one)) continue;
+    check_law(one, dynamics::law_from_name(one.text("law")));
+    for (const char* name : {"restitution-mean", "restitution-sd", "friction-mean", "friction-sd"})
+      put_moment(name, one);
+    settings.push_back(one_setting(one, {}, options.given("slope") ? "slope" : "slopes"));
   }
   return settings;
 }

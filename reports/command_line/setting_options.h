@@ -31,10 +31,17 @@ using Pairs = std::optional<std::vector<dynamics::Contact>>;
 analysis::Setting common_setting(const Options& options, const Pairs& pairs = {});
 /// Reads `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
 analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);
-/// Reads --slope and --initial-speed too, and checks them.
-analysis::Setting one_setting(const Options& options, const Pairs& pairs = {});
+/// Reads --slope and --initial-speed too, and checks them. @param slope_option  that a message on the slope names
+analysis::Setting one_setting(const Options& options, const Pairs& pairs = {}, const char* slope_option = "slope");
 /// Makes one setting a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
 std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least);
+/// Adds what several settings are told apart by: the slopes, and means and sds of eta and mu; lets the options of wheel,
+/// contact and course, added before, hold several values.
+void add_compared(Options& options);
+/// Makes all combinations of the values that were given, two settings at least, the first of all in front; checked. Of
+/// several slopes --initial-speed is given once a slope. Where laws differ, an option counts for those that know it.
+/// @throws std::invalid_argument as one_setting(), and for more than 100
+std::vector<analysis::Setting> compared_settings(const Options& options);
 analysis::StudyOptions study_options(const Options& options);
 /// Reads the standard errors above 0 that were given, checked against the setting. @throws std::invalid_argument
 std::vector<analysis::StandardError> standard_errors(const Options& options, const analysis::Setting& setting);

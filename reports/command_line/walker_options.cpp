@@ -96,7 +96,8 @@ markov::MeshStudyOptions mesh_options(const Options& o, const std::vector<std::s
 WalkerRequest walker_request(const Options& o, const std::string& command_line, std::vector<std::string> own) {
   WalkerRequest request = base_request(o, command_line, own);
   const analysis::WalkerSetting base = base_setting(o);
-  const std::string slope = o.has("slopes") ? "slopes" : "slope";
+  const bool several = o.has("slopes");
+  const std::string slope = several && !(o.has("slope") && o.given("slope")) ? "slopes" : "slope";
   std::vector<double> slopes = o.given(slope) ? slopes_in(o, slope) : std::vector<double>{base.slope_deg};
   std::vector<double> sds = slopes_in(o, "slope-sd");
   const std::size_t settings = std::max(slopes.size(), sds.size());
@@ -104,7 +105,7 @@ WalkerRequest walker_request(const Options& o, const std::string& command_line, 
     if (list->size() == 1) list->assign(settings, list->front());
   if (slopes.size() != sds.size())
     throw std::invalid_argument(fmt::format("--slope-sd: {} values for {} slopes", sds.size(), slopes.size()));
-  if (slope == "slope" && settings > 1) throw std::invalid_argument("--slope, --slope-sd: one number each expected");
+  if (!several && settings > 1) throw std::invalid_argument("--slope, --slope-sd: one number each expected");
   for (std::size_t i = 0; i < settings; ++i) {
     request.settings.push_back(base);
     request.settings.back().slope_deg = slopes[i];

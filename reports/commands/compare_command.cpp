@@ -35,8 +35,9 @@ CompareExtras from_standard_errors(const CompareRequest& request, const analysis
     extras.steps.push_back(
         analysis::propagate(comparison.studies[i].steps.from_start.value, all[i], request.standard_errors));
   for (const analysis::Contrast& contrast : comparison.contrasts)
-    extras.ratios.push_back(analysis::propagate_ratio(contrast.ratio->value, all[contrast.of], all[contrast.against],
-                                                      request.standard_errors));
+    extras.ratios.push_back(analysis::propagate_ratio(
+        contrast.ratio->value, {*comparison.studies[contrast.of].setting, all[contrast.of]},
+        {*comparison.studies[contrast.against].setting, all[contrast.against]}, request.standard_errors));
   return extras;
 }
 
@@ -64,6 +65,8 @@ std::string compare_answer_text(const CompareRequest& request, const CompareAnsw
   const CompareExtras& extras = answer.extras;
   std::string text;
   for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
+    const std::string& label = comparison.labels[i];
+    if (!request.settings[i].describe().starts_with(label)) text += label + ": ";
     text += study_text(comparison.studies[i], answer.thresholds[i]);
     if (!extras.steps.empty())
       text += fmt::format("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(extras.steps[i]));

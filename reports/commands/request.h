@@ -35,7 +35,7 @@ struct StepsRequest {
 
 /// Asks for `metastable compare`.
 struct CompareRequest {
-  std::vector<analysis::Setting> settings;  ///< one a slope
+  std::vector<analysis::Setting> settings;  ///< the others are compared with the first
   analysis::StudyOptions study;
   int collisions = 16;  ///< of a measured trial
   std::string json;

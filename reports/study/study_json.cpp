@@ -160,7 +160,8 @@ std::string compare_json(const analysis::Comparison& comparison,
                          const CompareExtras& extras) {
   Json json = {{"schema", 1}, {"settings", Json::array()}, {"contrasts", Json::array()}};
   for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
-    json["settings"].push_back(study_json(comparison.studies[i], thresholds[i]));
+    json["settings"].push_back({{"label", comparison.labels[i]}});
+    json["settings"].back().update(study_json(comparison.studies[i], thresholds[i]));
     if (!extras.steps.empty()) json["settings"].back()["from_standard_errors"] = propagated_json(extras.steps[i]);
   }
   const auto estimate = [](const std::optional<analysis::Estimate>& value) {
@@ -168,11 +169,14 @@ std::string compare_json(const analysis::Comparison& comparison,
   };
   for (std::size_t i = 0; i < comparison.contrasts.size(); ++i) {
     const analysis::Contrast& contrast = comparison.contrasts[i];
-    json["contrasts"].push_back({{"slope_deg", comparison.studies[contrast.of].setting->slope_deg},
+    json["contrasts"].push_back({{"label", comparison.labels[contrast.of]},
+                                 {"against_label", comparison.labels[contrast.against]},
+                                 {"slope_deg", comparison.studies[contrast.of].setting->slope_deg},
                                  {"against_slope_deg", comparison.studies[contrast.against].setting->slope_deg},
                                  {"ratio", estimate(contrast.ratio)},
                                  {"difference", estimate(contrast.difference)},
                                  {"trials_needed", optional_number(contrast.trials_needed)},
+                                 {"power", optional_number(contrast.power)},
                                  {"sentence", contrast.sentence}});
     if (!extras.ratios.empty())
       json["contrasts"].back()["ratio_from_standard_errors"] = propagated_json(extras.ratios[i]);

@@ -139,6 +139,7 @@ std::string thresholds_text(const analysis::RestThresholds& thresholds) {
 std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds) {
   const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
+  const bool followed = study.method == analysis::Method::followed;
   const double error = relative_error(study.steps.from_start);
   std::string text = setting.describe() + "\n\n";
   if (study.status == analysis::Status::rest_unresolved) return text + "  " + study.message + "\n";
@@ -146,9 +147,10 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
     text += line("expected steps before failure", study.message);
   } else {
     text += line("expected steps before failure", estimate_text(study.steps.from_start));
-    text += line("  from the metastable regime", estimate_text(study.steps.from_quasi_stationary));
-    text += line("  from the worst start", estimate_text(study.steps.worst_start));
-    text += line("failure rate per step", estimate_text(study.spectrum.failure_rate));
+    if (!followed) text += line("  from the metastable regime", estimate_text(study.steps.from_quasi_stationary));
+    if (std::isfinite(study.steps.worst_start.upper))
+      text += line("  from the worst start", estimate_text(study.steps.worst_start));
+    if (!followed) text += line("failure rate per step", estimate_text(study.spectrum.failure_rate));
     text += line("steps", fmt::format("sd {}, {}", show(study.steps.distribution.sd, error),
                                       quantiles_text(study.steps.distribution, error)));
     if (study.steps.seconds) text += total_line("seconds", *study.steps.seconds, error);
@@ -160,14 +162,16 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
                  show(reached, reached > 0 ? -std::log(reached) * std::max(error, 0.001) : 0));
   }
   const analysis::Survivors& survivors = study.survivors;
-  text += line(endless ? "stationary speed" : "quasi-stationary speed",
-               speed_text(survivors.mean, survivors.sd, survivors.error));
-  if (!endless)
+  if (endless || !followed)
+    text += line(endless ? "stationary speed" : "quasi-stationary speed",
+                 speed_text(survivors.mean, survivors.sd, survivors.error));
+  if (!endless && !(followed && study.samples > 0))
     text += line("stationary speed, relaunched",
                  std::isnan(survivors.restart_mean)
                      ? "none: every launch rests at its first collision"
                      : speed_text(survivors.restart_mean, survivors.restart_sd, survivors.restart_error));
-  text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.spectrum.moduli, ", ")));
+  if (!followed)
+    text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.spectrum.moduli, ", ")));
   std::string mixing;
   if (study.spectrum.moduli.size() > 1) mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);
   if (study.spectrum.total_variation_steps)
@@ -182,12 +186,16 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
              fmt::format("{} in the {} regime, {} {}", percent(share.quasi_stationary, share.quasi_stationary_error),
                          endless ? "stationary" : "metastable", percent(share.until_rest, share.until_rest_error),
                          endless ? "on the ramp" : "until rest"));
+  if (followed)
+    text += line("resolution", study.samples > 0 ? fmt::format("none: {} trials were followed", study.samples)
+                                                 : std::string("none: without noise launches are followed"));
   const std::string legs = study.phases > 1 ? fmt::format(" for each of {} legs", study.phases) : "";
-  text += line("resolution", study.method == analysis::Method::integrated
-                                 ? fmt::format("{} nodes{}, integrated", study.cells, legs)
-                                 : fmt::format("{} cells{}, {} draws a cell, {}", study.cells, legs, study.samples,
-                                               study.replicates > 1 ? fmt::format("{} replicates", study.replicates)
-                                                                    : std::string("one randomisation")));
+  if (!followed)
+    text += line("resolution", study.method == analysis::Method::integrated
+                                   ? fmt::format("{} nodes{}, integrated", study.cells, legs)
+                                   : fmt::format("{} cells{}, {} draws a cell, {}", study.cells, legs, study.samples,
+                                                 study.replicates > 1 ? fmt::format("{} replicates", study.replicates)
+                                                                      : std::string("one randomisation")));
   if (!endless) {
     text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)",
                                                study.steps.discretization_error, study.steps.sampling_error));
@@ -199,8 +207,9 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
       text += line("feet still moving at the next touch",
                    fmt::format("move the steps by {:.2g} ({:.2g} to {:.2g}, in the interval)", study.steps.memory.value,
                                study.steps.memory.lower, study.steps.memory.upper));
-    text +=
-        line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.steps.solver_disagreement));
+    if (!followed)
+      text +=
+          line("solvers", fmt::format("elimination and KLU differ by {:.2g} at most", study.steps.solver_disagreement));
     if (!study.message.empty()) text += "\n" + study.message + "\n";
   }
   return text;

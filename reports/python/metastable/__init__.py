@@ -14,6 +14,7 @@ computations a ComputationError (a RuntimeError).
 import dataclasses
 import decimal
 import html
+import itertools
 import json
 import numbers
 import os
@@ -216,23 +217,36 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     raise TypeError(f"setting: a Setting, WalkerSetting or Walker expected, not {type(setting).__name__}")
 
 
-def compare(settings, *, collisions=16, method=None, cells=None, samples=None, tolerance=None, sequence=None,
-            draws=None, tail=None, replicates=None, mixing_distance=None, eigenvalues=None, standard_errors=None,
-            spacing=None, simulated_steps=None, guided_samples=None, memory_gb=None, seed=1, threads=0, progress=None):
+def compare(settings=None, *, collisions=16, method=None, cells=None, samples=None, tolerance=None, sequence=None,
+            draws=None, tail=None, replicates=None, mixing_distance=None, eigenvalues=None, direct=False,
+            standard_errors=None, spacing=None, simulated_steps=None, guided_samples=None, memory_gb=None, seed=1,
+            threads=0, progress=None, **varied):
     """Expected steps of two or more settings on common random numbers, each compared with the first: `metastable
     compare`. Settings of the wheel give a Comparison, WalkerSettings a WalkerComparison.
+
+    settings    two or more settings; or one Setting (None: the paper's), of which `varied` makes several
+    varied      any field of Setting, and restitution_mean, restitution_sd, friction_mean and friction_sd: a list of
+                values, or one. All combinations are compared, the first values together are the reference; of several
+                slopes, as many launches are taken one a slope. What is a list itself, (mean, sd) or the legs of a
+                wheel, is one value: a list of such lists holds several.
+
+        metastable.compare(law=["published", "settled"], friction_mean=[0.4, 0.6])
 
     collisions  of a measured trial, 1 to 63: how many such trials would tell the settings apart
     The other arguments are those of study().
     """
+    if settings is None or isinstance(settings, Setting):
+        settings = _combinations(settings or Setting(), varied)
+    elif varied:
+        raise InputError(f"{next(iter(varied))}: varies one setting, and several are given")
     settings = list(settings)
     kinds = {type(setting) for setting in settings}
     if len(settings) < 2 or len(kinds) > 1 or not kinds <= {Setting, WalkerSetting}:
         raise InputError("settings: two or more of one kind, Setting or WalkerSetting, expected")
     options = dict(collisions=None if collisions == 16 else collisions, method=method, cells=cells, samples=samples,
                    tolerance=tolerance, sequence=sequence, draws=draws, tail=tail, replicates=replicates,
-                   mixing_distance=mixing_distance, eigenvalues=eigenvalues, standard_errors=standard_errors,
-                   spacing=spacing, simulated_steps=simulated_steps,
+                   mixing_distance=mixing_distance, eigenvalues=eigenvalues, direct=direct,
+                   standard_errors=standard_errors, spacing=spacing, simulated_steps=simulated_steps,
                    guided_samples=guided_samples, memory_gb=memory_gb, seed=seed, threads=threads)
     command = _called("compare", settings, **{key: value for key, value in options.items() if key != "threads"})
     fields = [_fields(setting) for setting in settings]
@@ -240,6 +254,60 @@ def compare(settings, *, collisions=16, method=None, cells=None, samples=None, t
         if kinds == {Setting}:
             return Comparison(_metastable.compare(fields, options, command, tell))
         return WalkerComparison(_metastable.study_walkers(fields, options, command, tell))
+
+
+_moments = {"restitution_mean": ("restitution", 0), "restitution_sd": ("restitution", 1),
+            "friction_mean": ("friction", 0), "friction_sd": ("friction", 1)}
+
+
+def _values_of(name, given):
+    """The values that an argument of compare() holds."""
+    given = given.tolist() if hasattr(given, "tolist") else given
+    if not isinstance(given, (list, tuple, range)):
+        return [given]
+    flat = all(isinstance(each, numbers.Real) for each in given)
+    one = (name == "legs" and len(given) > 2) or name in ("initial_speed", "restitution", "friction")
+    listed = name == "contact_list" and all(numpy.ndim(each) == 1 for each in given)
+    return [given] if listed or (flat and one) else list(given)
+
+
+def _with(setting, changes):
+    """The setting with other values, of a mean or an sd alone too."""
+    fields = {name: value for name, value in changes.items() if name not in _moments}
+    for name, value in changes.items():
+        if name in _moments:
+            field, place = _moments[name]
+            spread = fields.get(field, getattr(setting, field))
+            spread = (0.4, 0.1) if spread is None else spread
+            spread = list(spread) if isinstance(spread, (list, tuple)) else [spread, 0.0]
+            spread[place] = value
+            fields[field] = tuple(spread)
+    return setting.replace(**fields)
+
+
+def _combinations(setting, varied):
+    """All combinations of the values, the last argument's fastest."""
+    known = [field.name for field in dataclasses.fields(Setting)] + list(_moments)
+    for name in varied:
+        if name not in known:
+            raise InputError(f"{name}: is neither an argument of compare nor a field of Setting")
+    values = {name: _values_of(name, given) for name, given in varied.items()}
+    for name in values:
+        if not values[name]:
+            raise InputError(f"{name}: holds no value")
+    slopes, launches = values.get("slope_deg", ()), values.get("initial_speed", ())
+    together = len(slopes) > 1 and len(launches) > 1
+    if together and len(slopes) != len(launches):
+        raise InputError(f"initial_speed: {len(launches)} values for {len(slopes)} slopes (give it once a slope, in order)")
+    if together:
+        values["slope_deg"] = list(zip(slopes, values.pop("initial_speed")))
+    settings = []
+    for each in itertools.product(*values.values()):
+        changes = dict(zip(values, each))
+        if together:
+            changes["slope_deg"], changes["initial_speed"] = changes["slope_deg"]
+        settings.append(_with(setting, changes))
+    return settings
 
 
 def sweep(setting, *, slope_deg=None, restitution_mean=None, restitution_sd=None, friction_mean=None, friction_sd=None,

@@ -352,12 +352,13 @@ def study(setting: Union[WalkerSetting, Walker], *, spacing: Optional[float] = N
 
 
 @overload
-def compare(settings: Iterable[Setting], *, collisions: int = 16, method: Optional[str] = None,
+def compare(settings: Union[Iterable[Setting], Setting, None] = None, *, collisions: int = 16, method: Optional[str] = None,
             cells: Optional[int] = None, samples: Optional[int] = None, tolerance: Optional[float] = None,
             sequence: Optional[str] = None, draws: Optional[str] = None, tail: Optional[float] = None,
             replicates: Optional[int] = None, mixing_distance: Optional[float] = None,
-            eigenvalues: Optional[int] = None, standard_errors: Optional[Mapping[str, float]] = None, seed: int = 1,
-            threads: int = 0, progress: Progress = None) -> Comparison: ...
+            eigenvalues: Optional[int] = None, direct: bool = False,
+            standard_errors: Optional[Mapping[str, float]] = None, seed: int = 1, threads: int = 0,
+            progress: Progress = None, **varied: Any) -> Comparison: ...
 @overload
 def compare(settings: Iterable[WalkerSetting], *, spacing: Optional[float] = None,
             simulated_steps: Optional[int] = None, guided_samples: Optional[int] = None,

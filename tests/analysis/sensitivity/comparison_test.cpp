@@ -44,14 +44,39 @@ TEST(Comparison, NoRatioWhereOneSideIsInfinite) {
   EXPECT_TRUE(contrast.trials_needed);  // trials that rest tell it from one that does not
 }
 
-// Of two geometric lifetimes, failure 0.5 and 0.25 a step, seen for 2 collisions, min(T, 3) has means 1.75 and 2.3125.
-TEST(Comparison, TrialsToTellApartByHand) {
+// Of two geometric lifetimes, failure 0.5 and 0.25 a step, seen for 2 collisions, min(T, 3) is 1, 2, 3.
+TEST(Comparison, TrialsToTellApartAreOfStepsWithinTheCollisions) {
   const std::vector<double> a{1, 0.5, 0.25}, b{1, 0.75, 0.5625};
-  const double var_a = (1 + 3 * 0.5 + 5 * 0.25) - 1.75 * 1.75, var_b = (1 + 3 * 0.75 + 5 * 0.5625) - 2.3125 * 2.3125;
-  const double reach = 1.959963984540054 + 0.8416212335729143;
-  EXPECT_EQ(*trials_to_tell_apart(a, b, 2), std::ceil(reach * reach * (var_a + var_b) / (0.5625 * 0.5625)));
+  const auto design = trials_to_tell_apart(a, b, 2), by_hand = trials_for_power({0, 0.5, 0.25, 0.25}, {0, 0.25, 0.1875, 0.5625});
+  EXPECT_EQ(design->trials, by_hand->trials);
+  EXPECT_EQ(design->power, by_hand->power);
   EXPECT_FALSE(trials_to_tell_apart(a, a, 2));
   EXPECT_THROW(trials_to_tell_apart(a, b, 3), std::invalid_argument);
+}
+
+TEST(Comparison, FewerStepsAreSaidSo) {
+  Setting smooth = paper_setting(7.02, true);
+  smooth.restitution.sd = smooth.friction.sd = 0.05;
+  const Contrast contrast = compare({smooth, paper_setting(7.02, true)}, {.cells = 64, .samples = 1024}).contrasts[0];
+  EXPECT_NE(contrast.sentence.find("eta 0.4 sd"), 0u);
+  EXPECT_EQ(contrast.sentence.find("sd of eta 0.1, sd of mu 0.1 takes 0."), 0u) << contrast.sentence;
+  EXPECT_NE(contrast.sentence.find(" fewer ("), std::string::npos) << contrast.sentence;
+  EXPECT_EQ(contrast.sentence.find("-"), std::string::npos) << contrast.sentence;
+}
+
+// One side has replicates of a chain, the other takes seven steps for certain.
+TEST(Comparison, AWheelWithoutNoiseBesideOneWithIt) {
+  Setting plastic = paper_setting(7.02, true);
+  plastic.law = dynamics::Law::plastic;
+  plastic.slope_deg = 2;
+  plastic.initial_speed.sd = 0;
+  Setting noisy = paper_setting(7.02, true);
+  const Comparison comparison = compare({plastic, noisy}, {.cells = 64, .samples = 1024});
+  const double certain = comparison.studies[0].steps.from_start.value;
+  EXPECT_EQ(certain, std::round(certain));
+  const Estimate &steps = comparison.studies[1].steps.from_start, &ratio = *comparison.contrasts[0].ratio;
+  EXPECT_DOUBLE_EQ(ratio.value, steps.value / certain);
+  EXPECT_NEAR(ratio.upper / ratio.value, steps.upper / steps.value, 1e-3);
 }
 
 TEST(Comparison, NeedsTwoSettings) { EXPECT_THROW(compare({paper_setting(7.02, true)}, {}), std::invalid_argument); }

@@ -35,11 +35,17 @@ TEST(Propagation, DeltaMethodInTheLogarithm) {
 
 // Friction is one unknown for both ramps and cancels where both respond alike; two slopes are two unknowns.
 TEST(Propagation, RatioCancelsWhatIsCommon) {
-  const Propagated common = propagate_ratio(2, two(0.3, -4), two(0.4, -4), {{Parameter::friction_mean, 0.1}});
+  Setting here, there;
+  there.slope_deg = 9.59;
+  const auto ratio = [&](Parameter parameter, double error) {
+    return propagate_ratio(2, {here, two(0.3, -4)}, {there, two(0.4, -4)}, {{parameter, error}});
+  };
+  const Propagated common = ratio(Parameter::friction_mean, 0.1);
   EXPECT_EQ(common.log_sd, 0);
   EXPECT_EQ(common.interval.lower, 2);
-  const Propagated slopes = propagate_ratio(2, two(0.3, -4), two(0.4, -4), {{Parameter::slope, 1.0}});
-  EXPECT_DOUBLE_EQ(slopes.log_sd, 0.5);
+  EXPECT_DOUBLE_EQ(ratio(Parameter::slope, 1.0).log_sd, 0.5);
+  there = here;
+  EXPECT_DOUBLE_EQ(ratio(Parameter::slope, 1.0).log_sd, 0.1);  // one ramp
 }
 
 TEST(Propagation, RefusesWhatHasNoMeaning) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "analysis/sensitivity/comparison.h"
 #include "analysis/study/certify.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/rest_reachability.h"
@@ -63,6 +64,19 @@ TEST(SettledStudy, ChainIsTheRolledWheel) {
   EXPECT_GT(study.steps.landing_error, 0);
   EXPECT_LT(study.steps.landing_error, 0.02);
   expect_alike(study.steps.from_start, roll(setting, 2000));
+}
+
+// A ratio is as uncertain as a table of landings leaves both its sides.
+TEST(SettledStudy, RatiosHoldWhatTheTableLeavesOpen) {
+  const Setting one = settled(7.02, {0.4, 0.1}, {0.4, 0.1}, true), other = settled(7.02, {0.4, 0.1}, {0.45, 0.1}, true);
+  const Comparison comparison = compare({one, other}, {.tolerance = 0.05});
+  const double open = comparison.studies[0].steps.landing_error + comparison.studies[1].steps.landing_error;
+  const Estimate &ratio = *comparison.contrasts[0].ratio, &difference = *comparison.contrasts[0].difference;
+  EXPECT_GT(open, 0);
+  EXPECT_GE(std::log(ratio.upper / ratio.value), open);
+  EXPECT_LE(std::log(ratio.lower / ratio.value), -open);
+  EXPECT_GT(difference.upper - difference.value,
+            comparison.studies[1].steps.landing_error * comparison.studies[1].steps.from_start.value);
 }
 
 // A sixth of the feet still move at the next touch; what that does is measured, and in the interval.

@@ -215,6 +215,23 @@ TEST(SettledMotion, ATipRollsAsItStands) {
   EXPECT_NEAR(step.omega_minus * step.omega_minus - std::pow(step.landing.omega_plus, 2), gained, 1e-9);
 }
 
+// The time of a stance by quadrature is that of the motion followed in time, up to the barrier and on slopes without.
+TEST(SettledMotion, AStanceTakesAsLongAsItsMotion) {
+  for (const double slope : {3.0, 7.02, 15.0, 22.0})
+    for (const double tip : {0.0, 0.0005, 0.005, 0.0075})
+      for (const double omega : {2.5, 3.2, 4.8, 8.0}) {
+        SettledWheel wheel = paper(slope);
+        wheel.tip_radius = tip;
+        const SettledMotion motion(wheel);
+        const Step step = motion.step(1, omega, {0, 2});
+        if (!step.touched || step.landing.end != LandingEnd::settled) continue;
+        EXPECT_NEAR(motion.foot(1).duration(step.omega_minus * step.omega_minus), step.duration, 1e-7)
+            << slope << ' ' << tip << ' ' << omega;
+        const StandingFoot& foot = motion.foot(1);
+        EXPECT_TRUE(std::isfinite(foot.duration(foot.next_squared(foot.barrier_squared()))));
+      }
+}
+
 TEST(SettledMotion, DragSlowsInFlightAndOnTheFoot) {
   // The work of a linear drag over a step that sticks is c times the integral of omega over the turn, here by the
   // trapezoid of a fine series of steps without drag at first order in c.

@@ -104,6 +104,15 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
        "list.csv:3: column restitution"},
       {{"compare", "--slopes", "7.02"}, "--slopes: 1 given where at least 2"},
       {{"compare", "--slopes", "7.02,9.59", "--initial-speed", "7,0.1"}, "--initial-speed: 1 values for 2 slopes"},
+      {{"compare", "--slope", "9.59"}, "--slope: 1 given where at least 2"},
+      {{"compare", "--slope", "9.59", "--slopes", "7.02,9.59"}, "--slope: is one of --slopes"},
+      {{"compare", "--law", "published,sticky"}, "'sticky'"},
+      {{"compare", "--mass", "1,-2"}, "--mass: -2 is outside"},
+      {{"compare", "--mass", "1,"}, "--mass: '' is not a number"},
+      {{"compare", "--law", "plastic", "--friction-mean", "0.4,0.5"}, "--friction-mean: has a meaning under --law"},
+      {{"compare", "--friction-mean", "0.4,0.5", "--friction", "0.4,0.1", "--law", "sticky"}, "sticky"},
+      {{"compare", "--slopes", "7,30", "--initial-speed", "7,0", "--initial-speed", "7,0"},
+       "--slopes: 30 deg is outside [0.001, 22.5) deg"},
       {{"sweep"}, "no range given"},
       {{"sweep", "--slope", "5:12:0"}, "--slope: range 5:12:0"},
       {{"sweep", "--slope", "5:30:5", "--initial-speed", "7,0.1", "--out", path("s.csv")},
@@ -192,6 +201,35 @@ TEST_F(CommandLine, ComparePrintsTheContrast) {
   const auto json = nlohmann::json::parse(read(path("c.json")));
   EXPECT_EQ(json.at("settings").size(), 2u);
   EXPECT_TRUE(json.at("contrasts")[0].at("ratio").at("value").is_number());
+}
+
+// Every parameter that steps takes can be what differs; the first values together are the reference.
+TEST_F(CommandLine, CompareTakesSeveralValuesOfAnyParameter) {
+  const auto labels = [&](const std::vector<std::string>& words) {
+    const Ran ran = metastable(with(with({"compare", "--json", "-"}, words), quick));
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    std::vector<std::string> all;
+    if (ran.code != 0) return all;
+    const auto json = nlohmann::json::parse(ran.out);
+    for (const auto& one : json.at("settings")) all.push_back(one.at("label"));
+    for (const auto& one : json.at("contrasts")) {
+      EXPECT_EQ(one.at("against_label"), all.front());
+      EXPECT_TRUE(one.at("power").is_null() || one.at("power") >= 0.8);
+    }
+    return all;
+  };
+  using Labels = std::vector<std::string>;
+  EXPECT_EQ(labels({"--friction-mean", "0.4,0.6"}), (Labels{"mu 0.4", "mu 0.6"}));
+  EXPECT_EQ(labels({"--slope", "9.59", "--restitution-sd", "0.1,0.05,0.02"}),
+            (Labels{"sd of eta 0.1", "sd of eta 0.05", "sd of eta 0.02"}));
+  EXPECT_EQ(labels({"--legs", "0.15", "--legs", "0.16"}), (Labels{"legs of 0.15 m", "legs of 0.16 m"}));
+  EXPECT_EQ(labels({"--mass", "1.39,2"}), (Labels{"M 1.39 kg", "M 2 kg"}));
+  EXPECT_EQ(labels({"--law", "published,plastic", "--friction", "0.4,0.1"}),
+            (Labels{"law published", "law plastic"}));
+  EXPECT_EQ(labels({"--initial-speed", "7,0.1", "--initial-speed", "5,0.1"}), (Labels{"omega_0 7", "omega_0 5"}));
+  EXPECT_EQ(labels({"--slopes", "7.02,9.59", "--friction-mean", "0.4,0.5"}),
+            (Labels{"7.02 deg, mu 0.4", "7.02 deg, mu 0.5", "9.59 deg, mu 0.4", "9.59 deg, mu 0.5"}));
+  EXPECT_EQ(labels({"--law", "published,coulomb", "--rebound-lost", "0,0.5"}).size(), 3u);  // published has one
 }
 
 TEST_F(CommandLine, SweepCutShortIsTakenUpAgainToTheSameBytes) {

@@ -30,6 +30,23 @@ class SameAsTheCommandLine(unittest.TestCase):
         self.assertEqual(told(metastable.compare(settings, cells=24, samples=256).to_dict()),
                          command_line("compare", "--cells", "24", "--samples", "256"))
 
+    def test_compare_by_values(self):
+        several = metastable.compare(slope_deg=9.59, law=["published", "coulomb"], friction_mean=[0.4, 0.6], cells=24,
+                                     samples=256)
+        self.assertEqual(told(several.to_dict()),
+                         command_line("compare", "--slope", "9.59", "--law", "published,coulomb", "--friction-mean",
+                                      "0.4,0.6", "--cells", "24", "--samples", "256"))
+        self.assertEqual([one.label for one in several.settings][:2], ["law published, mu 0.4", "law published, mu 0.6"])
+        launches = metastable.compare(slope_deg=[6, 7], initial_speed=[(5, 0.1), (6, 0.1)], legs=[0.15] * 8, cells=24,
+                                      samples=256)
+        self.assertEqual([one.label for one in launches.settings], ["6 deg, omega_0 5", "7 deg, omega_0 6"])
+        for wrong, said in ((dict(friction_men=[1, 2]), "friction_men: is neither"), (dict(mass=[]), "mass: holds no value"),
+                            (dict(mass=[1, -1]), "mass"), (dict(mass=2), "two or more")):
+            with self.assertRaisesRegex(metastable.InputError, said):
+                metastable.compare(**wrong)
+        with self.assertRaisesRegex(metastable.InputError, "mass: varies one setting"):
+            metastable.compare([metastable.Setting()] * 2, mass=[1, 2])
+
     def test_walker(self):
         setting = metastable.WalkerSetting("simplest", slope_sd_deg=0.5)
         study = metastable.study(setting, spacing=1.2, simulated_steps=20000, how_it_fails=True)

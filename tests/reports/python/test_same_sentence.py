@@ -15,11 +15,13 @@ from support import data, program, refusal
 others = {"slope": "slope_deg", "slopes": "slope_deg", "slope-sd": "slope_sd_deg", "memory": "memory_gb",
           "effect": "effects", "no-flight": "flight", "shuffle": "shuffled"}
 
-# What Python does in other ways: results are objects, standard errors a dict, legs a list, a list of contacts an array.
+# What Python does in other ways: results are objects, standard errors a dict, legs a list, a list of contacts an array,
+# means and sds alone those of a Setting's pairs.
+moments = {f"{of}-{moment}" for of in ("restitution", "friction") for moment in ("mean", "sd")}
 files = {"json", "config", "out"}
 elsewhere = {
     "steps": files | {"explain", "leg-count", "contact-list"},
-    "compare": files | {"leg-count", "contact-list"},
+    "compare": files | moments | {"leg-count", "contact-list"},
     "sweep": files | {"leg-count", "contact-list", "walker", "slope-sd", "terrain", "spacing", "simulated-steps", "memory"},
     "simulate": files | {"leg-count", "contact-list"},
     "describe": files, "diagnose": files, "blind": files | {"sealed", "tool"},
