@@ -116,6 +116,23 @@ MeanAndError mean_and_error(const std::vector<std::uint64_t>& steps) {
   return found;
 }
 
+/// Says what direct simulation finds where there is no mesh, and whether walks fail in it.
+std::pair<std::string, bool> walked_alone(const BatchMap& map, std::span<const double> start,
+                                          const MeshStudyOptions& options) {
+  const std::size_t walks = std::clamp<std::size_t>(options.simulated_steps, 2, kWalks);
+  const std::uint64_t longest = std::max<std::uint64_t>(1, options.simulated_steps / walks);
+  const std::vector<std::uint64_t> walked =
+      follow_walks(map, start, longest, {.trials = walks, .seed = options.seed, .threads = options.threads});
+  const auto failed = static_cast<std::size_t>(std::count_if(walked.begin(), walked.end(), [](auto n) { return n > 0; }));
+  if (failed == 0) return {fmt::format("none of {} simulated walks of {} steps fails", walks, longest), false};
+  if (failed < walks)
+    return {fmt::format("{} of {} simulated walks fail within {} steps", failed, walks, longest), true};
+  const auto [mean, error] = mean_and_error(walked);
+  return {fmt::format("direct simulation: {} walks fail after {:.4g} steps in the mean (standard error {:.2g})", walks,
+                      mean, error),
+          true};
+}
+
 /// Makes one study.
 class Run {
  public:
@@ -145,8 +162,10 @@ class Run {
     });
     join();
     if (study_.steps.upper > kWidest * study_.steps.lower)
-      study_.disagreement = fmt::format("the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}): no number is given",
-                                        study_.steps.value, study_.steps.lower, study_.steps.upper);
+      study_.disagreement = fmt::format(
+          "the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}: no number is given", study_.steps.value,
+          study_.steps.lower, study_.steps.upper,
+          options_.simulated_steps > 0 ? "; " + walked_alone(map_, start_, options_).first : std::string());
     if (study_.disagreement.empty()) simulate();
     if (study_.disagreement.empty()) see_blind_spots();
     if (!study_.disagreement.empty()) return std::move(study_);
@@ -370,23 +389,6 @@ class Run {
   std::mutex mutex_;
   double done_ = 0;
 };
-
-/// Says what direct simulation finds where there is no mesh, and whether walks fail in it.
-std::pair<std::string, bool> walked_alone(const BatchMap& map, std::span<const double> start,
-                                          const MeshStudyOptions& options) {
-  const std::size_t walks = std::clamp<std::size_t>(options.simulated_steps, 2, kWalks);
-  const std::uint64_t longest = std::max<std::uint64_t>(1, options.simulated_steps / walks);
-  const std::vector<std::uint64_t> walked =
-      follow_walks(map, start, longest, {.trials = walks, .seed = options.seed, .threads = options.threads});
-  const auto failed = static_cast<std::size_t>(std::count_if(walked.begin(), walked.end(), [](auto n) { return n > 0; }));
-  if (failed == 0) return {fmt::format("none of {} simulated walks of {} steps fails", walks, longest), false};
-  if (failed < walks)
-    return {fmt::format("{} of {} simulated walks fail within {} steps", failed, walks, longest), true};
-  const auto [mean, error] = mean_and_error(walked);
-  return {fmt::format("direct simulation: {} walks fail after {:.4g} steps in the mean (standard error {:.2g})", walks,
-                      mean, error),
-          true};
-}
 
 }  // namespace
 

@@ -29,9 +29,11 @@ TEST(CoupledPassage, IsWhatEliminationSaysOfItsChain) {
     double steps = 0;
     for (int c = 0; c < corners.count; ++c)
       steps += corners.weight[static_cast<std::size_t>(c)] * mean[corners.node[static_cast<std::size_t>(c)]];
-    EXPECT_NEAR(coupled.passage.steps_lower / steps, 1, 1e-5) << gaits.sd;
+    const double bracket = coupled.passage.steps_upper / coupled.passage.steps_lower - 1;  // of what leaves the mesh
+    EXPECT_LT(bracket, 1e-3) << gaits.sd;
+    EXPECT_NEAR(coupled.passage.steps_lower / steps, 1, 1e-6 + bracket) << gaits.sd;
     EXPECT_NEAR(coupled.share[0] + coupled.share[1], 1, 1e-6);
-    EXPECT_GE(coupled.passage.steps_upper, coupled.passage.steps_lower);
+    EXPECT_GE(bracket, 0);
   }
 }
 

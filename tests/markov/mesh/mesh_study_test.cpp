@@ -89,9 +89,10 @@ TEST(MeshStudy, SimulationRefutesFailuresThatAreSteppedOver) {
                     narrow = said(damped_batch([](double, double z, double) { return z > 2 && z < 2.03; })),
                     hole = said(damped_batch([](double, double, double x) { return std::abs(x - 1) < 0.001; }));
   for (const std::string& text : {wide, narrow, hole}) {
-    EXPECT_NE(text.find("simulated walks failed within 195 steps, where the mesh foretells"), std::string::npos) << text;
+    EXPECT_NE(text.find("of 512 simulated walks fail"), std::string::npos) << text;
     EXPECT_NE(text.find("no number is given"), std::string::npos) << text;
   }
+  EXPECT_NE(narrow.find("failed within 195 steps, where the mesh foretells 0.02"), std::string::npos) << narrow;
   const BatchMap by_state = damped_batch([](double s, double, double) { return s > 1.9 && s < 1.95; });
   try {  // its nodes may or may not meet the band
     EXPECT_NE(mesh_study(by_state, start, quick()).disagreement, "");
