@@ -343,7 +343,7 @@ class Run {
   void sample() {
     if (options_.guided_samples == 0) study_.no_guided = "not asked for";
     if (options_.guided_samples > 0 && study_.steps.value <= kSampledFrom)
-      study_.no_guided = "failures are too frequent for it";
+      study_.no_guided = "not asked: failures are too frequent";
     if (several_gaits()) study_.no_guided = "its samples would know one gait";
     if (!study_.no_guided.empty()) return;
     const Mesh mesh(map_, frames_, start_, mesh_options(1, 0));
@@ -366,7 +366,7 @@ class Run {
     }
     study_.guided_samples = guided.samples;
     study_.no_guided = guided.samples > 0 ? "too few of its samples lead to failure to tell"
-                                          : "failures are too frequent for windows that forget the start";
+                                          : "not asked: failures are too frequent";
     if (!(guided.rate > 0)) return;
     const double half = normal_95 * guided.standard_error / guided.rate * std::max(1.0, kEven / even);
     if (!(half < 1)) return;                                                   // it tells nothing

@@ -191,7 +191,8 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
 
     Of a WalkerSetting or a Walker:
     spacing          of the coarsest mesh, in stationary sds of the noise, 0.05 to 2; None: by dimension
-    simulated_steps  about how many steps the direct simulation beside it takes; None: 2 million, 0: none
+    simulated_steps  how many steps, about, direct simulation takes beside it, however rare failures are; None: 2
+                     million, 0: none, and failures that the meshes step over may go unseen
     guided_samples   of the importance sampling beside it, asked above 100 steps; None: 4000, 0: none. It takes some
                      hundred calls of a Walker's step for each
     memory_gb        most memory of the meshes; None: 3

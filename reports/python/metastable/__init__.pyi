@@ -127,6 +127,9 @@ class WalkerStudy(Result):
     relative_errors: Record
     guided_sampling: Optional[MeshEstimate]
     direct_simulation: Optional[MeshEstimate]
+    no_guided_sampling: Optional[str]
+    no_direct_simulation: Optional[str]
+    other_gaits: Tuple[Record, ...]
     meshes: Tuple[Record, ...]
     memory_bytes: float
     gait: Optional[Record]
