@@ -36,9 +36,9 @@ void LandingShares::resize() {
 
 double LandingShares::settling_restitution(int leg, double omega) const {
   if (settling.empty()) return 1;
-  const auto [below, weight] = between_nodes(speed, omega);
-  const auto at = static_cast<std::size_t>(leg * speed.count + below);
-  return (1 - weight) * static_cast<double>(settling[at]) + weight * static_cast<double>(settling[at + 1]);
+  const auto at = static_cast<std::size_t>(leg * speed.count + between_nodes(speed, omega).first);
+  const double cell = (restitution.high - restitution.low) / (restitution.count - 1);
+  return static_cast<double>(std::min(settling[at], settling[at + 1])) - cell;
 }
 
 std::size_t LandingShares::cell(int leg, int at_speed, int at_restitution) const {

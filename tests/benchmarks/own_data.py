@@ -29,9 +29,9 @@ def run(command):
 
 
 def simulated(program, folder, law, spread, friction, trials, collisions, seed):
-    run([program, "simulate", "--slope", 9.59, "--law", law, "--restitution", f"0.4,{spread}",
-         "--friction", f"{friction},{spread}", "--trials", trials, "--collisions", collisions, "--seed", seed,
-         "--out", folder])
+    contact = [] if law == "plastic" else ["--restitution", f"0.4,{spread}", "--friction", f"{friction},{spread}"]
+    run([program, "simulate", "--slope", 9.59, "--law", law, *contact, "--trials", trials, "--collisions", collisions,
+         "--seed", seed, "--out", folder])
 
 
 def verdict_of(program, folder):
@@ -114,7 +114,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="build/release/reports/metastable")
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--laws", default="published,coulomb,settled")
+    parser.add_argument("--laws", default="published,coulomb,plastic,settled")
     parser.add_argument("--spreads", default="0.1,0.05")
     parser.add_argument("--trials", default="20,60")
     parser.add_argument("--few", action="store_true", help="over trials and collisions, few of them")
