@@ -113,7 +113,7 @@ TEST(OwnData, UnderSettledHasTransitionsWhateverRestitutionDoes) {
   }
   for (const EventKind kind : {EventKind::collision, EventKind::stance}) {
     const auto k = static_cast<std::size_t>(kind);
-    ASSERT_GT(counts[k], 30);
+    ASSERT_GT(counts[k], 15);
     EXPECT_NEAR(squares[k] / counts[k], 1, 3.5 * std::sqrt(2 / counts[k])) << k;
   }
 }
