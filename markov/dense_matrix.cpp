@@ -19,13 +19,21 @@ SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix) {
 }
 
 Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& whole, double least_share) {
-  if (!matrix.allFinite() || !whole.allFinite()) return Eigen::MatrixXd(whole.size(), 0);
+  if (!matrix.allFinite() || !whole.allFinite()) return Eigen::MatrixXd::Constant(whole.size(), whole.size(), NAN);
   const Eigen::VectorXd unit =
       whole.unaryExpr([](double information) { return information > 0 ? 1 / std::sqrt(information) : 0; });
   const SymmetricEigen split = symmetric_eigen(unit.asDiagonal() * matrix * unit.asDiagonal());
   const Eigen::Index resolved = (split.values.array() > least_share).count();  // the last ones
   return unit.asDiagonal() * split.vectors.rightCols(resolved) *
          split.values.tail(resolved).cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
+Eigen::MatrixXd floored_inverse(const Eigen::MatrixXd& matrix, double least_share) {
+  constexpr double least = 1e-12;  // of a diagonal, so that what has no information at all has an inverse
+  const Eigen::VectorXd unit = matrix.diagonal().cwiseMax(least).cwiseSqrt().cwiseInverse();
+  const SymmetricEigen split = symmetric_eigen(unit.asDiagonal() * matrix * unit.asDiagonal());
+  const Eigen::MatrixXd root = unit.asDiagonal() * split.vectors;
+  return root * split.values.cwiseMax(least_share).cwiseInverse().asDiagonal() * root.transpose();
 }
 
 double spectral_radius(Eigen::MatrixXd matrix) {

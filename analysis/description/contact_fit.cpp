@@ -183,7 +183,9 @@ void describe_curvature(ContactFit& fit, const Eigen::MatrixXd& information, con
       direction.weight[free[a]] = eigen.vectors(static_cast<Eigen::Index>(a), k);
     fit.directions.push_back(direction);
   }
-  if (!(eigen.values[0] > 0)) {
+  // Along such a direction one standard error is longer than the widest range searched.
+  constexpr double widest = highest[0] - lowest[0];
+  if (!(eigen.values[0] > 1 / (widest * widest))) {
     fit.status = ContactFit::Status::undetermined;
     fit.message = "the likelihood does not fall off in every direction: the four numbers are one choice among many";
     return;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
+
+#include "analysis/statistics/falling_order.h"
 
 namespace metastable::analysis {
 namespace {
@@ -16,10 +17,7 @@ constexpr double worth_moving = 0.2;     // rise of the log likelihood
 
 // These variants are worth a full fit.
 std::vector<std::size_t> leading_variants(const ScannedEffect& scanned, std::size_t most) {
-  std::vector<std::size_t> order(scanned.gain.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return scanned.gain[a] > scanned.gain[b]; });
+  const std::vector<std::size_t> order = falling_order(scanned.gain);
   std::vector<std::size_t> leading;
   for (const std::size_t v : order)
     if (leading.empty() || (leading.size() < most && scanned.gain[v] > variant_gain &&

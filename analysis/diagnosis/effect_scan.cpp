@@ -7,6 +7,7 @@
 #include <functional>
 #include <stdexcept>
 
+#include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/random.h"
 #include "markov/dense_matrix.h"
 #include "markov/parallel.h"
@@ -21,11 +22,13 @@ constexpr double far_out = 0.03;  // share of the draws beyond which a tail foll
 // Returns the root of the inverse of an effect's information, that of its priors included, in the directions that the
 // data resolve. @param whole  the information's diagonal before the projection
 Eigen::MatrixXd root_with_priors(const Candidate& candidate, Eigen::MatrixXd info, Eigen::VectorXd whole) {
-  for (Eigen::Index p = 0; p < whole.size(); ++p)
-    if (const double sd = candidate.parameters[static_cast<std::size_t>(p)].prior_sd; sd > 0) {
-      info(p, p) += 1 / (sd * sd);
-      whole[p] += 1 / (sd * sd);
-    }
+  for (Eigen::Index p = 0; p < whole.size(); ++p) {
+    const FreeParameter& parameter = candidate.parameters[static_cast<std::size_t>(p)];
+    const double range = parameter.upper - parameter.lower;
+    const double prior = parameter.prior_sd > 0 ? 1 / (parameter.prior_sd * parameter.prior_sd) : 0;
+    info(p, p) += prior;
+    whole[p] = whole[p] * range * range > resolved_range ? whole[p] + prior : 0;
+  }
   return markov::resolved_root(info, whole, resolved_share);
 }
 
@@ -85,9 +88,8 @@ std::vector<char> scanned_variants(const Candidate& candidate, const ScanBeside&
   const ScannedEffect *effect = beside.earlier->find(&candidate), *other = beside.earlier->find(beside.effect);
   if (!effect || !other) return scanned;
   const std::vector<double> promised = promised_beside(beside, *effect, *other);
-  std::vector<double> falling = promised;
-  std::ranges::nth_element(falling, falling.begin() + most_scanned, std::greater<>());
-  for (std::size_t v = 0; v < scanned.size(); ++v) scanned[v] = promised[v] > falling[most_scanned];
+  const std::vector<std::size_t> order = falling_order(promised);
+  for (std::size_t k = most_scanned; k < order.size(); ++k) scanned[order[k]] = false;
   return scanned;
 }
 
@@ -157,7 +159,10 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   const Eigen::MatrixXd cross =
       held.change.transpose() * all.change + held_stretch.transpose() * stretch;  // [held x columns]
   Eigen::MatrixXd weights = cross;
-  if (columns > 0) weights = markov::solve_columns(fit.information, cross);  // Eigen's solve refers to a first element
+  if (held.slope.cols() > 0) {
+    const Eigen::MatrixXd root = resolved_root(fit.information);
+    weights = root * (root.transpose() * cross);
+  }
   scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch;
   scan.whole = scan.information.diagonal();
   scan.information -= cross.transpose() * weights;
@@ -177,8 +182,7 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
                                           root_of_variant(scan, *effect.candidate, first), &start));
       effect.start.push_back(start);
     }
-    effect.best =
-        static_cast<std::size_t>(std::max_element(effect.gain.begin(), effect.gain.end()) - effect.gain.begin());
+    effect.best = falling_order(effect.gain).front();
   }
   return scan;
 }

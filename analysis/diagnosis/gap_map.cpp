@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "analysis/diagnosis/effect_scan.h"
 #include "analysis/diagnosis/map_columns.h"
+#include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/wheel/truncated_normal.h"
 #include "markov/dense_matrix.h"
@@ -48,18 +48,20 @@ Units units_of_chance(const EfficientColumns& efficient, const TransitionModel& 
 
 // Says how much of a shift of the cell the fitted parameters leave, by the slopes of its scores: where the gap is large
 // the events' own products say too much.
-double left_of_shift(const MapColumn& column, const Fit& fit) {
+// @param root  of the inverse of their information
+double left_of_shift(const MapColumn& column, const Fit& fit, const Eigen::MatrixXd& root) {
   Eigen::VectorXd follows = Eigen::VectorXd::Zero(fit.derivatives.change.cols());
   for (std::size_t k = 0; k < column.terms.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(column.terms[k].first);
     follows += (column.weights.empty() ? 1 : column.weights[k]) * fit.derivatives.change.row(i).transpose();
   }
-  return 1 - follows.dot(markov::solve_symmetric(fit.information, follows)) / column.variance;
+  return 1 - (root.transpose() * follows).squaredNorm() / column.variance;
 }
 
 // Gives the cells their own statistics, sizes and p-values.
 void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& columns, const EfficientColumns& efficient,
                  const Units& units, const Fit& fit) {
+  const Eigen::MatrixXd root = fit.information.rows() > 0 ? resolved_root(fit.information) : fit.information;
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const MapColumn& column = columns[k];
     const auto c = static_cast<Eigen::Index>(k);
@@ -82,7 +84,7 @@ void standardise(std::vector<GapCell>& cells, const std::vector<MapColumn>& colu
     }
     // The efficient size is the score by its information, so that size and statistic have one sign.
     const bool shift = column.measure == Measure::shift;
-    const double left = shift && fit.derivatives.change.cols() > 0 ? left_of_shift(column, fit) : kept;
+    const double left = shift && fit.derivatives.change.cols() > 0 ? left_of_shift(column, fit, root) : kept;
     const double information = std::max(1e-12, std::max(least_left, left) * column.variance);
     if (shift)
       cell.size = sum / information * cell.size;
@@ -179,11 +181,9 @@ GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uin
   const Units units = units_of_chance(efficient, model);
   standardise(map.cells, all.columns, efficient, units, fit);
 
-  std::vector<std::size_t> order(map.cells.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::abs(map.cells[a].statistic) > std::abs(map.cells[b].statistic);
-  });
+  std::vector<double> sizes;
+  for (const GapCell& cell : map.cells) sizes.push_back(std::abs(cell.statistic));
+  const std::vector<std::size_t> order = falling_order(sizes);
   step_down(map.cells, order, centred(units.rows), draws, seed);
   discover(map.cells, order);
   for (const GapCell& cell : map.cells) map.p_value = std::min(map.p_value, cell.p_adjusted);

@@ -170,7 +170,10 @@ Eigen::MatrixXd chance_of_sums(const TransitionModel& model, const Fit& chosen, 
     slopes.row(trial) += training[i] * (by.slope.row(i) + known[i] * by.change.row(i));
   }
   const Eigen::MatrixXd taken = by.change.transpose() * (training.asDiagonal() * cells);
-  sums += slopes * markov::solve_columns(chosen.information, taken);
+  if (slopes.cols() > 0) {
+    const Eigen::MatrixXd root = resolved_root(chosen.information);
+    sums += slopes * (root * (root.transpose() * taken));
+  }
   return sums.transpose() * sums;
 }
 

@@ -201,9 +201,8 @@ EfficientColumns project(const std::vector<MapColumn>& columns, const Transition
       if (p.prior_sd > 0) gram(at, at) += 1 / (p.prior_sd * p.prior_sd);
       ++at;
     }
-  gram.diagonal() *= 1 + 1e-9;
-  gram.diagonal().array() += 1e-12;
-  const Eigen::MatrixXd weights = markov::solve_columns(gram, held.transpose() * all.dense);
+  const Eigen::MatrixXd root = resolved_root(gram);
+  const Eigen::MatrixXd weights = root * (root.transpose() * (held.transpose() * all.dense));
   all.dense -= held * weights;
   all.sums -= left.transpose() * weights;
   return all;

@@ -16,7 +16,7 @@ constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is t
 constexpr double unresolved = 0.5, unresolved_share = 1e-4;
 // Are added to the information's diagonal, as shares of it. Where a step rises by less than this share of what it
 // promised, the next one is damped more.
-constexpr double dampings[] = {1e-9, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
+constexpr double dampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
 // Share of what a step foretold by which its rise may differ, for what it leaves to be next to nothing: of the order of
 // that share squared.
 constexpr double as_foretold = 0.1;
@@ -114,7 +114,8 @@ Eigen::VectorXd picked(const Eigen::VectorXd& all, const std::vector<Eigen::Inde
   return some;
 }
 
-// Solves with a diagonal that is so much larger: where a ridge bends, undamped steps along it leave it.
+// Solves with a diagonal that is so much larger: where a ridge bends, undamped steps along it leave it. No step goes
+// along what the data do not resolve.
 Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::VectorXd& gradient,
                              const std::vector<Eigen::Index>& part, double damping) {
   const auto size = static_cast<Eigen::Index>(part.size());
@@ -123,7 +124,8 @@ Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::Ve
     for (Eigen::Index b = 0; b < size; ++b)
       block(a, b) = information(part[static_cast<std::size_t>(a)], part[static_cast<std::size_t>(b)]);
   block.diagonal() *= 1 + damping;
-  return markov::solve_symmetric(block, picked(gradient, part));
+  const Eigen::MatrixXd root = resolved_root(block);
+  return root * (root.transpose() * picked(gradient, part));
 }
 
 // Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does.
@@ -180,7 +182,8 @@ FreeParts free_parts(const std::vector<Point::Slot>& slots, const Eigen::VectorX
     const auto p = static_cast<Eigen::Index>(k);
     const Point::Slot& s = slots[k];
     const bool held = (*s.value <= s.lower && gradient[p] <= 0) || (*s.value >= s.upper && gradient[p] >= 0);
-    if (held || !(information(p, p) > 0)) continue;
+    const double range = s.upper - s.lower;
+    if (held || !(information(p, p) * range * range > resolved_range)) continue;
     parts.all.push_back(p);
     (s.of_nuisance ? parts.of_nuisances : parts.of_terms).push_back(p);
   }
@@ -188,6 +191,10 @@ FreeParts free_parts(const std::vector<Point::Slot>& slots, const Eigen::VectorX
 }
 
 }  // namespace
+
+Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& information) {
+  return markov::resolved_root(information, information.diagonal(), resolved_share);
+}
 
 Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.events().size()));

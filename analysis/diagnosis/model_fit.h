@@ -37,6 +37,14 @@ struct Fit {
 /// which the fitted parameters take up altogether a share of about 0.001^2 seems to be left.
 inline constexpr double resolved_share = 1e-6;
 
+/// Is the information in units of a parameter's range that the data must hold for the parameter to be told from nothing:
+/// with less its whole range moves the log likelihood by less than a millionth, and slopes are rounding.
+inline constexpr double resolved_range = 1e-6;
+
+/// Returns the root R [n x r] of the pseudo-inverse R R^T of the information of fitted parameters, over the directions
+/// that the data and the priors resolve. @param information  [n x n], n >= 1
+Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& information);
+
 struct FitOptions {
   std::vector<char> count;  ///< by trial: 0 leaves its events out; empty: all
   bool refit_nuisances = true;

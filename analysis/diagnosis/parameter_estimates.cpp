@@ -127,7 +127,7 @@ void cover_variants(const RankedCause& ranked, const EffectScan& scan, std::vect
   for (std::size_t v = 0; v < variants.size(); ++v) {
     const double weight = std::exp(std::min(0.0, scanned->gain[v] - scanned->gain[own]) / 2);
     const double information = scan.information(scanned->first[v], scanned->first[v]);
-    if (v == own || weight < least_weight || !(information > 0)) continue;
+    if (v == own || weight < least_weight || !(information > resolved_share * scan.whole[scanned->first[v]])) continue;
     const EffectTerm other{
         term.candidate, variants[v], {std::clamp(p.neutral + factor * scanned->start[v][0], p.lower, p.upper)}};
     all.push_back({estimates(other, Eigen::MatrixXd::Constant(1, 1, factor * factor / information)), weight});
@@ -170,10 +170,7 @@ Cause described_cause(const TransitionModel& model, const RankedCause& ranked, c
     cause.parameters.resize(ranked.terms.size());
     return cause;
   }
-  Eigen::MatrixXd steadied = ranked.fit.information;
-  steadied.diagonal().array() += 1e-12;
-  const Eigen::MatrixXd covariance =
-      markov::solve_columns(steadied, Eigen::MatrixXd::Identity(steadied.rows(), steadied.cols()));
+  const Eigen::MatrixXd covariance = markov::floored_inverse(ranked.fit.information, resolved_share);
   auto first = static_cast<Eigen::Index>(model.nuisances().size());
   for (const EffectTerm& term : ranked.terms) {
     cause.parameters.push_back(estimates(term, covariance, first));
@@ -191,8 +188,7 @@ Cause described_cause(const TransitionModel& model, const RankedCause& ranked, c
 
 // Intervals follow the slopes of the reported numbers, unless those take a positive one below zero.
 std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, const Fit& fit) {
-  Eigen::MatrixXd covariance =
-      markov::solve_columns(fit.information, Eigen::MatrixXd::Identity(fit.information.rows(), fit.information.cols()));
+  Eigen::MatrixXd covariance = markov::floored_inverse(fit.information, resolved_share);
   for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
     const auto at = static_cast<Eigen::Index>(p);
     covariance(at, at) += model.nuisances()[p].form_sd * model.nuisances()[p].form_sd;

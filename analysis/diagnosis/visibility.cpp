@@ -11,6 +11,13 @@ namespace {
 
 constexpr double seen_gain = 16;
 
+// Returns the information that an effect's parameters, `count` columns of the scan, take up of what crosses with them.
+double taken_up(const EffectScan& scan, Eigen::Index first, Eigen::Index count, const Eigen::VectorXd& cross) {
+  const Eigen::MatrixXd root = markov::resolved_root(scan.information.block(first, first, count, count),
+                                                     scan.whole.segment(first, count), resolved_share);
+  return (root.transpose() * cross).squaredNorm();
+}
+
 }  // namespace
 
 std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<const Candidate*>& candidates) {
@@ -29,7 +36,8 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
     const auto count = static_cast<Eigen::Index>(candidate->parameters.size());
     const Eigen::Index first = found->first[found->best];
     const Eigen::MatrixXd own = scan.information.block(first, first, count, count);
-    if (!(own(0, 0) > 0)) {
+    const double least = resolved_share * scan.whole[first];
+    if (!(own(0, 0) > least)) {
       v.undecidable = "these data hold no information on it";
       all.push_back(std::move(v));
       continue;
@@ -38,12 +46,12 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
     double information = own(0, 0);
     if (count > 1) {
       const Eigen::VectorXd cross = own.block(1, 0, count - 1, 1);
-      Eigen::MatrixXd rest = own.block(1, 1, count - 1, count - 1);
-      rest.diagonal() *= 1 + 1e-9;
-      information -= cross.dot(markov::solve_symmetric(rest, cross));
+      const Eigen::MatrixXd rest = markov::resolved_root(own.block(1, 1, count - 1, count - 1),
+                                                         scan.whole.segment(first + 1, count - 1), resolved_share);
+      information -= (rest.transpose() * cross).squaredNorm();
     }
     const FreeParameter& p = candidate->parameters[0];
-    const double size = std::sqrt(seen_gain / std::max(information, 1e-300));
+    const double size = std::sqrt(seen_gain / std::max(information, least));
     std::vector<double> values;
     for (const FreeParameter& one : candidate->parameters) values.push_back(one.neutral);
     const auto neutral = candidate->report(candidate->variants[found->best], values);
@@ -67,11 +75,8 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
       double share = 0;
       const auto size_of = static_cast<Eigen::Index>(other.candidate->parameters.size());
       for (const Eigen::Index at : other.first) {
-        Eigen::MatrixXd theirs = scan.information.block(at, at, size_of, size_of);
-        theirs.diagonal() *= 1 + 1e-9;
-        theirs.diagonal().array() += 1e-300;
         const Eigen::VectorXd cross = scan.information.block(at, first, size_of, count) * direction;
-        share = std::max(share, cross.dot(markov::solve_symmetric(theirs, cross)) / strength);
+        share = std::max(share, taken_up(scan, at, size_of, cross) / strength);
       }
       if (share > 0.5) v.alike.emplace_back(other.candidate->id, std::min(1.0, share));
     }
@@ -104,11 +109,9 @@ std::vector<NextExperiment> next_experiments(const TransitionModel& model, const
     for (Eigen::Index p = 0; p < n; ++p)
       size[p] =
           cause.terms[0].values[static_cast<std::size_t>(p)] - first.parameters[static_cast<std::size_t>(p)].neutral;
-    Eigen::MatrixXd theirs = scan.information.block(n, n, m, m);
-    theirs.diagonal() *= 1 + 1e-9;
     const Eigen::VectorXd cross = scan.information.block(n, 0, m, n) * size;
-    all[i].separation = std::max(
-        0.0, size.dot(scan.information.block(0, 0, n, n) * size) - cross.dot(markov::solve_symmetric(theirs, cross)));
+    all[i].separation =
+        std::max(0.0, size.dot(scan.information.block(0, 0, n, n) * size) - taken_up(scan, n, m, cross));
   });
   std::sort(all.begin(), all.end(),
             [](const NextExperiment& a, const NextExperiment& b) { return a.separation > b.separation; });

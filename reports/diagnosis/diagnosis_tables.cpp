@@ -7,6 +7,7 @@
 #include <string>
 
 #include "analysis/diagnosis/diagnosis_sentences.h"
+#include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/interval_95.h"
 #include "dynamics/wheel/effect_catalogue.h"
 
@@ -79,13 +80,13 @@ std::string_view effect_unit(std::string_view effect, std::string_view parameter
   return "";
 }
 
+// Adjusted p-values rise as statistics fall.
 std::vector<GapCell> beyond_chance(const analysis::GapMap& map) {
+  std::vector<double> sizes;
+  for (const GapCell& cell : map.cells) sizes.push_back(std::abs(cell.statistic));
   std::vector<GapCell> cells;
-  std::copy_if(map.cells.begin(), map.cells.end(), std::back_inserter(cells),
-               [](const GapCell& cell) { return cell.p_adjusted < where_level; });
-  std::stable_sort(cells.begin(), cells.end(), [](const GapCell& a, const GapCell& b) {
-    return std::pair(a.p_adjusted, -std::abs(a.statistic)) < std::pair(b.p_adjusted, -std::abs(b.statistic));
-  });
+  for (const std::size_t k : analysis::falling_order(sizes))
+    if (map.cells[k].p_adjusted < where_level) cells.push_back(map.cells[k]);
   return cells;
 }
 

@@ -40,7 +40,20 @@ TEST(DenseMatrix, ResolvedRootLeavesOutWhatIsLost) {
     EXPECT_LT((root * root.transpose() - 0.5 * u * u.transpose()).norm(), 1e-14);
   }
   EXPECT_EQ(resolved_root(Eigen::MatrixXd::Identity(2, 2), Eigen::VectorXd::Zero(2), 1e-6).cols(), 0);
-  EXPECT_EQ(resolved_root(Eigen::MatrixXd::Constant(2, 2, NAN), two, 1e-6).cols(), 0);
+  EXPECT_TRUE(resolved_root(Eigen::MatrixXd::Constant(2, 2, NAN), two, 1e-6).array().isNaN().all());
+}
+
+// A lost direction has the variance of the floor, a resolved one its own; no information at all is no division by zero.
+TEST(DenseMatrix, FlooredInverseIsLargeAlongWhatIsLost) {
+  const Eigen::MatrixXd matrix{{4, 1, 0}, {1, 3, -1}, {0, -1, 2}};
+  EXPECT_LT((floored_inverse(matrix, 1e-6) - inverse_of(matrix)).norm(), 1e-13);
+  for (const double rounding : {1e-16, -1e-16, 0.0}) {
+    const Eigen::MatrixXd inverse =
+        floored_inverse(Eigen::MatrixXd::Ones(2, 2) + rounding * Eigen::MatrixXd::Identity(2, 2), 1e-6);
+    EXPECT_NEAR(inverse(0, 0), 0.5e6, 1);
+    EXPECT_NEAR(Eigen::VectorXd::Ones(2).dot(inverse * Eigen::VectorXd::Ones(2)), 1, 1e-9);
+  }
+  EXPECT_NEAR(floored_inverse(Eigen::MatrixXd::Zero(1, 1), 1e-6)(0, 0), 1e18, 1e9);
 }
 
 }  // namespace

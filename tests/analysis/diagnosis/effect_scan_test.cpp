@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
@@ -41,6 +42,35 @@ TEST(EffectScan, WhatAFittedEffectTakesUpPromisesNothing) {
   const EffectScan beside_waves = scan_effects(model, with_waves, {&slope, &waves}, 1);
   EXPECT_EQ(beside_waves.effects[0].gain[0], 0);
   EXPECT_EQ(beside_waves.effects[1].gain[0], 0);
+}
+
+// Its slope moves the scores by some last bits at most.
+class NextToNothing : public Line {
+ public:
+  using Line::Line;
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    std::vector<EffectTerm> small(terms.begin(), terms.end());
+    for (EffectTerm& term : small) term.values[0] *= 1e-12;
+    return Line::evaluate(n, small);
+  }
+};
+
+// What a parameter moves by rounding alone is nothing: neither a gain nor a fit that does not settle.
+TEST(EffectScan, AParameterThatMovesNothingPromisesNothing) {
+  const Line plain = line(0.5, 1, 1200);
+  std::vector<double> y, w;
+  for (const Event& event : plain.events()) {
+    w.push_back(event.speed);
+    y.push_back(3 + 0.5 * event.speed + 0.5 * std::sin(static_cast<double>(y.size())));
+  }
+  const NextToNothing model(y, w);
+  const Candidate& slope = model.candidates()[0];
+  const EffectScan scan = scan_effects(model, fit(model, {0, 0}, {}), {&slope}, 1);
+  EXPECT_EQ(scan.effects[0].gain[0], 0);
+  EXPECT_EQ(scan.effects[0].start[0][0], 0);
+  const Fit with = fit(model, {0, 0}, {{&slope, {}, {0.0}}});
+  EXPECT_TRUE(with.converged) << with.reason;
+  EXPECT_EQ(with.terms[0].values[0], 0);
 }
 
 // Under no effect the p-values of many data sets are uniform.

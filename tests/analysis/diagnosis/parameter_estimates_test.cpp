@@ -33,6 +33,7 @@ TEST(ParameterEstimates, CoverVariantsThatTheDataHardlyTellApart) {
     EffectScan scan;
     scan.effects = {{&sag, {10, gain}, {Eigen::VectorXd::Constant(1, 2), Eigen::VectorXd::Constant(1, 3)}, {0, 1}, 0}};
     scan.information = 100 * Eigen::MatrixXd::Identity(2, 2);
+    scan.whole = scan.information.diagonal();
     const std::vector<EstimatedParameter> told = described_cause(model, ranked, scan).parameters[0];
     EXPECT_NEAR(told[0].lower, 1.836, 1e-3);
     EXPECT_NEAR(told[0].upper, upper, 1e-3);
