@@ -87,11 +87,15 @@ MeanSd relaunched(const Problem& problem, std::span<const double> states, const 
 std::vector<double> moduli_per_step(const markov::Chain& revolution, int period, int count, double failure_rate,
                                     std::string& message) {
   const std::vector<double> first{1 - failure_rate};
-  constexpr double rounding = 1e-13;  // of a revolution's eigenvalue: below it a modulus means nothing
+  constexpr double rounding = 1e-13;  // of a revolution's eigenvalue
+  // Eigenvalues beyond the first are off by some 5e-12, rounding times their condition (the same chain on two
+  // processors): from 1e-6 on that leaves their moduli six digits. The second one tells how fast the chain mixes.
+  constexpr double resolved = 1e-6;
   std::vector<double> moduli;
   try {
     for (const std::complex<double>& value : markov::leading_eigenpairs(revolution, count).values)
-      if (moduli.empty() || std::abs(value) > rounding) moduli.push_back(std::pow(std::abs(value), 1.0 / period));
+      if (moduli.empty() || std::abs(value) > (moduli.size() == 1 ? rounding : resolved))
+        moduli.push_back(std::pow(std::abs(value), 1.0 / period));
     // Inverse iteration subtracts nothing. Spectra does, and where a launch takes many steps to come down to the others
     // (Q is nearly nilpotent) its rounding alone looks like eigenvalues larger than lambda_1.
     const double largest = *std::max_element(moduli.begin(), moduli.end()),

@@ -122,7 +122,8 @@ struct StepsToRest {
 /// Holds the eigenvalues of the chain: they say how fast it fails, and how fast it forgets its start.
 struct Spectrum {
   Estimate failure_rate;                     ///< 1 - lambda_1 per step
-  std::vector<double> moduli;                ///< per step, falling; lambda_1 alone for a map without noise
+  /// Per step, falling: lambda_1, and others that rounding leaves six digits, none for a map without noise.
+  std::vector<double> moduli;
   int period = 1;                            ///< steps after which a phase comes again
   double mixing_steps = 0;                   ///< spectral, 1 / ln(lambda_1 / |lambda_2|)
   std::optional<int> total_variation_steps;  ///< from the launch to within StudyOptions::mixing_distance
