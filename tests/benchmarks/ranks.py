@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Cost of one mesh across ranks, against nodes and ranks, as Markdown: seconds, and memory at each rank's peak.
 
-    cmake --preset mpi && cmake --build --preset mpi --target metastable-mpi shared_mesh
+    cmake --preset release -DMETASTABLE_MPI=ON && cmake --build --preset release --target metastable-mpi shared_mesh
     tests/benchmarks/ranks.py --spacings 0.4,0.2,0.1 --ranks 1,2          # of a map that costs next to nothing
     tests/benchmarks/ranks.py --mesh '--walker compass --slope-sd 0.5 --memory 100' --spacings 0.4,0.3,0.2
 """
@@ -34,7 +34,7 @@ def run(build, ranks, spacing, options):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", default="build/mpi")
+    parser.add_argument("--build", default="build/release")
     parser.add_argument("--spacings", default="0.4,0.3,0.2,0.15")
     parser.add_argument("--ranks", default="1,2")
     parser.add_argument("--mesh", default="", help="options of `metastable-mpi mesh`")
