@@ -23,7 +23,8 @@ DescribeAnswer answer_describe(const analysis::Experiment& experiment, const Des
                                          request.options.threads, request.options.progress);
   answer.tables.push_back(conditions_table(answer.description, provenance));
   if (!answer.description.comparisons.empty()) answer.tables.push_back(tests_table(answer.description, provenance));
-  if (!answer.description.fits.empty()) answer.tables.push_back(fits_table(answer.description, provenance));
+  if (!answer.description.fits.empty()) 
+    answer.tables.push_back(fits_table(answer.description, experiment.contact.law, provenance));
   if (answer.laws) answer.tables.push_back(laws_table(*answer.laws, provenance));
   if (answer.laws && !answer.laws->legs.empty()) answer.tables.push_back(landings_table(answer.laws->legs, provenance));
   return answer;
@@ -50,19 +51,20 @@ void run_describe(const DescribeRequest& request) {
 
   Page& page = pages->page();
   page.title = experiment.title;
-  page.intro = {
-      "What the trials of this experiment show: speeds just before each collision, how conditions differ, how "
-      "long trials last, and which restitution and friction they speak for."};
+  page.lead = description_sentences(description);
   page.provenance = provenance;
-  pages->section("conditions", "The conditions",
-                 "Mean speeds collision by collision; they meet where a steady state is reached.",
-                 {profiles_figure(description, provenance)}, {tables[0], profiles_table(description, provenance)});
+  std::vector<Fold> folds{{"Every condition in full", {}, {}, {tables[0]}},
+                          {"The speeds collision by collision", {}, {}, {profiles_table(description, provenance)}}};
   if (!description.comparisons.empty())
-    pages->section(
-        "tests", "Do they end in one steady state?",
-        "A large P says that two conditions cannot be told apart; the interval of the difference says how far "
-        "apart they may still be.",
-        {}, {tests_table(description, provenance)});
+    folds.push_back({"Do they end in one steady state? The tests",
+                     {"A large P says that two conditions cannot be told apart; the interval of the difference says how "
+                      "far apart they may still be."},
+                     {},
+                     {tests_table(description, provenance)}});
+  pages->section("conditions", "How fast they roll",
+                 "Mean speeds collision by collision; they meet where a steady state is reached.",
+                 {profiles_figure(description, provenance)}, {short_table(description, provenance)}, std::move(folds),
+                 Arrangement::beside);
   std::vector<Figure> maps;
   for (const analysis::ConditionDescription& c : description.conditions)
     if (auto figure = measured_map_figure(c, provenance)) maps.push_back(std::move(*figure));
@@ -71,17 +73,17 @@ void run_describe(const DescribeRequest& request) {
                    maps, {});
   if (const auto figure = legs_figure(description, provenance))
     pages->section("legs", "Leg by leg", "Legs of one length and one contact would give one level.", {*figure},
-                   {legs_table(description, provenance)});
+                   {}, {{"The speeds of the legs in numbers", {}, {}, {legs_table(description, provenance)}}});
   if (const auto figure = survival_curves_figure(description, provenance))
     pages->section("survival", "How long trials last",
                    "The curve falls where trials rest; bands are 95 % intervals, one collision at a time.", {*figure},
-                   {survival_table(description, provenance)});
+                   {}, {{"The curve in numbers", {}, {}, {survival_table(description, provenance)}}});
   if (!description.fits.empty())
     pages->section(
         "contact", "Restitution and friction",
         "What the trials say about both distributions under the nominal law, and which of their numbers they "
         "cannot tell apart.",
-        {}, {fits_table(description, provenance)});
+        {}, {fits_table(description, experiment.contact.law, provenance)});
   if (laws) {
     std::vector<Table> beside{laws_table(*laws, provenance)};
     if (!laws->legs.empty()) beside.push_back(landings_table(laws->legs, provenance));

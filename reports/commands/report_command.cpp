@@ -2,14 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "analysis/paper/energy_losses.h"
+#include "analysis/sensitivity/rolled_steps.h"
 #include "analysis/sensitivity/sweep.h"
 #include "analysis/study/how_it_fails.h"
 #include "dynamics/wheel/contact_law.h"
+#include "markov/parallel.h"
+#include "reports/output/interrupt.h"
 #include "reports/output/page_folder.h"
 #include "reports/output/version.h"
 #include "reports/study/last_moments_text.h"
@@ -23,6 +30,31 @@ namespace {
 
 constexpr std::array<double, 4> energy_spreads = {0.05, 0.1, 0.15, 0.2};  // Fig. 8
 constexpr int energy_collisions = 16;                                     // of a trial
+// Landings that are rolled under `settled`: 0.8 s of one core a cell of a map (a few per cent of its steps); to each side
+// of a parameter, so many that a change by 1 % is known to 0.5 % or better where rests are frequent.
+constexpr std::uint64_t map_landings = 40000, sensitivity_landings = 60000;
+constexpr double rare_tolerance = 0.1;           // of cells that the chain has to answer, where rests are rare
+constexpr std::size_t map_units = study_units / 20;  // a cell's share of a study's work
+constexpr std::size_t map_cells = 16 + 12;           // of one ramp's two maps
+
+std::string slope_id(const std::string& stem, const analysis::Setting& setting) {
+  std::string id = fmt::format("{}-{}", stem, setting.slope_deg);
+  for (char& c : id)
+    if (c == '.') c = '-';
+  return id;
+}
+
+// Says in a figure's or table's title what it is of.
+std::string titled(const std::string& what, const analysis::Setting& setting) {
+  return fmt::format("{}: {}", law_and_ramp(setting), what);
+}
+
+// Holds expected steps over two parameters under one law.
+struct Map {
+  analysis::Setting base;
+  std::vector<Estimate> steps;
+  bool rolled = false;
+};
 
 // Writes the report as it grows: files in the folder, sections of the page.
 class Report {
@@ -33,20 +65,18 @@ class Report {
         progress_("report", work()),
         provenance_{request.command, {}, request.study.seed, version()} {
     Page& page = pages_.page();
-    page.title = "Metastability of the rimless wheel";
-    page.intro = {
-        "Expected steps before a rimless wheel on a ramp comes to rest, from a Markov chain sampled from its "
-        "stochastic return map. Model: Nanayakkara, Byl, Liu, Song, Villabona, “Dominant Sources of "
-        "Variability in Passive Walking” (ICRA 2012)."};
-    for (const analysis::Setting& setting : request.settings) page.intro.push_back(setting.describe() + ".");
+    page.title = "How long does a rimless wheel roll before it rests?";
     page.provenance = provenance_for(request.settings);
   }
 
   void write(Answer& answer) {
-    ramps();
-    for (const analysis::Setting& setting : request_.settings) spreads(setting);
-    for (const analysis::Setting& setting : request_.settings) means(setting);
-    energies();
+    study_all();
+    answers();
+    failures();
+    hangs_on();
+    spreads();
+    means();
+    details();
     pages_.write_index();
     pages_.finish(answer);
   }
@@ -54,7 +84,34 @@ class Report {
  private:
   std::size_t work() const {
     const std::size_t ramps = request_.settings.size();
-    return study_units * (3 * ramps + ramps * (16 + 12) + energy_spreads.size());
+    return study_units * (laws().size() * ramps + 2 * ramps + energy_spreads.size()) +
+           map_units * 2 * map_cells * ramps;
+  }
+
+  dynamics::Law asked() const { return request_.settings.front().law; }
+  // Returns the paper's and its alternatives, and whichever was asked for.
+  std::vector<dynamics::Law> laws() const {
+    std::vector<dynamics::Law> all{dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::settled};
+    if (std::ranges::find(all, asked()) == all.end()) all.push_back(asked());
+    return all;
+  }
+  // Returns the two that stand side by side: that of rigid bodies, and the one asked for or the paper's.
+  std::array<dynamics::Law, 2> compared() const {
+    return {dynamics::Law::settled, asked() == dynamics::Law::settled ? dynamics::Law::published : asked()};
+  }
+
+  // Returns nullptr where there is no such wheel under the law.
+  const Studied* study_of(dynamics::Law law, double slope_deg) const {
+    const auto found = std::ranges::find_if(studied_, [&](const Studied& one) {
+      return one.study.setting->law == law && one.study.setting->slope_deg == slope_deg;
+    });
+    return found == studied_.end() ? nullptr : &*found;
+  }
+  std::vector<const Studied*> compared_on(double slope_deg) const {
+    std::vector<const Studied*> found;
+    for (const dynamics::Law law : compared())
+      if (const Studied* one = study_of(law, slope_deg)) found.push_back(one);
+    return found;
   }
 
   Provenance provenance_for(const std::vector<analysis::Setting>& settings) const {
@@ -63,17 +120,20 @@ class Report {
       provenance.settings += (provenance.settings.empty() ? "" : "\n") + setting.describe();
     return provenance;
   }
-
-  void ramps() {
-    std::vector<Studied> studied;
+  Provenance provenance_for_all() const {
     std::vector<analysis::Setting> settings;
-    for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::settled}) {
+    for (const Studied& one : studied_) settings.push_back(*one.study.setting);
+    return provenance_for(settings);
+  }
+
+  void study_all() {
+    for (const dynamics::Law law : laws()) {
       for (analysis::Setting setting : request_.settings) {
         setting.law = law;
         try {
           analysis::check_setting(setting, request_.study.method);
         } catch (const std::invalid_argument&) {
-          if (law == request_.settings.front().law) throw;
+          if (law == asked()) throw;
           progress_.advance(study_units);
           continue;  // there is no such wheel under this law
         }
@@ -82,100 +142,242 @@ class Report {
         Studied one{analysis::study(setting, options), {}};
         options.progress(1, "");
         one.thresholds = analysis::rest_thresholds(one.study);
-        settings.push_back(setting);
-        studied.push_back(std::move(one));
+        studied_.push_back(std::move(one));
       }
     }
-    const Provenance provenance = provenance_for(settings);
-    section(
-        "ramps", "The ramps side by side",
-        "Read down a column for one ramp under one contact law; “infinite” means that launches this fast never come "
-        "to rest, whatever the contacts do. " +
-            laws_text(studied),
-        {}, {ramps_table(studied, provenance)});
-    section(
-        "regime", "What survivors look like",
-        "Left: speeds just before a collision once the start is forgotten; right: how fast the chance of still rolling "
-        "falls, straight on this scale as soon as the regime is metastable.",
-        {density_figure(studied, provenance), survival_figure(studied, provenance)}, {});
-    for (const analysis::Setting& setting : request_.settings) last_steps(setting, studied);
-    std::vector<Figure> maps;
-    for (const analysis::Setting& setting : request_.settings)
-      maps.push_back(return_map_figure(setting, provenance_for({setting})));
-    section("return-map", "The return map and its cloud",
-            "Each dot is one simulated step; where the mean crosses the diagonal the wheel would roll steadily, and "
-            "dots to "
-            "the lower left are on their way to rest.",
-            std::move(maps), {});
   }
 
-  // Shows them of the law that real wheels obey, or of the next one before it under which this ramp's wheel fails.
-  void last_steps(const analysis::Setting& setting, const std::vector<Studied>& studied) {
-    for (auto one = studied.rbegin(); one != studied.rend(); ++one) {
-      const analysis::Setting& of = *one->study.setting;
-      if (of.slope_deg != setting.slope_deg) continue;
-      analysis::StudyOptions options = request_.study;
-      options.progress = {};
-      const analysis::LastMoments moments = analysis::how_it_fails(of, one->study, options);
-      if (!moments.reason.empty()) continue;
-      const std::string id = slope_id("last-steps", of);
-      section(id, fmt::format("How it fails at {} deg under the law {}", of.slope_deg, dynamics::law_name(of.law)),
-              "Backwards from the collision that brings it to rest: speeds and contacts of the last collisions beside "
-              "those of all others.",
-              last_moments_figures(moments, id, provenance_for({of})),
-              {last_moments_table(moments, id + "-table", provenance_for({of}))});
-      return;
+  void answers() {
+    std::vector<Studied> ordered;  // the two that the sentences name come first
+    for (const bool first : {true, false})
+      for (const dynamics::Law law : laws())
+        for (const Studied& one : studied_)
+          if (one.study.setting->law == law && first == (law == compared()[0])) ordered.push_back(one);
+    for (const analysis::Setting& setting : request_.settings) {
+      const std::vector<const Studied*> two = compared_on(setting.slope_deg);
+      pages_.page().lead.push_back(
+          answer_sentence(two.front()->study, two.size() > 1 ? &two.back()->study : nullptr));
+    }
+    pages_.section(
+        "answer", "The chance of still rolling",
+        "A step is one landing of the next leg. The law settled follows a rigid body through impacts, hops and slides "
+        "until the landed foot stands: it is what rigid-body engines obey, and the one to take for a real wheel; "
+        "published is the paper’s. On this scale a curve is straight as soon as the wheel has forgotten its launch. " +
+            rests_text(ordered),
+        {survival_figure(ordered, provenance_for_all())}, {answer_table(ordered, provenance_for_all())}, {},
+        Arrangement::beside);
+  }
+
+  // Shows how the law that real wheels obey fails, or the next one before it under which this ramp's wheel fails.
+  void failures() {
+    std::string reading;
+    std::vector<Figure> telling;
+    std::vector<Fold> folds;
+    for (const analysis::Setting& setting : request_.settings) {
+      for (auto one = studied_.rbegin(); one != studied_.rend(); ++one) {
+        const analysis::Setting& of = *one->study.setting;
+        if (of.slope_deg != setting.slope_deg) continue;
+        analysis::StudyOptions options = request_.study;
+        options.progress = {};
+        const analysis::LastMoments moments = analysis::how_it_fails(of, one->study, options);
+        if (!moments.reason.empty()) continue;
+        const std::string id = slope_id("last-steps", of), where = law_and_ramp(of);
+        std::vector<Figure> figures = last_moments_figures(moments, id, where, provenance_for({of}));
+        const auto most = figures.begin() + static_cast<std::ptrdiff_t>(telling_number(moments));
+        reading += fmt::format("{}Under {} on {} deg {}.", reading.empty() ? "" : " ", dynamics::law_name(of.law),
+                               of.slope_deg, last_moments_sentence(moments));
+        telling.push_back(std::move(*most));
+        figures.erase(most);
+        folds.push_back({"The last steps in numbers, " + where,
+                         {},
+                         std::move(figures),
+                         {last_moments_table(moments, id + "-table", where, provenance_for({of}))}});
+        break;
+      }
+    }
+    if (telling.empty()) return;
+    pages_.section("how-it-fails", "How it fails",
+                   reading + " The figures go back from the collision that brings it to rest.", telling, {},
+                   std::move(folds));
+  }
+
+  Hanging hanging(const Studied& one) {
+    const analysis::Setting& setting = *one.study.setting;
+    const auto tell = study_progress(progress_);
+    if (setting.law == dynamics::Law::settled)
+      return {setting, analysis::rolled_sensitivities(setting, {.landings = sensitivity_landings,
+                                                                .seed = request_.study.seed,
+                                                                .threads = request_.study.threads,
+                                                                .progress = [&](double share) { tell(share, ""); }})};
+    Hanging found{setting, analysis::sensitivities(one.study, request_.study)};
+    tell(1, "");
+    return found;
+  }
+
+  void hangs_on() {
+    std::string reading;
+    std::vector<Figure> main, others;
+    std::vector<Table> tables;
+    for (const analysis::Setting& setting : request_.settings) {
+      std::vector<Hanging> found;
+      for (const Studied* one : compared_on(setting.slope_deg)) found.push_back(hanging(*one));
+      bool first = true;
+      for (const Hanging& one : found) {
+        if (one.sensitivities.ranked.empty()) continue;
+        if (const std::string says = first ? sensitivity_sentence(one) : ""; !says.empty())
+          reading += fmt::format("Under {} on {} deg {}. ", dynamics::law_name(one.setting.law), one.setting.slope_deg,
+                                 says);
+        const std::string id = slope_id(fmt::format("hangs-on-{}", dynamics::law_name(one.setting.law)), one.setting);
+        (first ? main : others).push_back(sensitivity_figure(id, one, provenance_for({one.setting})));
+        first = false;
+      }
+      std::vector<analysis::Setting> settings;
+      for (const Hanging& one : found) settings.push_back(one.setting);
+      tables.push_back(sensitivity_table(slope_id("hangs-on", setting), found, provenance_for(settings)));
+    }
+    std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
+    if (main.empty()) return;
+    pages_.section("hangs-on", "What it hangs on",
+                   reading + "Whiskers are numerical, 95 %.", main, {},
+                   {{"All parameters in numbers, and the other law", {}, std::move(others), std::move(tables)}});
+  }
+
+  // Returns expected steps over two axes; under `settled` of wheels rolled, from the chain where they hardly rest.
+  Map map(const analysis::Setting& base, const std::vector<analysis::SweepAxis>& axes) {
+    Map map{base, {}, base.law == dynamics::Law::settled};
+    if (!map.rolled) {
+      analysis::sweep(base, axes, 0, request_.study, [&](std::size_t, const analysis::SweepPoint& point) {
+        if (point.failure) std::rethrow_exception(point.failure);
+        map.steps.push_back(point.study.steps.from_start);
+        progress_.advance(map_units);
+      });
+      return map;
+    }
+    map.steps.resize(analysis::sweep_size(axes));
+    std::vector<char> rare(map.steps.size(), 0);
+    markov::parallel_for(map.steps.size(), request_.study.threads, [&](std::size_t i) {
+      const auto steps = analysis::rolled_steps(
+          analysis::sweep_setting(base, axes, i),
+          {.landings = map_landings, .seed = request_.study.seed, .progress = [](double) { check_interrupt(); }});
+      if (steps) map.steps[i] = *steps;
+      rare[i] = !steps;
+      progress_.advance(map_units);
+    });
+    analysis::StudyOptions options = request_.study;
+    options.tolerance = std::max(options.tolerance, rare_tolerance);
+    options.progress = [](double, const std::string&) { check_interrupt(); };
+    for (std::size_t i = 0; i < rare.size(); ++i) {
+      if (!rare[i]) continue;
+      const analysis::SweepPoint point = analysis::sweep_point(base, axes, i, options);
+      if (point.failure) std::rethrow_exception(point.failure);
+      map.steps[i] = point.study.steps.from_start;
+    }
+    return map;
+  }
+
+  // Shows the maps of one ramp under both laws with one scale of colours.
+  void maps(const std::string& stem, const std::string& what, const analysis::Setting& setting,
+            const analysis::SweepAxis& down, const analysis::SweepAxis& across, std::vector<Figure>& figures,
+            std::vector<Table>& tables) {
+    if (!analysis::matters(setting, down.parameter) || !analysis::matters(setting, across.parameter))
+      return progress_.advance(2 * map_units * down.values.size() * across.values.size());
+    std::vector<Map> both;
+    double low = std::numeric_limits<double>::infinity(), high = 0;
+    for (const dynamics::Law law : compared()) {
+      analysis::Setting base = setting;
+      base.law = law;
+      if (!study_of(law, base.slope_deg)) continue;
+      both.push_back(map(base, {down, across}));
+      for (const Estimate& steps : both.back().steps)
+        if (std::isfinite(steps.value)) low = std::min(low, steps.value), high = std::max(high, steps.value);
+    }
+    if (low > high) low = high = 1;
+    for (const Map& one : both) {
+      const bool plain = one.base.law == asked();
+      const std::string id =
+          slope_id(plain ? stem : fmt::format("{}-{}", stem, dynamics::law_name(one.base.law)), one.base);
+      Provenance provenance = provenance_for({one.base});
+      provenance.settings += fmt::format("; varied here: {} and {}", analysis::parameter_label(down.parameter),
+                                         analysis::parameter_label(across.parameter));
+      figures.push_back(
+          grid_figure(id, law_and_ramp(one.base), down, across, one.steps, {low, high}, provenance));
+      tables.push_back(
+          grid_table(id, titled("expected steps over the " + what, one.base), down, across, one.steps, provenance));
+      if (one.rolled)
+        tables.back().notes.push_back(
+            fmt::format("From wheels that are rolled, {} landings a cell; where fewer than 100 of them rest, from the "
+                        "chain.",
+                        map_landings));
     }
   }
 
-  // Shows one table and one map of expected steps over two axes.
-  void grid(const std::string& id, const std::string& heading, const std::string& title, const std::string& reading,
-            const analysis::Setting& base, const analysis::SweepAxis& down, const analysis::SweepAxis& across) {
-    std::vector<analysis::Metastability> studies;
-    analysis::sweep(base, {down, across}, 0, request_.study, [&](std::size_t, const analysis::SweepPoint& point) {
-      if (point.failure) std::rethrow_exception(point.failure);
-      studies.push_back(point.study);
-      progress_.advance(study_units);
-    });
-    Provenance provenance = provenance_for({base});
-    provenance.settings += fmt::format("; varied here: {} and {}", analysis::parameter_label(down.parameter),
-                                       analysis::parameter_label(across.parameter));
-    section(id, heading, reading, {grid_figure(id, title, down, across, studies, provenance)},
-            {grid_table(id, title, down, across, studies, provenance)});
-  }
-
-  static std::string slope_id(const std::string& stem, const analysis::Setting& setting) {
-    std::string id = fmt::format("{}-{}", stem, setting.slope_deg);
-    for (char& c : id)
-      if (c == '.') c = '-';
-    return id;
-  }
-
-  void spreads(const analysis::Setting& setting) {
+  void spreads() {
     const std::vector<double> values = analysis::axis_values(0.05, 0.2, 0.05);
-    grid(slope_id("spreads", setting), fmt::format("Spreads of restitution and friction at {} deg", setting.slope_deg),
-         fmt::format("Expected steps over the spreads of η and μ, {} deg", setting.slope_deg),
-         "Going right friction scatters more, going up restitution does; the direction in which the number changes "
-         "faster holds "
-         "the source that matters.",
-         setting, {analysis::Parameter::restitution_sd, values}, {analysis::Parameter::friction_sd, values});
+    std::vector<Figure> figures;
+    std::vector<Table> tables;
+    for (const analysis::Setting& setting : request_.settings)
+      maps("spreads", "spreads of η and μ", setting, {analysis::Parameter::restitution_sd, values},
+           {analysis::Parameter::friction_sd, values}, figures, tables);
+    map_section("spreads", "Over the spreads of restitution and friction",
+                "Each cell holds expected steps. To the right friction scatters more, upward restitution does; the "
+                "direction in which the number changes faster holds the source that matters.",
+                figures, std::move(tables));
   }
 
-  void means(analysis::Setting setting) {
-    setting.restitution.sd = setting.friction.sd = 0.15;  // Fig. 9
-    grid(slope_id("means", setting), fmt::format("Means of restitution and friction at {} deg", setting.slope_deg),
-         fmt::format("Expected steps over the means of η and μ (sd 0.15, the grid of Fig. 9), {} deg",
-                     setting.slope_deg),
-         "Each cell is one floor: mean friction grows to the right, mean restitution upward, both with the paper's "
-         "spread of 0.15.",
-         setting, {analysis::Parameter::restitution_mean, {0.3, 0.5, 0.7}},
-         {analysis::Parameter::friction_mean, analysis::axis_values(0.2, 0.5, 0.1)});
+  void means() {
+    std::vector<Figure> figures;
+    std::vector<Table> tables;
+    for (analysis::Setting setting : request_.settings) {
+      setting.restitution.sd = setting.friction.sd = 0.15;  // Fig. 9
+      maps("means", "means of η and μ (sd 0.15, the grid of Fig. 9)", setting,
+           {analysis::Parameter::restitution_mean, {0.3, 0.5, 0.7}},
+           {analysis::Parameter::friction_mean, analysis::axis_values(0.2, 0.5, 0.1)}, figures, tables);
+    }
+    map_section("means", "Over the means of restitution and friction",
+                "Each cell is one floor, both with the spread of 0.15 of the paper’s Fig. 9: mean friction grows to the "
+                "right, mean restitution upward.",
+                figures, std::move(tables));
+  }
+
+  void map_section(const std::string& id, const std::string& heading, const std::string& reading,
+                   const std::vector<Figure>& figures, std::vector<Table> tables) {
+    if (figures.empty()) return;
+    pages_.section(id, heading, reading, figures, {},
+                   {{"The same numbers with their intervals", {}, {}, std::move(tables)}});
+  }
+
+  void details() {
+    std::vector<Fold> folds;
+    folds.push_back({"Every number, law by law",
+                     {"Read down a column for one ramp under one contact law; “infinite” means that launches this fast "
+                      "never come to rest, whatever the contacts do."},
+                     {},
+                     {ramps_table(studied_, provenance_for_all())}});
+    folds.push_back({"Speeds of wheels that still roll, and the return map",
+                     {"Speeds just before a collision once the launch is forgotten. In a return map each dot is one "
+                      "simulated step; where the mean crosses the diagonal the wheel would roll steadily, and dots to "
+                      "the lower left are on their way to rest."},
+                     {density_figure(studied_, provenance_for_all())},
+                     {}});
+    for (const analysis::Setting& setting : request_.settings)
+      folds.back().figures.push_back(return_map_figure(setting, provenance_for({setting})));
+    energies(folds);
+    std::vector<std::string> settings;
+    for (const analysis::Setting& setting : request_.settings) settings.push_back(setting.describe() + ".");
+    settings.insert(settings.begin(),
+                    "The steps come from a Markov chain sampled from the stochastic return map of the wheel. Model: "
+                    "Nanayakkara, Byl, Liu, Song, Villabona, “Dominant Sources of Variability in Passive Walking” (ICRA "
+                    "2012).");
+    folds.push_back({"Assumptions and resolution",
+                     std::move(settings),
+                     {},
+                     {resolution_table(studied_, provenance_for_all())}});
+    pages_.section("details", "Details", "What stands behind the numbers above.", {}, {}, std::move(folds));
   }
 
   // Shows the energies of single impacts: a landing under settled is many, with slides between.
-  void energies() {
-    if (request_.settings.front().law == dynamics::Law::settled)
-      return progress_.advance(study_units * energy_spreads.size());
+  void energies(std::vector<Fold>& folds) {
+    if (asked() == dynamics::Law::settled) return progress_.advance(study_units * energy_spreads.size());
     std::vector<analysis::EnergyLosses> losses;
     std::vector<analysis::Setting> settings;
     for (std::size_t k = 0; k < energy_spreads.size(); ++k) {
@@ -188,21 +390,17 @@ class Report {
       settings.push_back(setting);
       progress_.advance(study_units);
     }
-    section("energy", "Energy losses of a collision",
-            "Ours beside the paper's printed figures: means with 95 % intervals, and the spread from collision to "
-            "collision.",
-            {}, {energy_table(losses, provenance_for(settings))});
-  }
-
-  void section(const std::string& id, const std::string& heading, const std::string& reading,
-               const std::vector<Figure>& figures, std::vector<Table> tables) {
-    pages_.section(id, heading, reading, figures, std::move(tables));
+    folds.push_back({"Energy losses of a collision, beside the paper’s",
+                     {"Means with 95 % intervals, and the spread from collision to collision."},
+                     {},
+                     {energy_table(losses, asked(), provenance_for(settings))}});
   }
 
   const ReportRequest& request_;
   PageFolder pages_;
   Progress progress_;
   Provenance provenance_;
+  std::vector<Studied> studied_;
 };
 
 }  // namespace

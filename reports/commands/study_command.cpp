@@ -22,15 +22,30 @@ namespace {
 
 using analysis::PaperExperiments;
 
-// Makes the panels of all variants, one variant after the other.
+// Holds the panels of one figure of the paper: under the first variant, the paper's own, and under all others.
+struct Panels {
+  std::vector<Figure> papers, others;
+};
+
 template <typename Make>
-std::vector<Figure> all_variants(const Studies& studies, const Make& make) {
-  std::vector<Figure> all;
+Panels all_variants(const Studies& studies, const Make& make) {
+  Panels all;
   for (const analysis::VariantStudy& study : studies) {
     std::vector<Figure> figures = make(study);
-    all.insert(all.end(), std::make_move_iterator(figures.begin()), std::make_move_iterator(figures.end()));
+    std::vector<Figure>& to = &study == &studies.front() ? all.papers : all.others;
+    to.insert(to.end(), std::make_move_iterator(figures.begin()), std::make_move_iterator(figures.end()));
   }
   return all;
+}
+
+// Shows the paper's own panels; other laws and all numbers are folded.
+void figure_section(PageFolder& pages, const std::string& id, const std::string& heading, const std::string& reading,
+                    Panels panels, Table table) {
+  std::vector<Table> tables;
+  tables.push_back(std::move(table));
+  pages.section(id, heading, reading, panels.papers, {},
+                {{"Under the other readings and laws", {}, std::move(panels.others), {}},
+                 {"In numbers", {}, {}, std::move(tables)}});
 }
 
 }  // namespace
@@ -74,42 +89,49 @@ void run_study(const StudyRequest& request) {
                            : "Measured trials: " + experiments.title + "."};
   page.provenance = provenance;
   const std::vector<analysis::Claim> claims = analysis::paper_claims(studies, experiments);
-  pages.section("claims", "Claim by claim", "Each cell gives the verdict first and then the numbers behind it.", {},
-                {claims_table(claims, studies, experiments, provenance),
-                 changes_table(claims, studies, experiments, provenance), readings_table(claims, provenance)});
+  page.lead = claims_sentences(claims, studies);
+  pages.section("claims", "Claim by claim",
+                "How many of the paper’s claims come out under each law and reading; what counts is below.",
+                {claims_figure(claims, studies, provenance)}, {claims_count_table(claims, studies, provenance)},
+                {{"Each claim, its verdicts and the numbers behind them",
+                  {"Each cell gives the verdict first and then the numbers behind it."},
+                  {},
+                  {claims_table(claims, studies, experiments, provenance)}},
+                 {"What the law and the reading change", {}, {}, {changes_table(claims, studies, experiments, provenance)}},
+                 {"What counts as reproduced", {}, {}, {readings_table(claims, provenance)}}},
+                Arrangement::beside);
   pages.section("hypotheses", "The three hypotheses",
-                "A source that matters takes a large share of the variance with it; the table below has all shares.",
-                {},
-                {hypotheses_table(analysis::paper_hypotheses(studies), studies, provenance),
-                 variance_table(studies, provenance)});
+                "A source that matters takes a large share of the variance with it.", {},
+                {hypotheses_table(analysis::paper_hypotheses(studies), studies, provenance)},
+                {{"All shares of the variance", {}, {}, {variance_table(studies, provenance)}}});
   pages.section("stopping", "Why a wheel that rolls steadily stops: the law settled", stopping_story(stopping),
                 {sticking_figure(stopping, provenance), resting_figure(stopping, provenance)},
-                {stopping_table(stopping, provenance), design_table(designs, provenance)});
-  std::vector<Figure> fig4{fig4_experiment_figure(experiments, provenance)};
-  for (Figure& figure : all_variants(studies, [&](const auto& s) { return fig4_figures(s, provenance); }))
-    fig4.push_back(std::move(figure));
-  pages.section("fig4", "Fig. 4: two starts, one steady state",
-                "Lines that meet forget their start; bands are standard errors.", fig4,
-                {fig4_table(studies, experiments, provenance)});
-  pages.section(
-      "fig6", "Fig. 6: launch speed and friction",
+                {design_table(designs, provenance)},
+                {{"Leg by leg in numbers", {}, {}, {stopping_table(stopping, provenance)}}});
+  Panels fig4 = all_variants(studies, [&](const auto& s) { return fig4_figures(s, provenance); });
+  fig4.papers.insert(fig4.papers.begin(), fig4_experiment_figure(experiments, provenance));
+  figure_section(pages, "fig4", "Fig. 4: two starts, one steady state",
+                 "Lines that meet forget their start; bands are standard errors.", std::move(fig4),
+                 fig4_table(studies, experiments, provenance));
+  figure_section(
+      pages, "fig6", "Fig. 6: launch speed and friction",
       "Three launches at one friction each; a steady state that remembers its launch would keep the lines apart.",
       all_variants(studies, [&](const auto& s) { return fig6_figures(s, experiments, provenance); }),
-      {fig6_table(studies, provenance)});
+      fig6_table(studies, provenance));
   pages.section("equal-legs", "Sec. IV-A: leg lengths",
-                "The runs of Fig. 6 with the measured legs and with eight equal ones.", {},
-                {equal_legs_table(studies, provenance)});
-  pages.section("fig7", "Fig. 7: spreads of restitution and friction",
-                "From panel to panel friction scatters more, from line to line restitution does.",
-                all_variants(studies, [&](const auto& s) { return fig7_figures(s, experiments, provenance); }),
-                {fig7_table(studies, experiments, provenance)});
-  pages.section("fig8", "Fig. 8: energy losses", "Bars are standard deviations from collision to collision.",
-                all_variants(studies, [&](const auto& s) { return fig8_figures(s, provenance); }),
-                {fig8_table(studies, provenance)});
-  pages.section("fig9", "Fig. 9: means of restitution and friction",
-                "From panel to panel friction grows, from line to line restitution does.",
-                all_variants(studies, [&](const auto& s) { return fig9_figures(s, experiments, provenance); }),
-                {fig9_table(studies, provenance)});
+                "The runs of Fig. 6 with the measured legs and with eight equal ones.", {}, {},
+                {{"In numbers", {}, {}, {equal_legs_table(studies, provenance)}}});
+  figure_section(pages, "fig7", "Fig. 7: spreads of restitution and friction",
+                 "From panel to panel friction scatters more, from line to line restitution does.",
+                 all_variants(studies, [&](const auto& s) { return fig7_figures(s, experiments, provenance); }),
+                 fig7_table(studies, experiments, provenance));
+  figure_section(pages, "fig8", "Fig. 8: energy losses", "Bars are standard deviations from collision to collision.",
+                 all_variants(studies, [&](const auto& s) { return fig8_figures(s, provenance); }),
+                 fig8_table(studies, provenance));
+  figure_section(pages, "fig9", "Fig. 9: means of restitution and friction",
+                 "From panel to panel friction grows, from line to line restitution does.",
+                 all_variants(studies, [&](const auto& s) { return fig9_figures(s, experiments, provenance); }),
+                 fig9_table(studies, provenance));
   pages.write_index();
   pages.finish(answer);
 }

@@ -185,27 +185,34 @@ void run_walker_report(const WalkerRequest& request) {
     }
   }
   Page& page = pages.page();
-  page.title = "Metastability of walkers on two legs";
-  page.intro = {
-      "Expected steps before a passive walker on rough ground falls, from meshes of its stochastic return map."};
-  for (const WalkerSetting& setting : request.settings) page.intro.push_back(setting.describe() + ".");
+  page.title = "How long does a walker on two legs walk before it falls?";
+  for (const StudiedWalker& walker : walkers) page.lead.push_back(walker_sentence(walker));
   page.provenance = provenance;
-  pages.section("walkers", "The walkers side by side", "Read down a column for one walker.",
-                {walker_survival_figure(walkers, provenance)}, {walkers_table(walkers, provenance)});
+  std::vector<Fold> meshes;
+  for (std::size_t i = 0; i < walkers.size(); ++i)
+    meshes.push_back({"Meshes of the walker " + walker_label(walkers[i]),
+                      {walkers[i].setting.describe() + "."},
+                      {},
+                      {meshes_table(walkers[i], fmt::format("walker-{}-meshes", i + 1), provenance)}});
+  pages.section("walkers", "The chance of still walking",
+                "From meshes of the walker’s stochastic return map; guided sampling and direct simulation stand beside "
+                "them.",
+                {walker_survival_figure(walkers, provenance)}, {walkers_table(walkers, provenance)}, std::move(meshes),
+                Arrangement::beside);
   for (std::size_t i = 0; i < walkers.size(); ++i) {
-    const std::string id = fmt::format("walker-{}", i + 1);
-    const std::string name = walkers[i].setting.describe();
+    const std::string id = fmt::format("walker-{}", i + 1), name = walker_label(walkers[i]);
+    const analysis::LastMoments& moments = walkers[i].falls.moments;
     pages.section(
-        id + "-section", "Basin and failure in the section: " + name,
+        id + "-section", "Basin and failure: " + name,
         "Each dot is a state just after a strike, a node of the mesh. From some a walker comes back to its gait "
         "(within one sd of the noise), from others it falls before; and where the last steps before a fall "
         "begin, beside all steps.",
-        section_figures(walkers[i], id, provenance), {meshes_table(walkers[i], id + "-meshes", provenance)});
-    pages.section(
-        id + "-last-steps", "The last steps before a fall: " + name,
-        "Backwards from the step that fails: what walkers that are about to fall look like, beside all others.",
-        last_moments_figures(walkers[i].falls.moments, id + "-last", provenance),
-        {last_moments_table(walkers[i].falls.moments, id + "-last-steps", provenance)});
+        section_figures(walkers[i], id, provenance), {});
+    pages.section(id + "-last-steps", "The last steps before a fall: " + name,
+                  moments.reason.empty() ? "Backwards from the step that fails: " + last_moments_sentence(moments) + "."
+                                         : "There is nothing to tell: " + moments.reason + ".",
+                  last_moments_figures(moments, id + "-last", name, provenance), {},
+                  {{"In numbers", {}, {}, {last_moments_table(moments, id + "-last-steps", name, provenance)}}});
   }
   pages.write_index();
   pages.finish(answer);

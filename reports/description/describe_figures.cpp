@@ -36,7 +36,7 @@ void add_profile(Figure& figure, const std::vector<analysis::SpeedSummary>& prof
 }
 
 Figure profiles_figure(const analysis::Description& description, const Provenance& provenance) {
-  Figure figure = profile_figure("profiles", "Mean speed at each collision (band: standard error)", provenance);
+  Figure figure = profile_figure("profiles", "Mean speed of the trials (band: standard error)", provenance);
   for (std::size_t i = 0; i < description.conditions.size(); ++i)
     add_profile(figure, description.conditions[i].profile, description.conditions[i].id, static_cast<int>(i));
   figure.reference_lines = {{true, 9, "first leg again"}};
@@ -74,7 +74,7 @@ std::optional<Figure> measured_map_figure(const analysis::ConditionDescription& 
   figure.id = "return-map-" + condition.id;
   for (char& c : figure.id)
     if (!(c >= 'a' && c <= 'z') && !(c >= 'A' && c <= 'Z') && !(c >= '0' && c <= '9')) c = '-';
-  figure.title = "Return map, " + condition.id;
+  figure.title = "Return map of the trials, " + condition.id;
   figure.x = {"ω before a collision", "rad/s"};
   figure.y = {"ω before the next", "rad/s"};
   figure.diagonal = Diagonal::yes;
@@ -96,7 +96,7 @@ std::optional<Figure> measured_map_figure(const analysis::ConditionDescription& 
 std::optional<Figure> legs_figure(const analysis::Description& description, const Provenance& provenance) {
   Figure figure;
   figure.id = "legs";
-  figure.title = "Speed before the collision of each leg (bars: 95 %)";
+  figure.title = "Speed of the trials, leg by leg (bars: 95 %)";
   std::size_t legs = 0;
   figure.x = {"leg", ""};
   figure.y = {"ω before a collision", "rad/s"};

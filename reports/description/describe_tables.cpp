@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "analysis/statistics/t_interval.h"
@@ -44,6 +45,53 @@ Estimate mean_interval(const analysis::SpeedSummary& s) {
 }
 
 Cell p_cell(double p) { return std::isnan(p) ? Cell("") : Cell(p); }
+
+std::vector<std::string> description_sentences(const analysis::Description& description) {
+  std::vector<std::string> sentences;
+  std::string speeds;
+  std::size_t trials = 0, rests = 0, known = 0;
+  for (const analysis::ConditionDescription& c : description.conditions) {
+    trials += c.trials;
+    if (c.survival) rests += c.survival->rests, known += c.survival->trials;
+    if (c.steady.count < 2) continue;
+    speeds += fmt::format("{}{} at {} rad/s", speeds.empty() ? "" : ", ", c.id,
+                          format_estimate(mean_interval(c.steady), NumberFormat::significant, 3));
+  }
+  if (!speeds.empty())
+    sentences.push_back(fmt::format("From the 13th collision on the trials roll steadily: {}.", speeds));
+  // Few pairs can be told one by one.
+  constexpr std::size_t most_pairs = 3;
+  std::string alike;
+  if (description.comparisons.size() <= most_pairs)
+    for (const analysis::ConditionComparison& c : description.comparisons) {
+      if (!c.trial_means || std::isnan(c.trial_means->welch.p)) continue;
+      const double p = c.trial_means->welch.p;
+      if (p < 0.05 || description.conditions[c.a].slope_deg != description.conditions[c.b].slope_deg) continue;
+      alike += fmt::format("{}{} and {} cannot be told apart there (P = {})", alike.empty() ? "" : "; ",
+                           description.conditions[c.a].id, description.conditions[c.b].id,
+                           format_number(p, NumberFormat::p_value, 2));
+    }
+  if (!alike.empty()) sentences.push_back(alike + ".");
+  if (known > 0)
+    sentences.push_back(fmt::format("{} of {} trials came to rest.", rests == 0 ? std::string("None") : fmt::format("{}", rests), known));
+  else
+    sentences.push_back(fmt::format("How the {} trials ended is not known.", trials));
+  return sentences;
+}
+
+Table short_table(const analysis::Description& description, const Provenance& provenance) {
+  const Table all = conditions_table(description, provenance);
+  Table table{.id = "in-short", .title = "The trials by condition", .columns = {}, .provenance = provenance};
+  constexpr std::array<std::size_t, 5> shown = {0, 2, 4, 9, 10};  // of conditions_table()
+  for (const std::size_t j : shown) table.columns.push_back(all.columns[j]);
+  for (const std::vector<Cell>& row : all.rows) {
+    table.rows.emplace_back();
+    for (const std::size_t j : shown) table.rows.back().push_back(row[j]);
+  }
+  table.notes = {"Steady speed: just before a collision, from the 13th on. Below each number its 95 % interval; “> n” where "
+                 "no trial rested from there on."};
+  return table;
+}
 
 Table conditions_table(const analysis::Description& description, const Provenance& provenance) {
   Table table;
@@ -213,10 +261,10 @@ Table survival_table(const analysis::Description& description, const Provenance&
   return table;
 }
 
-Table fits_table(const analysis::Description& description, const Provenance& provenance) {
+Table fits_table(const analysis::Description& description, dynamics::Law law, const Provenance& provenance) {
   Table table;
   table.id = "contact";
-  table.title = "Restitution and friction by maximum likelihood";
+  table.title = fmt::format("Restitution and friction by maximum likelihood under {}", dynamics::law_name(law));
   table.provenance = provenance;
   table.columns = {{"fitted to"}, {"transitions"}, {"rests"}, {"left out"}};
   for (const char* name : {"η mean", "η sd", "μ mean", "μ sd"})

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "reports/description/describe_figures.h"
 
 namespace metastable::reports {
@@ -47,6 +49,27 @@ std::vector<const analysis::StudiedProfile*> lines(const Runs& runs, analysis::S
 }
 
 }  // namespace
+
+Figure claims_figure(const std::vector<analysis::Claim>& claims, const std::vector<VariantStudy>& studies,
+                     const Provenance& provenance) {
+  Figure figure{.id = "claims-reproduced",
+                .title = "Claims reproduced, by law and reading",
+                .x = {.label = fmt::format("claims, of {}", claims.size()),
+                      .low = 0,
+                      .high = 1.05 * static_cast<double>(claims.size())},
+                .y = {""},
+                .provenance = provenance};
+  BarChart bars{.name = {}, .value = {}, .digits = 2};
+  for (std::size_t v = 0; v < studies.size(); ++v) {
+    bars.name.push_back(studies[v].variant.name);
+    bars.value.push_back(static_cast<double>(std::ranges::count_if(claims, [&](const analysis::Claim& claim) {
+      return claim.findings.at(v).verdict == analysis::ClaimVerdict::reproduced;
+    })));
+  }
+  figure.height = 120 + 40 * static_cast<int>(bars.name.size());
+  figure.bars = std::move(bars);
+  return figure;
+}
 
 Figure fig4_experiment_figure(const analysis::PaperExperiments& experiments, const Provenance& provenance) {
   Figure figure = profile_figure(

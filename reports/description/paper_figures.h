@@ -3,11 +3,15 @@
 
 #include <vector>
 
+#include "analysis/paper/paper_claims.h"
 #include "analysis/paper/paper_study.h"
 #include "reports/output/figure.h"
 
 namespace metastable::reports {
 
+/// Draws how many of the claims come out under each variant, as bars.
+Figure claims_figure(const std::vector<analysis::Claim>& claims, const std::vector<analysis::VariantStudy>& studies,
+                     const Provenance& provenance);
 /// Draws one figure a panel of the paper's, for one variant.
 std::vector<Figure> fig4_figures(const analysis::VariantStudy& study, const Provenance& provenance);
 std::vector<Figure> fig6_figures(const analysis::VariantStudy& study, const analysis::PaperExperiments& experiments,

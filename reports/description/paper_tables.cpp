@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "reports/description/describe_tables.h"
 
 namespace metastable::reports {
@@ -63,7 +65,37 @@ Table start(const char* id, const std::string& title, const Provenance& provenan
   return table;
 }
 
+std::size_t count(const std::vector<analysis::Claim>& claims, std::size_t variant, analysis::ClaimVerdict verdict) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      claims, [&](const analysis::Claim& claim) { return claim.findings.at(variant).verdict == verdict; }));
+}
+
 }  // namespace
+
+std::vector<std::string> claims_sentences(const std::vector<analysis::Claim>& claims, const Studies& studies) {
+  using enum analysis::ClaimVerdict;
+  std::vector<std::string> parts;
+  for (std::size_t v = 0; v < studies.size(); ++v)
+    parts.push_back(fmt::format("{} under {}", count(claims, v, reproduced), studies[v].variant.name));
+  return {fmt::format("Of {} claims of the paper so many are reproduced: {}.", claims.size(), fmt::join(parts, "; "))};
+}
+
+Table claims_count_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
+                         const Provenance& provenance) {
+  using enum analysis::ClaimVerdict;
+  Table table = start("claim-counts", "Claims by verdict, under each law and reading", provenance);
+  table.columns = {{"law and reading"}};
+  for (const analysis::ClaimVerdict verdict : {reproduced, partly, not_reproduced, not_applicable})
+    table.columns.push_back({analysis::verdict_text(verdict)});
+  for (std::size_t v = 0; v < studies.size(); ++v) {
+    std::vector<Cell> row{studies[v].variant.name};
+    for (const analysis::ClaimVerdict verdict : {reproduced, partly, not_reproduced, not_applicable})
+      row.emplace_back(count(claims, v, verdict));
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {variants_note};
+  return table;
+}
 
 Table claims_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
                    const analysis::PaperExperiments& experiments, const Provenance& provenance) {

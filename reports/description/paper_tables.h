@@ -1,6 +1,7 @@
 #pragma once
 // Makes the tables of `metastable study`.
 
+#include <string>
 #include <vector>
 
 #include "analysis/paper/paper_claims.h"
@@ -10,6 +11,11 @@ namespace metastable::reports {
 
 using Studies = std::vector<analysis::VariantStudy>;
 
+/// Says how many claims come out under the paper's own law and under that of rigid bodies.
+std::vector<std::string> claims_sentences(const std::vector<analysis::Claim>& claims, const Studies& studies);
+/// Counts the claims by verdict, a row a variant.
+Table claims_count_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
+                         const Provenance& provenance);
 Table claims_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
                    const analysis::PaperExperiments& experiments, const Provenance& provenance);
 /// Lists the main numbers, and the claims whose verdict differs between the variants (of paper_variants(), in order).

@@ -51,7 +51,7 @@ Figure over_density(const std::string& id, const std::string& title, FigureAxis 
   figure.x = friction_axis(stopping);
   figure.y = std::move(y);
   figure.legend = Legend::below;
-  figure.height = 560;
+  figure.height = 500;
   figure.provenance = provenance;
   return figure;
 }
@@ -77,7 +77,7 @@ std::string stopping_story(const Stopping& s) {
 }
 
 Figure sticking_figure(const Stopping& stopping, const Provenance& provenance) {
-  Figure figure = over_density("stopping-sticking", "Friction below which a foot slides, μ_c, leg by leg",
+  Figure figure = over_density("stopping-sticking", "Friction below which a foot slides, μ_c (settled)",
                                {"longer than the leg before it", "mm"}, stopping, provenance);
   double low = 0, high = 0;
   for (const StoppingLeg& leg : stopping.legs) {
@@ -110,7 +110,7 @@ Figure sticking_figure(const Stopping& stopping, const Provenance& provenance) {
 Figure resting_figure(const Stopping& stopping, const Provenance& provenance) {
   Figure figure = over_density(
       "stopping-resting",
-      fmt::format("Friction below which the wheel stops, μ_r, at η = {}", stopping.setting.restitution.mean),
+      fmt::format("Friction below which the wheel stops, μ_r, η = {} (settled)", stopping.setting.restitution.mean),
       {"speed before the landing, ω−", "rad/s"}, stopping, provenance);
   double low = 100, high = 0;
   for (const analysis::RestingCurve& curve : stopping.curves) {
@@ -146,7 +146,7 @@ Figure resting_figure(const Stopping& stopping, const Provenance& provenance) {
 Table stopping_table(const Stopping& stopping, const Provenance& provenance) {
   Table table;
   table.id = "stopping";
-  table.title = "Where the wheel stops, leg by leg";
+  table.title = "Where the wheel stops under settled, leg by leg";
   table.provenance = provenance;
   table.columns = {{"leg"},
                    {"longer than the leg before it", "mm", NumberFormat::fixed, 1},
@@ -169,7 +169,7 @@ Table stopping_table(const Stopping& stopping, const Provenance& provenance) {
 Table design_table(const std::vector<analysis::DesignChange>& changes, const Provenance& provenance) {
   Table table;
   table.id = "designs";
-  table.title = "What a designer changes to walk longer";
+  table.title = "What a designer changes to walk longer, under settled";
   table.provenance = provenance;
   table.columns = {{"change"}, {"from"}, {"to"}, {"expected steps"}, {"times as many"}};
   for (const analysis::DesignChange& change : changes)

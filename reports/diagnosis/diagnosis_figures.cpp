@@ -20,6 +20,8 @@ using analysis::GapMap;
 
 constexpr double full_colour = 6;  // score beyond which colours do not change
 constexpr std::size_t bars_at_most = 12;
+constexpr std::size_t furthest_rows = 10, most_rows = 14;  // of one figure
+constexpr int map_width = 720, row_height = 26;            // [px]
 constexpr int given_colour = 1, recalibrated_colour = 4, effect_colour = 0, floor_colour = 6;
 
 constexpr std::string_view stance_mark = ", stance", collision_mark = ", collision",
@@ -39,61 +41,114 @@ struct ModelMap {
   const GapMap* map;
 };
 
-// Draws cells of one phase as rows, models and aspects as columns.
-Figure map_figure(const std::vector<ModelMap>& models, bool stances, const std::string& id, const std::string& title) {
-  std::vector<std::string> rows;  // as the map orders them
-  std::map<std::pair<std::string, std::size_t>, double> scores;
-  std::vector<std::string> columns;
+// Lists the models that the map is told under.
+std::vector<ModelMap> models_of(const Diagnosis& d) {
+  std::vector<ModelMap> models{{"as given", &d.gap.as_given}, {"recalibrated", &d.gap.recalibrated}};
+  if (d.verdict == analysis::Verdict::explained || d.verdict == analysis::Verdict::unexplained)
+    models.push_back({"with effect", &d.gap.left});
+  return models;
+}
+
+bool two_phases(const Diagnosis& d) {
+  return std::ranges::any_of(d.gap.recalibrated.cells, [](const GapCell& cell) { return cell.stance; });
+}
+
+// Is one line of a map's figure: the cells of one place, of all aspects and models.
+struct Row {
+  std::string facet, name, phase;  // phase: "" where there is one
+  std::vector<double> scores;      // a column each; NaN: no such cell
+  double furthest = 0;             // of the recalibrated model
+};
+
+// Lists rows as the map orders them; columns are aspects by models.
+std::vector<Row> rows_of(const Diagnosis& d, std::vector<std::string>& columns) {
+  const std::vector<ModelMap> models = models_of(d);
+  const bool phases = two_phases(d);
+  std::vector<Row> rows;
   for (const char* aspect : {"mean", "spread"})
-    for (const ModelMap& model : models) {
-      const std::size_t column = columns.size();
-      columns.push_back(fmt::format("{}, {}", aspect, model.name));
-      for (const GapCell& cell : model.map->cells) {
-        if (cell.aspect != aspect || cell.stance != stances) continue;
-        const std::string row = row_name(cell);
-        if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
-        double& score = scores[{row, column}];
-        if (!cell.swing || std::abs(cell.statistic) > std::abs(score)) score = cell.statistic;
-      }
+    for (const ModelMap& model : models) columns.push_back(fmt::format("{}, {}", aspect, model.name));
+  for (std::size_t m = 0; m < models.size(); ++m)
+    for (const GapCell& cell : models[m].map->cells) {
+      if (cell.aspect != "mean" && cell.aspect != "spread") continue;
+      const std::string name = row_name(cell), phase = !phases ? "" : cell.stance ? "stance" : "collision";
+      auto row = std::ranges::find_if(rows, [&](const Row& r) { return r.name == name && r.phase == phase; });
+      if (row == rows.end())
+        row = rows.insert(rows.end(), {cell.facet, name, phase,
+                                       std::vector<double>(columns.size(), std::numeric_limits<double>::quiet_NaN()),
+                                       0});
+      double& score = row->scores[m + (cell.aspect == "spread" ? models.size() : 0)];
+      if (std::isnan(score) || !cell.swing || std::abs(cell.statistic) > std::abs(score)) score = cell.statistic;
+      if (models[m].map == &d.gap.recalibrated) row->furthest = std::max(row->furthest, std::abs(cell.statistic));
     }
-  std::reverse(rows.begin(), rows.end());  // the first on top
+  return rows;
+}
+
+// Draws the rows, the first on top, in letters one can read.
+Figure map_figure(const std::vector<Row>& rows, const std::vector<std::string>& columns, const std::string& id,
+                  const std::string& title, bool with_phase) {
   Figure figure{.id = id, .title = title, .x = {""}, .y = {""}};
   HeatMap map{.x = {},
               .y = {},
               .value = {},
-              .label = "score (standard normal without a gap)",
+              .label = "score",
               .digits = 1,
               .format = NumberFormat::fixed};
   map.limit = full_colour;
   map.x_names = columns;
-  map.y_names = rows;
   for (std::size_t i = 0; i < columns.size(); ++i) map.x.push_back(static_cast<double>(i));
-  for (std::size_t j = 0; j < rows.size(); ++j) {
-    map.y.push_back(static_cast<double>(j));
-    map.value.emplace_back();
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      const auto found = scores.find({rows[j], i});
-      map.value.back().push_back(found == scores.end() ? std::numeric_limits<double>::quiet_NaN() : found->second);
-    }
+  for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
+    map.y.push_back(static_cast<double>(map.y.size()));
+    map.y_names.push_back(with_phase && !row->phase.empty() ? row->name + ", " + row->phase : row->name);
+    map.value.push_back(row->scores);
   }
   figure.heat_map = std::move(map);
-  figure.width = 820;
-  figure.height = 150 + 20 * static_cast<int>(rows.size());
+  figure.width = map_width;
+  figure.height = 150 + row_height * static_cast<int>(rows.size());
   return figure;
 }
 
 }  // namespace
 
+std::vector<Figure> furthest_figure(const Diagnosis& d) {
+  std::vector<std::string> columns;
+  std::vector<Row> rows = rows_of(d, columns);
+  if (rows.empty()) return {};
+  std::ranges::stable_sort(rows, [](const Row& a, const Row& b) { return a.furthest > b.furthest; });
+  rows.resize(std::min(rows.size(), furthest_rows));
+  return {map_figure(rows, columns, "map-furthest", "Where measured and modelled speeds differ most", true)};
+}
+
 std::vector<Figure> map_figures(const Diagnosis& d) {
-  if (d.gap.recalibrated.cells.empty()) return {};
-  std::vector<ModelMap> models{{"as given", &d.gap.as_given}, {"recalibrated", &d.gap.recalibrated}};
-  const bool with_effect = d.verdict == analysis::Verdict::explained || d.verdict == analysis::Verdict::unexplained;
-  if (with_effect) models.push_back({"with effect", &d.gap.left});
-  const bool two_phases = std::any_of(d.gap.recalibrated.cells.begin(), d.gap.recalibrated.cells.end(),
-                                      [](const GapCell& cell) { return cell.stance; });
+  std::vector<std::string> columns;
+  const std::vector<Row> all = rows_of(d, columns);
   std::vector<Figure> figures;
-  figures.push_back(map_figure(models, false, "map-collisions", two_phases ? "Collisions" : "Steps"));
-  if (two_phases) figures.push_back(map_figure(models, true, "map-stances", "Stances"));
+  const std::vector<std::string> phases =
+      two_phases(d) ? std::vector<std::string>{"collision", "stance"} : std::vector<std::string>{""};
+  for (const std::string& phase : phases) {
+    const std::string name = phase.empty() ? "steps" : phase + "s";
+    std::vector<Row> rows;
+    std::vector<std::string> facets;
+    int part = 0;
+    const auto draw = [&] {
+      if (rows.empty()) return;
+      const std::string id = "map-" + name;  // of the first part; then map-stances-2, ...
+      figures.push_back(map_figure(rows, columns, ++part == 1 ? id : fmt::format("{}-{}", id, part),
+                                   fmt::format("The map of {}: {}", name, fmt::join(facets, ", ")), false));
+      rows.clear(), facets.clear();
+    };
+    // A facet's rows stay together.
+    for (std::size_t from = 0; from < all.size();) {
+      std::size_t to = from;
+      std::vector<Row> facet;
+      for (; to < all.size() && all[to].facet == all[from].facet; ++to)
+        if (all[to].phase == phase) facet.push_back(all[to]);
+      if (rows.size() + facet.size() > most_rows) draw();
+      if (!facet.empty()) facets.push_back(all[from].facet);
+      rows.insert(rows.end(), facet.begin(), facet.end());
+      from = to;
+    }
+    draw();
+  }
   return figures;
 }
 

@@ -8,8 +8,9 @@
 
 namespace metastable::reports {
 
-/// Draws scores of the map's cells under the three models, a figure for the collisions and one for the stances (or one
-/// for whole steps).
+/// Draws the ten places of the map whose scores under the recalibrated model are largest, under all models.
+std::vector<Figure> furthest_figure(const analysis::Diagnosis& diagnosis);
+/// Draws scores of all the map's cells under the three models, some facets a figure, collisions and stances apart.
 std::vector<Figure> map_figures(const analysis::Diagnosis& diagnosis);
 /// Draws the mean speed by collision, measured and simulated, a figure a condition.
 std::vector<Figure> profile_figures(const analysis::Diagnosis& diagnosis);

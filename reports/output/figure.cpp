@@ -134,6 +134,9 @@ std::string plot_element(const Series& series, std::size_t index) {
     case Style::steps:
       style = fmt::format("using 1:2 with steps lw 2 lc rgb '{}'", colour);
       break;
+    case Style::dashed_steps:
+      style = fmt::format("using 1:2 with steps lw 2 dt (8,5) lc rgb '{}'", colour);
+      break;
     case Style::impulses:
       style = fmt::format("using 1:2 with impulses lw 3 lc rgb '{}'", colour);
       break;
@@ -220,6 +223,7 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
     }
   }
   if (low > high) low = high = 1;  // no finite cell
+  low = map.low.value_or(low), high = map.high.value_or(high);
   const auto scale = [&](double value) { return map.logarithmic ? std::log(value) : value; };
   const auto shade = [&](double value) {
     return high > low ? (scale(value) - scale(low)) / (scale(high) - scale(low)) : 0.5;
@@ -258,12 +262,12 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
   script +=
       fmt::format("set xtics ({}) nomirror scale 0 noenhanced{}\nset ytics ({}) nomirror scale 0 noenhanced\n",
                   tics(map.x, map.x_names), map.x_names.empty() ? "" : " rotate by 25 right", tics(map.y, map.y_names));
-  script += "unset grid\nset key off\nset style fill solid 1 border rgb 'white'\n";
+  script += "unset grid\nset key off\nset style fill solid 1 border rgb '#fefefe'\n";
   script += map.limit > 0
                 ? "set palette defined (0 '#2166ac', 0.25 '#92c5de', 0.5 '#f7f7f7', 0.75 '#f4a582', 1 '#b2182b')\n"
                 : "set palette defined (0 '#440154', 0.25 '#3b528b', 0.5 '#21918c', 0.75 '#5ec962', 1 '#fde725')\n";
   if (map.limit > 0) low = -map.limit, high = map.limit;
-  script += fmt::format("set cblabel {} noenhanced\nset cbrange [{}:{}]\n", quote(map.label), low, high);
+  script += fmt::format("set cblabel {} noenhanced textcolor rgb '#222222'\nset cbrange [{}:{}]\n", quote(map.label), low, high);
   if (map.logarithmic && high / low >= 100) {
     script += "set logscale cb\nset format cb '10^{%T}'\n";
   } else if (map.logarithmic) {  // too few powers of ten to read a scale by
@@ -278,12 +282,12 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
   script += "plot ";
   if (!infinite_cells.empty()) {
     script +=
-        "$infinite using 1:2:(0.5):(0.5) with boxxyerror fs solid 1 border rgb 'white' lc rgb '#d0d0d0', \\\n     ";
+        "$infinite using 1:2:(0.5):(0.5) with boxxyerror fs solid 1 border rgb '#fefefe' lc rgb '#d0d0d0', \\\n     ";
   }
   script += "$finite using 1:2:(0.5):(0.5):3 with boxxyerror lc palette";
   if (fit.font > 0) {
     script += fmt::format(
-        ", \\\n     $dark using 1:2:3 with labels noenhanced font ',{0}' textcolor rgb '#000000'"
+        ", \\\n     $dark using 1:2:3 with labels noenhanced font ',{0}' textcolor rgb '#101010'"
         ", \\\n     $light using 1:2:3 with labels noenhanced font ',{0}' textcolor rgb '#ffffff'",
         fit.font);
   }
@@ -438,16 +442,16 @@ void replace_once(std::string& text, std::string_view begin, std::string_view en
 
 std::string gnuplot_script(const Figure& figure) {
   std::string script = fmt::format(
-      "set terminal svg size {},{} dynamic enhanced font '{},14' linewidth 1 background 'white'\n"
+      "set terminal svg size {},{} dynamic enhanced font '{},15' linewidth 1 background 'white'\n"
       "set encoding utf8\nset output\n"
       "set border 3 lc rgb '#444444' lw 1\n"
       "set grid lt 1 lc rgb '#e4e4e4' lw 0.7\n"
       "set tics nomirror out scale 0.6 textcolor rgb '#222222'\n"
       "set key {} samplen 2.2 spacing 1.2 textcolor rgb '#222222'\n"
-      "set xlabel {} noenhanced\nset ylabel {} noenhanced\n",
+      "set xlabel {} noenhanced textcolor rgb '#222222'\nset ylabel {} noenhanced textcolor rgb '#222222'\n",
       figure.width, figure.height, font_family, legend_position(figure.legend), quote(axis_label(figure.x)),
       quote(axis_label(figure.y)));
-  if (!figure.title.empty()) script += fmt::format("set title {} noenhanced\n", quote(figure.title));
+  if (!figure.title.empty()) script += fmt::format("set title {} noenhanced textcolor rgb '#222222'\n", quote(figure.title));
 
   if (figure.heat_map) {
     check_heat_map(figure, *figure.heat_map);

@@ -24,6 +24,7 @@ enum class Style {
   points,    ///< x, y; vertical 95 % bars if lower and upper are given
   dots,      ///< x, y: a cloud of many small points
   steps,     ///< x, y: y[i] holds from x[i] to x[i+1]
+  dashed_steps,  ///< x, y: likewise
   impulses,  ///< x, y: a stem from zero
   area,      ///< x, y: filled down to zero (to the bottom of a logarithmic axis)
   band,      ///< x, lower, upper: filled between
@@ -64,6 +65,8 @@ struct HeatMap {
   std::vector<std::string> y_names = {};            ///< likewise, one a row
   /// If not 0, colours go from blue over white to red, white at 0, full at -limit, +limit and beyond.
   double limit = 0;
+  /// Ends of the colour scale, e.g. of maps side by side; not given: the least and the largest value.
+  std::optional<double> low = {}, high = {};
 };
 
 /// Holds named horizontal bars from zero, the first on top, each with its value at the end.
@@ -88,8 +91,8 @@ struct Figure {
   std::optional<HeatMap> heat_map = {};  ///< instead of series
   std::optional<BarChart> bars = {};     ///< instead of series; vertical reference lines are drawn
   Legend legend = Legend::top_right;     ///< drawn only if a series has a label
-  int width = 640;                       ///< [px]; text is sized for 640 across a column or half a page
-  int height = 420;                      ///< [px]
+  int width = 520;                       ///< [px]; letters of 15 px are then read on a phone too
+  int height = 380;                      ///< [px]
   Provenance provenance = {};            ///< the SVG's <desc>
 };
 

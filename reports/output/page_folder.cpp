@@ -4,25 +4,44 @@
 
 namespace metastable::reports {
 
-void PageFolder::section(const std::string& id, const std::string& heading, const std::string& reading,
-                         const std::vector<Figure>& figures, std::vector<Table> tables) {
-  PageSection section{id, heading, reading, {}, {}};
+namespace {
+
+constexpr int readable_width = 640;  // [px] beyond it a figure's letters are too small for a narrow screen
+
+}  // namespace
+
+std::vector<PageFigure> PageFolder::write(const std::vector<Figure>& figures) {
   if (!figures.empty()) make_folder(folder_.path() / "figures");
+  std::vector<PageFigure> written;
   for (const Figure& figure : figures) {
     const std::string svg = render_svg(figure);
     write_file(folder_.path() / "figures" / (figure.id + ".svg"), svg);
-    section.figures.push_back({figure.id, svg, ""});
+    written.push_back({figure.id, svg, "", figure.width > readable_width});
   }
+  return written;
+}
+
+std::vector<PageTable> PageFolder::write(std::vector<Table> tables) {
   if (!tables.empty()) make_folder(folder_.path() / "tables");
+  std::vector<PageTable> written;
   for (Table& table : tables) {
     const std::filesystem::path stem = folder_.path() / "tables" / table.id;
     write_file(stem.string() + ".csv", to_csv(table));
     write_file(stem.string() + ".md", to_markdown(table));
     write_file(stem.string() + ".tex", to_latex(table));
     const std::string href = "tables/" + table.id;
-    section.tables.push_back(
-        {std::move(table), {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}, {"LaTeX", href + ".tex"}}});
+    written.push_back({std::move(table), {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}, {"LaTeX", href + ".tex"}}});
   }
+  return written;
+}
+
+void PageFolder::section(const std::string& id, const std::string& heading, const std::string& reading,
+                         const std::vector<Figure>& figures, std::vector<Table> tables, std::vector<Fold> folded,
+                         Arrangement arrangement) {
+  PageSection section{id, heading, reading, write(figures), write(std::move(tables)), {}, arrangement};
+  for (Fold& fold : folded)
+    section.folded.push_back(
+        {std::move(fold.summary), std::move(fold.texts), write(fold.figures), write(std::move(fold.tables))});
   page_.sections.push_back(std::move(section));
 }
 
@@ -35,13 +54,16 @@ void PageFolder::finish(Answer& answer) const {
   const std::string index = (made_.path() / "index.html").string();
   answer.say("{}", index);
   answer.file(index);
-  for (const PageSection& section : page_.sections) {
-    for (const PageFigure& figure : section.figures)
-      answer.file((made_.path() / "figures" / (figure.id + ".svg")).string());
-    for (const PageTable& table : section.tables) {
+  const auto tell = [&](const std::vector<PageFigure>& figures, const std::vector<PageTable>& tables) {
+    for (const PageFigure& figure : figures) answer.file((made_.path() / "figures" / (figure.id + ".svg")).string());
+    for (const PageTable& table : tables) {
       for (const PageLink& link : table.files) answer.file((made_.path() / link.href).string());
       answer.table(table.table);
     }
+  };
+  for (const PageSection& section : page_.sections) {
+    tell(section.figures, section.tables);
+    for (const FoldedPart& part : section.folded) tell(part.figures, part.tables);
   }
   answer.finish(page_.provenance);
 }

@@ -13,6 +13,14 @@
 
 namespace metastable::reports {
 
+/// Holds a FoldedPart as data.
+struct Fold {
+  std::string summary;
+  std::vector<std::string> texts = {};
+  std::vector<Figure> figures = {};
+  std::vector<Table> tables = {};
+};
+
 /// Writes index.html, tables/<id>.csv, .md and .tex, figures/<id>.svg in one folder, all of them or none: they are
 /// there once the page is written. A folder that gets none is gone again.
 class PageFolder {
@@ -24,13 +32,17 @@ class PageFolder {
   /// Adds a section, its tables and figures written beside the folder until the page is there. @throws as the
   /// renderings and write_file() do
   void section(const std::string& id, const std::string& heading, const std::string& reading,
-               const std::vector<Figure>& figures, std::vector<Table> tables);
+               const std::vector<Figure>& figures, std::vector<Table> tables, std::vector<Fold> folded = {},
+               Arrangement arrangement = Arrangement::stacked);
   /// Writes the page, with which everything takes its place. Call once.
   void write_index();
   /// Says where the page is; its tables and files go into the answer, which is finished.
   void finish(Answer& answer) const;
 
  private:
+  std::vector<PageFigure> write(const std::vector<Figure>& figures);
+  std::vector<PageTable> write(std::vector<Table> tables);
+
   FolderIfFilled made_;  // with its parents
   OutputFolder folder_;
   Page page_;

@@ -16,7 +16,10 @@ namespace {
 
 constexpr std::string_view minus_sign = "−";
 constexpr std::string_view infinite_word = "infinite";
-constexpr std::size_t html_long = 60;  // characters of a text that wants a wide column
+constexpr std::size_t html_long = 60, html_some = 24;  // characters of a text that wants a wide column, a wider one
+constexpr std::size_t html_few = 12;    // cells that are shown in large letters, at most
+constexpr std::size_t html_columns = 7;  // beyond, smaller type
+constexpr std::size_t html_cards = 90;  // cells beyond which rows stay rows on a narrow screen, and scroll
 
 std::string full_precision(double number) {
   if (std::isinf(number)) return number > 0 ? std::string(infinite_word) : "-" + std::string(infinite_word);
@@ -488,14 +491,18 @@ std::string to_html(const Table& table) {
   validate(table);
   std::string out = fmt::format("<figure class=\"table\" id=\"table-{}\">\n<figcaption>{}</figcaption>\n",
                                 escape_html(table.id), escape_html(table.title));
-  out += "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>";
-  const auto kind = [&](std::size_t j) {
+  const std::size_t cells = table.rows.size() * table.columns.size();
+  std::string classes = cells <= html_few ? "cards few" : cells <= html_cards ? "cards" : "rows";
+  if (table.columns.size() > html_columns) classes += " dense";
+  out += fmt::format("<div class=\"scroll\" tabindex=\"0\"><table class=\"{}\">\n<thead><tr>", classes);
+  const auto kind = [&](std::size_t j) -> std::string_view {
     if (!is_text(table, j)) return "";
-    const bool long_text = std::ranges::any_of(table.rows, [&](const auto& row) {
-      const auto* text = std::get_if<std::string>(&row[j].value());
-      return text && text->size() > html_long;
-    });
-    return long_text ? " class=\"text long\"" : " class=\"text\"";
+    std::size_t longest = 0;
+    for (const auto& row : table.rows)
+      if (const auto* text = std::get_if<std::string>(&row[j].value())) longest = std::max(longest, text->size());
+    return longest > html_long   ? " class=\"text long\""
+           : longest > html_some ? " class=\"text some\""
+                                 : " class=\"text\"";
   };
   for (std::size_t j = 0; j < table.columns.size(); ++j) {
     out += fmt::format("<th scope=\"col\"{}>{}", kind(j), escape_html(table.columns[j].name));
@@ -509,9 +516,13 @@ std::string to_html(const Table& table) {
     out += "<tr>";
     for (std::size_t j = 0; j < row.size(); ++j) {
       const bool said = std::holds_alternative<NotShown>(row[j].value());
-      out += fmt::format(
-          "<td{}>{}</td>", said ? " class=\"said\"" : kind(j),
-          show(row[j], table.columns[j], escape_html, [](const Decimal& d) { return escape_html(plain_text(d)); }));
+      std::string shown =
+          show(row[j], table.columns[j], escape_html, [](const Decimal& d) { return escape_html(plain_text(d)); });
+      // An interval stands below its number.
+      if (const std::size_t at = shown.find(" ("); at != std::string::npos && std::get_if<Estimate>(&row[j].value()))
+        shown = fmt::format("{} <span class=\"interval\">{}</span>", shown.substr(0, at), shown.substr(at + 1));
+      out += fmt::format("<td{} data-label=\"{}\">{}</td>", said ? " class=\"said\"" : kind(j),
+                         escape_html(heading(table.columns[j])), shown);
     }
     out += "</tr>\n";
   }

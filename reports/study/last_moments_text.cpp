@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "reports/output/text_table.h"
@@ -16,6 +17,11 @@ using analysis::StepProfile;
 using Json = nlohmann::ordered_json;
 
 std::string step_name(std::size_t k) { return k == 0 ? "the one that fails" : fmt::format("{} before", k); }
+
+// Numbers are those of the state, then those of the noise.
+const Estimate& number_of(const StepProfile& profile, std::size_t i, std::size_t states) {
+  return i < states ? profile.state[i] : profile.noise[i - states];
+}
 
 std::vector<Cell> profile_row(const std::string& name, const StepProfile& profile) {
   std::vector<Cell> row{name};
@@ -54,9 +60,10 @@ std::string path_text(const LastMoments& moments, const std::string& phase) {
 
 }  // namespace
 
-Table last_moments_table(const LastMoments& moments, const std::string& id, const Provenance& provenance) {
+Table last_moments_table(const LastMoments& moments, const std::string& id, const std::string& where,
+                         const Provenance& provenance) {
   Table table{.id = id,
-              .title = "How it fails: the last steps",
+              .title = where.empty() ? "How it fails: the last steps" : "The last steps, " + where,
               .notes = {"Medians with the middle 90 % of what a step begins with and meets. Bound to fail: the mean "
                         "chance of failing before being back in the middle of the metastable regime."},
               .columns = {{"step"}},
@@ -69,9 +76,36 @@ Table last_moments_table(const LastMoments& moments, const std::string& id, cons
   return table;
 }
 
+std::size_t telling_number(const LastMoments& moments) {
+  std::size_t most = 0;
+  double furthest = 0;
+  const std::size_t states = moments.state_names.size();
+  for (std::size_t i = 0; i < states + moments.noise_names.size(); ++i) {
+    const Estimate &last = number_of(moments.last.front(), i, states), &all = number_of(moments.regime, i, states);
+    const double shift = all.upper > all.lower ? std::abs(last.value - all.value) / (all.upper - all.lower) : 0;
+    if (shift > furthest) most = i, furthest = shift;
+  }
+  return most;
+}
+
+std::string last_moments_sentence(const LastMoments& moments) {
+  const std::size_t states = moments.state_names.size(), i = telling_number(moments);
+  const DecimalEstimate last = to_decimal(number_of(moments.last.front(), i, states), NumberFormat::general, 3),
+                        all = to_decimal(number_of(moments.regime, i, states), NumberFormat::general, 3);
+  std::string name = i < states ? moments.state_names[i] : moments.noise_names[i - states], unit;
+  if (const std::size_t at = name.find(" ["); at != std::string::npos) {
+    unit = " " + name.substr(at + 2, name.size() - at - 3);
+    name.resize(at);
+  }
+  return fmt::format("the step that fails {} a {} of {}{} (middle 90 %: {} to {}), all steps of {}{} ({} to {})",
+                     i < states ? "begins with" : "meets", name, plain_text(last.value), unit, plain_text(last.lower),
+                     plain_text(last.upper), plain_text(all.value), unit, plain_text(all.lower),
+                     plain_text(all.upper));
+}
+
 std::string last_moments_text(const LastMoments& moments, const std::string& phase, std::size_t width) {
   if (!moments.reason.empty()) return "How it fails is not told: " + moments.reason + ".\n";
-  std::string text = to_text(last_moments_table(moments, "last-steps", {}), 1000, width);
+  std::string text = to_text(last_moments_table(moments, "last-steps", "", {}), 1000, width);
   if (moments.by_phase.size() > 1) {
     std::string shares;
     for (std::size_t p = 0; p < moments.by_phase.size(); ++p)
@@ -98,12 +132,12 @@ std::string last_moments_json(const LastMoments& moments) {
 }
 
 std::vector<Figure> last_moments_figures(const LastMoments& moments, const std::string& id,
-                                         const Provenance& provenance) {
+                                         const std::string& where, const Provenance& provenance) {
   std::vector<Figure> figures;
   const auto add = [&](const std::string& name, const auto& of) {
     Figure figure;
     figure.id = fmt::format("{}-{}", id, figures.size() + 1);
-    figure.title = "Before it fails: " + name;
+    figure.title = "Before it fails, " + where;
     figure.x = {"steps before the one that fails"};
     figure.x.low = -static_cast<double>(moments.last.size() - 1);
     figure.x.high = 0.0;

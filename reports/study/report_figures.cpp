@@ -19,8 +19,25 @@ constexpr int cloud_collisions = 16;
 constexpr std::size_t mean_draws = 1024;
 constexpr std::size_t density_bins = 120;
 
-std::string label(const analysis::Setting& setting) {
-  return fmt::format("{}, {} deg", dynamics::law_name(setting.law), setting.slope_deg);
+int law_colour(dynamics::Law law) {
+  switch (law) {
+    case dynamics::Law::settled:
+      return 0;
+    case dynamics::Law::published:
+      return 1;
+    case dynamics::Law::coulomb:
+      return 2;
+    case dynamics::Law::plastic:
+      break;
+  }
+  return 3;
+}
+
+// Returns dashes for every second ramp of the same law.
+bool dashed(const std::vector<Studied>& settings, std::size_t i) {
+  std::size_t before = 0;
+  for (std::size_t j = 0; j < i; ++j) before += settings[j].study.setting->law == settings[i].study.setting->law;
+  return before % 2 == 1;
 }
 
 // Cells carry mass over x = omega^2; spread evenly over equal bins of omega.
@@ -58,14 +75,16 @@ Series density(const analysis::Metastability& study, int colour) {
 Figure density_figure(const std::vector<Studied>& settings, const Provenance& provenance) {
   Figure figure;
   figure.id = "quasi-stationary";
-  figure.title = "Speed of rolling wheels before a collision, long run";
+  figure.title = "Speed before a collision, long run, by law and ramp";
   figure.x = {"ω before a collision", "rad/s"};
   figure.y = {"density", "s/rad"};
   figure.legend = Legend::below;
   figure.provenance = provenance;
   for (std::size_t i = 0; i < settings.size(); ++i) {
-    Series series = density(settings[i].study, static_cast<int>(i));
-    series.label = label(*settings[i].study.setting);
+    const analysis::Setting& setting = *settings[i].study.setting;
+    Series series = density(settings[i].study, law_colour(setting.law));
+    if (dashed(settings, i)) series.style = Style::dashed;
+    series.label = law_and_ramp(setting);
     figure.series.push_back(std::move(series));
   }
   return figure;
@@ -74,21 +93,22 @@ Figure density_figure(const std::vector<Studied>& settings, const Provenance& pr
 Figure survival_figure(const std::vector<Studied>& settings, const Provenance& provenance) {
   Figure figure;
   figure.id = "survival";
-  figure.title = "Probability of still rolling";
+  figure.title = "Probability of still rolling, by law and ramp";
   figure.x = {"steps n", ""};
   figure.y = {.label = "P(steps > n)", .logarithmic = true, .high = 1.0};
   figure.legend = Legend::below;
-  figure.height = 540;  // room for the legend
+  figure.height = 450;  // room for the legend
   figure.provenance = provenance;
-  bool any_endless = false;
   for (std::size_t i = 0; i < settings.size(); ++i) {
+    const analysis::Setting& setting = *settings[i].study.setting;
     const bool endless = settings[i].study.status == analysis::Status::rest_unreachable;
-    Series series{label(*settings[i].study.setting), Style::steps, {}, {}, {}, {}, static_cast<int>(i)};
-    if (endless) {
-      series.label += " (never rests)";
-      if (any_endless) series.style = Style::dashed;  // over the one before it
-      any_endless = true;
-    }
+    Series series{law_and_ramp(setting) + (endless ? " (never rests)" : ""),
+                  dashed(settings, i) ? Style::dashed_steps : Style::steps,
+                  {},
+                  {},
+                  {},
+                  {},
+                  law_colour(setting.law)};
     const std::vector<double>& survival = settings[i].study.steps.survival;
     for (std::size_t n = 0; n < std::min(survival.size(), survival_steps); ++n) {
       series.x.push_back(static_cast<double>(n));
@@ -103,7 +123,7 @@ Figure return_map_figure(const analysis::Setting& setting, const Provenance& pro
   Figure figure;
   figure.id = fmt::format("return-map-{}", setting.slope_deg);
   std::replace(figure.id.begin(), figure.id.end(), '.', '-');
-  figure.title = fmt::format("Return map, {}", label(setting));
+  figure.title = fmt::format("Return map, {}", law_and_ramp(setting));
   figure.x = {"ω before a collision", "rad/s"};
   figure.y = {"ω before the next", "rad/s"};
   figure.diagonal = Diagonal::yes;
@@ -148,9 +168,31 @@ Figure return_map_figure(const analysis::Setting& setting, const Provenance& pro
   return figure;
 }
 
+Figure sensitivity_figure(const std::string& id, const Hanging& one, const Provenance& provenance) {
+  Figure figure;
+  figure.id = id;
+  figure.title = law_and_ramp(one.setting);
+  figure.x = {"change of the steps for 1 % more", "%"};
+  figure.y = {""};
+  figure.provenance = provenance;
+  BarChart bars{.name = {}, .value = {}};
+  for (const analysis::Sensitivity& s : one.sensitivities.ranked) {
+    if (s.leg || s.value == 0) continue;
+    const Estimate change = for_one_per_cent(s);
+    bars.name.emplace_back(analysis::parameter_label(s.parameter));
+    bars.value.push_back(change.value);
+    bars.lower.push_back(change.lower);
+    bars.upper.push_back(change.upper);
+    bars.colour.push_back(law_colour(one.setting.law));
+  }
+  figure.height = 110 + 32 * static_cast<int>(bars.name.size());
+  figure.bars = std::move(bars);
+  return figure;
+}
+
 Figure grid_figure(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
-                   const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,
-                   const Provenance& provenance) {
+                   const analysis::SweepAxis& across, const std::vector<Estimate>& steps,
+                   const std::pair<double, double>& scale, const Provenance& provenance) {
   Figure figure;
   figure.id = id;
   figure.title = title;
@@ -158,10 +200,11 @@ Figure grid_figure(const std::string& id, const std::string& title, const analys
   figure.y = {std::string(analysis::parameter_label(down.parameter)), ""};
   figure.provenance = provenance;
   HeatMap map{across.values, down.values, {}, "expected steps", true};
+  map.low = scale.first, map.high = scale.second;
   for (std::size_t i = 0; i < down.values.size(); ++i) {
     map.value.emplace_back();
     for (std::size_t j = 0; j < across.values.size(); ++j)
-      map.value.back().push_back(studies[i * across.values.size() + j].steps.from_start.value);
+      map.value.back().push_back(steps[i * across.values.size() + j].value);
   }
   figure.heat_map = std::move(map);
   return figure;

@@ -12,7 +12,11 @@
 namespace metastable::reports {
 namespace {
 
+// Where rest lies beyond the draws, all that is known of the steps is that they are more.
 Cell cell(const analysis::Estimate& estimate) {
+  if (std::isnan(estimate.value)) return "";
+  if (std::isinf(estimate.value) && std::isfinite(estimate.lower))
+    return "> " + format_number(estimate.lower, NumberFormat::general, 3);
   if (std::isinf(estimate.value)) return Infinite{};
   return Estimate{estimate.value, estimate.lower, estimate.upper};
 }
@@ -35,8 +39,7 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   table.columns = {{"quantity"}, {"unit"}};
   for (const Studied& one : columns)
     table.columns.push_back(
-        {fmt::format("{}, {} deg", dynamics::law_name(one.study.setting->law), one.study.setting->slope_deg), "",
-         NumberFormat::general, 4});
+        {law_and_ramp(*one.study.setting), "", NumberFormat::general, 4});
   const auto add = [&](const std::string& name, const std::string& unit,
                        const std::function<Cell(const Studied&)>& of) {
     std::vector<Cell> row{name, unit};
@@ -107,32 +110,165 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   return table;
 }
 
-std::string laws_text(const std::vector<Studied>& columns) {
-  constexpr double seldom = 0.02, mostly = 0.9;  // trials that rest on the ramp, as for the paper's failures
-  std::vector<std::string_view> both, all;
-  for (const Studied& one : columns) {
-    const dynamics::Law law = one.study.setting->law;
-    const std::string_view name = dynamics::law_name(law);
-    if (!all.empty() && all.back() == name) continue;
-    all.push_back(name);
-    const bool on_all = std::ranges::all_of(columns, [&](const Studied& other) {
-      if (other.study.setting->law != law || !other.study.steps.reach_end) return other.study.setting->law != law;
-      const double rests = 1 - *other.study.steps.reach_end;
-      return rests > seldom && rests < mostly;
-    });
-    if (on_all) both.push_back(name);
+std::string law_words(dynamics::Law law) {
+  const std::string_view what = law == dynamics::Law::settled     ? "the law of rigid bodies"
+                                : law == dynamics::Law::published ? "the paper’s law"
+                                                                  : "the law";
+  return law == dynamics::Law::settled || law == dynamics::Law::published
+             ? fmt::format("{} ({})", what, dynamics::law_name(law))
+             : fmt::format("{} {}", what, dynamics::law_name(law));
+}
+
+std::string law_and_ramp(const analysis::Setting& setting) {
+  return fmt::format("{}, {} deg", dynamics::law_name(setting.law), setting.slope_deg);
+}
+
+std::string answer_sentence(const analysis::Metastability& study, const analysis::Metastability* beside) {
+  const auto rests = [](const analysis::Metastability& of, bool first) -> std::string {
+    const analysis::Estimate& e = of.steps.from_start;
+    if (std::isinf(e.value) && std::isfinite(e.lower))
+      return fmt::format("rests after more than {} steps on average",
+                         format_number(e.lower, NumberFormat::general, 3));
+    if (std::isinf(e.value)) return "never rests";
+    const DecimalEstimate d = to_decimal(e, NumberFormat::significant, 3);
+    return fmt::format("rests after {} steps on average ({}{} to {})", plain_text(d.value),
+                       first ? "95 % interval " : "", plain_text(d.lower), plain_text(d.upper));
+  };
+  std::string text = fmt::format("On {} deg the wheel {} under {}", study.setting->slope_deg, rests(study, true),
+                                 law_words(study.setting->law));
+  if (beside)
+    text += fmt::format("; under {} it {}", law_words(beside->setting->law), rests(*beside, false));
+  return text + ".";
+}
+
+Table answer_table(const std::vector<Studied>& studies, const Provenance& provenance) {
+  Table table{.id = "answer", .title = "Expected steps before the wheel rests, by contact law", .columns = {}, .provenance = provenance};
+  table.columns = {{"ramp"}};
+  std::vector<dynamics::Law> laws;
+  std::vector<double> ramps;
+  for (const Studied& one : studies) {
+    const analysis::Setting& setting = *one.study.setting;
+    if (std::ranges::find(laws, setting.law) == laws.end()) laws.push_back(setting.law);
+    if (std::ranges::find(ramps, setting.slope_deg) == ramps.end()) ramps.push_back(setting.slope_deg);
   }
-  return both.empty()
-             ? std::string("Real wheels both rest now and then and mostly roll on; here no law has them do so.")
-             : fmt::format(
-                   "Real wheels both rest now and then and mostly roll on; of {} only {} has them do so here (2 "
-                   "to 90 % of the trials rest on each ramp).",
-                   fmt::join(all, ", "), fmt::join(both, " and "));
+  for (const dynamics::Law law : laws) table.columns.push_back({std::string(dynamics::law_name(law)), "steps"});
+  for (const double ramp : ramps) {
+    std::vector<Cell> row{fmt::format("{} deg", ramp)};
+    for (const dynamics::Law law : laws) {
+      const auto found = std::ranges::find_if(studies, [&](const Studied& one) {
+        return one.study.setting->law == law && one.study.setting->slope_deg == ramp;
+      });
+      row.push_back(found == studies.end() ? Cell("") : cell(found->study.steps.from_start));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  table.notes = {"From the launch, on a ramp without end; below each number its 95 % interval."};
+  return table;
+}
+
+std::string rests_text(const std::vector<Studied>& studies) {
+  const auto percent = [](double share) {
+    // A share that is not all must not be rounded up to it.
+    const double shown = 100 * share;
+    return shown > 99.9 && shown < 100 ? std::string("more than 99.9") : format_number(shown, NumberFormat::general, 3);
+  };
+  std::string text;
+  for (std::size_t i = 0; i < studies.size();) {
+    const dynamics::Law law = studies[i].study.setting->law;
+    double low = 1, high = 0;
+    for (; i < studies.size() && studies[i].study.setting->law == law; ++i)
+      if (const std::optional<double>& end = studies[i].study.steps.reach_end)
+        low = std::min(low, 1 - *end), high = std::max(high, 1 - *end);
+    if (low > high) continue;  // no ramp end
+    const std::string name(dynamics::law_name(law)), first = percent(low), last = percent(high);
+    text += text.empty() ? "Before the ramp ends, " : ", ";
+    text += high == 0       ? "none rest under " + name
+            : first == last ? fmt::format("{} % of the trials rest under {}", first, name)
+                            : fmt::format("{} to {} % of the trials rest under {}", first, last, name);
+  }
+  return text.empty() ? text : text + ".";
+}
+
+Table resolution_table(const std::vector<Studied>& studies, const Provenance& provenance) {
+  Table table{.id = "resolution", .title = "How each number was obtained, by law and ramp", .columns = {}, .provenance = provenance};
+  table.columns = {{"law and ramp"},
+                   {"status"},
+                   {"cells a leg"},
+                   {"draws a cell"},
+                   {"cell size", "%", NumberFormat::general, 2},
+                   {"draws", "%", NumberFormat::general, 2},
+                   {"table of landings", "%", NumberFormat::general, 2}};
+  for (const Studied& one : studies) {
+    const analysis::Metastability& s = one.study;
+    const bool finite = std::isfinite(s.steps.from_start.value);
+    const auto error = [&](double relative) { return finite ? Cell(100 * relative) : Cell(""); };
+    table.rows.push_back({law_and_ramp(*s.setting), status_text(s.status), s.cells, s.samples,
+                          error(s.steps.discretization_error), error(s.steps.sampling_error),
+                          s.setting->law == dynamics::Law::settled ? error(s.steps.landing_error) : Cell("")});
+  }
+  table.notes = {
+      "The last three columns: relative errors of the expected steps, all of them within the interval. “tolerance_not_"
+      "met”: the interval is wider than asked for, and stands."};
+  for (const Studied& one : studies)
+    if (!one.study.message.empty())
+      table.notes.push_back(fmt::format("{}: {}.", law_and_ramp(*one.study.setting), one.study.message));
+  return table;
+}
+
+Estimate for_one_per_cent(const analysis::Sensitivity& one) {
+  const auto grows = [&](double derivative) { return 100 * std::expm1(0.01 * derivative * one.value); };
+  return {grows(one.derivative), grows(one.derivative - one.error), grows(one.derivative + one.error)};
+}
+
+Table sensitivity_table(const std::string& id, const std::vector<Hanging>& laws, const Provenance& provenance) {
+  Table table{.id = id, .title = "", .columns = {}, .provenance = provenance};
+  table.columns = {{"one per cent more"}, {"value", "", NumberFormat::general, 4}, {"unit"}};
+  std::vector<std::string> names;
+  for (const Hanging& one : laws) {
+    table.title = fmt::format("What the expected steps hang on at {} deg, by law", one.setting.slope_deg);
+    table.columns.push_back({fmt::format("steps under {}", dynamics::law_name(one.setting.law)), "%"});
+    for (const analysis::Sensitivity& s : one.sensitivities.ranked) {
+      const std::string name = s.leg ? sensitivity_name(s) : std::string(analysis::parameter_label(s.parameter));
+      if (s.value == 0 || std::ranges::find(names, name) != names.end()) continue;
+      names.push_back(name);
+      const std::string_view unit = analysis::parameter_unit(s.parameter);
+      std::vector<Cell> row{name, s.value, unit == "1" ? std::string() : std::string(unit)};
+      for (const Hanging& other : laws) {
+        const auto found = std::ranges::find_if(other.sensitivities.ranked, [&](const analysis::Sensitivity& o) {
+          return o.parameter == s.parameter && o.leg == s.leg;
+        });
+        row.push_back(found == other.sensitivities.ranked.end() ? Cell("") : Cell(for_one_per_cent(*found)));
+      }
+      table.rows.push_back(std::move(row));
+    }
+  }
+  table.notes = {
+      "By how many per cent the expected steps from the launch change, all else kept; intervals are numerical, 95 %. "
+      "Empty: the law does not know the parameter, or it was not varied."};
+  for (const Hanging& one : laws)
+    if (!one.sensitivities.reason.empty())
+      table.notes.push_back(fmt::format("None under {}: {}.", dynamics::law_name(one.setting.law),
+                                        one.sensitivities.reason));
+  return table;
+}
+
+std::string sensitivity_sentence(const Hanging& one) {
+  std::string text;
+  std::size_t told = 0;
+  for (const analysis::Sensitivity& s : one.sensitivities.ranked) {
+    const Estimate change = for_one_per_cent(s);
+    if (s.leg || !(change.lower > 0 || change.upper < 0)) continue;  // what is not sure of its sign is not told
+    text += fmt::format("{}1 % more {} makes {} % {} steps", told == 0 ? "" : ", ",
+                        analysis::parameter_label(s.parameter),
+                        format_number(std::abs(change.value), NumberFormat::significant, 2),
+                        change.value > 0 ? "more" : "fewer");
+    if (++told == 2) break;
+  }
+  return text;
 }
 
 Table grid_table(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
-                 const analysis::SweepAxis& across, const std::vector<analysis::Metastability>& studies,
-                 const Provenance& provenance) {
+                 const analysis::SweepAxis& across, const std::vector<Estimate>& steps, const Provenance& provenance) {
   Table table;
   table.id = id;
   table.title = title;
@@ -143,15 +279,15 @@ Table grid_table(const std::string& id, const std::string& title, const analysis
                              NumberFormat::significant, 3});
   for (std::size_t i = 0; i < down.values.size(); ++i) {
     std::vector<Cell> row{down.values[i]};
-    for (std::size_t j = 0; j < across.values.size(); ++j)
-      row.push_back(cell(studies[i * across.values.size() + j].steps.from_start));
+    for (std::size_t j = 0; j < across.values.size(); ++j) row.push_back(cell(steps[i * across.values.size() + j]));
     table.rows.push_back(std::move(row));
   }
   table.notes = {"Expected steps before failure from the launch, with 95 % intervals."};
   return table;
 }
 
-Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Provenance& provenance) {
+Table energy_table(const std::vector<analysis::EnergyLosses>& losses, dynamics::Law law,
+                   const Provenance& provenance) {
   // The paper prints with Fig. 8: tangential from N(0.05, 0.03^2) to N(0.11, 0.19^2), normal about 0.17 with sd 0.06 to
   // 0.1.
   struct Printed {
@@ -164,7 +300,8 @@ Table energy_table(const std::vector<analysis::EnergyLosses>& losses, const Prov
   };
   Table table;
   table.id = "energy-losses";
-  table.title = "Energy lost in a collision, beside the figures of the paper's Fig. 8";
+  table.title = fmt::format("Energy lost in a collision under {}, beside the figures of the paper's Fig. 8",
+                            dynamics::law_name(law));
   table.provenance = provenance;
   table.columns = {{"sd of η and μ", "", NumberFormat::fixed, 2}};
   for (const char* name : {"tangential net mean", "tangential net sd", "normal mean", "normal sd"}) {

@@ -16,11 +16,6 @@ constexpr double most_of = 0.9;  // of the regime, or of the last steps
 
 Cell estimate_cell(const markov::MeshEstimate& e) { return Estimate{e.value, e.lower, e.upper}; }
 
-std::string walker_label(const StudiedWalker& walker) {
-  return fmt::format("{}, {:.4g} deg, sd {:.4g} deg", analysis::walker_name(walker.setting.walker),
-                     walker.setting.slope_deg, walker.setting.slope_sd_deg);
-}
-
 /// Finds the points with the largest weights that hold together `most_of` them.
 std::vector<std::size_t> heaviest(const std::vector<analysis::SectionPoint>& points,
                                   double analysis::SectionPoint::*weight) {
@@ -36,6 +31,20 @@ std::vector<std::size_t> heaviest(const std::vector<analysis::SectionPoint>& poi
 }
 
 }  // namespace
+
+std::string walker_label(const StudiedWalker& walker) {
+  return fmt::format("{}, {:.4g} deg, sd {:.4g} deg", analysis::walker_name(walker.setting.walker),
+                     walker.setting.slope_deg, walker.setting.slope_sd_deg);
+}
+
+std::string walker_sentence(const StudiedWalker& walker) {
+  const markov::MeshEstimate& steps = walker.study.passage.steps;
+  const DecimalEstimate e = to_decimal(Estimate{steps.value, steps.lower, steps.upper}, NumberFormat::significant, 3);
+  return fmt::format("On {:.4g} deg, {:.4g} deg rough, the {} walker falls after {} steps on average (95 % interval {} to {}).",
+                     walker.setting.slope_deg, walker.setting.slope_sd_deg,
+                     analysis::walker_name(walker.setting.walker), plain_text(e.value), plain_text(e.lower),
+                     plain_text(e.upper));
+}
 
 std::string eigenvalues_text(const dynamics::Gait& gait) {
   std::string all;
@@ -92,7 +101,7 @@ Table meshes_table(const StudiedWalker& walker, const std::string& id, const Pro
 Figure walker_survival_figure(const std::vector<StudiedWalker>& walkers, const Provenance& provenance) {
   Figure figure;
   figure.id = "walker-survival";
-  figure.title = "Probability of still walking";
+  figure.title = "Probability of still walking, by walker";
   figure.x = {.label = "steps n", .logarithmic = true};
   figure.y = {.label = "P(steps > n)", .low = 0.0, .high = 1.0};
   figure.legend = Legend::below;
@@ -133,7 +142,7 @@ std::vector<Figure> section_figures(const StudiedWalker& walker, const std::stri
     one.x = {walker.falls.moments.state_names[0]};
     one.y = {"stance rate / half angle"};
     one.legend = Legend::below;
-    one.height = 500;
+    one.height = 470;
     one.provenance = provenance;
     return one;
   };

@@ -18,6 +18,11 @@ struct StudiedWalker {
   analysis::WalkerFalls falls;
 };
 
+/// Returns "compass, 3 deg, sd 0.458 deg".
+std::string walker_label(const StudiedWalker& walker);
+/// Answers in one sentence: expected steps with their interval.
+std::string walker_sentence(const StudiedWalker& walker);
+
 /// Puts the walkers side by side: quantities down, settings across.
 Table walkers_table(const std::vector<StudiedWalker>& columns, const Provenance& provenance);
 

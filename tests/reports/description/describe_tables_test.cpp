@@ -184,7 +184,7 @@ TEST(DescribeTables, SurvivalEndsWithEachCondition) {
 }
 
 TEST(DescribeTables, FitsHoldTheFourParametersInOrder) {
-  const Table table = fits_table(description(), {});
+  const Table table = fits_table(description(), dynamics::Law::published, {});
   test::expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   expect_cell(at(table, 0, "fitted to"), "all conditions");

@@ -21,12 +21,14 @@ Page sample_page() {
   const std::string svg = render_svg(figure);
   const Table table{.id = "t", .title = "Numbers {{title}}", .columns = {{"x"}}, .rows = {{1}}};
   return {.title = "Report <1> & {{more}}",
+          .lead = {"The answer & its interval."},
           .intro = {"First paragraph.", "Second."},
           .sections = {{.id = "one",
                         .heading = "A \"heading\"",
                         .reading = "Read it so.",
                         .figures = {{"a", svg, "Caption"}, {"b", svg, ""}},
-                        .tables = {{table, {{"CSV", "tables/t.csv?a=1&b=2"}, {"LaTeX", "tables/t.tex"}}}}},
+                        .tables = {{table, {{"CSV", "tables/t.csv?a=1&b=2"}, {"LaTeX", "tables/t.tex"}}}},
+                        .folded = {{"More <details>", {"A paragraph."}, {{"c", svg, ""}}, {}}}},
                        {.id = "two", .heading = "No figures", .reading = "Nothing here."}},
           .provenance = {"metastable report", "", 1, "0.1.0"}};
 }
@@ -35,6 +37,8 @@ TEST(Page, HoldsEverything) {
   const std::string html = render_page(sample_page());
   for (const char* part :
        {"<!DOCTYPE html>", "<title>Report &lt;1&gt; &amp; {{more}}</title>", "<p>Second.</p>",
+        "<p class=\"lead\">The answer &amp; its interval.</p>",
+        "<details>\n<summary>More &lt;details&gt;</summary>\n<p>A paragraph.</p>", "<figure id=\"figure-c\">",
         "<a href=\"#two\">No figures</a>", "<section id=\"one\">", "A &quot;heading&quot;",
         "<p class=\"reading\">Read it so.</p>", "<figure id=\"figure-a\">", "<figcaption>Caption</figcaption>",
         "Numbers {{title}}", "<a href=\"tables/t.csv?a=1&amp;b=2\">CSV</a>", "<li>version: 0.1.0</li>", "</html>"}) {
@@ -59,6 +63,35 @@ TEST(Page, LoadsNothing) {
   const std::string html = render_page(sample_page());
   for (const char* part : {"<script", "src=", "@import", "<link"})
     EXPECT_EQ(html.find(part), std::string::npos) << part;
+}
+
+// Every grey and every colour of the palette follows the reader's scheme, and so does the ground; coloured cells keep
+// their colours, and what is written on them too.
+TEST(Page, FiguresTakeTheColoursOfThePage) {
+  Figure figure{.id = "a", .title = "T", .x = {"x"}, .y = {"y"}};
+  for (int colour = 0; colour < 7; ++colour) figure.series.push_back({.x = {0, 1}, .y = {0, 1}, .colour = colour});
+  figure.reference_lines = {{.vertical = true, .at = 0.5, .label = "here"}};
+  Figure map{.id = "m", .title = "T", .x = {"x"}, .y = {"y"}};
+  map.heat_map = HeatMap{.x = {1, 2}, .y = {1}, .value = {{1, 9}}, .label = "steps"};
+  Page page = sample_page();
+  page.sections[0].figures = {{"a", render_svg(figure), ""}, {"m", render_svg(map), ""}};
+  page.sections[0].folded.clear();
+  const std::string html = render_page(page);
+  const std::string curves = html.substr(html.find("figure-a"), html.find("figure-m") - html.find("figure-a")),
+                    cells = html.substr(html.find("figure-m"));
+  EXPECT_EQ(curves.find("rgb("), std::string::npos) << curves.substr(curves.find("rgb(") - 200, 300);
+  EXPECT_EQ(curves.find("#ffffff"), std::string::npos);
+  for (const char* name : {"--ink", "--axis", "--grid", "--mark", "--c0", "--c5"})
+    EXPECT_NE(curves.find(std::string("var(") + name + ")"), std::string::npos) << name;
+  EXPECT_NE(cells.find("rgb(68,1,84)"), std::string::npos) << "the darkest cell";
+  EXPECT_NE(cells.find("rgb(16,16,16)"), std::string::npos) << "letters on a light cell";
+}
+
+TEST(Page, TablesMayStandBesideFigures) {
+  Page page = sample_page();
+  EXPECT_EQ(render_page(page).find("<div class=\"beside\">"), std::string::npos);
+  page.sections[0].arrangement = Arrangement::beside;
+  EXPECT_NE(render_page(page).find("<div class=\"beside\">"), std::string::npos);
 }
 
 TEST(Page, RefusesWhatIsNoSvg) {

@@ -53,7 +53,8 @@ TEST(Table, IntervalsOfAnotherLevelAndNumbersThatSayNothing) {
       to_markdown(table).find("| 0.97 (0.93 to 1.01) | 0.031 |\n| not known: wider than 1 & the gap | &lt; 10⁻¹² |"),
       std::string::npos)
       << to_markdown(table);
-  EXPECT_NE(to_html(table).find("<td class=\"said\">not known: wider than 1 &amp; the gap</td><td>&lt; 10⁻¹²</td>"),
+  EXPECT_NE(to_html(table).find("<td class=\"said\" data-label=\"closed (90 %)\">not known: wider than 1 &amp; the gap</td>"
+                               "<td data-label=\"p\">&lt; 10⁻¹²</td>"),
             std::string::npos)
       << to_html(table);
   EXPECT_NE(to_latex(table).find("not known: wider than 1 \\& the gap & $< 10^{-12}$ \\\\"), std::string::npos)
@@ -66,7 +67,31 @@ TEST(Table, HtmlGivesLongTextAWideColumn) {
                     .columns = {{"where"}, {"claim"}},
                     .rows = {{"Fig. 4", std::string(61, 'x')}, {"Fig. 6", "short"}}};
   const std::string html = to_html(table);
-  EXPECT_NE(html.find("<td class=\"text\">Fig. 6</td><td class=\"text long\">short</td>"), std::string::npos) << html;
+  EXPECT_NE(html.find("<td class=\"text\" data-label=\"where\">Fig. 6</td>"
+                      "<td class=\"text long\" data-label=\"claim\">short</td>"),
+            std::string::npos)
+      << html;
+}
+
+TEST(Table, HtmlPutsIntervalsBelowTheirNumbersAndNothingElse) {
+  const Table table{.id = "t",
+                    .title = "T",
+                    .columns = {{"steps", "1"}, {"text"}},
+                    .rows = {{Estimate{6.41, 6.36, 6.54}, "as (it) is"}}};
+  EXPECT_NE(to_html(table).find("<td data-label=\"steps [1]\">6.41 <span class=\"interval\">(6.36 to 6.54)</span></td>"
+                                "<td class=\"text\" data-label=\"text\">as (it) is</td>"),
+            std::string::npos)
+      << to_html(table);
+}
+
+// On a narrow screen the rows of a small table become cards; a large one keeps its rows and scrolls.
+TEST(Table, HtmlOfASmallTableTurnsIntoCards) {
+  Table table{.id = "t", .title = "T", .columns = {{"a"}, {"b"}}, .rows = {{1, 2}}};
+  EXPECT_NE(to_html(table).find("<table class=\"cards few\">"), std::string::npos);
+  table.rows.resize(20, {1, 2});
+  EXPECT_NE(to_html(table).find("<table class=\"cards\">"), std::string::npos);
+  table.rows.resize(60, {1, 2});
+  EXPECT_NE(to_html(table).find("<table class=\"rows\">"), std::string::npos);
 }
 
 TEST(Table, CsvNumbersReadBackExactly) {

@@ -83,14 +83,80 @@ TEST(ReportTables, RampsHaveARowForEachAnswer) {
   expect_cell(at(table, row_of(table, "mean distance to failure"), "unit"), "m");
 }
 
+Studied with_steps(dynamics::Law law, double slope, Estimate steps) {
+  Studied one = studied();
+  one.study.setting->law = law;
+  one.study.setting->slope_deg = slope;
+  one.study.steps.from_start = steps;
+  return one;
+}
+
+TEST(ReportTables, TheAnswerIsOneSentenceARamp) {
+  const Studied settled = with_steps(dynamics::Law::settled, 7.02, {6.41, 6.36, 6.54}),
+                published = with_steps(dynamics::Law::published, 7.02, {4.2527, 4.249, 4.2563}),
+                endless = with_steps(dynamics::Law::coulomb, 7.02, {infinity, infinity, infinity}),
+                rare = with_steps(dynamics::Law::published, 7.02, {infinity, 2.5e40, infinity});
+  EXPECT_EQ(answer_sentence(settled.study, &published.study),
+            "On 7.02 deg the wheel rests after 6.41 steps on average (95 % interval 6.36 to 6.54) under the law of rigid "
+            "bodies (settled); under the paper’s law (published) it rests after 4.253 steps on average (4.249 to 4.256).");
+  EXPECT_EQ(answer_sentence(endless.study, nullptr), "On 7.02 deg the wheel never rests under the law coulomb.");
+  EXPECT_EQ(answer_sentence(rare.study, nullptr),
+            "On 7.02 deg the wheel rests after more than 2.5×10⁴⁰ steps on average under the paper’s law (published).");
+  const Table table = answer_table({settled, published, endless}, {});
+  ASSERT_EQ(table.rows.size(), 1u);
+  expect_cell(at(table, 0, "settled"), Estimate{6.41, 6.36, 6.54});
+  expect_cell(at(table, 0, "coulomb"), Infinite{});
+  expect_cell(at(answer_table({rare}, {}), 0, "published"), "> 2.5×10⁴⁰");
+}
+
+TEST(ReportTables, RestsAreToldByLaw) {
+  std::vector<Studied> all{with_steps(dynamics::Law::settled, 7.02, {6, 5, 7}),
+                           with_steps(dynamics::Law::settled, 9.59, {6, 5, 7}),
+                           with_steps(dynamics::Law::coulomb, 7.02, {infinity, infinity, infinity}),
+                           with_steps(dynamics::Law::published, 7.02, {4, 3, 5})};
+  all[0].study.steps.reach_end = 0.4;
+  all[1].study.steps.reach_end = 0.25;
+  all[2].study.steps.reach_end = 1;
+  all[3].study.steps.reach_end = 7e-6;  // not all of them rest
+  EXPECT_EQ(rests_text(all),
+            "Before the ramp ends, 60 to 75 % of the trials rest under settled, none rest under coulomb, more than 99.9 % "
+            "of the trials rest under published.");
+  for (Studied& one : all) one.study.steps.reach_end.reset();  // a ramp without end
+  EXPECT_EQ(rests_text(all), "");
+}
+
+TEST(ReportTables, SensitivitiesStandSideBySideAndOnlySureOnesAreTold) {
+  analysis::Setting setting;
+  setting.slope_deg = 9.59;
+  setting.law = dynamics::Law::settled;
+  using P = analysis::Parameter;
+  const Hanging settled{setting,
+                        {{{P::friction_mean, {}, 0.4, 17.5, 0.4},
+                          {P::slope, {}, 9.59, 0.04, 0.07},
+                          {P::friction_sd, {}, 0.1, -18, 1}},
+                         ""}};
+  setting.law = dynamics::Law::published;
+  const Hanging published{setting, {{{P::friction_mean, {}, 0.4, -12, 0.1}, {P::leg_length, 3, 0.15, 2, 0.1}}, ""}};
+  EXPECT_EQ(sensitivity_sentence(settled),
+            "1 % more mean of friction μ makes 7.3 % more steps, 1 % more sd of friction μ makes 1.8 % fewer steps");
+  const Table table = sensitivity_table("hangs-on", {settled, published}, {});
+  test::expect_rectangular(table);
+  ASSERT_EQ(table.rows.size(), 4u);
+  expect_cell(at(table, 0, "value"), 0.4);
+  EXPECT_NEAR(std::get<Estimate>(at(table, 0, "steps under settled").value()).value, 7.25, 0.01);
+  EXPECT_NEAR(std::get<Estimate>(at(table, 0, "steps under published").value()).value, -4.69, 0.01);
+  expect_cell(at(table, 1, "steps under published"), "");
+  expect_cell(at(table, 3, "one per cent more"), "leg 3");
+}
+
 TEST(ReportTables, GridsRunRowByRow) {
-  std::vector<analysis::Metastability> studies(6);
+  std::vector<Estimate> cells(6);
   for (std::size_t i = 0; i < 6; ++i) {
     const double steps = 10 * static_cast<double>(i + 1);
-    studies[i].steps.from_start = {steps, steps - 1, steps + 2};
+    cells[i] = {steps, steps - 1, steps + 2};
   }
   const Table table = grid_table("grid", "a grid", {analysis::Parameter::slope, {7, 8}},
-                                 {analysis::Parameter::friction_mean, {0.2, 0.3, 0.4}}, studies, {});
+                                 {analysis::Parameter::friction_mean, {0.2, 0.3, 0.4}}, cells, {});
   test::expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 2u);
   const std::string down(analysis::parameter_label(analysis::Parameter::slope)),
@@ -107,7 +173,8 @@ TEST(ReportTables, EnergyLossesStandBesideThePaper) {
   const Table table = energy_table({{{0.066, 0.031, 0.001}, {0.148, 0.051, 0.002}, 1600},
                                     {{0.071, 0.082, 0.003}, {0.145, 0.073, 0.004}, 1600},
                                     {{0.091, 0.112, 0.005}, {0.141, 0.084, 0.006}, 1600}},
-                                   {});
+                                   dynamics::Law::published, {});
+  EXPECT_NE(table.title.find("under published"), std::string::npos);
   test::expect_rectangular(table);
   ASSERT_EQ(table.rows.size(), 3u);
   expect_cell(at(table, 0, "sd of η and μ"), 0.05);
