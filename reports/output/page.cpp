@@ -35,14 +35,14 @@ h1 { font-size: 1.15rem; line-height: 1.3; margin: 0 0 .6rem; color: var(--soft)
 h1.alone { font-size: 1.9rem; color: inherit; }
 h2 { font-size: 1.4rem; line-height: 1.3; margin: 0 0 .4rem; }
 p { margin: 0 0 .75rem; max-width: 50rem; }
-p.lead { font-size: clamp(1.2rem, .9rem + 1.1vw, 1.75rem); line-height: 1.35; margin: 0 0 .7rem; max-width: 62rem; font-weight: 500; text-wrap: pretty; }
+p.lead { font-size: clamp(1.2rem, .9rem + 1.1vw, 1.75rem); line-height: 1.35; margin: 0 0 .7rem; max-width: 72rem; font-weight: 500; text-wrap: pretty; }
 a { color: var(--link); }
 nav ul { list-style: none; margin: 1.1rem 0 0; padding: .6rem 0; border: solid var(--rule); border-width: 1px 0; display: flex; flex-wrap: wrap; gap: .2rem 1.4rem; }
 section { margin: 2.75rem 0; scroll-margin-top: 1rem; }
 .reading { color: var(--soft); }
 .beside { display: grid; gap: 0 2.5rem; align-items: start; }
-@media (min-width: 68rem) { .beside { grid-template-columns: minmax(0, 1fr) minmax(0, 1.1fr); } .beside > .figures { grid-column: 2; grid-row: 1; } .beside > .tables { grid-column: 1; grid-row: 1; } }
-.figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 25rem), 1fr)); gap: .5rem 2rem; margin-top: .75rem; }
+@media (min-width: 68rem) { .beside { grid-template-columns: minmax(0, 1fr) minmax(0, 1.1fr); } }
+.figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, max(25rem, 34%)), 1fr)); gap: .5rem 2rem; margin-top: .75rem; }
 .figures.one { grid-template-columns: minmax(0, 44rem); }
 figure { margin: 0 0 1.25rem; min-width: 0; }
 figure svg { display: block; width: 100%; max-width: 44rem; height: auto; }
@@ -52,7 +52,7 @@ figure.table { margin-top: .75rem; }
 figure.table figcaption { font-weight: 600; margin-bottom: .4rem; }
 .scroll { overflow-x: auto; background: linear-gradient(to right, var(--page) 40%, transparent) left / 2.5rem 100% no-repeat local, linear-gradient(to left, var(--page) 40%, transparent) right / 2.5rem 100% no-repeat local, linear-gradient(to right, var(--shade), transparent) left / .8rem 100% no-repeat scroll, linear-gradient(to left, var(--shade), transparent) right / .8rem 100% no-repeat scroll; }
 table { border-collapse: collapse; font-size: .92rem; line-height: 1.4; font-variant-numeric: tabular-nums; border-top: 2px solid var(--ink); border-bottom: 2px solid var(--ink); }
-th, td { padding: .4rem .8rem; text-align: right; white-space: nowrap; vertical-align: top; }
+th, td { padding: .4rem .8rem; text-align: right; white-space: nowrap; vertical-align: baseline; }
 tbody tr + tr > * { border-top: 1px solid var(--rule); }
 th { white-space: normal; max-width: 11rem; border-bottom: 1px solid var(--ink); font-weight: 600; vertical-align: bottom; }
 th.text, td.text { text-align: left; }
@@ -87,7 +87,7 @@ table.cards { border: 0; width: 100%; }
 table.cards thead { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
 table.cards tr { border: 1px solid var(--rule); border-radius: .4rem; background: var(--card); padding: .35rem .8rem; margin: 0 0 .6rem; }
 table.cards tbody tr + tr > * { border-top: 0; }
-table.cards td, table.cards td.text { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 1.3fr); gap: 1rem; padding: .25rem 0; text-align: right; white-space: normal; max-width: none; }
+table.cards td, table.cards td.text { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 1.3fr); gap: 0 1rem; padding: .25rem 0; text-align: right; white-space: normal; max-width: none; }
 table.cards td > * { grid-column: 2; }
 table.cards td::before { content: attr(data-label); color: var(--soft); text-align: left; font-weight: 400; font-size: .92rem; }
 table.cards td.text:first-child { display: block; text-align: left; font-weight: 600; padding-bottom: .3rem; }
@@ -229,8 +229,9 @@ std::string folded_html(const FoldedPart& part) {
 }
 
 std::string section_html(const PageSection& section) {
-  std::string html = figures_html(section.figures) + tables_html(section.tables);
-  if (section.arrangement == Arrangement::beside) html = "<div class=\"beside\">\n" + html + "</div>\n";
+  const std::string figures = figures_html(section.figures), tables = tables_html(section.tables);
+  std::string html = section.arrangement == Arrangement::beside ? "<div class=\"beside\">\n" + tables + figures + "</div>\n"
+                                                                : figures + tables;
   for (const FoldedPart& part : section.folded) html += folded_html(part);
   return html;
 }

@@ -36,7 +36,7 @@ struct FoldedPart {
 
 enum class Arrangement {
   stacked,  ///< figures above tables
-  beside,   ///< tables to the left of the figures where the screen is wide enough
+  beside,   ///< tables to the left of the figures where the screen is wide enough, above them elsewhere
 };
 
 struct PageSection {

@@ -111,12 +111,10 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
 }
 
 std::string law_words(dynamics::Law law) {
-  const std::string_view what = law == dynamics::Law::settled     ? "the law of rigid bodies"
-                                : law == dynamics::Law::published ? "the paper’s law"
-                                                                  : "the law";
-  return law == dynamics::Law::settled || law == dynamics::Law::published
-             ? fmt::format("{} ({})", what, dynamics::law_name(law))
-             : fmt::format("{} {}", what, dynamics::law_name(law));
+  const std::string_view name = dynamics::law_name(law);
+  if (law == dynamics::Law::settled) return fmt::format("the law of rigid bodies ({})", name);
+  if (law == dynamics::Law::published) return fmt::format("the paper’s law ({})", name);
+  return fmt::format("the law {}", name);
 }
 
 std::string law_and_ramp(const analysis::Setting& setting) {
@@ -124,20 +122,29 @@ std::string law_and_ramp(const analysis::Setting& setting) {
 }
 
 std::string answer_sentence(const analysis::Metastability& study, const analysis::Metastability* beside) {
-  const auto rests = [](const analysis::Metastability& of, bool first) -> std::string {
+  const auto law = [](const analysis::Metastability& of) { return law_words(of.setting->law); };
+  const auto steps = [](const analysis::Metastability& of) {
     const analysis::Estimate& e = of.steps.from_start;
-    if (std::isinf(e.value) && std::isfinite(e.lower))
-      return fmt::format("rests after more than {} steps on average",
-                         format_number(e.lower, NumberFormat::general, 3));
-    if (std::isinf(e.value)) return "never rests";
-    const DecimalEstimate d = to_decimal(e, NumberFormat::significant, 3);
-    return fmt::format("rests after {} steps on average ({}{} to {})", plain_text(d.value),
-                       first ? "95 % interval " : "", plain_text(d.lower), plain_text(d.upper));
+    if (!std::isinf(e.value)) return plain_text(to_decimal(e, NumberFormat::significant, 3).value);
+    return std::isfinite(e.lower) ? "more than " + format_number(e.lower, NumberFormat::general, 3) : std::string();
   };
-  std::string text = fmt::format("On {} deg the wheel {} under {}", study.setting->slope_deg, rests(study, true),
-                                 law_words(study.setting->law));
-  if (beside)
-    text += fmt::format("; under {} it {}", law_words(beside->setting->law), rests(*beside, false));
+  const std::string first = steps(study);
+  std::string text = fmt::format("On {} deg ", study.setting->slope_deg);
+  if (first.empty()) {
+    text += fmt::format("the wheel never rests under {}", law(study));
+  } else {
+    text += fmt::format("the wheel rests after {} steps", first);
+    if (const analysis::Estimate& e = study.steps.from_start; std::isfinite(e.value)) {
+      const DecimalEstimate d = to_decimal(e, NumberFormat::significant, 3);
+      text += fmt::format(" (95 %: {} to {})", plain_text(d.lower), plain_text(d.upper));
+    }
+    text += " under " + law(study);
+  }
+  if (beside) {
+    const std::string second = steps(*beside);
+    text += second.empty() ? fmt::format(", never under {}", law(*beside))
+                           : fmt::format(", after {} under {}", second, law(*beside));
+  }
   return text + ".";
 }
 
