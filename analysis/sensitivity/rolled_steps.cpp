@@ -17,11 +17,11 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::uint64_t fewest_rests = 100;  // the interval of their mean is then normal, and known to a tenth
-// What a parameter is moved by: means and sds in sds, all else in parts of itself. Under `published` at 9.59 deg a quarter
-// of the sd of mu is 9 % off in its derivative by the third order, a tenth 1.4 %.
+// What a parameter is moved by: means and sds in sds, all else in parts of itself. Under `published` at 9.59 deg a
+// quarter of the sd of mu is 9 % off in its derivative by the third order, a tenth 1.4 %.
 constexpr double mean_step = 0.25, sd_step = 0.1, other_step = 0.025;
-constexpr double cut = 50;                   // times the expected steps: a wheel in e^50 rolls longer
-constexpr std::size_t block = 64;            // wheels between two looks at the progress
+constexpr double cut = 50;         // times the expected steps: a wheel in e^50 rolls longer
+constexpr std::size_t block = 64;  // wheels between two looks at the progress
 
 // Rolls the wheels of one setting, under any law.
 class Roller {
@@ -59,8 +59,8 @@ double step_of(const Setting& setting, Parameter parameter) {
 }
 
 constexpr Parameter moved_parameters[] = {
-    Parameter::slope,      Parameter::restitution_mean, Parameter::restitution_sd, Parameter::friction_mean,
-    Parameter::friction_sd, Parameter::leg_length,      Parameter::inertia,        Parameter::ramp_stiffness,
+    Parameter::slope,        Parameter::restitution_mean,  Parameter::restitution_sd, Parameter::friction_mean,
+    Parameter::friction_sd,  Parameter::leg_length,        Parameter::inertia,        Parameter::ramp_stiffness,
     Parameter::contact_mass, Parameter::radius_of_gyration};
 
 // Returns d ln(mean of plus / mean of minus) / distance, of pairs with common random numbers.

@@ -18,18 +18,18 @@ struct RollOptions {
   std::function<void(double share)> progress = {};
 };
 
-/// Counts the steps of one wheel after another, each until it rests, until so many landings are rolled: their number over
-/// that of the rests is the expected steps before failure from the launch, the wheel that is cut off included (renewal
-/// theory: its bias is of the order of one rest). The interval is normal, from the scatter of the wheels that rested.
-/// Nothing where fewer than 100 came to rest. Cost under `settled`: some 20 us a landing, on one thread.
+/// Counts the steps of one wheel after another, each until it rests, until so many landings are rolled: their number
+/// over that of the rests is the expected steps before failure from the launch, the wheel that is cut off included
+/// (renewal theory: its bias is of the order of one rest). The interval is normal, from the scatter of the wheels that
+/// rested. Nothing where fewer than 100 came to rest. Cost under `settled`: some 20 us a landing, on one thread.
 /// @throws std::invalid_argument as Setting::validate()
 std::optional<Estimate> rolled_steps(const Setting& setting, const RollOptions& options);
 
 /// Finds d ln(expected steps) / d parameter by rolling the same wheels, with the same random numbers, a little to
 /// either side of each parameter: means of eta and mu by a quarter of their sd, the sds by a tenth, all else by 2.5 %.
 /// The error is the 95 % half-width of the paired difference; what the width of the step adds is of third order, one or
-/// two per cent of the derivative. Legs are moved together. There are none, but a reason, where fewer than 100 wheels come to rest.
-/// Cost: twice the landings for every parameter.
+/// two per cent of the derivative. Legs are moved together. There are none, but a reason, where fewer than 100 wheels
+/// come to rest. Cost: twice the landings for every parameter.
 /// @throws std::invalid_argument as rolled_steps()
 Sensitivities rolled_sensitivities(const Setting& setting, const RollOptions& options);
 

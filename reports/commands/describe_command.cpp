@@ -23,7 +23,7 @@ DescribeAnswer answer_describe(const analysis::Experiment& experiment, const Des
                                          request.options.threads, request.options.progress);
   answer.tables.push_back(conditions_table(answer.description, provenance));
   if (!answer.description.comparisons.empty()) answer.tables.push_back(tests_table(answer.description, provenance));
-  if (!answer.description.fits.empty()) 
+  if (!answer.description.fits.empty())
     answer.tables.push_back(fits_table(answer.description, experiment.contact.law, provenance));
   if (answer.laws) answer.tables.push_back(laws_table(*answer.laws, provenance));
   if (answer.laws && !answer.laws->legs.empty()) answer.tables.push_back(landings_table(answer.laws->legs, provenance));
@@ -56,11 +56,12 @@ void run_describe(const DescribeRequest& request) {
   std::vector<Fold> folds{{"Every condition in full", {}, {}, {tables[0]}},
                           {"The speeds collision by collision", {}, {}, {profiles_table(description, provenance)}}};
   if (!description.comparisons.empty())
-    folds.push_back({"Do they end in one steady state? The tests",
-                     {"A large P says that two conditions cannot be told apart; the interval of the difference says how "
-                      "far apart they may still be."},
-                     {},
-                     {tests_table(description, provenance)}});
+    folds.push_back(
+        {"Do they end in one steady state? The tests",
+         {"A large P says that two conditions cannot be told apart; the interval of the difference says how "
+          "far apart they may still be."},
+         {},
+         {tests_table(description, provenance)}});
   pages->section("conditions", "How fast they roll",
                  "Mean speeds collision by collision; they meet where a steady state is reached.",
                  {profiles_figure(description, provenance)}, {short_table(description, provenance)}, std::move(folds),
@@ -72,8 +73,8 @@ void run_describe(const DescribeRequest& request) {
     pages->section("return-maps", "Return maps", "Each dot is one step; a steady state is a cloud on the diagonal.",
                    maps, {});
   if (const auto figure = legs_figure(description, provenance))
-    pages->section("legs", "Leg by leg", "Legs of one length and one contact would give one level.", {*figure},
-                   {}, {{"The speeds of the legs in numbers", {}, {}, {legs_table(description, provenance)}}});
+    pages->section("legs", "Leg by leg", "Legs of one length and one contact would give one level.", {*figure}, {},
+                   {{"The speeds of the legs in numbers", {}, {}, {legs_table(description, provenance)}}});
   if (const auto figure = survival_curves_figure(description, provenance))
     pages->section("survival", "How long trials last",
                    "The curve falls where trials rest; bands are 95 % intervals, one collision at a time.", {*figure},

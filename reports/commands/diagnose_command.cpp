@@ -75,14 +75,12 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
                furthest_figure(d), {},
                {{"Cells beyond chance, after recalibration", {}, {}, {where_table(d)}},
                 {"The whole map", {}, map_figures(d), {map_table(d)}}});
-  sections.add("which", "Which effect",
-               "Probabilities over the effects of the catalogue, pairs, and their alternatives; the 95 % set is what "
-               "these data leave open.",
-               ranking_figures(d), {},
-               {{"All causes and their parameters",
-                 {},
-                 {},
-                 {causes_table(d), parameters_table(d), undecided_table(d)}}});
+  sections.add(
+      "which", "Which effect",
+      "Probabilities over the effects of the catalogue, pairs, and their alternatives; the 95 % set is what "
+      "these data leave open.",
+      ranking_figures(d), {},
+      {{"All causes and their parameters", {}, {}, {causes_table(d), parameters_table(d), undecided_table(d)}}});
   sections.add("how-far", "How far it shrinks",
                "Measured on trials that the fit did not see; the line is the floor, what remains where the model is "
                "right.",

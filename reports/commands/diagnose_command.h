@@ -13,7 +13,6 @@ void run_diagnose(const DiagnoseRequest& request);
 
 /// Writes page, figures and tables of a diagnosis into `folder`. @param title  of the experiment
 void write_diagnosis(const analysis::Diagnosis& diagnosis, const std::string& title, const std::string& law,
-                     const Provenance& provenance,
-                     const std::string& folder);
+                     const Provenance& provenance, const std::string& folder);
 
 }  // namespace metastable::reports

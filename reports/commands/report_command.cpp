@@ -30,10 +30,10 @@ namespace {
 
 constexpr std::array<double, 4> energy_spreads = {0.05, 0.1, 0.15, 0.2};  // Fig. 8
 constexpr int energy_collisions = 16;                                     // of a trial
-// Landings that are rolled under `settled`: 0.8 s of one core a cell of a map (a few per cent of its steps); to each side
-// of a parameter, so many that a change by 1 % is known to 0.5 % or better where rests are frequent.
+// Landings that are rolled under `settled`: 0.8 s of one core a cell of a map (a few per cent of its steps); to each
+// side of a parameter, so many that a change by 1 % is known to 0.5 % or better where rests are frequent.
 constexpr std::uint64_t map_landings = 40000, sensitivity_landings = 60000;
-constexpr double rare_tolerance = 0.1;           // of cells that the chain has to answer, where rests are rare
+constexpr double rare_tolerance = 0.1;               // of cells that the chain has to answer, where rests are rare
 constexpr std::size_t map_units = study_units / 20;  // a cell's share of a study's work
 constexpr std::size_t map_cells = 16 + 12;           // of one ramp's two maps
 
@@ -155,8 +155,7 @@ class Report {
           if (one.study.setting->law == law && first == (law == compared()[0])) ordered.push_back(one);
     for (const analysis::Setting& setting : request_.settings) {
       const std::vector<const Studied*> two = compared_on(setting.slope_deg);
-      pages_.page().lead.push_back(
-          answer_sentence(two.front()->study, two.size() > 1 ? &two.back()->study : nullptr));
+      pages_.page().lead.push_back(answer_sentence(two.front()->study, two.size() > 1 ? &two.back()->study : nullptr));
     }
     pages_.section(
         "answer", "The chance of still rolling",
@@ -225,8 +224,8 @@ class Report {
       for (const Hanging& one : found) {
         if (one.sensitivities.ranked.empty()) continue;
         if (const std::string says = first ? sensitivity_sentence(one) : ""; !says.empty())
-          reading += fmt::format("Under {} on {} deg {}. ", dynamics::law_name(one.setting.law), one.setting.slope_deg,
-                                 says);
+          reading +=
+              fmt::format("Under {} on {} deg {}. ", dynamics::law_name(one.setting.law), one.setting.slope_deg, says);
         const std::string id = slope_id(fmt::format("hangs-on-{}", dynamics::law_name(one.setting.law)), one.setting);
         (first ? main : others).push_back(sensitivity_figure(id, one, provenance_for({one.setting})));
         first = false;
@@ -237,8 +236,7 @@ class Report {
     }
     std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
     if (main.empty()) return;
-    pages_.section("hangs-on", "What it hangs on",
-                   reading + "Whiskers are numerical, 95 %.", main, {},
+    pages_.section("hangs-on", "What it hangs on", reading + "Whiskers are numerical, 95 %.", main, {},
                    {{"All parameters in numbers, and the other law", {}, std::move(others), std::move(tables)}});
   }
 
@@ -299,8 +297,7 @@ class Report {
       Provenance provenance = provenance_for({one.base});
       provenance.settings += fmt::format("; varied here: {} and {}", analysis::parameter_label(down.parameter),
                                          analysis::parameter_label(across.parameter));
-      figures.push_back(
-          grid_figure(id, law_and_ramp(one.base), down, across, one.steps, {low, high}, provenance));
+      figures.push_back(grid_figure(id, law_and_ramp(one.base), down, across, one.steps, {low, high}, provenance));
       tables.push_back(
           grid_table(id, titled("expected steps over the " + what, one.base), down, across, one.steps, provenance));
       if (one.rolled)
@@ -333,10 +330,11 @@ class Report {
            {analysis::Parameter::restitution_mean, {0.3, 0.5, 0.7}},
            {analysis::Parameter::friction_mean, analysis::axis_values(0.2, 0.5, 0.1)}, figures, tables);
     }
-    map_section("means", "Over the means of restitution and friction",
-                "Each cell is one floor, both with the spread of 0.15 of the paper’s Fig. 9: mean friction grows to the "
-                "right, mean restitution upward.",
-                figures, std::move(tables));
+    map_section(
+        "means", "Over the means of restitution and friction",
+        "Each cell is one floor, both with the spread of 0.15 of the paper’s Fig. 9: mean friction grows to the "
+        "right, mean restitution upward.",
+        figures, std::move(tables));
   }
 
   void map_section(const std::string& id, const std::string& heading, const std::string& reading,
@@ -364,14 +362,13 @@ class Report {
     energies(folds);
     std::vector<std::string> settings;
     for (const analysis::Setting& setting : request_.settings) settings.push_back(setting.describe() + ".");
-    settings.insert(settings.begin(),
-                    "The steps come from a Markov chain sampled from the stochastic return map of the wheel. Model: "
-                    "Nanayakkara, Byl, Liu, Song, Villabona, “Dominant Sources of Variability in Passive Walking” (ICRA "
-                    "2012).");
-    folds.push_back({"Assumptions and resolution",
-                     std::move(settings),
-                     {},
-                     {resolution_table(studied_, provenance_for_all())}});
+    settings.insert(
+        settings.begin(),
+        "The steps come from a Markov chain sampled from the stochastic return map of the wheel. Model: "
+        "Nanayakkara, Byl, Liu, Song, Villabona, “Dominant Sources of Variability in Passive Walking” (ICRA "
+        "2012).");
+    folds.push_back(
+        {"Assumptions and resolution", std::move(settings), {}, {resolution_table(studied_, provenance_for_all())}});
     pages_.section("details", "Details", "What stands behind the numbers above.", {}, {}, std::move(folds));
   }
 

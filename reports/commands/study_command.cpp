@@ -90,16 +90,17 @@ void run_study(const StudyRequest& request) {
   page.provenance = provenance;
   const std::vector<analysis::Claim> claims = analysis::paper_claims(studies, experiments);
   page.lead = claims_sentences(claims, studies);
-  pages.section("claims", "Claim by claim",
-                "How many of the paper’s claims come out under each law and reading; what counts is below.",
-                {claims_figure(claims, studies, provenance)}, {claims_count_table(claims, studies, provenance)},
-                {{"Each claim, its verdicts and the numbers behind them",
-                  {"Each cell gives the verdict first and then the numbers behind it."},
-                  {},
-                  {claims_table(claims, studies, experiments, provenance)}},
-                 {"What the law and the reading change", {}, {}, {changes_table(claims, studies, experiments, provenance)}},
-                 {"What counts as reproduced", {}, {}, {readings_table(claims, provenance)}}},
-                Arrangement::beside);
+  pages.section(
+      "claims", "Claim by claim",
+      "How many of the paper’s claims come out under each law and reading; what counts is below.",
+      {claims_figure(claims, studies, provenance)}, {claims_count_table(claims, studies, provenance)},
+      {{"Each claim, its verdicts and the numbers behind them",
+        {"Each cell gives the verdict first and then the numbers behind it."},
+        {},
+        {claims_table(claims, studies, experiments, provenance)}},
+       {"What the law and the reading change", {}, {}, {changes_table(claims, studies, experiments, provenance)}},
+       {"What counts as reproduced", {}, {}, {readings_table(claims, provenance)}}},
+      Arrangement::beside);
   pages.section("hypotheses", "The three hypotheses",
                 "A source that matters takes a large share of the variance with it.", {},
                 {hypotheses_table(analysis::paper_hypotheses(studies), studies, provenance)},

@@ -73,7 +73,8 @@ std::vector<std::string> description_sentences(const analysis::Description& desc
     }
   if (!alike.empty()) sentences.push_back(alike + ".");
   if (known > 0)
-    sentences.push_back(fmt::format("{} of {} trials came to rest.", rests == 0 ? std::string("None") : fmt::format("{}", rests), known));
+    sentences.push_back(fmt::format("{} of {} trials came to rest.",
+                                    rests == 0 ? std::string("None") : fmt::format("{}", rests), known));
   else
     sentences.push_back(fmt::format("How the {} trials ended is not known.", trials));
   return sentences;
@@ -88,8 +89,9 @@ Table short_table(const analysis::Description& description, const Provenance& pr
     table.rows.emplace_back();
     for (const std::size_t j : shown) table.rows.back().push_back(row[j]);
   }
-  table.notes = {"Steady speed: just before a collision, from the 13th on. Below each number its 95 % interval; “> n” where "
-                 "no trial rested from there on."};
+  table.notes = {
+      "Steady speed: just before a collision, from the 13th on. Below each number its 95 % interval; “> n” where "
+      "no trial rested from there on."};
   return table;
 }
 

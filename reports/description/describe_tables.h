@@ -11,8 +11,8 @@
 
 namespace metastable::reports {
 
-/// Says in a few sentences how fast the wheel rolls in the end, which conditions cannot be told apart, and how many trials
-/// rest.
+/// Says in a few sentences how fast the wheel rolls in the end, which conditions cannot be told apart, and how many
+/// trials rest.
 std::vector<std::string> description_sentences(const analysis::Description& description);
 /// Lists trials, steady speed, rests and expected steps of each condition.
 Table short_table(const analysis::Description& description, const Provenance& provenance);

@@ -73,9 +73,9 @@ std::vector<Row> rows_of(const Diagnosis& d, std::vector<std::string>& columns) 
       const std::string name = row_name(cell), phase = !phases ? "" : cell.stance ? "stance" : "collision";
       auto row = std::ranges::find_if(rows, [&](const Row& r) { return r.name == name && r.phase == phase; });
       if (row == rows.end())
-        row = rows.insert(rows.end(), {cell.facet, name, phase,
-                                       std::vector<double>(columns.size(), std::numeric_limits<double>::quiet_NaN()),
-                                       0});
+        row =
+            rows.insert(rows.end(), {cell.facet, name, phase,
+                                     std::vector<double>(columns.size(), std::numeric_limits<double>::quiet_NaN()), 0});
       double& score = row->scores[m + (cell.aspect == "spread" ? models.size() : 0)];
       if (std::isnan(score) || !cell.swing || std::abs(cell.statistic) > std::abs(score)) score = cell.statistic;
       if (models[m].map == &d.gap.recalibrated) row->furthest = std::max(row->furthest, std::abs(cell.statistic));
@@ -87,12 +87,7 @@ std::vector<Row> rows_of(const Diagnosis& d, std::vector<std::string>& columns) 
 Figure map_figure(const std::vector<Row>& rows, const std::vector<std::string>& columns, const std::string& id,
                   const std::string& title, bool with_phase) {
   Figure figure{.id = id, .title = title, .x = {""}, .y = {""}};
-  HeatMap map{.x = {},
-              .y = {},
-              .value = {},
-              .label = "score",
-              .digits = 1,
-              .format = NumberFormat::fixed};
+  HeatMap map{.x = {}, .y = {}, .value = {}, .label = "score", .digits = 1, .format = NumberFormat::fixed};
   map.limit = full_colour;
   map.x_names = columns;
   for (std::size_t i = 0; i < columns.size(); ++i) map.x.push_back(static_cast<double>(i));

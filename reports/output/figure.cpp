@@ -267,7 +267,8 @@ void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fi
                 ? "set palette defined (0 '#2166ac', 0.25 '#92c5de', 0.5 '#f7f7f7', 0.75 '#f4a582', 1 '#b2182b')\n"
                 : "set palette defined (0 '#440154', 0.25 '#3b528b', 0.5 '#21918c', 0.75 '#5ec962', 1 '#fde725')\n";
   if (map.limit > 0) low = -map.limit, high = map.limit;
-  script += fmt::format("set cblabel {} noenhanced textcolor rgb '#222222'\nset cbrange [{}:{}]\n", quote(map.label), low, high);
+  script += fmt::format("set cblabel {} noenhanced textcolor rgb '#222222'\nset cbrange [{}:{}]\n", quote(map.label),
+                        low, high);
   if (map.logarithmic && high / low >= 100) {
     script += "set logscale cb\nset format cb '10^{%T}'\n";
   } else if (map.logarithmic) {  // too few powers of ten to read a scale by
@@ -451,7 +452,8 @@ std::string gnuplot_script(const Figure& figure) {
       "set xlabel {} noenhanced textcolor rgb '#222222'\nset ylabel {} noenhanced textcolor rgb '#222222'\n",
       figure.width, figure.height, font_family, legend_position(figure.legend), quote(axis_label(figure.x)),
       quote(axis_label(figure.y)));
-  if (!figure.title.empty()) script += fmt::format("set title {} noenhanced textcolor rgb '#222222'\n", quote(figure.title));
+  if (!figure.title.empty())
+    script += fmt::format("set title {} noenhanced textcolor rgb '#222222'\n", quote(figure.title));
 
   if (figure.heat_map) {
     check_heat_map(figure, *figure.heat_map);

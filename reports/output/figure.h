@@ -19,15 +19,15 @@ struct FigureAxis {
 };
 
 enum class Style {
-  line,      ///< x, y
-  dashed,    ///< x, y
-  points,    ///< x, y; vertical 95 % bars if lower and upper are given
-  dots,      ///< x, y: a cloud of many small points
-  steps,     ///< x, y: y[i] holds from x[i] to x[i+1]
+  line,          ///< x, y
+  dashed,        ///< x, y
+  points,        ///< x, y; vertical 95 % bars if lower and upper are given
+  dots,          ///< x, y: a cloud of many small points
+  steps,         ///< x, y: y[i] holds from x[i] to x[i+1]
   dashed_steps,  ///< x, y: likewise
-  impulses,  ///< x, y: a stem from zero
-  area,      ///< x, y: filled down to zero (to the bottom of a logarithmic axis)
-  band,      ///< x, lower, upper: filled between
+  impulses,      ///< x, y: a stem from zero
+  area,          ///< x, y: filled down to zero (to the bottom of a logarithmic axis)
+  band,          ///< x, lower, upper: filled between
 };
 
 struct Series {

@@ -142,10 +142,10 @@ struct PageColour {
 
 // These are the greys and the palette of figure.cpp. What stands on coloured cells keeps its colour.
 constexpr PageColour page_colours[] = {
-    {{0x22, 0x22, 0x22}, "--ink"}, {{0x44, 0x44, 0x44}, "--axis"}, {{0xe4, 0xe4, 0xe4}, "--grid"},
+    {{0x22, 0x22, 0x22}, "--ink"},  {{0x44, 0x44, 0x44}, "--axis"}, {{0xe4, 0xe4, 0xe4}, "--grid"},
     {{0x77, 0x77, 0x77}, "--mark"}, {{0x55, 0x55, 0x55}, "--soft"}, {{0, 0, 0}, "--ink"},
-    {{0xfe, 0xfe, 0xfe}, "--page"}, {{0x00, 0x72, 0xb2}, "--c0"},  {{0xd5, 0x5e, 0x00}, "--c1"},
-    {{0x00, 0x9e, 0x73}, "--c2"},   {{0xcc, 0x79, 0xa7}, "--c3"},  {{0xe6, 0x9f, 0x00}, "--c4"},
+    {{0xfe, 0xfe, 0xfe}, "--page"}, {{0x00, 0x72, 0xb2}, "--c0"},   {{0xd5, 0x5e, 0x00}, "--c1"},
+    {{0x00, 0x9e, 0x73}, "--c2"},   {{0xcc, 0x79, 0xa7}, "--c3"},   {{0xe6, 0x9f, 0x00}, "--c4"},
     {{0x56, 0xb4, 0xe9}, "--c5"}};
 
 /// Reads "rgb( 68,  68,  68)" at the beginning of the text. @param length of it
@@ -230,8 +230,9 @@ std::string folded_html(const FoldedPart& part) {
 
 std::string section_html(const PageSection& section) {
   const std::string figures = figures_html(section.figures), tables = tables_html(section.tables);
-  std::string html = section.arrangement == Arrangement::beside ? "<div class=\"beside\">\n" + tables + figures + "</div>\n"
-                                                                : figures + tables;
+  std::string html = section.arrangement == Arrangement::beside
+                         ? "<div class=\"beside\">\n" + tables + figures + "</div>\n"
+                         : figures + tables;
   for (const FoldedPart& part : section.folded) html += folded_html(part);
   return html;
 }

@@ -57,9 +57,10 @@ struct Page {
   Provenance provenance = {};
 };
 
-/// Renders the page as HTML: no script, nothing loaded from elsewhere, fit for a phone, a dark screen and for print; the
-/// same bytes for the same page. Text is escaped. Figures take the page's colours: text and lines that render_svg() draws
-/// in grey or black, and its palette, follow the reader's light or dark scheme. @throws std::invalid_argument for a table that cannot be rendered (see table.h)
+/// Renders the page as HTML: no script, nothing loaded from elsewhere, fit for a phone, a dark screen and for print;
+/// the same bytes for the same page. Text is escaped. Figures take the page's colours: text and lines that render_svg()
+/// draws in grey or black, and its palette, follow the reader's light or dark scheme. @throws std::invalid_argument for
+/// a table that cannot be rendered (see table.h)
 std::string render_page(const Page& page);
 
 }  // namespace metastable::reports

@@ -30,7 +30,8 @@ std::vector<PageTable> PageFolder::write(std::vector<Table> tables) {
     write_file(stem.string() + ".md", to_markdown(table));
     write_file(stem.string() + ".tex", to_latex(table));
     const std::string href = "tables/" + table.id;
-    written.push_back({std::move(table), {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}, {"LaTeX", href + ".tex"}}});
+    written.push_back(
+        {std::move(table), {{"CSV", href + ".csv"}, {"Markdown", href + ".md"}, {"LaTeX", href + ".tex"}}});
   }
   return written;
 }

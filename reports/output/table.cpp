@@ -17,8 +17,8 @@ namespace {
 constexpr std::string_view minus_sign = "−";
 constexpr std::string_view infinite_word = "infinite";
 constexpr std::size_t html_long = 60, html_some = 24;  // characters of a text that wants a wide column, a wider one
-constexpr std::size_t html_few = 12;    // cells that are shown in large letters, at most
-constexpr std::size_t html_columns = 7;  // beyond, smaller type
+constexpr std::size_t html_few = 12;                   // cells that are shown in large letters, at most
+constexpr std::size_t html_columns = 7;                // beyond, smaller type
 constexpr std::size_t html_cards = 90;  // cells beyond which rows stay rows on a narrow screen, and scroll
 
 std::string full_precision(double number) {

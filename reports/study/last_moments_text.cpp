@@ -99,8 +99,7 @@ std::string last_moments_sentence(const LastMoments& moments) {
   }
   return fmt::format("the step that fails {} a {} of {}{} (middle 90 %: {} to {}), all steps of {}{} ({} to {})",
                      i < states ? "begins with" : "meets", name, plain_text(last.value), unit, plain_text(last.lower),
-                     plain_text(last.upper), plain_text(all.value), unit, plain_text(all.lower),
-                     plain_text(all.upper));
+                     plain_text(last.upper), plain_text(all.value), unit, plain_text(all.lower), plain_text(all.upper));
 }
 
 std::string last_moments_text(const LastMoments& moments, const std::string& phase, std::size_t width) {
@@ -131,8 +130,8 @@ std::string last_moments_json(const LastMoments& moments) {
       .dump();
 }
 
-std::vector<Figure> last_moments_figures(const LastMoments& moments, const std::string& id,
-                                         const std::string& where, const Provenance& provenance) {
+std::vector<Figure> last_moments_figures(const LastMoments& moments, const std::string& id, const std::string& where,
+                                         const Provenance& provenance) {
   std::vector<Figure> figures;
   const auto add = [&](const std::string& name, const auto& of) {
     Figure figure;

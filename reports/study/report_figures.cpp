@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "analysis/experiment/experiment_folder.h"
 #include "dynamics/wheel/contact_law.h"
@@ -99,16 +100,23 @@ Figure survival_figure(const std::vector<Studied>& settings, const Provenance& p
   figure.legend = Legend::below;
   figure.height = 450;  // room for the legend
   figure.provenance = provenance;
+  std::set<dynamics::Law> never_rests;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const analysis::Setting& setting = *settings[i].study.setting;
     const bool endless = settings[i].study.status == analysis::Status::rest_unreachable;
-    Series series{law_and_ramp(setting) + (endless ? " (never rests)" : ""),
+    const bool everywhere = std::ranges::all_of(settings, [&](const Studied& other) {
+      return other.study.setting->law != setting.law || other.study.status == analysis::Status::rest_unreachable;
+    });
+    // Curves that stay at one lie on each other: where a law never lets a wheel rest, one stands for all ramps.
+    if (everywhere && !never_rests.insert(setting.law).second) continue;
+    Series series{everywhere ? std::string(dynamics::law_name(setting.law)) : law_and_ramp(setting),
                   dashed(settings, i) ? Style::dashed_steps : Style::steps,
                   {},
                   {},
                   {},
                   {},
                   law_colour(setting.law)};
+    if (endless) series.label += " (never rests)";
     const std::vector<double>& survival = settings[i].study.steps.survival;
     for (std::size_t n = 0; n < std::min(survival.size(), survival_steps); ++n) {
       series.x.push_back(static_cast<double>(n));

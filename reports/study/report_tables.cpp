@@ -38,8 +38,7 @@ Table ramps_table(const std::vector<Studied>& columns, const Provenance& provena
   table.provenance = provenance;
   table.columns = {{"quantity"}, {"unit"}};
   for (const Studied& one : columns)
-    table.columns.push_back(
-        {law_and_ramp(*one.study.setting), "", NumberFormat::general, 4});
+    table.columns.push_back({law_and_ramp(*one.study.setting), "", NumberFormat::general, 4});
   const auto add = [&](const std::string& name, const std::string& unit,
                        const std::function<Cell(const Studied&)>& of) {
     std::vector<Cell> row{name, unit};
@@ -149,7 +148,10 @@ std::string answer_sentence(const analysis::Metastability& study, const analysis
 }
 
 Table answer_table(const std::vector<Studied>& studies, const Provenance& provenance) {
-  Table table{.id = "answer", .title = "Expected steps before the wheel rests, by contact law", .columns = {}, .provenance = provenance};
+  Table table{.id = "answer",
+              .title = "Expected steps before the wheel rests, by contact law",
+              .columns = {},
+              .provenance = provenance};
   table.columns = {{"ramp"}};
   std::vector<dynamics::Law> laws;
   std::vector<double> ramps;
@@ -197,7 +199,10 @@ std::string rests_text(const std::vector<Studied>& studies) {
 }
 
 Table resolution_table(const std::vector<Studied>& studies, const Provenance& provenance) {
-  Table table{.id = "resolution", .title = "How each number was obtained, by law and ramp", .columns = {}, .provenance = provenance};
+  Table table{.id = "resolution",
+              .title = "How each number was obtained, by law and ramp",
+              .columns = {},
+              .provenance = provenance};
   table.columns = {{"law and ramp"},
                    {"status"},
                    {"cells a leg"},
@@ -254,8 +259,8 @@ Table sensitivity_table(const std::string& id, const std::vector<Hanging>& laws,
       "Empty: the law does not know the parameter, or it was not varied."};
   for (const Hanging& one : laws)
     if (!one.sensitivities.reason.empty())
-      table.notes.push_back(fmt::format("None under {}: {}.", dynamics::law_name(one.setting.law),
-                                        one.sensitivities.reason));
+      table.notes.push_back(
+          fmt::format("None under {}: {}.", dynamics::law_name(one.setting.law), one.sensitivities.reason));
   return table;
 }
 
@@ -265,10 +270,9 @@ std::string sensitivity_sentence(const Hanging& one) {
   for (const analysis::Sensitivity& s : one.sensitivities.ranked) {
     const Estimate change = for_one_per_cent(s);
     if (s.leg || !(change.lower > 0 || change.upper < 0)) continue;  // what is not sure of its sign is not told
-    text += fmt::format("{}1 % more {} makes {} % {} steps", told == 0 ? "" : ", ",
-                        analysis::parameter_label(s.parameter),
-                        format_number(std::abs(change.value), NumberFormat::significant, 2),
-                        change.value > 0 ? "more" : "fewer");
+    text += fmt::format(
+        "{}1 % more {} makes {} % {} steps", told == 0 ? "" : ", ", analysis::parameter_label(s.parameter),
+        format_number(std::abs(change.value), NumberFormat::significant, 2), change.value > 0 ? "more" : "fewer");
     if (++told == 2) break;
   }
   return text;
@@ -293,8 +297,7 @@ Table grid_table(const std::string& id, const std::string& title, const analysis
   return table;
 }
 
-Table energy_table(const std::vector<analysis::EnergyLosses>& losses, dynamics::Law law,
-                   const Provenance& provenance) {
+Table energy_table(const std::vector<analysis::EnergyLosses>& losses, dynamics::Law law, const Provenance& provenance) {
   // The paper prints with Fig. 8: tangential from N(0.05, 0.03^2) to N(0.11, 0.19^2), normal about 0.17 with sd 0.06 to
   // 0.1.
   struct Printed {

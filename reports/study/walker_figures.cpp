@@ -40,10 +40,10 @@ std::string walker_label(const StudiedWalker& walker) {
 std::string walker_sentence(const StudiedWalker& walker) {
   const markov::MeshEstimate& steps = walker.study.passage.steps;
   const DecimalEstimate e = to_decimal(Estimate{steps.value, steps.lower, steps.upper}, NumberFormat::significant, 3);
-  return fmt::format("On {:.4g} deg, {:.4g} deg rough, the {} walker falls after {} steps on average (95 % interval {} to {}).",
-                     walker.setting.slope_deg, walker.setting.slope_sd_deg,
-                     analysis::walker_name(walker.setting.walker), plain_text(e.value), plain_text(e.lower),
-                     plain_text(e.upper));
+  return fmt::format(
+      "On {:.4g} deg, {:.4g} deg rough, the {} walker falls after {} steps on average (95 % interval {} to {}).",
+      walker.setting.slope_deg, walker.setting.slope_sd_deg, analysis::walker_name(walker.setting.walker),
+      plain_text(e.value), plain_text(e.lower), plain_text(e.upper));
 }
 
 std::string eigenvalues_text(const dynamics::Gait& gait) {

@@ -39,7 +39,8 @@ class DescribeCommandTest : public test::InFolder {
 
 TEST_F(DescribeCommandTest, TablesOnTheTerminal) {
   const std::string said = run("");
-  for (const char* text : {"The conditions\n", "\nRestitution and friction by maximum likelihood under published\n", "plastic"})
+  for (const char* text :
+       {"The conditions\n", "\nRestitution and friction by maximum likelihood under published\n", "plastic"})
     EXPECT_NE(said.find(text), std::string::npos) << text << said;
   EXPECT_EQ(said.find("seed:"), std::string::npos);
 }

@@ -280,10 +280,10 @@ TEST(DiagnosisPage, HoldsFiguresAndTablesAndLoadsNothing) {
   write_diagnosis(sample(), "Wheel <1>", "coulomb", provenance, folder.string());
   std::ifstream in(folder / "index.html");
   const std::string html{std::istreambuf_iterator<char>(in), {}};
-  for (const char* part :
-       {"Wheel &lt;1&gt;", "Verdict: explained", "(law coulomb)", "figure-map-furthest", "figure-map-collisions", "figure-map-stances", "figure-profile-1",
-        "figure-ranking", "figure-shrinkage-1", "table-gap", "table-where", "table-causes", "table-shrinkage",
-        "table-steps", "table-visibility", "table-next-experiment", "table-map", "seed: 7"})
+  for (const char* part : {"Wheel &lt;1&gt;", "Verdict: explained", "(law coulomb)", "figure-map-furthest",
+                           "figure-map-collisions", "figure-map-stances", "figure-profile-1", "figure-ranking",
+                           "figure-shrinkage-1", "table-gap", "table-where", "table-causes", "table-shrinkage",
+                           "table-steps", "table-visibility", "table-next-experiment", "table-map", "seed: 7"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   EXPECT_EQ(html.find("<script"), std::string::npos);
   EXPECT_EQ(html.find("src="), std::string::npos);

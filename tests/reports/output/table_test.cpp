@@ -53,9 +53,10 @@ TEST(Table, IntervalsOfAnotherLevelAndNumbersThatSayNothing) {
       to_markdown(table).find("| 0.97 (0.93 to 1.01) | 0.031 |\n| not known: wider than 1 & the gap | &lt; 10⁻¹² |"),
       std::string::npos)
       << to_markdown(table);
-  EXPECT_NE(to_html(table).find("<td class=\"said\" data-label=\"closed (90 %)\">not known: wider than 1 &amp; the gap</td>"
-                               "<td data-label=\"p\">&lt; 10⁻¹²</td>"),
-            std::string::npos)
+  EXPECT_NE(
+      to_html(table).find("<td class=\"said\" data-label=\"closed (90 %)\">not known: wider than 1 &amp; the gap</td>"
+                          "<td data-label=\"p\">&lt; 10⁻¹²</td>"),
+      std::string::npos)
       << to_html(table);
   EXPECT_NE(to_latex(table).find("not known: wider than 1 \\& the gap & $< 10^{-12}$ \\\\"), std::string::npos)
       << to_latex(table);

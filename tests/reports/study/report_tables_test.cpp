@@ -96,12 +96,14 @@ TEST(ReportTables, TheAnswerIsOneSentenceARamp) {
                 published = with_steps(dynamics::Law::published, 7.02, {4.2527, 4.249, 4.2563}),
                 endless = with_steps(dynamics::Law::coulomb, 7.02, {infinity, infinity, infinity}),
                 rare = with_steps(dynamics::Law::published, 7.02, {infinity, 2.5e40, infinity});
-  EXPECT_EQ(answer_sentence(settled.study, &published.study),
-            "On 7.02 deg the wheel rests after 6.41 steps (95 %: 6.36 to 6.54) under the law of rigid bodies (settled), "
-            "after 4.253 under the paper’s law (published).");
-  EXPECT_EQ(answer_sentence(settled.study, &endless.study),
-            "On 7.02 deg the wheel rests after 6.41 steps (95 %: 6.36 to 6.54) under the law of rigid bodies (settled), "
-            "never under the law coulomb.");
+  EXPECT_EQ(
+      answer_sentence(settled.study, &published.study),
+      "On 7.02 deg the wheel rests after 6.41 steps (95 %: 6.36 to 6.54) under the law of rigid bodies (settled), "
+      "after 4.253 under the paper’s law (published).");
+  EXPECT_EQ(
+      answer_sentence(settled.study, &endless.study),
+      "On 7.02 deg the wheel rests after 6.41 steps (95 %: 6.36 to 6.54) under the law of rigid bodies (settled), "
+      "never under the law coulomb.");
   EXPECT_EQ(answer_sentence(endless.study, nullptr), "On 7.02 deg the wheel never rests under the law coulomb.");
   EXPECT_EQ(answer_sentence(rare.study, nullptr),
             "On 7.02 deg the wheel rests after more than 2.5×10⁴⁰ steps under the paper’s law (published).");
@@ -121,9 +123,10 @@ TEST(ReportTables, RestsAreToldByLaw) {
   all[1].study.steps.reach_end = 0.25;
   all[2].study.steps.reach_end = 1;
   all[3].study.steps.reach_end = 7e-6;  // not all of them rest
-  EXPECT_EQ(rests_text(all),
-            "Before the ramp ends, 60 to 75 % of the trials rest under settled, none rest under coulomb, more than 99.9 % "
-            "of the trials rest under published.");
+  EXPECT_EQ(
+      rests_text(all),
+      "Before the ramp ends, 60 to 75 % of the trials rest under settled, none rest under coulomb, more than 99.9 % "
+      "of the trials rest under published.");
   for (Studied& one : all) one.study.steps.reach_end.reset();  // a ramp without end
   EXPECT_EQ(rests_text(all), "");
 }
@@ -133,11 +136,10 @@ TEST(ReportTables, SensitivitiesStandSideBySideAndOnlySureOnesAreTold) {
   setting.slope_deg = 9.59;
   setting.law = dynamics::Law::settled;
   using P = analysis::Parameter;
-  const Hanging settled{setting,
-                        {{{P::friction_mean, {}, 0.4, 17.5, 0.4},
-                          {P::slope, {}, 9.59, 0.04, 0.07},
-                          {P::friction_sd, {}, 0.1, -18, 1}},
-                         ""}};
+  const Hanging settled{
+      setting,
+      {{{P::friction_mean, {}, 0.4, 17.5, 0.4}, {P::slope, {}, 9.59, 0.04, 0.07}, {P::friction_sd, {}, 0.1, -18, 1}},
+       ""}};
   setting.law = dynamics::Law::published;
   const Hanging published{setting, {{{P::friction_mean, {}, 0.4, -12, 0.1}, {P::leg_length, 3, 0.15, 2, 0.1}}, ""}};
   EXPECT_EQ(sensitivity_sentence(settled),
