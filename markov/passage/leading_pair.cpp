@@ -28,6 +28,7 @@ Extended total(const Row& v) { return std::accumulate(v.begin(), v.end(), Extend
 /// Holds the leading pair of one communicating class, the rate without its base (see Classes).
 struct ClassPair {
   Extended rate = 0;
+  bool exact = true;  ///< whether that is a sum of kill rates and rates of leaving, not the end of an iteration
   Row left, right;
   int iterations = 0;
   double error = 0;
@@ -98,6 +99,7 @@ ClassPair pair_of_class(Generator scaled, const States& states, Extended base) {
   const Row stationary = stationary_vector(scaled);
   excess += std::inner_product(stationary.begin(), stationary.end(), scaled.kill.begin(), Extended{0});
   pair.rate = common + excess;
+  pair.exact = excess == 0;
   const auto most_visited =
       static_cast<std::uint32_t>(std::max_element(stationary.begin(), stationary.end()) - stationary.begin());
   const auto [time, from] = slowest_return(scaled, stationary, most_visited);
@@ -204,19 +206,26 @@ class Classes {
     return marked;
   }
 
+  [[noreturn]] void refuse(std::uint32_t one, std::uint32_t other, bool equal) const {
+    throw NotUnique(std::min(one, other), std::max(one, other), static_cast<double>(lowest()), equal);
+  }
+
   /// Finds the one of the tied classes that leads to no other (or that no other leads to): only there does a vector of
-  /// one sign begin (Frobenius; Schneider, Linear Algebra Appl. 84, 1986).
+  /// one sign begin (Frobenius; Schneider, Linear Algebra Appl. 84, 1986). Rates that are only nearly equal may as well
+  /// differ, whichever leads to which.
   std::size_t only(const std::vector<std::size_t>& tied, bool after) const {
+    for (const std::size_t c : tied) {
+      const std::size_t other = c == tied.front() ? tied.back() : tied.front();
+      if (tied.size() > 1 && (!pairs_[c]->exact || beyond_lowest(c, pairs_[c]->rate) != 0))
+        refuse(states_[c].front(), states_[other].front(), false);
+    }
     std::vector<std::size_t> ends;
     for (const std::size_t c : tied) {
       const std::vector<std::uint8_t> marked = tied.size() == 1 ? std::vector<std::uint8_t>() : beyond(c, after);
       if (std::none_of(tied.begin(), tied.end(), [&](std::size_t d) { return d != c && marked[d]; }))
         ends.push_back(c);
     }
-    if (ends.size() > 1) {
-      const auto [one, other] = std::minmax(states_[ends[0]].front(), states_[ends[1]].front());
-      throw NotUnique(one, other, static_cast<double>(lowest()), true);
-    }
+    if (ends.size() > 1) refuse(states_[ends[0]].front(), states_[ends[1]].front(), true);
     return ends.front();
   }
 

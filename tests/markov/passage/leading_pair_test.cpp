@@ -142,6 +142,7 @@ TEST(LeadingPair, HasEveryEntryOverAWideFamilyOfChains) {
         EXPECT_EQ(chain.kill(error.one()), chain.kill(error.other())) << problem;
         continue;
       }
+      if (kind == 4) continue;
       std::vector<double> other = kill_rates(chain);
       for (double& kill : other) kill *= 1 + 1e-13 * std::uniform_real_distribution<double>(-1, 1)(engine);
       const Exact moved = exact_pair(chain, other);
