@@ -77,8 +77,7 @@ GeneratorFactors::GeneratorFactors(const Generator& generator, bool closed) {
     const Extended* from = row(pivot);
     exit_[pivot] = std::accumulate(from + low_[pivot], from + pivot, kill[pivot]);
     if (closed && pivot == 0) exit_[pivot] = 1;
-    if (!(exit_[pivot] > 0))
-      throw RestTooRare(static_cast<double>(exit_[pivot]), pivot);
+    if (!(exit_[pivot] > 0)) throw RestTooRare(static_cast<double>(exit_[pivot]), pivot);
     for (std::size_t i = top[pivot]; i < pivot; ++i) {
       if (high_[i] < pivot) continue;
       Extended* target = row(i);

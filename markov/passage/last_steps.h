@@ -39,8 +39,8 @@ struct PassageTo {
   std::vector<double> steps;  ///< expected steps until either; 0 in the set, infinite where neither need come
 };
 
-/// Solves the chain outside of the set, by elimination up to 3000 states, beyond them by products. Where neither the set
-/// nor failure can be reached, both probabilities are 0.
+/// Solves the chain outside of the set, by elimination up to 3000 states, beyond them by products. Where neither the
+/// set nor failure can be reached, both probabilities are 0.
 /// @param set  one entry a state, 1 for those of the set
 /// @throws std::invalid_argument for another size; RestTooRare as Elimination; ConvergenceError if 100000 products do
 ///         not settle

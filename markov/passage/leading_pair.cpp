@@ -104,7 +104,8 @@ ClassPair pair_of_class(Generator scaled, const States& states, Extended base) {
       static_cast<std::uint32_t>(std::max_element(stationary.begin(), stationary.end()) - stationary.begin());
   const auto [time, from] = slowest_return(scaled, stationary, most_visited);
   const Extended error = std::max(change <= same_vector ? change * change : 0, rate_rounding * excess * time);
-  if (!(error <= undecided)) throw NotUnique(states[most_visited], states[from], static_cast<double>(base + pair.rate), false);
+  if (!(error <= undecided))
+    throw NotUnique(states[most_visited], states[from], static_cast<double>(base + pair.rate), false);
   pair.error = static_cast<double>(error);
   for (std::size_t i = 0; i < n; ++i) pair.left.push_back(stationary[i] / pair.right[i]);
   const Extended sum = total(pair.left);
@@ -112,8 +113,8 @@ ClassPair pair_of_class(Generator scaled, const States& states, Extended base) {
   return pair;
 }
 
-/// Holds a chain by its classes, those that may lead solved. From the kill rates in a class their smallest, its base, is
-/// taken off before the rates of leaving the class are added, which may be far smaller.
+/// Holds a chain by its classes, those that may lead solved. From the kill rates in a class their smallest, its base,
+/// is taken off before the rates of leaving the class are added, which may be far smaller.
 class Classes {
  public:
   explicit Classes(const Generator& generator)
@@ -222,8 +223,7 @@ class Classes {
     std::vector<std::size_t> ends;
     for (const std::size_t c : tied) {
       const std::vector<std::uint8_t> marked = tied.size() == 1 ? std::vector<std::uint8_t>() : beyond(c, after);
-      if (std::none_of(tied.begin(), tied.end(), [&](std::size_t d) { return d != c && marked[d]; }))
-        ends.push_back(c);
+      if (std::none_of(tied.begin(), tied.end(), [&](std::size_t d) { return d != c && marked[d]; })) ends.push_back(c);
     }
     if (ends.size() > 1) refuse(states_[ends[0]].front(), states_[ends[1]].front(), true);
     return ends.front();

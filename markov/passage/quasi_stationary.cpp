@@ -11,18 +11,18 @@
 namespace metastable::markov {
 namespace {
 
-constexpr int kIterations = 10000;     // of interpolated rows
-constexpr int kPatience = 500;         // of all others, before leading_pair() is asked
-constexpr std::size_t kSmall = 64;     // states, of which leading_pair() is asked at once
-constexpr std::size_t kWhole = 512;    // states of a cyclic chain, up to which leading_pair() takes all of them
-constexpr double kSameEnd = 1e-9;      // of two starts, relative
+constexpr int kIterations = 10000;   // of interpolated rows
+constexpr int kPatience = 500;       // of all others, before leading_pair() is asked
+constexpr std::size_t kSmall = 64;   // states, of which leading_pair() is asked at once
+constexpr std::size_t kWhole = 512;  // states of a cyclic chain, up to which leading_pair() takes all of them
+constexpr double kSameEnd = 1e-9;    // of two starts, relative
 constexpr double kWorstResidual = 1e-8;
 constexpr double kSmallEntry = 1e-12;  // of the largest: below it an entry's relative change is not watched
 constexpr double kAccuracy = 1e-13;    // wanted of an entry, relative
 constexpr double kRounding = 1e-11;    // a change that has stopped falling below this is rounding
 constexpr int kStagnant = 8;           // iterations without a smaller change
 constexpr double kRateAccuracy = 1e-14;
-constexpr double kStays = 1e-12;        // a probability of staying below it is the rounding of a row sum
+constexpr double kStays = 1e-12;         // a probability of staying below it is the rounding of a row sum
 constexpr double kNobody = 1e-13;        // lambda_1 of interpolated rows from which nobody survives: rounding
 constexpr int kNobodyLeft = 100;         // iterations spent on its vectors
 constexpr double kHardlyAnybody = 1e-6;  // lambda_1 of rows that keep so few that neighbouring eigenvalues are rounding
@@ -137,8 +137,8 @@ double iterate_left(const Chain& chain, const Elimination& elimination, std::vec
   return visits;
 }
 
-/// Goes from a start that favours some states to where the even one has ended. A component that fades so slowly that its
-/// changes pass for rounding is of another size there.
+/// Goes from a start that favours some states to where the even one has ended. A component that fades so slowly that
+/// its changes pass for rounding is of another size there.
 double distance_between_ends(const Chain& chain, const Elimination& elimination, const IteratedPair& pair) {
   constexpr double golden = 0.6180339887498949, least = 0.1;
   std::vector<double> left(chain.size());
@@ -148,7 +148,8 @@ double distance_between_ends(const Chain& chain, const Elimination& elimination,
 }
 
 /// Iterates with Q (I - Q)^{-1}, whose eigenvalues are lambda / (1 - lambda): lambda_2 fades at least as fast as under
-/// inverse iteration (rare rest) and as under plain iteration (frequent rest). Returns nothing where that does not tell.
+/// inverse iteration (rare rest) and as under plain iteration (frequent rest). Returns nothing where that does not
+/// tell.
 std::optional<IteratedPair> iterate(const Chain& chain, const Elimination& elimination, FewSurvivors few) {
   const std::size_t n = chain.size();
   const bool unsettled_ends = chain.interpolated() || few == FewSurvivors::unsettled;
@@ -188,8 +189,7 @@ std::optional<IteratedPair> iterate(const Chain& chain, const Elimination& elimi
       return pair;
     }
   }
-  if (chain.interpolated())
-    throw ConvergenceError("inverse iteration", pair.residual, still_changing(kIterations));
+  if (chain.interpolated()) throw ConvergenceError("inverse iteration", pair.residual, still_changing(kIterations));
   return std::nullopt;
 }
 

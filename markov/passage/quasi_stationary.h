@@ -36,8 +36,8 @@ enum class FewSurvivors { as_others, unsettled };
 /// Iterates inversely with the subtraction-free factors, each time followed by one step of the chain (iterates stay
 /// positive; an iteration shrinks the rest by (1 - lambda_1) |lambda_2| / (lambda_1 |1 - lambda_2|)), from two starts.
 /// Chains of up to 64 states, and those for which 500 iterations were not enough or the starts lead to different ends,
-/// take leading_pair(). A chain that cannot visit a state twice has lambda_1 = 0: failure_rate = 1, and the distribution
-/// is that of the last survivors of an even start. O(n^2) an iteration for full rows.
+/// take leading_pair(). A chain that cannot visit a state twice has lambda_1 = 0: failure_rate = 1, and the
+/// distribution is that of the last survivors of an even start. O(n^2) an iteration for full rows.
 /// @param few  unsettled: where hardly anybody survives (lambda_1 < 1e-6) the vectors are those of 500 iterations,
 /// settled or not (of 100 for lambda_1 < 1e-13), and mean little. Interpolated rows are always taken so.
 /// @throws NotUnique where the chain has several quasi-stationary distributions, or double precision does not tell;

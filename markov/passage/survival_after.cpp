@@ -28,8 +28,7 @@ double sum_of(std::span<const double> v) { return std::accumulate(v.begin(), v.e
 void check(const Chain& chain, std::span<const double> start, std::span<const double> steps) {
   if (chain.interpolated()) throw std::invalid_argument("survival: interpolated chains are not taken");
   if (start.size() != chain.size())
-    throw std::invalid_argument(
-        fmt::format("start: {} probabilities given for {} states", start.size(), chain.size()));
+    throw std::invalid_argument(fmt::format("start: {} probabilities given for {} states", start.size(), chain.size()));
   for (std::size_t i = 0; i < start.size(); ++i)
     if (!(start[i] >= 0)) throw std::invalid_argument(fmt::format("start: {} for state {} is below 0", start[i], i));
   if (!(std::abs(sum_of(start) - 1) <= kStartTolerance))

@@ -9,8 +9,9 @@
 namespace metastable::markov {
 
 /// Returns P(no rest within n steps) for each n of `steps`, from a distribution over the states. Up to 4096 steps are
-/// followed one by one, further ones by doubling the chain, whose failure probabilities are sums of products throughout,
-/// O(states^3) a doubling. On more than 512 states as many as take 2e8 products are followed, further ones by Survival.
+/// followed one by one, further ones by doubling the chain, whose failure probabilities are sums of products
+/// throughout, O(states^3) a doubling. On more than 512 states as many as take 2e8 products are followed, further ones
+/// by Survival.
 /// @param start  size n, >= 0, sums to one
 /// @param steps  >= 0, fractions cut; infinity: that of never coming to rest
 /// @throws std::invalid_argument for other arguments (interpolated chains too); std::domain_error and ConvergenceError

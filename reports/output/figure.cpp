@@ -364,8 +364,8 @@ std::string contents(std::FILE* file) {
   return text;
 }
 
-/// Waits for a program that leads a process group of its own. At the limit, or once a signal has come, the whole group is
-/// ended. @returns its status; nothing at the limit. @throws Interrupted
+/// Waits for a program that leads a process group of its own. At the limit, or once a signal has come, the whole group
+/// is ended. @returns its status; nothing at the limit. @throws Interrupted
 std::optional<int> wait_for(pid_t child, std::chrono::milliseconds limit) {
   constexpr auto glance = std::chrono::milliseconds(5);
   const auto until = std::chrono::steady_clock::now() + limit;
@@ -378,7 +378,8 @@ std::optional<int> wait_for(pid_t child, std::chrono::milliseconds limit) {
     int status = 0;
     const pid_t ended = waitpid(child, &status, WNOHANG);
     if (ended == child) return status;
-    if (ended < 0 && errno != EINTR) throw std::runtime_error(fmt::format("waiting for gnuplot: {}", std::strerror(errno)));
+    if (ended < 0 && errno != EINTR)
+      throw std::runtime_error(fmt::format("waiting for gnuplot: {}", std::strerror(errno)));
     try {
       check_interrupt();
     } catch (const Interrupted&) {
@@ -425,8 +426,8 @@ std::string run_gnuplot(const std::string& script, const std::string& id, std::c
   const std::optional<int> status = wait_for(child, limit);
   check_interrupt();
   if (!status)
-    throw std::runtime_error(fmt::format("figure '{}' was not drawn: gnuplot did not end within {:.3g} s and was ended", id,
-                                         std::chrono::duration<double>(limit).count()));
+    throw std::runtime_error(fmt::format("figure '{}' was not drawn: gnuplot did not end within {:.3g} s and was ended",
+                                         id, std::chrono::duration<double>(limit).count()));
   const std::string message = contents(errors.get());
   if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) throw std::runtime_error("gnuplot failed: " + message);
   return contents(output.get());

@@ -74,9 +74,9 @@ HeldChain chain_of(const Index& starts, const Index& columns, const Number& valu
                  threads};
   for (std::size_t i = 0; i < n && given; ++i)
     if (!(std::abs(sums[i] - 1) <= sum_tolerance))
-      throw std::invalid_argument(fmt::format(
-          "chain: row {} and its kill rate sum to {:.12g}, 1 expected where the diagonal is given{}", i, sums[i],
-          *given == i ? "" : fmt::format(", as it is in row {}", *given)));
+      throw std::invalid_argument(
+          fmt::format("chain: row {} and its kill rate sum to {:.12g}, 1 expected where the diagonal is given{}", i,
+                      sums[i], *given == i ? "" : fmt::format(", as it is in row {}", *given)));
   return held;
 }
 

@@ -580,7 +580,9 @@ class FirstPassage(Record):
 
 class QuasiStationary(Record):
     """What survivors look like once the start is forgotten: their `distribution`, the `survival_weight` of each state
-    (largest 1), and the `failure_rate` per step; `residual` and `iterations` say how it was found."""
+    (largest 1), and the `failure_rate` per step. `residual` is the largest of |y Q - lambda y| and |Q x - lambda x|,
+    entry by entry, relative to the entry times the probability of leaving its state, and of the error that may be left
+    along other eigenvectors; `iterations` says how long it took."""
 
     def __init__(self, distribution, survival_weight, failure_rate, residual, iterations):
         super().__init__(dict(distribution=distribution, survival_weight=survival_weight, failure_rate=failure_rate,
@@ -592,7 +594,7 @@ class QuasiStationary(Record):
 
 class Passage(Record):
     """First passage to a set of states: the committor `reach` (probability of being there before failing), `fail`
-    (neither is one minus the other), and the expected `steps` until either."""
+    (neither is one minus the other), and the expected `steps` until either, infinite where neither need come."""
 
     def __init__(self, reach, fail, steps):
         super().__init__(dict(reach=reach, fail=fail, steps=steps))

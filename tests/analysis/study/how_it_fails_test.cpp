@@ -96,7 +96,8 @@ TEST(MiddleNinety, OfCellsIsThatOfTheirDistribution) {
     std::vector<double> values, weights;
     for (double x = -8.03; x < 8; x += spacing) {
       values.push_back(x);
-      weights.push_back(0.5 * (std::erfc(-(x + spacing / 2) / std::sqrt(2)) - std::erfc(-(x - spacing / 2) / std::sqrt(2))));
+      weights.push_back(0.5 *
+                        (std::erfc(-(x + spacing / 2) / std::sqrt(2)) - std::erfc(-(x - spacing / 2) / std::sqrt(2))));
     }
     const Estimate middle = middle_90(values, weights, std::vector<double>(values.size(), spacing));
     EXPECT_NEAR(middle.lower, -1.6448536269514722, 0.15 * spacing * spacing);

@@ -55,8 +55,9 @@ TEST(PassageTo, IsToldBesideASafeState) {
 // The state that is left too rarely is the 4th of the chain and the 2nd outside of the set.
 TEST(PassageTo, NamesTheStateOfTheChain) {
   const Chain chain({0, 0, 0, 1, 2}, {3, 2}, {0.5, 1e-320}, {0.5, 0.5, 0.25, 0});
-  const std::string message =
-      message_of<RestTooRare>([&] { passage_to(chain, std::vector<std::uint8_t>{1, 1, 0, 0}); });
+  const std::string message = message_of<RestTooRare>([&] {
+    passage_to(chain, std::vector<std::uint8_t>{1, 1, 0, 0});
+  });
   EXPECT_NE(message.find("state 3 is left too rarely"), std::string::npos) << message;
 }
 

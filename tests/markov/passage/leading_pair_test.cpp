@@ -18,8 +18,7 @@ namespace metastable::markov {
 namespace {
 
 using testing::message_of;
-using Digits =
-    boost::multiprecision::number<boost::multiprecision::cpp_bin_float<400>, boost::multiprecision::et_off>;
+using Digits = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<400>, boost::multiprecision::et_off>;
 using Matrix = std::vector<std::vector<Digits>>;
 
 Matrix transposed(const Matrix& matrix) {
@@ -105,11 +104,12 @@ Chain random_kind(std::mt19937_64& engine, int kind) {
   const double common = std::pow(10, -uniform(0.5, kind == 4 ? 90 : 12)), spread = std::pow(10, -uniform(0, 12));
   std::vector<double> matrix(n * n, 0.0), kill(n);
   for (std::size_t i = 0; i < n; ++i) {
-    kill[i] = kind == 0 ? std::pow(10, -uniform(0.3, 60)) : common * (1 + (engine() % 3 == 0 ? 0 : spread * uniform(0, 1)));
+    kill[i] =
+        kind == 0 ? std::pow(10, -uniform(0.3, 60)) : common * (1 + (engine() % 3 == 0 ? 0 : spread * uniform(0, 1)));
     if (kind == 5 && engine() % 2 == 0) kill[i] = 0.4 * uniform(0, 1);
     for (std::size_t j = 0; j < n; ++j) {
-      const bool there = kind == 2 ? (i + 1) % n == j || (i + n - 1) % n == j  // of period 2, if n is even
-                         : kind == 3 ? j > i && engine() % 2 == 0              // transient, never returning
+      const bool there = kind == 2   ? (i + 1) % n == j || (i + n - 1) % n == j  // of period 2, if n is even
+                         : kind == 3 ? j > i && engine() % 2 == 0                // transient, never returning
                                      : engine() % 3 != 0;
       const double size = kind == 4 ? std::pow(10, -uniform(0.5, 90)) : std::pow(10, exchange) * uniform(0.01, 1);
       if (i != j && there) matrix[i * n + j] = size * (kind == 2 ? 4 : 1) / static_cast<double>(n);
@@ -131,9 +131,9 @@ TEST(LeadingPair, HasEveryEntryOverAWideFamilyOfChains) {
       // The exact vectors hold traces of others, 1e-220 over the relative distance of their rates. Where ways back are
       // as rare as 1e-90 (kind 4), two eigenvalues may differ by the root of that, and entries that small are lost.
       const Digits beside(kind == 4 ? "1" : "1e-150");
-      const double off = std::max({worst(quasi.distribution, exact.left, beside),
-                                   worst(quasi.survival_weight, exact.right, beside),
-                                   std::abs(quasi.failure_rate / exact.rate.convert_to<double>() - 1)});
+      const double off =
+          std::max({worst(quasi.distribution, exact.left, beside), worst(quasi.survival_weight, exact.right, beside),
+                    std::abs(quasi.failure_rate / exact.rate.convert_to<double>() - 1)});
       EXPECT_LT(off, (kind == 4 ? 1e-8 : 1e-12) + 4 * quasi.residual) << problem;
       ++found;
     } catch (const NotUnique& error) {

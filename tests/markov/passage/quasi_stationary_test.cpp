@@ -143,8 +143,8 @@ TEST(QuasiStationary, TellsLargeGroupsApartThatFadeAlike) {
         if (i / half == j / half) matrix[i * n + j] = 0.5 / half;
     }
     const double over = 1e-15;
-    matrix[half] = over;              // 0 -> 60
-    matrix[half * n] = over;          // 60 -> 0
+    matrix[half] = over;      // 0 -> 60
+    matrix[half * n] = over;  // 60 -> 0
     const QuasiStationary quasi = quasi_stationary(ChainSolver(Chain::from_dense(n, matrix, kill)));
     // The groups as two states: exchange over / 60 either way, kill rates 0 and d.
     const double d = (kill[half] - kill[0]) / (over / half), ratio = 2 / (d + std::sqrt(d * d + 4));

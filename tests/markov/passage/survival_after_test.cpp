@@ -34,7 +34,8 @@ TEST(SurvivalAfter, CountsThoseThatAreSafe) {
   const Chain chain({0, 1, 1}, {1}, {0.25}, {0.25, 0});
   for (const double n : {1.0, 2.0, 10000.0, 1e12, 1e300, ever}) {
     const double still = std::pow(0.5, std::min(n, 5000.0));
-    EXPECT_NEAR(survival_after(chain, std::vector<double>{1, 0}, std::vector<double>{n})[0], 0.5 + still / 2, 1e-14) << n;
+    EXPECT_NEAR(survival_after(chain, std::vector<double>{1, 0}, std::vector<double>{n})[0], 0.5 + still / 2, 1e-14)
+        << n;
     EXPECT_EQ(survival_after(chain, std::vector<double>{0, 1}, std::vector<double>{n})[0], 1) << n;
   }
 }

@@ -74,7 +74,8 @@ class Chains(unittest.TestCase):
         matrix = np.array([[0, 1.], [.9, 0]])
         quasi = metastable.chain(matrix, [0, .1]).quasi_stationary()
         self.assertAlmostEqual(quasi.distribution.sum(), 1, 14)
-        np.testing.assert_allclose(quasi.distribution @ matrix, (1 - quasi.failure_rate) * quasi.distribution, rtol=1e-14)
+        after = quasi.distribution @ matrix
+        np.testing.assert_allclose(after, (1 - quasi.failure_rate) * quasi.distribution, rtol=1e-14)
 
     def test_what_is_not_unique_is_said(self):
         with self.assertRaisesRegex(metastable.ComputationError, "not unique"):
