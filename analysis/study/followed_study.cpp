@@ -40,7 +40,7 @@ constexpr std::size_t shown_launches = 1024, shown_runs = 64;  // for seconds, m
 
 constexpr std::size_t checked_trials = 4096;
 constexpr double surprising = 4;  // standard errors
-constexpr std::size_t unresolved_trials = 64, unresolved_steps = 10000;
+constexpr std::size_t unresolved_trials = 64, unresolved_steps = 2000;
 constexpr double most_events = 2e7, most_rolled = 2e5;      // of a trial study: by the map, by Problem::follow
 constexpr std::uint32_t of_trials = 1u << 24;               // the first of their randomisations
 constexpr std::size_t first_trials = 4096, most_trials = 1u << 20;
@@ -696,10 +696,13 @@ Metastability held_against_trials(const Problem& problem, Metastability study, c
   const std::size_t most = std::min<std::size_t>(study.steps.survival.size(), 64);
   const Trials trials = follow_trials(problem, options, 0, checked_trials, most, true);
   const MeanError found = mean_of(trials.steps);
-  const double expected = std::accumulate(study.steps.survival.begin(),
-                                          study.steps.survival.begin() + static_cast<std::ptrdiff_t>(most), 0.0);
   const Estimate& all = study.steps.from_start;
-  const double lower = expected * std::exp(std::log(all.lower / all.value)), upper = expected * all.upper / all.value;
+  // Survival is that of the finest chain, whose own mean is not extrapolated.
+  const double extrapolated = all.value / study.steps.distribution.mean;
+  const double expected =
+      extrapolated * std::accumulate(study.steps.survival.begin(),
+                                     study.steps.survival.begin() + static_cast<std::ptrdiff_t>(most), 0.0);
+  const double lower = expected * all.lower / all.value, upper = expected * all.upper / all.value;
   const double slack = surprising * found.error;
   if (found.mean + slack >= lower && found.mean - slack <= upper) return study;
   if (std::optional<Metastability> answer = trial_study(problem, options)) {

@@ -38,7 +38,7 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
 /// an extrapolation from them does not show it: if the steps of 4096 trials, counted no further than `survival` is
 /// known, contradict the study's interval by more than 4 standard errors, the answer is that of trial_study(); where
 /// trials are too long for that, the interval is widened to what the trials say. A study that found no rest is tried
-/// with 64 trials of 10000 steps.
+/// with 64 trials of 2000 steps.
 Metastability held_against_trials(const Problem& problem, Metastability study, const StudyOptions& options);
 
 }  // namespace metastable::analysis

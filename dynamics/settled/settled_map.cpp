@@ -20,9 +20,9 @@ constexpr double never = std::numeric_limits<double>::infinity();
 constexpr double smooth_restitution = 0.6;  // above it feet hop on to the next touch
 constexpr double rough_step = 0.05;         // between rows there
 constexpr std::size_t most_kept = 32;       // maps, of some 8 MB
-// Of a processor: the table of the paper's wheel takes 8 s of its landings of 20 us, and 10000 s were waited for in vain
-// at a radius of gyration of 5 mm.
-constexpr double longest_build = 3600;  // [s]
+// Of a processor: the table of the paper's wheel takes 8 s of its landings of 20 us, those of slopes of 15 deg or of a
+// radius of gyration of 0.4 m a minute; where it is 5 mm, feet slide for milliseconds of computing.
+constexpr double longest_build = 900;  // [s]
 constexpr int foreseen_from = 96;       // landings
 constexpr double landings_a_node = 2;   // beside those kept, mu_r and the kinks are solved for
 
@@ -417,9 +417,9 @@ void SettledMap::foresee() const {
     const double spent = processor_seconds() - from, each = spent / static_cast<double>(i + 1);
     if (each * landings > longest_build && (spent > enough || i + 1 == foreseen_from))
       throw TableTooLong(
-          fmt::format("the table of landings would take about {:.2g} h of a processor, as one landing of this wheel "
-                      "takes {:.2g} ms",
-                      each * landings / 3600, 1e3 * each));
+          fmt::format("the table of landings would take about {:.2g} min of a processor, more than {:.0f}, as one landing "
+                      "of this wheel takes {:.2g} ms",
+                      each * landings / 60, longest_build / 60, 1e3 * each));
   }
 }
 

@@ -62,7 +62,7 @@ class SettledMap {
   /// wheel takes some 4 s on two cores.
   /// @throws std::invalid_argument as SettledWheel::validate(), and for a range that is empty or out of bounds;
   /// TableTooLong where landings (feet that chatter, a wheel of hardly any inertia that slides) take so long that the
-  /// table would take more than an hour of a processor: foreseen from some landings, before it is begun
+  /// table would take more than 15 min of a processor: foreseen from some landings, before it is begun
   static std::shared_ptr<const SettledMap> of(const SettledWheel& wheel, const SettledMapOptions& options = {});
 
   const SettledMotion& motion() const { return motion_; }

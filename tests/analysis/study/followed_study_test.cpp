@@ -15,7 +15,7 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+constexpr double in_radians = std::numbers::pi / 180;
 const StudyOptions brief_sampled{.brief = true}, brief_integrated{.method = Method::integrated, .brief = true};
 
 // Is a point mass on eight legs of 1 m under `plastic`: x' = x / 2 + 4 g sin(gamma) cos(beta), rest where x / 2 does not
@@ -24,8 +24,8 @@ struct PointMass {
   double gain, barrier;
   explicit PointMass(double slope_deg) {
     const double beta = std::numbers::pi / 2 - std::numbers::pi / 8;
-    gain = 4 * 9.81 * std::sin(slope_deg * degree) * std::cos(beta);
-    barrier = 2 * 9.81 * (1 - std::sin(beta + slope_deg * degree));
+    gain = 4 * 9.81 * std::sin(slope_deg * in_radians) * std::cos(beta);
+    barrier = 2 * 9.81 * (1 - std::sin(beta + slope_deg * in_radians));
   }
   bool rolls_for_ever() const { return gain >= barrier; }  // its fixed point is 2 gain
   int steps(double omega) const {
@@ -171,10 +171,10 @@ TEST(FollowedStudy, NarrowNoiseIsNotSmeared) {
 
 TEST(FollowedStudy, ASmoothSlopeOfTheRoughTerrainWheel) {
   for (const double slope : {0.5, 1.5, 2.0, 4.0, 8.0}) {
-    const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = slope * degree, .sd_slope_rad = 0});
+    const dynamics::RoughTerrainWheel wheel({.mean_slope_rad = slope * in_radians, .sd_slope_rad = 0});
     int steps = 0;
     double x = 30;
-    for (; x > 0 && steps < 500; ++steps) x = wheel.next(x, slope * degree);
+    for (; x > 0 && steps < 500; ++steps) x = wheel.next(x, slope * in_radians);
     const Metastability found = study({wheel, {[](double) { return 30.0; }, 0}}, brief_integrated);
     if (steps == 500) {
       EXPECT_EQ(found.status, Status::rest_unreachable);

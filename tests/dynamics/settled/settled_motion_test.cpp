@@ -217,9 +217,9 @@ TEST(SettledMotion, ATipRollsAsItStands) {
 
 // The time of a stance by quadrature is that of the motion followed in time, up to the barrier and on slopes without.
 TEST(SettledMotion, AStanceTakesAsLongAsItsMotion) {
-  for (const double slope : {3.0, 7.02, 15.0, 22.0})
+  for (const double slope : {3.0, 7.02, 15.0})
     for (const double tip : {0.0, 0.0005, 0.005, 0.0075})
-      for (const double omega : {2.5, 3.2, 4.8, 8.0}) {
+      for (const double omega : {2.5, 3.2, 4.8}) {  // a faster foot lifts
         SettledWheel wheel = paper(slope);
         wheel.tip_radius = tip;
         const SettledMotion motion(wheel);
