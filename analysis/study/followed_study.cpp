@@ -302,6 +302,7 @@ Accumulated accumulated(const Distribution& shares) {
   for (const auto& [value, share] : shares) mean += share * value;
   for (const auto& [value, share] : shares) square += share * (value - mean) * (value - mean);
   if (std::isinf(mean)) return {no_end, no_end, quantiles_of(shares)};
+  if (shares.size() == 1) return {shares.begin()->first, 0, quantiles_of(shares)};
   return {mean, std::sqrt(square), quantiles_of(shares)};
 }
 

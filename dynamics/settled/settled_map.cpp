@@ -413,7 +413,7 @@ void SettledMap::foresee() const {
     const double still = std::sqrt(std::max(0.0, motion_.foot(leg).barrier_squared()));
     const double omega = still + (range.omega_high - still) * std::max(0.05, spread(i, 1));
     if (!(omega > 0)) return;
-    motion_.land(leg, omega, {eta, sticking_[static_cast<std::size_t>(leg)] * (0.6 + 0.4 * spread(i, 2))});
+    motion_.land(leg, omega, {eta, sticking_[static_cast<std::size_t>(leg)] * spread(i, 2)});
     const double spent = processor_seconds() - from, each = spent / static_cast<double>(i + 1);
     if (each * landings > longest_build && (spent > enough || i + 1 == foreseen_from))
       throw TableTooLong(
