@@ -111,23 +111,26 @@ Command sweep_command(const Sharing* sharing) {
 namespace {
 
 Command report() {
-  return {"report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
-          [](Options& o) {
-            o.add("slopes", "DEG,DEG,...", "7.02,9.59",
-                  "Ramp slopes [deg], each from 0.001 to below half the angle between legs");
-            o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
-                  dynamics::range::speed);
-            add_wheel(o), add_contact(o), add_course(o), add_study(o);
-            o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
-            o.add("out", "DIR", "report", "Folder for the files");
-            o.add_json();
-            add_walker(o, "DEG,DEG,...");
-          },
-          [](const Options& o, const std::string& line) {
-            if (asks_for_walker(o)) return run_walker_report(walker_request(o, line));
-            run_report({several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000), o.text("out"),
-                        line, o.text("json")});
-          }};
+  return {
+      "report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
+      [](Options& o) {
+        o.add("slopes", "DEG,DEG,...", "7.02,9.59",
+              "Ramp slopes [deg], each from 0.001 to below half the angle between legs");
+        o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
+              dynamics::range::speed);
+        add_wheel(o), add_contact(o), add_course(o), add_study(o);
+        o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
+        o.add("landings", "N", "40000",
+              "Landings rolled under settled for each cell of a map, 1000..1000000000: their cost and their intervals");
+        o.add("out", "DIR", "report", "Folder for the files");
+        o.add_json();
+        add_walker(o, "DEG,DEG,...");
+      },
+      [](const Options& o, const std::string& line) {
+        if (asks_for_walker(o)) return run_walker_report(walker_request(o, line));
+        run_report({several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000),
+                    o.count("landings", 1000, 1000000000), o.text("out"), line, o.text("json")});
+      }};
 }
 
 Command verify() {

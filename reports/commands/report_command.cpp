@@ -30,9 +30,9 @@ namespace {
 
 constexpr std::array<double, 4> energy_spreads = {0.05, 0.1, 0.15, 0.2};  // Fig. 8
 constexpr int energy_collisions = 16;                                     // of a trial
-// Landings that are rolled under `settled`: 0.8 s of one core a cell of a map (a few per cent of its steps); to each
-// side of a parameter, so many that a change by 1 % is known to 0.5 % or better where rests are frequent.
-constexpr std::uint64_t map_landings = 40000, sensitivity_landings = 60000;
+// Landings to each side of a parameter under `settled`, in landings of a cell of a map: with the 40000 of the default a
+// change by 1 % is known to 0.5 % of the steps where rests are frequent.
+constexpr double sensitivity_share = 1.5;
 constexpr double rare_tolerance = 0.1;               // of cells that the chain has to answer, where rests are rare
 constexpr std::size_t map_units = study_units / 20;  // a cell's share of a study's work
 constexpr std::size_t map_cells = 16 + 12;           // of one ramp's two maps
@@ -88,6 +88,9 @@ class Report {
            map_units * 2 * map_cells * ramps;
   }
 
+  std::uint64_t landings(double share) const {
+    return static_cast<std::uint64_t>(std::ceil(share * request_.landings));
+  }
   dynamics::Law asked() const { return request_.settings.front().law; }
   // Returns the paper's and its alternatives, and whichever was asked for.
   std::vector<dynamics::Law> laws() const {
@@ -204,7 +207,7 @@ class Report {
     const analysis::Setting& setting = *one.study.setting;
     const auto tell = study_progress(progress_);
     if (setting.law == dynamics::Law::settled)
-      return {setting, analysis::rolled_sensitivities(setting, {.landings = sensitivity_landings,
+      return {setting, analysis::rolled_sensitivities(setting, {.landings = landings(sensitivity_share),
                                                                 .seed = request_.study.seed,
                                                                 .threads = request_.study.threads,
                                                                 .progress = [&](double share) { tell(share, ""); }})};
@@ -256,7 +259,7 @@ class Report {
     markov::parallel_for(map.steps.size(), request_.study.threads, [&](std::size_t i) {
       const auto steps = analysis::rolled_steps(
           analysis::sweep_setting(base, axes, i),
-          {.landings = map_landings, .seed = request_.study.seed, .progress = [](double) { check_interrupt(); }});
+          {.landings = landings(1), .seed = request_.study.seed, .progress = [](double) { check_interrupt(); }});
       if (steps) map.steps[i] = *steps;
       rare[i] = !steps;
       progress_.advance(map_units);
@@ -277,14 +280,16 @@ class Report {
   void maps(const std::string& stem, const std::string& what, const analysis::Setting& setting,
             const analysis::SweepAxis& down, const analysis::SweepAxis& across, std::vector<Figure>& figures,
             std::vector<Table>& tables) {
-    if (!analysis::matters(setting, down.parameter) || !analysis::matters(setting, across.parameter))
-      return progress_.advance(2 * map_units * down.values.size() * across.values.size());
     std::vector<Map> both;
     double low = std::numeric_limits<double>::infinity(), high = 0;
     for (const dynamics::Law law : compared()) {
       analysis::Setting base = setting;
       base.law = law;
-      if (!study_of(law, base.slope_deg)) continue;
+      if (!study_of(law, base.slope_deg) || !analysis::matters(base, down.parameter) ||
+          !analysis::matters(base, across.parameter)) {  // there is no such wheel, or nothing that varies
+        progress_.advance(map_units * down.values.size() * across.values.size());
+        continue;
+      }
       both.push_back(map(base, {down, across}));
       for (const Estimate& steps : both.back().steps)
         if (std::isfinite(steps.value)) low = std::min(low, steps.value), high = std::max(high, steps.value);
@@ -304,7 +309,7 @@ class Report {
         tables.back().notes.push_back(
             fmt::format("From wheels that are rolled, {} landings a cell; where fewer than 100 of them rest, from the "
                         "chain.",
-                        map_landings));
+                        request_.landings));
     }
   }
 

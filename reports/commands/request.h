@@ -166,6 +166,7 @@ struct ReportRequest {
   std::vector<analysis::Setting> settings;  ///< one a ramp
   analysis::StudyOptions study;
   int energy_trials = 1000;  ///< trials behind the energy-loss table
+  int landings = 40000;      ///< rolled under `settled` for each cell of a map; 1.5 times as many a sensitivity's side
   std::string out = "report";
   std::string command;
   std::string json = {};  ///< as of StepsRequest
