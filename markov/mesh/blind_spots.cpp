@@ -15,13 +15,13 @@ namespace metastable::markov {
 namespace {
 
 constexpr std::uint64_t kStates = 0x9000, kScores = 0xa000, kPlaces = 0xb000;
-constexpr std::size_t kLines = 3000, kOnALine = 16, kBatch = 64;
-constexpr double kLeastReach = 6, kReach = 8.5;         // of a line [sds]: places of a curve hang on it
-constexpr double kHeat = 2;                             // of the scores but the first
-constexpr double kAboveNodes = 2;                       // of one score: a line fails so much oftener than any node around,
-constexpr double kLineFails = 0.3, kNodesFail = 0.03;   // of several: more than the first where no node does the second,
-                                                        // nor the first under the line's other scores
-constexpr double kErrors = 2;                           // standard errors
+constexpr std::size_t kProbeLines = 3000, kOnALine = 16, kProbeBatch = 64;
+constexpr double kLeastReach = 6, kReach = 8.5;  // of a line [sds]: places of a curve hang on it
+constexpr double kProbeHeat = 2;                 // of the scores but the first
+constexpr double kAboveNodes = 2;                // of one score: a line fails so much oftener than any node around,
+constexpr double kLineFails = 0.3, kNodesFail = 0.03;  // of several: more than the first where no node does the second,
+                                                       // nor the first under the line's other scores
+constexpr double kErrors = 2;                          // standard errors
 
 /// Sums contributions of lines, each with its probability.
 struct Sum {
@@ -31,7 +31,7 @@ struct Sum {
     squares += x * x;
   }
   double bound() const {
-    const auto n = static_cast<double>(kLines);
+    const auto n = static_cast<double>(kProbeLines);
     const double mean = sum / n;
     return mean + kErrors * std::sqrt(std::max(0.0, squares / n - mean * mean) / n);
   }
@@ -41,8 +41,13 @@ class Probing {
  public:
   Probing(const BatchMap& map, const std::vector<NoiseFrame>& frames, const Mesh& mesh, std::span<const double> visits,
           const MeshOptions& options)
-      : map_(map), mesh_(mesh), options_(options), lattice_(mesh_lattice(map, frames, options)),
-        d_(static_cast<std::size_t>(map.dimension)), s_(static_cast<std::size_t>(map.scores)), visits_(visits) {
+      : map_(map),
+        mesh_(mesh),
+        options_(options),
+        lattice_(mesh_lattice(map, frames, options)),
+        d_(static_cast<std::size_t>(map.dimension)),
+        s_(static_cast<std::size_t>(map.scores)),
+        visits_(visits) {
     const double all = std::accumulate(visits.begin(), visits.end(), 0.0);
     double failing = 0;
     for (std::size_t i = 0; i < mesh.size(); ++i) failing += visits[i] * mesh.kill()[i];
@@ -54,12 +59,12 @@ class Probing {
 
   BlindSpots find() {
     std::vector<std::vector<Line>> of_phase(static_cast<std::size_t>(map_.phases));
-    for (std::size_t n = 0; n < kLines; ++n) {
+    for (std::size_t n = 0; n < kProbeLines; ++n) {
       Line line = draw(n);
       if (map_.inside && !map_.inside(line.phase, line.state)) continue;
       auto& waiting = of_phase[static_cast<std::size_t>(line.phase)];
       waiting.push_back(std::move(line));
-      if (waiting.size() == kBatch) probe(waiting);
+      if (waiting.size() == kProbeBatch) probe(waiting);
     }
     for (auto& waiting : of_phase)
       if (!waiting.empty()) probe(waiting);
@@ -103,9 +108,9 @@ class Probing {
     line.reach = kLeastReach + (kReach - kLeastReach) * u[1];
     line.weight = visits_[node] / share_[node];
     for (const double v : numbers(kScores, number, s_ - 1)) {
-      const double z = kHeat * normal_score(v);
+      const double z = kProbeHeat * normal_score(v);
       line.others.push_back(z);
-      line.weight *= kHeat * std::exp(-0.5 * z * z * (1 - 1 / (kHeat * kHeat)));
+      line.weight *= kProbeHeat * std::exp(-0.5 * z * z * (1 - 1 / (kProbeHeat * kProbeHeat)));
     }
     const Mesh::Corners corners = mesh_.corners(line.phase, line.state);
     if (static_cast<std::size_t>(corners.count) <= d_) return line;  // at the edge of the mesh
@@ -149,9 +154,11 @@ class Probing {
     for (std::size_t j = 0; j < kOnALine; ++j) {
       const double z = scores[j * s_];
       const auto fate = curve.fate(z);
-      if (!fate || *fate == ScoreCurve::Fate::leaves || (*fate == ScoreCurve::Fate::fails) == (failed[j] != 0)) continue;
+      if (!fate || *fate == ScoreCurve::Fate::leaves || (*fate == ScoreCurve::Fate::fails) == (failed[j] != 0))
+        continue;
       ++found_.hits;
-      (failed[j] ? missed : imagined) += 2 * line.reach / kOnALine * std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi);
+      (failed[j] ? missed : imagined) +=
+          2 * line.reach / kOnALine * std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi);
     }
     parts_.clear();
     const double fails = curve.share(lattice_, (line.phase + 1) % map_.phases, 1, parts_).fails;

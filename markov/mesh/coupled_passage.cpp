@@ -13,9 +13,9 @@ namespace {
 
 constexpr int kProducts = 20000;      // of all rounds together
 constexpr int kSmoothing = 20;        // products between two solutions of the small chain
-constexpr double kStill = 1e-8;       // what a round may change of the expected steps
+constexpr double kStillSteps = 1e-8;  // what a round may change of the expected steps
 constexpr double kBalanced = 1e-6;    // and of any class's visits, beyond what leaves it,
-constexpr int kInARow = 3;            // so many rounds running
+constexpr int kStillRounds = 3;       // so many rounds running
 constexpr int kInverseRounds = 200;   // of the small chain's inverse iteration
 constexpr double kSettledRate = 1e-12;
 constexpr double kSettled = 1e-9;  // of survivors in the first gait: what their failures change by in a revolution,
@@ -28,7 +28,8 @@ std::vector<std::uint32_t> likeliest_steps(const Mesh& mesh) {
     next[i] = i;
     const auto values = mesh.values(i);
     if (values.empty()) continue;
-    next[i] = mesh.columns(i)[static_cast<std::size_t>(std::max_element(values.begin(), values.end()) - values.begin())];
+    next[i] =
+        mesh.columns(i)[static_cast<std::size_t>(std::max_element(values.begin(), values.end()) - values.begin())];
   }
   return next;
 }
@@ -37,11 +38,14 @@ std::vector<std::uint32_t> likeliest_steps(const Mesh& mesh) {
 class Aggregation {
  public:
   Aggregation(const Mesh& mesh, const std::vector<std::uint32_t>& gait, std::size_t gaits)
-      : mesh_(mesh), classes_(gaits * static_cast<std::size_t>(mesh.phases())), kill_(classes_), leave_(classes_),
-        flow_(classes_ * classes_), mass_(classes_) {
+      : mesh_(mesh),
+        classes_(gaits * static_cast<std::size_t>(mesh.phases())),
+        kill_(classes_),
+        leave_(classes_),
+        flow_(classes_ * classes_),
+        mass_(classes_) {
     for (std::size_t i = 0; i < mesh.size(); ++i)
-      class_.push_back(gait[i] * static_cast<std::uint32_t>(mesh.phases()) +
-                       static_cast<std::uint32_t>(mesh.phase(i)));
+      class_.push_back(gait[i] * static_cast<std::uint32_t>(mesh.phases()) + static_cast<std::uint32_t>(mesh.phase(i)));
   }
 
   std::size_t size() const { return classes_; }
@@ -76,8 +80,7 @@ class Aggregation {
       for (std::size_t b = 0; b < met.size(); ++b)
         if (a != b) matrix[a * met.size() + b] = flow_[from * classes_ + met[b]] / mass_[from];
     }
-    const std::vector<double> solved =
-        ChainSolver(Chain::from_dense(met.size(), matrix, kill)).solve_left(rhs);
+    const std::vector<double> solved = ChainSolver(Chain::from_dense(met.size(), matrix, kill)).solve_left(rhs);
     std::vector<double> visits(classes_, 0.0);
     for (std::size_t a = 0; a < met.size(); ++a) visits[met[a]] = solved[a];
     return visits;
@@ -194,7 +197,7 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
   for (std::size_t i = 0; i < b.size(); ++i) start_by_class[aggregation.of(i)] += b[i];
   std::vector<double> y = passage.visits;
   double last = 0, change = 0;
-  for (int still = 0; still < kInARow;) {
+  for (int still = 0; still < kStillRounds;) {
     if (passage.products >= kProducts)
       throw ConvergenceError("mesh", change, "visits still change after 20000 products");
     for (int k = 0; k < kSmoothing; ++k) smooth(mesh, b, y, led);
@@ -204,7 +207,7 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
     aggregation.scale(y, visits);
     const double steps = std::accumulate(visits.begin(), visits.end(), 0.0);
     change = std::abs(steps - last) / steps;
-    still = change <= kStill && aggregation.balanced(visits) ? still + 1 : 0;
+    still = change <= kStillSteps && aggregation.balanced(visits) ? still + 1 : 0;
     last = steps;
   }
   const std::vector<double> lower = aggregation.solve(start_by_class, true);

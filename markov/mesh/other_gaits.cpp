@@ -13,14 +13,14 @@
 namespace metastable::markov {
 namespace {
 
-constexpr std::uint64_t kStream = 0x8000;
-constexpr std::size_t kNodes = 1500;        // of the mesh, followed without noise
-constexpr std::size_t kHotWalks = 64;       // at each of
-constexpr double kHeat[] = {2, 4};          // so many times the noise: what has an action of 60 has one of 15 or 4 there
+constexpr std::uint64_t kWalkStream = 0x8000;
+constexpr std::size_t kNodes = 1500;   // of the mesh, followed without noise
+constexpr std::size_t kHotWalks = 64;  // at each of
+constexpr double kHeats[] = {2, 4};    // so many times the noise: what has an action of 60 has one of 15 or 4 there
 constexpr int kHotSteps = 128, kKeptEvery = 8;
-constexpr double kHottest = 8;              // sds: no score is larger
+constexpr double kHottest = 8;  // sds: no score is larger
 constexpr int kFirstRevolutions = 300, kMoreRevolutions = 2000, kOrbit = 32;
-constexpr double kNear = 1;                 // stationary sds
+constexpr double kNear = 1;  // stationary sds
 constexpr std::size_t kMostGaits = 8, kMostStrays = 64;
 
 using State = std::vector<double>;
@@ -28,7 +28,9 @@ using State = std::vector<double>;
 class Search {
  public:
   Search(const BatchMap& map, const std::vector<NoiseFrame>& frames)
-      : map_(map), frames_(frames), d_(static_cast<std::size_t>(map.dimension)),
+      : map_(map),
+        frames_(frames),
+        d_(static_cast<std::size_t>(map.dimension)),
         s_(static_cast<std::size_t>(map.scores)) {}
 
   /// Returns states of phase 0 that the noise can lead to.
@@ -40,7 +42,7 @@ class Search {
       State state = mesh.state(i);
       if (!map_.inside || map_.inside(0, state)) found.push_back(std::move(state));
     }
-    for (std::size_t heat = 0; heat < std::size(kHeat); ++heat) walk_hot(start, kHeat[heat], seed, heat, found);
+    for (std::size_t heat = 0; heat < std::size(kHeats); ++heat) walk_hot(start, kHeats[heat], seed, heat, found);
     return found;
   }
 
@@ -130,9 +132,9 @@ class Search {
       for (int phase = 0; phase < map_.phases; ++phase, ++number) {
         for (std::size_t i = 0; i < kHotWalks; ++i)
           for (std::size_t k = 0; k < s_; ++k)
-            scores[i * s_ + k] = std::clamp(
-                heat * normal_score(uniforms(seed, kStream + stream, i * s_ + k, static_cast<std::uint64_t>(number))[0]),
-                -kHottest, kHottest);
+            scores[i * s_ + k] = std::clamp(heat * normal_score(uniforms(seed, kWalkStream + stream, i * s_ + k,
+                                                                         static_cast<std::uint64_t>(number))[0]),
+                                            -kHottest, kHottest);
         step(phase, states, scores);
       }
       for (State& state : states) {
@@ -181,14 +183,15 @@ OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& 
   for (const State& stray : strays) {
     if (search.known(stray, orbits)) continue;
     if (orbits.size() > kMostGaits)
-      throw MapError(fmt::format("return map: it has more than {} other gaits, as at {}", kMostGaits,
-                                 describe_state(map, stray)));
+      throw MapError(
+          fmt::format("return map: it has more than {} other gaits, as at {}", kMostGaits, describe_state(map, stray)));
     orbits.push_back(search.orbit(stray));
     found.states.push_back(stray);
   }
   if (found.states.size() == 1) return found;
   std::vector<Ways> ways;
-  for (std::size_t g = 0; g < found.states.size(); ++g) ways.push_back(ways_from(map, frames, found.states, g, options));
+  for (std::size_t g = 0; g < found.states.size(); ++g)
+    ways.push_back(ways_from(map, frames, found.states, g, options));
   std::vector<double> limit(ways.size(), 0.0);
   std::vector<State> reached;
   for (std::size_t g = 0; g < ways.size(); ++g) {
@@ -199,7 +202,8 @@ OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& 
       limit[g] = std::max(limit[g], ways[g].failure);
     if (limit[g] == 0 && found.trap.empty())
       found.trap = fmt::format(
-          "the noise leads within an action of {:.3g} to another gait, at {}, from which neither a failure nor a way back "
+          "the noise leads within an action of {:.3g} to another gait, at {}, from which neither a failure nor a way "
+          "back "
           "is found within an action of {:.3g}",
           ways.front().to[g], describe_state(map, found.states[g]), MeshGrowth::farthest);
     limit[g] += options.margin;
