@@ -81,9 +81,10 @@ std::vector<double> drawn_power(const std::vector<double>& a, const std::vector<
       const double va = of_a.error(count), vb = of_b.error(count);
       const double apart = std::abs(of_a.mean(count) - of_b.mean(count));
       const double degrees = va + vb > 0 ? (va + vb) * (va + vb) * (count - 1) / (va * va + vb * vb) : 2 * count - 2;
-      if (apart > 0 && apart >= critical(degrees) * std::sqrt(va + vb)) power[n] += 1 / static_cast<double>(pairs);
+      if (apart > 0 && apart >= critical(degrees) * std::sqrt(va + vb)) power[n] += 1;
     }
   }
+  for (double& one : power) one /= static_cast<double>(pairs);
   return power;
 }
 
