@@ -19,6 +19,7 @@
 namespace metastable::analysis {
 namespace {
 
+constexpr double slowest_roll = 1e-9;  // [rad/s]: a motion starts with some speed
 constexpr double launch_reach = 5;  // [sd]: faster launches keep the share of omega^2 that the table's last speed does
 
 void require_range(const std::string& name, double value, const std::string& unit, const dynamics::Range& range) {
@@ -38,7 +39,8 @@ std::function<Run(double, int)> rolls(std::shared_ptr<const dynamics::SettledMot
                                       const dynamics::ContactNoise& noise) {
   const std::vector<double> middle(static_cast<std::size_t>(noise.dimension()));
   return [motion = std::move(motion), contact = noise.draw(middle)](double state, int phase) -> Run {
-    return [motion, contact, roll = dynamics::SettledRoll(*motion, phase, std::sqrt(state), contact, contact),
+    const double omega = std::max(std::sqrt(state), slowest_roll);
+    return [motion, contact, roll = dynamics::SettledRoll(*motion, phase, omega, contact, contact),
             seconds = 0.0, metres = 0.0]() mutable -> std::optional<FollowedEvent> {
       if (!roll.step().touched) return std::nullopt;
       roll.set_contact(contact);
