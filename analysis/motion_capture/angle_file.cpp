@@ -27,7 +27,7 @@ bool even(const std::vector<double>& values, double room) {
 // Says whether the angle is what only a clock shows, over enough frames, and the time is not.
 bool exchanged(const AngleRecording& recording) {
   constexpr std::size_t enough = 20;
-  return recording.time.size() >= enough && even(recording.angle_rad, 0.02) && !even(recording.time, 0.25);
+  return recording.time.size() >= enough && even(recording.angle_rad, 0.02) && !even(recording.time, 0.05);
 }
 
 // Frames that are missing or doubled would bend the derivative where nothing happened.

@@ -39,6 +39,7 @@ double frame_of(const std::vector<double>& time) {
 
 // Returns the step of the last digit that all values share, if they have five or less.
 double last_digit(const std::vector<double>& values) {
+  if (const auto [least, most] = std::ranges::minmax(values); least == most) return 0;
   double in_one = 1;
   for (int digits = 0; digits <= 5; ++digits, in_one *= 10)
     if (std::ranges::all_of(values, [&](double v) { return std::abs(v * in_one - std::round(v * in_one)) < 1e-6; }))
@@ -175,6 +176,7 @@ class Mending {
 
   void frames() {
     noise_ = angle_noise(angle_);
+    made_up_.assign(angle_.size(), 0);
     repeated_frames();
     lost_frames();
     stray_frames();
@@ -185,6 +187,7 @@ class Mending {
           "% are not mended",
           mended, angle_.size(), 100 * most_mended));
     check_jumps();
+    take_out();
   }
 
   const Mended& mended() const { return mended_; }
@@ -206,8 +209,10 @@ class Mending {
     throw Unmended(fmt::format("at {:.6g} s {}", time_[frame], what));
   }
 
-  // Puts the frames [from, to) on the straight line between their neighbours.
+  // Puts the frames [from, to) on the straight line between their neighbours, for as long as others are judged by them.
   void bridge(std::size_t from, std::size_t to) {
+    std::fill(made_up_.begin() + static_cast<std::ptrdiff_t>(from), made_up_.begin() + static_cast<std::ptrdiff_t>(to),
+              1);
     const double begin = angle_[from - 1], slope = (angle_[to] - begin) / static_cast<double>(to - from + 1);
     for (std::size_t i = from; i < to; ++i) angle_[i] = begin + static_cast<double>(i - from + 1) * slope;
   }
@@ -218,7 +223,9 @@ class Mending {
       std::size_t end = i + 1;  // of the frames that repeat
       while (end < angle_.size() && angle_[end] == angle_[i]) ++end;
       const std::optional<double> step = end < angle_.size() ? usual_step(i, end) : std::nullopt;
-      if (!step || std::abs(*step) < moving_noise * noise_) {  // it stands, or too slow to tell
+      // Where it stood before, or stands behind, it stands now; or it is too slow to tell.
+      if (!step || std::abs(*step) < moving_noise * noise_ || i < 2 ||
+          std::abs(angle_[i - 1] - angle_[i - 2]) < std::abs(*step) / 4) {
         i = end - 1;
         continue;
       }
@@ -234,6 +241,8 @@ class Mending {
         mended_.pushed_in += count;
         angle_.erase(angle_.begin() + static_cast<std::ptrdiff_t>(i),
                      angle_.begin() + static_cast<std::ptrdiff_t>(end));
+        made_up_.erase(made_up_.begin() + static_cast<std::ptrdiff_t>(i),
+                       made_up_.begin() + static_cast<std::ptrdiff_t>(end));
         time_.resize(angle_.size());  // the later frames move up: frames are even
       }
     }
@@ -253,6 +262,7 @@ class Mending {
       mended_.lost += lost;
       const double frame = frame_of(time_);
       angle_.insert(angle_.begin() + static_cast<std::ptrdiff_t>(i), lost, 0);
+      made_up_.insert(made_up_.begin() + static_cast<std::ptrdiff_t>(i), lost, 0);
       bridge(i, i + lost);
       for (std::size_t k = 0; k < lost; ++k) time_.push_back(time_.back() + frame);
       i += lost;
@@ -304,6 +314,17 @@ class Mending {
     }
   }
 
+  void take_out() {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < angle_.size(); ++i) {
+      if (made_up_[i]) continue;
+      time_[kept] = time_[i];
+      angle_[kept++] = angle_[i];
+    }
+    time_.resize(kept);
+    angle_.resize(kept);
+  }
+
   void check_jumps() const {
     const double furthest = speeds_.fastest * frame_of(time_) + moving_noise * noise_;
     for (std::size_t i = 1; i < angle_.size(); ++i)
@@ -318,6 +339,7 @@ class Mending {
   double leg_angle_;
   RollingSpeeds speeds_;
   double noise_ = 0;
+  std::vector<char> made_up_;  // frames
   Mended mended_;
 };
 
@@ -357,10 +379,8 @@ std::vector<std::string> sentences(const std::vector<MeasuredAngle>& angles, con
       });
   say([](const Mended& m) { return m.repeated > 0; },
       [&](const std::string& who, const Mended& m) {
-        return fmt::format(
-            "{} frames of {} repeat the one before (the first at {:.6g} s); they were put on the line between their "
-            "neighbours",
-            total(&Mended::repeated), who, m.first_repeat);
+        return fmt::format("{} frames of {} repeat the one before (the first at {:.6g} s); they were taken out",
+                           total(&Mended::repeated), who, m.first_repeat);
       });
   say([](const Mended& m) { return m.pushed_in > 0; },
       [&](const std::string& who, const Mended& m) {
@@ -372,8 +392,8 @@ std::vector<std::string> sentences(const std::vector<MeasuredAngle>& angles, con
   say([](const Mended& m) { return m.lost > 0; },
       [&](const std::string& who, const Mended& m) {
         return fmt::format(
-            "{} frames of {} are left out, though the times run on evenly (the first before {:.6g} s); they were put "
-            "in, and the later ones moved back",
+            "{} frames of {} are left out, though the times run on evenly (the first before {:.6g} s); the later "
+            "ones were moved back",
             total(&Mended::lost), who, m.first_lost);
       });
   say([](const Mended& m) { return m.stray > 0; },
@@ -382,7 +402,7 @@ std::vector<std::string> sentences(const std::vector<MeasuredAngle>& angles, con
         for (const Mended& one : mended) largest = std::max(largest, one.largest_stray);
         return fmt::format(
             "{} frames of {} lie off the motion of their neighbours by up to {:.3g} rad (the first at {:.6g} s); they "
-            "were put on the line between these",
+            "were taken out",
             total(&Mended::stray), who, largest, m.first_stray);
       });
   return said;
@@ -401,20 +421,25 @@ double angle_noise(const std::vector<double>& angle) {
   return std::max(*at / (normal_quantile * of_third_difference), last_digit(angle) / std::sqrt(12.0));
 }
 
-std::vector<double> evenly(const AngleRecording& recording) {
+AngleRecording evenly(const AngleRecording& recording) {
   const std::vector<double>& time = recording.time;
-  const double frame = frame_of(time);
-  double off = 0;
-  for (std::size_t i = 0; i < time.size(); ++i)
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < time.size(); ++i) intervals.push_back(time[i] - time[i - 1]);
+  const auto frames = static_cast<std::size_t>(std::lround((time.back() - time.front()) / median(intervals)));
+  const double frame = (time.back() - time.front()) / static_cast<double>(frames);
+  double off = frames + 1 == time.size() ? 0 : frame;
+  for (std::size_t i = 0; i < time.size() && off < frame; ++i)
     off = std::max(off, std::abs(time[i] - time.front() - static_cast<double>(i) * frame));
-  if (off < 0.01 * frame) return recording.angle_rad;
-  std::vector<double> even;
+  if (off < 0.01 * frame) return recording;
+  AngleRecording even;
   std::size_t next = 1;
-  for (std::size_t i = 0; i < time.size(); ++i) {
+  for (std::size_t i = 0; i <= frames; ++i) {
     const double at = time.front() + static_cast<double>(i) * frame;
     while (next + 1 < time.size() && time[next] < at) ++next;
     const double share = (at - time[next - 1]) / (time[next] - time[next - 1]);
-    even.push_back(recording.angle_rad[next - 1] + share * (recording.angle_rad[next] - recording.angle_rad[next - 1]));
+    even.time.push_back(at);
+    even.angle_rad.push_back(recording.angle_rad[next - 1] +
+                             share * (recording.angle_rad[next] - recording.angle_rad[next - 1]));
   }
   return even;
 }

@@ -15,9 +15,9 @@ inline constexpr double slowest_rate = 60, fastest_rate = 1000;
 /// smooth over four samples. The step of their last digit counts as noise. O(samples)
 double angle_noise(const std::vector<double>& angle);
 
-/// Returns the angles at as many evenly spaced times between the first frame and the last (linear interpolation where
-/// the times are more than a hundredth of a frame off, the angles themselves otherwise).
-std::vector<double> evenly(const AngleRecording& recording);
+/// Returns the recording at even times between its first frame and its last, linear between its frames; the recording
+/// itself where its times are even to a hundredth of a frame.
+AngleRecording evenly(const AngleRecording& recording);
 
 struct MendedAngles {
   std::vector<MeasuredAngle> angles;
@@ -26,9 +26,10 @@ struct MendedAngles {
 
 /// Puts right, and says: times rounded to a last digit; angles wrapped at a turn, half a turn or a leg angle; angles
 /// that fall as the wheel rolls; frames that repeat the one before, in the place of one that was lost or pushed in
-/// between; frames that are left out in the numbering; single frames off the motion of their neighbours.
-/// Refused: angles that turn faster than any wheel of these legs rolls, or so slowly that it could not come over a leg
-/// (the unit is suspected); jumps; more defects than a tenth of a trial's frames.
+/// between; frames that are left out in the numbering; single frames off the motion of their neighbours. Frames that
+/// tell nothing are taken out, which leaves a gap in the times. Refused: angles that turn faster than any wheel of
+/// these legs rolls, or so slowly that it could not come over a leg (the unit is suspected); jumps; more defects than a
+/// tenth of a trial's frames.
 /// @param file  for messages. @throws InputError, a line for each trial that cannot be mended. O(frames)
 MendedAngles mend_angles(std::vector<MeasuredAngle> angles, const Experiment& description, const std::string& file);
 

@@ -71,7 +71,8 @@ class Search {
   Search(const AngleRecording& recording, const dynamics::WheelMap& map, int first_landing_leg,
          const FinderOptions& options)
       : recording_(recording), map_(map), first_leg_(first_landing_leg), options_(options) {
-    const std::vector<double>& time = recording.time;
+    if (recording.time.size() > 1) even_ = evenly(recording);
+    const std::vector<double>& time = even_.time;
     const double rate = time.size() < 2 ? 0 : static_cast<double>(time.size() - 1) / (time.back() - time.front());
     if (!(rate >= slowest_rate * 0.99 && rate <= fastest_rate * 1.01))
       throw std::invalid_argument(
@@ -96,9 +97,8 @@ class Search {
       slope = SavitzkyGolay(slope.window() + 2, 3, 1);
     half_window_ = static_cast<std::size_t>(slope.window() / 2);
     rise_ = std::max(options.rise, noise_rise * speed_noise());
-    const std::vector<double> even = evenly(recording);
-    angle_ = SavitzkyGolay(slope.window(), 3, 0).apply(even, 1 / rate);
-    speed_ = slope.apply(even, 1 / rate);
+    angle_ = SavitzkyGolay(slope.window(), 3, 0).apply(even_.angle_rad, 1 / rate);
+    speed_ = slope.apply(even_.angle_rad, 1 / rate);
   }
 
   FoundTrial run() {
@@ -138,9 +138,9 @@ class Search {
   // Says whether the wheel is slower behind a fall than before it: smoothing also rings where a wheel is let go at
   // speed.
   bool slows(std::size_t fall) const {
-    const std::vector<double>& time = recording_.time;
+    const std::vector<double>& time = even_.time;
     const auto mean_speed = [&](std::size_t from, std::size_t to) {
-      return (recording_.angle_rad[to] - recording_.angle_rad[from]) / (time[to] - time[from]);
+      return (even_.angle_rad[to] - even_.angle_rad[from]) / (time[to] - time[from]);
     };
     const std::size_t span = std::max<std::size_t>(2, half_window_), begin = fall > span ? fall - span : 0,
                       end = std::min(fall + 1 + span, time.size() - 1);
@@ -218,7 +218,7 @@ class Search {
     for (const auto& [step, peak] : at) {
       if (!falls.empty() && peak.fall <= falls.back())
         throw std::invalid_argument(fmt::format("at {:.6g} s the wheel collides where it collided before ({:.6g} s)",
-                                                recording_.time[peak.fall], recording_.time[falls.back()]));
+                                                even_.time[peak.fall], even_.time[falls.back()]));
       if (!peak.shown) all.push_back(peak);
       falls.push_back(peak.fall);
     }
@@ -257,8 +257,8 @@ class Search {
                         end = n + 1 < chosen.size() ? all[chosen[n + 1]].at : speed_.size();
       peak.fall = passing(angle, begin, end);
       if (peak.fall + 1 >= end) continue;
-      const double from = begin > 0 ? recording_.time[(begin + peak.fall) / 2] : recording_.time.front(),
-                   to = recording_.time[end - 1];
+      const double from = begin > 0 ? even_.time[(begin + peak.fall) / 2] : even_.time.front(),
+                   to = even_.time[end - 1];
       const std::optional<StanceFit> again =
           fit(peak, from, to, n, KnownAngle{angle, std::min(1.0, noise_ / known_angle_sd)});
       if (again && near(*again, angle)) fit_now = again;
@@ -322,7 +322,7 @@ class Search {
     const bool last = n + 1 == chosen.size();
     FoundCollision c;
     c.number = static_cast<int>(n) + 1;
-    c.peak_time = recording_.time[peak.at];
+    c.peak_time = even_.time[peak.at];
     c.peak = speed_[peak.at];
     c.peak_angle_rad = angle_[peak.at];
     // The apex lies within one leg angle of the collision: behind the last one the recording may go on with others.
@@ -335,7 +335,7 @@ class Search {
     const auto apex = std::min_element(speed_.begin() + static_cast<std::ptrdiff_t>(peak.at),
                                        speed_.begin() + static_cast<std::ptrdiff_t>(end)) -
                       speed_.begin();
-    c.apex_time = recording_.time[static_cast<std::size_t>(apex)];
+    c.apex_time = even_.time[static_cast<std::size_t>(apex)];
     c.apex = speed_[static_cast<std::size_t>(apex)];
     c.fit = fit(all, chosen[n], n);
     return c;
@@ -343,7 +343,7 @@ class Search {
 
   std::optional<StanceFit> fit(const std::vector<Peak>& all, std::size_t k, std::size_t n) const {
     // It keeps away from the neighbouring peaks: half way to the fall behind the last one, and up to the next one.
-    const std::vector<double>& time = recording_.time;
+    const std::vector<double>& time = even_.time;
     return fit(all[k], k > 0 ? (time[all[k - 1].trough] + time[all[k - 1].at]) / 2 : time.front(),
                k + 1 < all.size() ? time[all[k + 1].at] : time.back(), n, {});
   }
@@ -353,10 +353,10 @@ class Search {
                                std::optional<KnownAngle> known) const {
     const std::vector<double>& time = recording_.time;
     const std::size_t fall = peak.fall;
-    const double at = (time[fall] + time[fall + 1]) / 2;
+    const double at = (even_.time[fall] + even_.time[fall + 1]) / 2;
     from = std::max(from, at - options_.fit_span), to = std::min(to, at + options_.fit_span);
     const StanceFit guess{.time = at,
-                          .angle_rad = (recording_.angle_rad[fall] + recording_.angle_rad[fall + 1]) / 2,
+                          .angle_rad = (even_.angle_rad[fall] + even_.angle_rad[fall + 1]) / 2,
                           .omega_minus = speed_[peak.at],
                           .omega_plus = speed_[std::min(peak.trough, fall + (fall - std::min(fall, peak.at)) + 1)],
                           .residual_sd_rad = 0};
@@ -372,9 +372,9 @@ class Search {
     const std::optional<StanceFit> whole = fitted(first, end_at(to), AfterCollision::stands);
     if (whole && noise_alone(*whole, end_at(to) - first)) return whole;
     // Feet hop: the wheel stands for the last part of a step only, and flies at first.
-    const std::size_t end = end_at(std::min(to, at + flight_span)),
-                      stride = std::max<std::size_t>(1, (fall - first) / most_tries);
-    for (std::size_t begin = first; begin + 2 <= fall; begin += stride)
+    const std::size_t end = end_at(std::min(to, at + flight_span)), before = end_at(even_.time[fall]),
+                      stride = std::max<std::size_t>(1, (before - first) / most_tries);
+    for (std::size_t begin = first; begin + 3 <= before; begin += stride)
       if (const std::optional<StanceFit> fit = fitted(begin, end, AfterCollision::flies);
           fit && noise_alone(*fit, end - begin))
         return fit;
@@ -390,6 +390,7 @@ class Search {
   }
 
   const AngleRecording& recording_;
+  AngleRecording even_;  // whose frames the indices count
   const dynamics::WheelMap& map_;
   int first_leg_;
   const FinderOptions& options_;

@@ -38,6 +38,7 @@ ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
   analysis::Defects defects;
   auto [form, found] = csv_form(text, request.form, [&](const std::vector<std::string>& names) {
     try {
+      if (!request.columns.empty()) return names_all(request.columns, names, request.collisions_from);
       const std::vector<MappedColumn> map = map_columns(request.columns, names, request.file, request.collisions_from);
       return column_of(map, Role::omega_minus) != nullptr || column_of(map, Role::angle) != nullptr;
     } catch (const std::invalid_argument&) {
@@ -46,6 +47,11 @@ ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
   });
   file.found = std::move(found);
   file.names = analysis::CsvReader::names(text, form);
+  if (request.form.separator && file.names.size() == 1)
+    for (const auto& [separator, name] : {std::pair(';', "';'"), std::pair('\t', "tab"), std::pair(',', "','")})
+      if (separator != *request.form.separator && file.names.front().find(separator) != std::string::npos)
+        throw std::invalid_argument(
+            fmt::format("{}:1: one column, which holds a {}; say --separator {}", request.file, name, name));
   if (!file.names.empty()) file.map = map_columns(request.columns, file.names, request.file, request.collisions_from);
   if (!file.names.empty() && column_of(file.map, Role::omega_minus) == nullptr &&
       column_of(file.map, Role::angle) == nullptr)

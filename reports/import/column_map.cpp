@@ -246,6 +246,17 @@ std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& reques
   return map;
 }
 
+bool names_all(const std::vector<RequestedColumn>& requests, std::span<const std::string> names, int first_collision) {
+  std::vector<std::string> bare;
+  for (const std::string& name : names) bare.emplace_back(split_unit(name).name);
+  return std::ranges::all_of(requests, [&](const RequestedColumn& request) {
+    const std::string without(split_unit(request.text).name);
+    return !columns_called(request.text, names, first_collision).empty() ||
+           !columns_called(without, names, first_collision).empty() ||
+           !columns_called(without, bare, first_collision).empty();
+  });
+}
+
 bool is_unit(std::string_view text) {
   while (text.starts_with(' ') || text.starts_with('[') || text.starts_with('(')) text.remove_prefix(1);
   while (text.ends_with(' ') || text.ends_with(']') || text.ends_with(')')) text.remove_suffix(1);

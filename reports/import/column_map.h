@@ -44,6 +44,9 @@ struct MappedColumn {
 std::vector<MappedColumn> map_columns(const std::vector<RequestedColumn>& requests, std::span<const std::string> names,
                                       const std::string& file, int first_collision);
 
+/// Says whether every requested name is there, whatever its unit.
+bool names_all(const std::vector<RequestedColumn>& requests, std::span<const std::string> names, int first_collision);
+
 /// Says whether a text is one of the units, as it is or in brackets ("deg/s", "[m]").
 bool is_unit(std::string_view text);
 

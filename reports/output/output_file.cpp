@@ -177,6 +177,8 @@ void OutputFolder::commit(const fs::path& last) {
     fs::rename(temporary_ / file, target_ / file, error);
     if (error) throw OutputError(target_ / file, error.message());
   }
+  fs::remove_all(temporary_, error);
+  temporary_.clear();
 }
 
 FolderIfFilled::FolderIfFilled(const fs::path& folder) : path_(folder) {

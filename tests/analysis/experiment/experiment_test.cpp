@@ -65,7 +65,7 @@ std::string replaced(std::string text, const std::string& old, const std::string
 TEST(Experiment, ReadsEverythingThatTheFilesSay) {
   const Experiment e = parse_experiment(source("title = \"t\"\n" + description + "[sensor]\nrate_hz = 120\n",
                                                "omega_plus_rad_s,condition,trial,collision,leg,omega_minus_rad_s\n"
-                                               "4.5,b,7,1,1,5.5\n4.0,a,3,1,0,5.0\n,b,7,2,2,5.1\n",
+                                               "4.5,b,7,1,1,5.5\n4.0,a,3,1,0,5.0\n,b,7,2,2,8.1\n",
                                                "trial,condition,outcome\n3,a,rest\n7,b,end_of_ramp\n"));
   EXPECT_EQ(e.title, "t");
   EXPECT_EQ(e.system, System::rimless_wheel);
@@ -87,7 +87,7 @@ TEST(Experiment, ReadsEverythingThatTheFilesSay) {
   ASSERT_EQ(e.trials[1].collisions.size(), 2u);
   EXPECT_EQ(e.trials[1].collisions[0].omega_plus, 4.5);
   EXPECT_EQ(e.trials[1].collisions[1].omega_plus, std::nullopt);
-  EXPECT_EQ(e.trials[1].collisions[1].omega_minus, 5.1);
+  EXPECT_EQ(e.trials[1].collisions[1].omega_minus, 8.1);
   EXPECT_EQ(e.columns.leg, Presence::all);
   EXPECT_EQ(e.columns.omega_plus, Presence::some);
   EXPECT_EQ(e.columns.time, Presence::none);
@@ -284,8 +284,8 @@ TEST(Experiment, ReadsAMillionRowsQuickly) {
   for (int t = 1; t <= trials; ++t)
     for (int c = 1; c <= collisions; ++c)
       fmt::format_to(std::back_inserter(rows), "a,{},{},{},{:.6f},{:.6f},{:.9g},{:.9g}\n", t, c, c % 4, 0.2 * c,
-                     0.1165 * c, 5 + 0.001 * t / c, 4 + 0.001 * t / c);
-  const ExperimentSource text = source(description, rows);
+                     0.1165 * c, 8 + 0.001 * t / c, 7 + 0.001 * t / c);
+  const ExperimentSource text = source(replaced(description, "3.66", "36.6"), rows);
   const auto start = std::chrono::steady_clock::now();
   const Experiment e = parse_experiment(text);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
