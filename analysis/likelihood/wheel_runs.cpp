@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/likelihood/wheel_columns.h"
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/settled/share_grid.h"
@@ -227,10 +228,10 @@ void blur_digits(WheelRuns& measured, double digits) {
                   added, measured.noise));
 }
 
-// Under `plastic` nothing scatters but what is seen: where that repeats the model to rounding, a normal error is added,
-// against which the model's collisions can be held.
+// Under `plastic` nothing scatters but what is seen: where that repeats the model to rounding, the normal error of a good
+// sensor is added, against which the model's collisions can be held.
 void blur_exact(WheelRuns& measured) {
-  constexpr double added = 1e-4;  // [rad/s], ten times what counts as rounding
+  constexpr double added = imagined_noise;
   const std::uint64_t seed = word_of(measured);
   std::uint64_t draw = 0;
   for (auto& [where, landings] : landings_by_number(measured)) {

@@ -141,7 +141,7 @@ TEST(OwnData, UnderSettledWithoutOmegaPlusFeetThatNeverSurelyStandAreRefused) {
 TEST(OwnData, UnderPlasticIsNoGapAndAMisreadSlopeIsOne) {
   Experiment own = own_experiment({.law = dynamics::Law::plastic, .trials = 20, .seed = 2});
   EXPECT_EQ(verdict_name(diagnosed(own).verdict), "no_gap");
-  own.conditions[0].slope_deg += 0.002;
+  own.conditions[0].slope_deg += 0.03;
   const Diagnosis d = diagnosed(own);
   EXPECT_EQ(verdict_name(d.verdict), "explained") << d.sentences.front();
   EXPECT_NE(std::ranges::find(d.causes.set, "slope_offset"), d.causes.set.end()) << d.sentences.front();
