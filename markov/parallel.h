@@ -14,7 +14,8 @@ int thread_count(int requested);
 /// started are then skipped.
 void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& work);
 
-/// Is told the share of the work that is done, (0, 1], from any thread, one at a time; what it throws ends the work.
+/// A listener that is told the share of the work that is done, (0, 1], from any thread, one at a time; what it throws
+/// ends the work.
 using Share = std::function<void(double share)>;
 
 /// Does the same, and `progress`, if there is one, is told a thousand times at most.

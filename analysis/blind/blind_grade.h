@@ -43,7 +43,7 @@ struct Proportion {
 /// Gives Wilson's 95 % interval of a proportion; that of nothing is {0, 1}.
 std::pair<double, double> wilson(const Proportion& proportion);
 
-/// Is one line of the table of measures.
+/// One line of the table of measures.
 struct Grade {
   std::string measure;
   Proportion proportion;
@@ -51,7 +51,8 @@ struct Grade {
   double most_upper = 1;             ///< the most that the upper end of its interval may be
 };
 
-/// Is how often one way of answering named what: the diagnosis by the first of its set, or a criterion by its effects.
+/// Counts of how often one way of answering named what: the diagnosis by the first of its set, or a criterion by its
+/// effects.
 struct WayGrade {
   std::string way;
   Proportion alarms;            ///< named something where there is no gap

@@ -25,7 +25,7 @@ constexpr std::string_view wind = "crosswind", sway = "swaying_floor";
 constexpr int wind_nodes = 17, phases = 24;
 constexpr double strongest_wind = 3.2;  // [sds]
 
-// Is something that a trial may have drawn, and how likely that is.
+// Something that a trial may have drawn, and how likely that is.
 struct Drawn {
   double weight = 1, torque = 0, phase = 0;
 };

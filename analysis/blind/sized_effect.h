@@ -11,7 +11,7 @@
 
 namespace metastable::analysis {
 
-/// Is an effect as a function of its size: the rest of it (which leg, where, which sign) is drawn once.
+/// An effect as a function of its size: the rest of it (which leg, where, which sign) is drawn once.
 struct SizedEffect {
   std::function<dynamics::Effect(double)> at;  ///< of a size in [0, largest]; at 0 the effect is neutral
   double start = 0;                            ///< where a search for a power of 16 begins, in (0, largest]

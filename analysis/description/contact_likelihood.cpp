@@ -28,7 +28,7 @@ std::vector<double> friction_nodes(const dynamics::WheelMap& map, int phase) {
 
 double restitution_at(std::size_t column) { return static_cast<double>(column) / (columns - 1); }
 
-// Is a node of the grid with omega+^2 there.
+// A node of the grid with omega+^2 there.
 struct Corner {
   double restitution, friction, value;
 };
@@ -78,7 +78,7 @@ std::vector<ContactLikelihood::Piece> ContactLikelihood::region_of_rest(const Su
   return pieces;
 }
 
-// Is the curve of the (eta, mu) that lead from one state to its landing: omega+^2 has the level it needs there.
+// The curve of the (eta, mu) that lead from one state to its landing: omega+^2 has the level it needs there.
 class ContactLikelihood::LevelCurve {
  public:
   LevelCurve(const dynamics::WheelMap& map, const MeasuredLanding& transition)

@@ -42,7 +42,7 @@ class ContactLikelihood {
     double restitution, friction, weight, friction_to;
     std::size_t column;
   };
-  /// Is one transition: the curve that leads to its landing, or the region that rests.
+  /// One transition: the curve that leads to its landing, or the region that rests.
   struct Observed {
     bool landing, rested;
     std::vector<Piece> pieces;

@@ -43,7 +43,7 @@ struct SampleComparison {
   EffectSize hedges, superiority, distance;
   DistributionTest kolmogorov_smirnov, anderson_darling;
 };
-/// Is nothing for fewer than two values in either sample.
+/// Nothing for fewer than two values in either sample.
 std::optional<SampleComparison> compare_samples(std::span<const double> a, std::span<const double> b);
 
 struct ConditionComparison {
@@ -51,7 +51,7 @@ struct ConditionComparison {
   std::optional<SampleComparison> trial_means;        ///< steady state, one value a trial: the p-values hold
   std::optional<SampleComparison> all_collisions;     ///< steady state, collisions pooled as the paper seems to do
   std::vector<std::optional<double>> p_by_collision;  ///< Welch at collision 1, 2, ...
-  /// Is the first collision from which on no test up to the last common one has p < 0.05; nothing if the last one has.
+  /// The first collision from which on no test up to the last common one has p < 0.05; nothing if the last one has.
   std::optional<int> meet;
 };
 ConditionComparison compare_conditions(const TrialSpeeds& a, const TrialSpeeds& b);

@@ -15,7 +15,7 @@ struct MeasuredLanding {
   std::size_t condition = 0;  ///< index in the experiment
   int phase = 0;              ///< of the map
   double state = 0;           ///< omega_minus^2 [rad^2/s^2]
-  /// Is x' [rad^2/s^2] of the landing; nothing where only whether it came to rest is known.
+  /// The landing's x' [rad^2/s^2]; nothing where only whether it came to rest is known.
   std::optional<double> landing;
   bool rested = false;
 };

@@ -18,7 +18,7 @@ using TrialSpeeds = std::vector<std::vector<double>>;
 TrialSpeeds speeds(const Experiment& experiment, std::size_t condition);
 TrialSpeeds speeds(const std::vector<dynamics::Trial>& trials);
 
-/// Is the first collision of the steady state: the paper compares beyond the 12th.
+/// The first collision of the steady state: the paper compares beyond the 12th.
 constexpr int steady_collision = 13;
 
 struct SpeedSummary {

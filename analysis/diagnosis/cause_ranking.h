@@ -16,8 +16,8 @@ struct RankedCause {
   std::vector<EffectTerm> terms;
   Fit fit;
   double gain = 0;  ///< 2 Delta penalised log likelihood over the recalibrated model
-  /// Is of the gain by chance: of a single effect by the variants listed, before one between them was sought; of a
-  /// pair that of what the second effect earned beyond the first.
+  /// The probability of the gain by chance: of a single effect by the variants listed, before one between them was
+  /// sought; of a pair that of what the second effect earned beyond the first.
   double p_value = 1;
   double evidence = 0;  ///< log Bayes factor against the recalibrated model, prior odds of pairs included
   double together =

@@ -72,7 +72,7 @@ struct Visibility {
   double times_more = 0;  ///< data needed to see the effect at the end of its range, as a multiple of these
 };
 
-/// Is a statement that these data do not allow.
+/// A statement that these data do not allow.
 struct NotPossible {
   std::string statement, because;
   std::optional<std::size_t>
@@ -80,7 +80,7 @@ struct NotPossible {
   bool of_the_gap = false;  ///< one of the questions asked of the gap, not of one effect or of the rests
 };
 
-/// Is an effect that a missing column hides.
+/// An effect that a missing column hides.
 struct HiddenEffect {
   std::string effect, parameter;
   std::optional<double> smallest;          ///< visible size without the column; nothing: it cannot be told at all
@@ -92,12 +92,12 @@ struct MissingColumn {
   std::vector<HiddenEffect> effects;  ///< empty: next to nothing is lost
 };
 
-/// Is a measure of the gap under the models compared, held out, and on data of the last model itself.
+/// A measure of the gap under the models compared, held out, and on data of the last model itself.
 struct Shrinkage {
   std::string measure, unit;
   double baseline = 0, recalibrated = 0, with_effect = 0, floor = 0;
-  /// Is (baseline - with_effect) / (baseline - floor), at most 1, as no model leaves less than nothing; no value where
-  /// the denominator's interval covers zero.
+  /// The closed share (baseline - with_effect) / (baseline - floor), at most 1, as no model leaves less than nothing;
+  /// no value where the denominator's interval covers zero.
   std::optional<double> closed, closed_lower, closed_upper;  ///< 90 % interval over trials
   double baseline_lower = 0, baseline_upper = 0;             ///< 90 %
   double with_effect_least = 0;  ///< of with_effect when trials are drawn anew, some hundred times
@@ -119,7 +119,7 @@ struct ProfilePoint {
   double band = 0;                          ///< half-width of the 95 % band of the mean of as many trials [rad/s]
 };
 
-/// Is an experiment that would tell the remaining causes apart.
+/// An experiment that would tell the remaining causes apart.
 struct NextExperiment {
   std::string change;
   double separation = 0;  ///< 2 Delta log likelihood expected between the two leading causes, at the fitted size

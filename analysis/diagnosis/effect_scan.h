@@ -44,7 +44,7 @@ struct ScanBeside {
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
                         int threads, const ScanBeside& beside = {});
 
-/// Are the trials, and transitions of each on average, from which their scores tell how large chance is: below, false
+/// The trials, and transitions of each on average, from which their scores tell how large chance is: below, false
 /// alarms soar.
 inline constexpr std::size_t enough_trials = 40, enough_transitions = 4;
 

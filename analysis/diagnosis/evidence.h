@@ -6,7 +6,7 @@
 
 namespace metastable::analysis {
 
-/// Is the share of an effect's size that its form may be off by: no catalogue entry has exactly the form of what nature
+/// The share of an effect's size that its form may be off by: no catalogue entry has exactly the form of what nature
 /// did, and such a misfit of a large effect is no second effect.
 inline constexpr double model_error = 0.06;
 
@@ -20,7 +20,7 @@ double evidence_of(const ScannedEffect& scanned, double gain);
 /// Returns the evidence of an effect without variants. @param parameters  >= 0
 double evidence_of_gain(double gain, double parameters);
 
-/// Is 2 Delta log likelihood of one fit over another, in stances and in everything else.
+/// The gain, 2 Delta log likelihood of one fit over another, in stances and in everything else.
 struct PhaseGain {
   double collisions = 0, stances = 0;
 };

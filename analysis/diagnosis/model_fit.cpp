@@ -14,7 +14,7 @@ constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is t
 // Where no step rises, a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
 // what differences do not resolve.
 constexpr double unresolved = 0.5, unresolved_share = 1e-4;
-// Are added to the information's diagonal, as shares of it. Where a step rises by less than this share of what it
+// Shares of the information's diagonal that are added to it. Where a step rises by less than this share of what it
 // promised, the next one is damped more.
 constexpr double dampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
 // Share of what a step foretold by which its rise may differ, for what it leaves to be next to nothing: of the order of

@@ -31,13 +31,13 @@ struct Fit {
   std::string reason;   ///< why it did not converge
 };
 
-/// Is the share of a direction's information, before fitted parameters were projected out of it, that must be left for
+/// The share of a direction's information, before fitted parameters were projected out of it, that must be left for
 /// the data to resolve the direction beside them. Derivatives are differences over 0.05 of what the data resolve, along
 /// which a score's slope changes by some 2 % of itself per unit: they err by 0.001 of their size, so that of a direction
 /// which the fitted parameters take up altogether a share of about 0.001^2 seems to be left.
 inline constexpr double resolved_share = 1e-6;
 
-/// Is the information in units of a parameter's range that the data must hold for the parameter to be told from nothing:
+/// The information in units of a parameter's range that the data must hold for the parameter to be told from nothing:
 /// with less its whole range moves the log likelihood by less than a millionth, and slopes are rounding.
 inline constexpr double resolved_range = 1e-6;
 

@@ -12,7 +12,7 @@ namespace metastable::analysis {
 /// Counts the trials that the held-out measures need: two a fold.
 inline std::size_t trials_for_folds(int folds) { return 2 * static_cast<std::size_t>(folds); }
 
-/// Are the trials, and transitions of a speed in all of them, from which a gap is put down to a cause: contact
+/// The trials, and transitions of a speed in all of them, from which a gap is put down to a cause: contact
 /// parameters, an effect of the catalogue, or something without a name. A rule: five transitions for each of the eight
 /// parameters that a hypothesis fits (means and sds of eta and mu, shape, noise, an effect's own), and as many trials as
 /// a trend among them takes to be told from one odd trial. The tests for a gap are honest below (of 384 folders without

@@ -27,7 +27,7 @@ inline bool is_stance(EventKind kind) { return kind == EventKind::stance; }
 /// Says whether it is a collision, with its stance or alone, or what came of one: rest, survival.
 inline bool is_contact(EventKind kind) { return kind != EventKind::stance && kind != EventKind::launch; }
 
-/// Is one observed transition and its place in the experiment. The list of a data set does not depend on parameters.
+/// One observed transition and its place in the experiment. The list of a data set does not depend on parameters.
 struct Event {
   EventKind kind = EventKind::step;
   std::size_t trial = 0;      ///< index, in the order the trials were run
@@ -50,7 +50,7 @@ struct Evaluation {
   double total() const;
 };
 
-/// Is a parameter that is refitted with every hypothesis, held near its nominal value by a normal prior. Where a stated
+/// A parameter that is refitted with every hypothesis, held near its nominal value by a normal prior. Where a stated
 /// number may be another one altogether, the prior is (1 - misstated) exp(-d^2/2) + misstated, d sds from it: far off it
 /// neither pulls nor lets an effect gain by bringing the parameter back.
 struct Nuisance {
@@ -71,7 +71,7 @@ struct Nuisance {
   double information(double value) const;
 };
 
-/// Is a parameter of an effect that is fitted.
+/// A parameter of an effect that is fitted.
 struct FreeParameter {
   double neutral = 0;
   double lower = 0, upper = 0;
@@ -81,15 +81,15 @@ struct FreeParameter {
   double prior_sd = 0;  ///< of a normal prior about neutral, where more is known than the bounds say; 0: there is none
 };
 
-/// Is a number as it is reported: by its name.
+/// A number as it is reported: by its name.
 using NamedValue = std::pair<std::string, double>;
 
-/// Is what stands for an effect of one size in a fit.
+/// One effect with its variant and the values of its parameters, as a fit holds it.
 struct FittedForm {
   std::vector<double> variant, values;
 };
 
-/// Is an effect as it is fitted: some parameters are free, the others run over a list of variants (a leg, an interval).
+/// An effect as it is fitted: some parameters are free, the others run over a list of variants (a leg, an interval).
 struct Candidate {
   std::string id;
   std::vector<FreeParameter> parameters;
@@ -107,7 +107,7 @@ struct Candidate {
   bool exact = false;
 };
 
-/// Is something that varies in a way that no effect of the catalogue has, as it is fitted.
+/// A variation without a name, as it is fitted: something varies in a way that no effect of the catalogue has.
 struct Variation {
   std::string facet, aspect;  ///< what it goes by, and what of the contact varies
   Candidate candidate;

@@ -22,7 +22,7 @@ using dynamics::StanceState;
 constexpr double lead = 0.3;         // [s] recorded before collision 1
 constexpr std::uint64_t stream = 1;  // of random numbers, apart from the trials' own
 
-// Is the motion between two collisions, or before the first, or after the last.
+// The motion between two collisions, or before the first, or after the last.
 struct Piece {
   double begin = 0, end = 0;  // [s]
   double angle = 0;           // of the wheel at `from`

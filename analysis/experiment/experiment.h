@@ -39,7 +39,8 @@ struct RevolutionLoss {
   /// Returns the mean loss at a speed [rad^2/s^2]. @param omega [rad/s]
   double at(double omega) const { return constant + linear * omega + quadratic * omega * omega; }
 };
-/// Is RevolutionLoss::run_to_run of a drum of which one run is known, and NominalContact::day_to_day where it is not.
+/// The value of RevolutionLoss::run_to_run of a drum of which one run is known, and NominalContact::day_to_day where it
+/// is not.
 inline constexpr double usual_run_to_run = 0.03;
 
 struct Condition {
@@ -54,7 +55,7 @@ struct Condition {
 struct Sensor {
   std::optional<double> rate;      ///< [Hz]
   std::optional<double> noise_sd;  ///< believed noise of the reported speeds [rad/s]
-  /// Is the step of the last digit in the speeds as they were printed [rad/s]; 0: none that tells; nothing: no speeds
+  /// The step of the last digit in the speeds as they were printed [rad/s]; 0: none that tells; nothing: no speeds
   /// were measured (a design).
   std::optional<double> last_digit;
 };

@@ -8,7 +8,7 @@
 namespace metastable::analysis {
 
 struct RollingSpeeds {
-  /// Is the share of an ideal wheel's least speed that others may have whose feet slide or hop. Of 60,000 landings of
+  /// The share of an ideal wheel's least speed that others may have whose feet slide or hop. Of 60,000 landings of
   /// four rigid-body engines and of the virtual laboratory none was below 0.99 of it.
   static constexpr double room = 0.7;
   /// Is `room` of what a wheel reaches before a collision once it has come over a leg: it fell from rest over the foot,

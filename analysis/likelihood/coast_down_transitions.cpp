@@ -77,7 +77,7 @@ struct Losses {
   }
 };
 
-// Is an effect as it is fitted, and what its value does to the losses.
+// An effect as it is fitted, and what its value does to the losses.
 struct DrumEffect {
   Candidate candidate;
   std::function<void(Losses&, double)> apply;

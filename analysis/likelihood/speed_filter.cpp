@@ -17,7 +17,7 @@ using dynamics::normal_density;
 using dynamics::StepContext;
 
 constexpr double log_sqrt_two_pi = 0.91893853320467274178;
-// Is the noise that a collision's density is blurred by [rad/s]; less than this is half a per cent of its variance.
+// The noise that a collision's density is blurred by [rad/s]; less than this is half a per cent of its variance.
 constexpr double least_blur = 0.012;
 
 struct Node {  // of Gauss-Hermite's rule for the standard normal

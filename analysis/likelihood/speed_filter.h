@@ -11,7 +11,7 @@
 
 namespace metastable::analysis {
 
-/// Is the log density below which no event falls: values outside a model's reach stay finite.
+/// The log density below which no event falls: values outside a model's reach stay finite.
 inline constexpr double least_log_density = -60;
 
 /// Returns the normal score of a probability, held inside +-8.

@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// Is the noise of speeds after collisions where these are imagined and none is stated [rad/s].
+/// The noise of speeds after collisions where these are imagined and none is stated [rad/s].
 inline constexpr double imagined_noise = 0.005;
 
 /// Returns the experiment with the legs that land in turn from each condition's first; it must be of a rimless wheel.

@@ -6,7 +6,7 @@
 namespace metastable::analysis {
 namespace {
 
-// Is the share of stated contact parameters that are those of another wheel or another unit altogether: an assumption.
+// The share of stated contact parameters that are those of another wheel or another unit altogether: an assumption.
 // It lets a fit leave them behind at a cost of 4.6 in log likelihood, and no effect gains more by bringing them back.
 constexpr double misstated_contact = 0.01;
 

@@ -27,7 +27,7 @@ struct FoundCollision {
   double peak_time = 0;       ///< of the largest smoothed speed [s]
   double peak = 0;            ///< that speed [rad/s]: the paper's omega_minus
   double peak_angle_rad = 0;  ///< of the wheel then
-  /// Is the stance motion fitted to the samples before and after the drop, extrapolated to the collision. Nothing where
+  /// The stance motion fitted to the samples before and after the drop, extrapolated to the collision. Nothing where
   /// samples are too few or the fit did not settle.
   std::optional<StanceFit> fit;
   double apex_time = 0;  ///< of the smallest smoothed speed before the next collision, mid-stance [s]

@@ -22,7 +22,7 @@ enum class AfterCollision {
   flies    ///< the foot hops: nothing changes the spin
 };
 
-/// Is the wheel's angle at a collision as the other collisions of its trial have it.
+/// The wheel's angle at a collision as the other collisions of its trial have it.
 struct KnownAngle {
   double angle_rad = 0;
   double weight = 0;  ///< of its residual beside those of the samples

@@ -14,7 +14,7 @@ namespace metastable::analysis {
 
 namespace {
 
-// Is a trial that goes on whatever happens: from collision to collision.
+// A trial that goes on whatever happens: from collision to collision.
 class MappedTrial {
  public:
   MappedTrial(const Setting& setting, double slope, const dynamics::ContactNoise& noise, double omega)

@@ -18,7 +18,7 @@ inline const SobolIndex& index_of(const SobolResult& result, VarianceSource sour
 }
 
 struct VarianceSources {
-  /// Is the mean speed before collisions 13 to 16 [rad/s], where nothing rests and x' < 0 is set to 0. Under `settled`
+  /// The mean speed before collisions 13 to 16 [rad/s], where nothing rests and x' < 0 is set to 0. Under `settled`
   /// a wheel that rests goes on as slowly as one just past the barrier.
   SobolResult steady_speed;
   SobolResult steps;  ///< steps before failure, at most those on the ramp; first order: of the expected steps

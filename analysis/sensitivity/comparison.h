@@ -16,7 +16,7 @@ struct Contrast {
   std::size_t against = 0, of = 0;  ///< indices: `of` compared with `against`
   std::optional<Estimate> ratio;    ///< expected steps of `of` over those of `against`; nothing if a side is infinite
   std::optional<Estimate> difference;  ///< expected steps of `of` minus those of `against`
-  /// Is the number of measured trials per setting, each of `collisions` collisions, after which a two-sided 5 % Welch
+  /// The number of measured trials per setting, each of `collisions` collisions, after which a two-sided 5 % Welch
   /// test on the mean number of steps within those collisions tells the two apart with 80 % power; nothing if they do
   /// not differ within them.
   std::optional<double> trials_needed;

@@ -15,8 +15,8 @@ namespace {
 constexpr int strata = 8;                     // launches a draw
 constexpr std::uint32_t other_draws = 1024u;  // replicates of a study are fewer: these draws are not the chain's
 
-// Is m on the states of one phase: linear between the midpoints of cells, from differences that keep their
-// digits.
+// The expected steps m on the states of one phase: linear between the midpoints of cells, from differences that keep
+// their digits.
 class MeanOfPhase {
  public:
   MeanOfPhase(const markov::Adjoint& at, const markov::StateSpace& space, int phase) : grid_(space.grid(phase)) {

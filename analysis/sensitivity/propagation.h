@@ -9,7 +9,7 @@
 
 namespace metastable::analysis {
 
-/// Is what is known of a parameter: its standard error, > 0, in parameter_unit(). Errors are independent of each
+/// The knowledge of a parameter: its standard error, > 0, in parameter_unit(). Errors are independent of each
 /// other.
 struct StandardError {
   Parameter parameter = Parameter::slope;

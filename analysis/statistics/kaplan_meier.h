@@ -10,7 +10,7 @@
 
 namespace metastable::analysis {
 
-/// Is one trial: it rested after collision `steps`, or it survived that one and was seen no further (censored: the end
+/// One trial: it rested after collision `steps`, or it survived that one and was seen no further (censored: the end
 /// of the ramp, or of the recording).
 struct ObservedSteps {
   int steps = 0;  ///< >= 1
@@ -32,7 +32,7 @@ std::vector<SurvivalPoint> kaplan_meier(std::span<const ObservedSteps> trials);
 
 /// Estimates the expected steps before failure from such trials.
 struct ExpectedSteps {
-  /// Is the area under S up to `steady_from` - 1 collisions, and beyond it S / rate: the failure rate is taken as
+  /// The area under S up to `steady_from` - 1 collisions, and beyond it S / rate: the failure rate is taken as
   /// constant in the steady state. Its 95 % come from trials resampled for the first part, the Jeffreys distribution of
   /// the rate for the second.
   Estimate from_start;

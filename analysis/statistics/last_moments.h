@@ -25,7 +25,7 @@ struct StepProfile {
       0;  ///< mean chance, at its beginning, of failing before being back in the middle of the regime
 };
 
-/// Is one step of a path: the state in which it begins, the noise that leads on to the next (or to failure).
+/// One step of a path: the state in which it begins, the noise that leads on to the next (or to failure).
 struct PathStep {
   int phase = 0;
   std::vector<double> state, noise;

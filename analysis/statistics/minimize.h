@@ -13,7 +13,7 @@ struct Minimum {
   bool converged = false;
 };
 
-/// Is a function with its gradient, which has the point's length.
+/// A function with its gradient, which has the point's length.
 using SmoothFunction = std::function<double(const std::vector<double>& at, std::vector<double>& gradient)>;
 
 /// Descends by quasi-Newton steps (BFGS; Nocedal and Wright 2006, ch. 6), for variables in which the function changes

@@ -14,7 +14,7 @@ enum class NumberFormat {
   p_value,      ///< `digits` significant digits, and "< 10⁻¹²" below: chance levels are not followed further down
 };
 
-/// Is a number in decimals: −1.20×10⁷ is sign, mantissa "1.20" and power of ten 7.
+/// A number in decimals: −1.20×10⁷ is sign, mantissa "1.20" and power of ten 7.
 struct Decimal {
   bool negative = false;
   bool infinite = false;

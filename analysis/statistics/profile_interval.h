@@ -14,7 +14,7 @@ namespace metastable::analysis {
 struct ProfileInterval {
   double lower = 0, upper = 0;
   bool bounded_below = false, bounded_above = false;
-  /// Is a point below the minimum given, should the others have found one: the interval then does not hold.
+  /// A point below the minimum given, should the others have found one: the interval then does not hold.
   std::optional<Minimum> better = {};
 };
 

@@ -7,7 +7,7 @@
 
 namespace metastable::analysis {
 
-/// Is a number of trials for each of two settings.
+/// A number of trials for each of two settings.
 struct TrialDesign {
   double trials = 0;  ///< of each, 2 or more
   double power = 0;   ///< with which a two-sided 5 % Welch test on the means then tells the two apart

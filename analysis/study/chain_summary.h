@@ -14,7 +14,7 @@
 
 namespace metastable::analysis {
 
-/// Is a chain whose every state reaches rest, solved once for all that is read off it.
+/// A chain whose every state reaches rest, solved once for all that is read off it.
 struct SolvedChain {
   /// @param regime  the states, ascending, among which the metastable regime is sought; none: all
   /// @throws std::domain_error, markov::ConvergenceError as markov::ChainSolver, markov::quasi_stationary
@@ -39,7 +39,7 @@ struct ChainSteps {
 ChainSteps chain_steps(const markov::AnyReturnMap& map, const markov::StateSpace& space, const SolvedChain& solved,
                        const std::vector<markov::DrawOptions>& draws);
 
-/// Are the levels of all quantiles.
+/// The levels of all quantiles.
 inline constexpr double quantile_levels[] = {0.05, 0.25, 0.5, 0.75, 0.95};
 
 /// Counts the values of the survival curve that a study gives: to the end of the course, where that is not too far.

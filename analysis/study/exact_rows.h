@@ -22,7 +22,7 @@ class ExactRows {
   bool collocated() const { return collocated_; }
   /// Returns the rows' error of the expected steps, relative, however many the nodes.
   double error() const;
-  /// Is rest out of the reach of doubles?
+  /// Says whether rest is out of the reach of doubles.
   bool unresolved() const { return ranges_.empty(); }
   /// Counts the nodes of the coarsest space, per phase.
   std::size_t coarsest() const;

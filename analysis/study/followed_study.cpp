@@ -183,7 +183,7 @@ class Follower {
 
 Course follow(const Problem& problem, double state, int phase) { return Follower(problem, state, phase).follow(); }
 
-// Is a share of the launches, between two scores, that takes equally many steps, or from `fewest` to `most`.
+// A share of the launches, between two scores, that takes equally many steps, or from `fewest` to `most`.
 struct Piece {
   double low = 0, high = 0, mass = 0;
   double fewest = 0, most = 0;

@@ -8,7 +8,7 @@
 
 namespace metastable::analysis {
 
-/// Is the landing of every state known, whatever the noise? It is asked of the map at some states of every phase
+/// The landing of every state known, whatever the noise? It is asked of the map at some states of every phase
 /// (AnyReturnMap::landing_range); a map without scores has no noise, one that does not tell its range counts as noisy.
 bool without_noise(const Problem& problem);
 

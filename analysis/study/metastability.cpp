@@ -29,7 +29,7 @@ constexpr std::size_t first_samples = 4096;
 constexpr std::size_t most_endless = 2048;     // cells a phase
 constexpr double narrowest_integrated = 1e-3;  // sd of eta or mu: between its nodes rest is lost
 constexpr int sizes = 3;                       // cell sizes a ladder holds: cells, cells / 2, cells / 4
-// Is the extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
+// The extrapolation's last change over the error left in it: the error falls by four at least with each cell size.
 constexpr double change_over_error = 3;
 
 // Removes the error of order 2 in the cell size.

@@ -70,7 +70,7 @@ enum class Status {
   rest_unresolved,    ///< rest is possible, but beyond the draws: expected steps exceed from_start.lower
 };
 
-/// Is a value below which a share `level` of all launches stay.
+/// A value below which a share `level` of all launches stay.
 struct Quantile {
   double level = 0;  ///< in (0, 1)
   double value = 0;
@@ -115,7 +115,7 @@ struct StepsToRest {
   std::optional<Accumulated> metres;   ///< from the first foot to the last
   std::vector<double> survival;     ///< P(steps > n), n = 0, 1, ...: 64 values, or to the course's end (10000 at most)
   std::optional<double> reach_end;  ///< probability of surviving the last event of the course
-  /// Is the state below which a launch may come to rest, when faster ones never do.
+  /// The state below which a launch may come to rest, when faster ones never do.
   std::optional<double> safe_state;
 };
 

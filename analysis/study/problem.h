@@ -11,7 +11,7 @@
 
 namespace metastable::analysis {
 
-/// Is one event that was followed.
+/// One event that was followed.
 struct FollowedEvent {
   double state = 0;               ///< before the next event
   double seconds = 0, metres = 0; ///< from the event to the next one; 0 if unknown
@@ -22,7 +22,7 @@ using Run = std::function<std::optional<FollowedEvent>()>;
 struct Problem {
   markov::AnyReturnMap map;
   markov::LaunchState launch;
-  /// Is what is reported of a state (a wheel: omega = sqrt(x) [rad/s]).
+  /// The number that is reported of a state (a wheel: omega = sqrt(x) [rad/s]).
   std::function<double(double state)> observable = [](double state) { return state; };
   /// Numbers the event whose survival means that the end of the course is reached (a ramp: its last
   /// collision).

@@ -11,7 +11,7 @@ namespace metastable::analysis {
 struct RestReachability {
   /// It is false where some launches never come to rest, whatever the noise does: expected steps are infinite.
   bool certain = true;
-  /// Is the lowest state at the launch phase from which no sequence of noise leads to rest; nothing if there is none.
+  /// The lowest state at the launch phase from which no sequence of noise leads to rest; nothing if there is none.
   std::optional<double> safe_state;
 };
 

@@ -12,7 +12,7 @@
 
 namespace metastable::analysis {
 
-/// Is one problem to verify on, with what is known of it.
+/// One problem to verify on, with what is known of it.
 struct Benchmark {
   std::string name;
   Problem problem;

@@ -10,7 +10,7 @@
 
 namespace metastable::analysis {
 
-/// Is a node of the mesh.
+/// A node of the mesh.
 struct SectionPoint {
   std::vector<double> state;
   std::vector<double> place;  ///< along the principal axes of the noise [stationary sds]
@@ -25,7 +25,7 @@ struct WalkerFalls {
   double spacing = 0;  ///< of the nodes [stationary sds]
 };
 
-/// Is a noise by its name and unit: mean + sd z at the normal score z.
+/// A noise by its name and unit: mean + sd z at the normal score z.
 struct NamedNoise {
   std::string name;
   double mean = 0, sd = 1;

@@ -5,7 +5,7 @@
 
 namespace metastable::dynamics {
 
-/// Is a body that is about to hit a surface with one point. "Along" is down the ramp, "up" is out of the surface.
+/// A body that is about to hit a surface with one point. "Along" is down the ramp, "up" is out of the surface.
 struct Impact {
   Law law = Law::published;  ///< published or coulomb
   double mass = 0;           ///< [kg]

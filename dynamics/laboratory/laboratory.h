@@ -1,5 +1,5 @@
 #pragma once
-// Is a virtual laboratory: wheels as they might really be, against which models of them are tested.
+// A virtual laboratory: wheels as they might really be, against which models of them are tested.
 //
 // Shares no formula with WheelMap or the contact laws: the stance is integrated in time (rolling_motion), the collision
 // over its impulse (impulse_collision). The balance of energy over a collision is the paper's: what the impulse does
@@ -61,7 +61,7 @@ struct LaboratoryTrial {
   std::size_t condition = 0;
   std::vector<LaboratoryCollision> collisions;
   Outcome outcome = Outcome::max_collisions;
-  /// Is the wheel's angle in continuous time, 0 at collision 1 [rad], rising; from at most 0.3 s before it to the next
+  /// The wheel's angle in continuous time, 0 at collision 1 [rad], rising; from at most 0.3 s before it to the next
   /// touch after the last collision, or to where the wheel turns back.
   std::vector<Moment> motion;
 };

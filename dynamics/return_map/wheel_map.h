@@ -68,8 +68,8 @@ class WheelMap {
   int phases() const { return static_cast<int>(stance_.size()); }
   int noise_dimension() const { return noise_.dimension(); }
   std::optional<double> landing(double state, int phase, std::span<const double> score) const;
-  /// Is exact, by quadrature over eta and the distribution function of mu in closed form (independent eta, mu, or a
-  /// list); returns nothing for a correlated pair.
+  /// Returns it exactly, by quadrature over eta and the distribution function of mu in closed form (independent eta,
+  /// mu, or a list); returns nothing for a correlated pair.
   std::optional<double> rest_probability(double state, int phase) const;
   /// Gives the density of the landing at each of the next states [1/(rad^2/s^2)]: density[k] belongs to next[k]
   /// (PublishedDensity, and LandingDensity for states slower than any survivor); returns the probability of rest.

@@ -13,7 +13,7 @@ struct FootState {
   double angle = 0, spin = 0, slip = 0, along = 0;
 };
 
-/// Is a Taylor polynomial in time about 0.
+/// A Taylor polynomial in time about 0.
 struct TimeSeries {
   static constexpr int order = 16;
   std::array<double, order + 1> term{};

@@ -34,7 +34,7 @@ struct ContactLever {
 PlaneVelocity strike(const ContactLever& lever, const Contact& contact, const PlaneVelocity& before,
                      double* rubbed_off = nullptr);
 
-/// Is the slip down the plane that a foot would have left at the end of its compression and of the whole impact if
+/// The slip down the plane that a foot would have left at the end of its compression and of the whole impact if
 /// friction held against it without an end [m/s]: below 0 it stops before. Smooth in mu and eta.
 struct SlipLeft {
   double compressed = 0, struck = 0;

@@ -35,7 +35,7 @@ struct SettledMapError {
   std::size_t landings = 0, misjudged_rests = 0;
   double rms = 0, median = 0, largest = 0;  ///< of carried_squared / omega-^2, where both roll on
   double displacement = 0;                  ///< the largest [m]
-  /// Are those of mu_r, the largest and the median.
+  /// Those of mu_r, the largest and the median.
   double resting_friction = 0, resting_friction_median = 0;
 };
 

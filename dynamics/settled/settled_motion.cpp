@@ -12,11 +12,11 @@
 namespace metastable::dynamics {
 namespace {
 
-// Are shares of M g (mean length): kinetic energy that counts as none (1e-3 J for the paper's wheel) and the height
+// Shares of M g (mean length): kinetic energy that counts as none (1e-3 J for the paper's wheel) and the height
 // under the barrier that it cannot climb.
 constexpr double still_share = 4.8e-4, deep_share = 4.8e-3;
 
-// Are the time for which a foot that lifts without speed is let go [s]; how far the wheel turns between two looks at
+// The time for which a foot that lifts without speed is let go [s]; how far the wheel turns between two looks at
 // where its tips are [rad].
 constexpr double lift_off = 1e-6, steady_turn = 0.1;
 

@@ -21,16 +21,16 @@ enum class LandingEnd {
 /// Says what one landing does.
 struct Landing {
   LandingEnd end = LandingEnd::given_up;
-  /// Is omega^2 that a standing foot would have at the landing angle to reach the same spin at the next touch
+  /// The omega^2 that a standing foot would have at the landing angle to reach the same spin at the next touch
   /// [rad^2/s^2]; below the barrier's at rest, 0 where the wheel rests on two feet or was given up.
   double omega_eq_squared = 0;
-  /// Is the same to bring the same angular momentum about the next foot: what the next landing depends on. Differs from
+  /// The same to bring the same angular momentum about the next foot: what the next landing depends on. Differs from
   /// omega_eq_squared only if the foot moves at the next touch: unsettled, or settled and sliding or lifting once more
   /// (`slips_late`: backward, at low mu). The next landing from a standing foot with this then is that from the
   /// moving one to 2e-5 rad/s (median; omega_eq_squared: 1e-3).
   double carried_squared = 0;
   bool slips_late = false;
-  /// Is omega_eq^2 when the foot began to stand, before any late slip; 0 if it never did [rad^2/s^2]. It is continuous
+  /// The omega_eq^2 when the foot began to stand, before any late slip; 0 if it never did [rad^2/s^2]. It is continuous
   /// across the friction below which the wheel rests, where it is the barrier's.
   double settled_squared = 0;
   double displacement =
@@ -44,7 +44,7 @@ struct Landing {
   double slid = 0;           ///< of the landed foot down the plane, without rolling [m]
 };
 
-/// Is a landing and the way to the next touch.
+/// A landing and the way to the next touch.
 struct Step {
   Landing landing;
   bool touched = false;     ///< the next leg touches; else rest, or given up as `landing.end` has it

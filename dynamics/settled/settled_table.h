@@ -13,14 +13,14 @@ class SettledSlice;
 
 /// Says what a landing leaves.
 struct MappedLanding {
-  /// Is omega_eq^2 of the standing foot that carries the same angular momentum to the next touch [rad^2/s^2]
+  /// The omega_eq^2 of the standing foot that carries the same angular momentum to the next touch [rad^2/s^2]
   /// (Landing::carried_squared); 0 at rest.
   double carried_squared = 0;
   double displacement = 0;  ///< of the foot down the plane [m]; 0 at rest
   bool rest = false;
 };
 
-/// Is one leg's table. It holds by restitution the speed at which even a sticking foot rests; from there on, spread in
+/// One leg's table. It holds by restitution the speed at which even a sticking foot rests; from there on, spread in
 /// speed, mu_r and the frictions at which the landing has a kink: mu_2', from which slip stops before the second
 /// compression ends, and mu_2, mu_3, ..., from which it stops in the second, third, ... impact; between them it is
 /// smooth. Landings are kept on every piece [mu_c, mu_2'], [mu_2', mu_2], ... at a few even places, on the last one,
@@ -61,7 +61,7 @@ struct SettledTable {
   SettledSlice slice(double eta) const;  ///< @param eta that holds()
 };
 
-/// Is the table at one restitution. It refers to the table.
+/// The table at one restitution. It refers to the table.
 class SettledSlice {
   // Holds neighbouring nodes around a place on an axis and their weights: Lagrange's polynomial through them.
   static constexpr std::size_t smooth = 6, straight = 2, beyond = 3;  // nodes: between them, and outside
@@ -75,7 +75,7 @@ class SettledSlice {
 
   double lowest_speed() const { return standstill_ + SettledTable::clear_of_rest; }
   bool holds(double omega) const { return omega >= lowest_speed() && omega <= table_->omega_high; }
-  /// Is the table at one of its speeds.
+  /// The table at one of its speeds.
   class SliceAtSpeed {
    public:
     double resting_friction() const { return edge_[SettledTable::stops]; }

@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// Is a planar rigid wheel on a plane of constant slope, SI units. The legs end in discs of radius r that reach to l_i
+/// A planar rigid wheel on a plane of constant slope, SI units. The legs end in discs of radius r that reach to l_i
 /// from the hub, so a standing foot rolls on its disc. (Of a rigid-body engine with tips of 0.5 mm this gives mean
 /// speeds and paces inside their errors; discs about the points at l_i are 0.003 rad/s and 0.5 mm off.)
 struct SettledWheel {
@@ -18,7 +18,7 @@ struct SettledWheel {
   double tip_radius = 0;                                 ///< r [m], in [0, shortest leg / 20]
   double gravity = 9.81;                                 ///< g [m/s^2], > 0
   double slope_rad = 0;                                  ///< gamma, in (0, pi / legs)
-  /// Is the torque against the spin: constant [N m], by omega [N m s], by omega |omega| [N m s^2]; all >= 0.
+  /// The torque against the spin: constant [N m], by omega [N m s], by omega |omega| [N m s^2]; all >= 0.
   double constant_drag = 0, linear_drag = 0, quadratic_drag = 0;
 
   double rest_speed = 1e-5;  ///< v_tol [m/s], > 0: a foot stays down once its bounce is slower
@@ -42,7 +42,7 @@ struct SettledWheel {
 /// @throws std::invalid_argument as validate() and contact_model()
 SettledWheel settled_wheel(const Wheel& wheel, double slope);
 
-/// Is a foot that stands, seen along its leg's angle a past the normal of the plane [rad]; energies per unit mass.
+/// A foot that stands, seen along its leg's angle a past the normal of the plane [rad]; energies per unit mass.
 class StandingFoot {
  public:
   /// @param leg any whole number, counted around the wheel
@@ -80,7 +80,7 @@ inline constexpr double most_settled_restitution = 0.95;
 
 /// Returns the friction from which a rolling wheel's landing on `leg` does not slip, mu_c = d h / (J/M + h^2).
 double sticking_friction(const SettledWheel& wheel, int leg);
-/// Is far enough above mu_c that the foot sticks under its weight, too, on every slope with a barrier.
+/// A margin above mu_c so large that the foot sticks under its weight, too, on every slope with a barrier.
 inline constexpr double clear_of_sticking = 0.02;
 
 }  // namespace metastable::dynamics

@@ -12,7 +12,7 @@ constexpr int speeds = 15, restitutions = 13;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
 constexpr double nearly_all = 2;              // of these sds above the mean, at which a foot must still come to stand
 constexpr double just_above = 1e-7;           // mu_r, of the first place
-// Are the places at which a wheel of so much more J is followed, for the changes with J: every so many speeds and
+// The places at which a wheel of so much more J is followed, for the changes with J: every so many speeds and
 // restitutions.
 constexpr double more_inertia = 1.1;
 constexpr int speed_stride = 2, restitution_stride = 2;

@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// Is a gait that repeats itself after every step.
+/// A gait that repeats itself after every step.
 struct Gait {
   std::vector<double> state;                      ///< just after a strike, as TwoLinkWalker::step takes it
   std::vector<std::complex<double>> eigenvalues;  ///< of the step's derivative there, by falling modulus

@@ -16,7 +16,7 @@ enum class Terrain {
   facets  ///< facets: at the start of a step the feet still stand on the last one, whose slope is one more number
 };
 
-/// Is the walker's stochastic return map: one score a step, the slope's.
+/// The walker's stochastic return map: one score a step, the slope's.
 ///
 /// States are the walker's (half angle [rad], rates [rad/s]), with Terrain::facets followed by the slope [rad] of the
 /// facet under both feet. Thread-safe.

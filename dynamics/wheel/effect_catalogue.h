@@ -28,7 +28,7 @@ struct EffectInfo {
   std::vector<EffectParameter> parameters;
 };
 
-/// Is the one effect that is no missing physics: other contact parameters, which a recalibration refits.
+/// The one effect that is no missing physics: other contact parameters, which a recalibration refits.
 inline constexpr std::string_view contact_distribution_id = "contact_distribution";
 
 /// Lists all effects, in a fixed order.

@@ -86,7 +86,7 @@ class ExtendedWheel {
                           double next) const;
   /// Returns P(rest) after a landing at omega [rad/s]. @param omega_plus  after the first impact, where it is known
   double rest_share(const StepContext& context, double omega, std::optional<double> omega_plus) const;
-  /// Is a landing with a drawn contact: the next omega- [rad/s], nothing at rest, and the slide [m].
+  /// A landing with a drawn contact: the next omega- [rad/s], nothing at rest, and the slide [m].
   struct Drawn {
     std::optional<double> next;
     double displacement = 0;

@@ -43,7 +43,7 @@ struct LandingShares {
   std::vector<float> resting;             ///< by leg, speed, restitution: mu_r; mu_c where even a sticking foot rests
   std::vector<float> kept, displacement;  ///< ... and place: carried omega^2 / omega-^2, slide of the foot [m]
 
-  /// Are the changes of these with ln J, by straight lines; a grid without them is not read at another J.
+  /// The changes of these with ln J, by straight lines; a grid without them is not read at another J.
   std::vector<float> resting_rate, kept_rate, displacement_rate;
 
   /// By leg and speed: the largest restitution with which a sticking foot stands before the next leg touches. Empty: it
@@ -67,7 +67,7 @@ struct LandingShares {
   struct Kept {
     double share = 0, displacement = 0;
   };
-  /// Is one leg at one speed and one restitution; beyond the axes the last values are kept. It refers to the grid.
+  /// One leg at one speed and one restitution; beyond the axes the last values are kept. It refers to the grid.
   class SharesAtRestitution {
    public:
     double resting_friction() const { return resting_; }
@@ -87,7 +87,7 @@ struct LandingShares {
     std::array<double, 4> weights_;
     double resting_;
   };
-  /// Is one leg at one speed; beyond the axes as above.
+  /// One leg at one speed; beyond the axes as above.
   class SharesAtSpeed {
    public:
     SharesAtSpeed(const LandingShares& grid, int leg, double omega);

@@ -5,7 +5,7 @@
 
 namespace metastable::dynamics {
 
-/// Is where the table ends.
+/// The score at which the table ends.
 inline constexpr double normal_reach = 8;
 
 /// Finds Phi(z) and the density there, to 1e-9 of either; beyond |z| = 8 they are those there, and of NaN those at -8.

@@ -14,7 +14,7 @@ enum class Law;
 struct Range {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
   bool low_open = false, high_open = false;  ///< an infinite end is always open
-  /// Is false for what is not finite.
+  /// Holds for finite values only.
   bool holds(double value) const;
   std::string text() const;  ///< "[0.001, 100]", "(0, inf)"
 };

@@ -20,7 +20,7 @@ constexpr double far_score = 4.2, far_of_all = 3.4;  // of restitutions
 
 double square(double v) { return v * v; }
 
-// Are contacts that gave one omega+, at some restitutions.
+// Contacts that gave one omega+, at some restitutions.
 struct Contacts {
   using Values = std::array<double, nodes_of_restitution>;
   std::size_t count = 0;
@@ -152,7 +152,7 @@ class FirstImpact {
   double lever_sq_, lost_, rate_, stuck_;
 };
 
-// Are landings in the order of their restitution, each standing for those half the way to its neighbours.
+// Landings in the order of their restitution, each standing for those half the way to its neighbours.
 struct Landings {
   struct One {
     double eta, mass;
@@ -192,7 +192,7 @@ Contacts contacts(const FirstImpact& first, const Weights& weights, double low, 
   return contacts(first, weights, low, high, [](double eta, double weight) { return std::pair(eta, weight); });
 }
 
-// Is the restitution at which omega_eq^2 crosses the barrier.
+// The restitution at which omega_eq^2 crosses the barrier.
 struct Edge {
   double eta;
   bool rising;  // those above it go on
@@ -251,7 +251,7 @@ void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weig
   }
 }
 
-// Are every second of the grid's places, and the first.
+// Every second of the grid's places, and the first.
 constexpr std::array<int, LandingShares::parts / 2 + 1> cell_places = [] {
   std::array<int, LandingShares::parts / 2 + 1> places{};
   for (std::size_t k = 1; k < places.size(); ++k) places[k] = 2 * static_cast<int>(k) - 1;

@@ -12,7 +12,7 @@
 
 namespace metastable::dynamics {
 
-/// Is a landing of a wheel that may differ from the grid's own.
+/// A landing of a wheel that may differ from the grid's own.
 struct SettledLanding {
   LandingShares::SharesAtSpeed place;  ///< of the grid, at `omega`
   double omega = 0;                    ///< omega- [rad/s]

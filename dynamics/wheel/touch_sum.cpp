@@ -12,7 +12,7 @@ namespace {
 constexpr double unknown_share = 0.002, unknown_error = 0.2;  // of landings; [rad/s]
 constexpr double thin = 0.02;                                 // a cell whose ends' mean is taken, in blurs
 
-// Is Student's density with three degrees of freedom: a foot that slides far does so less surely than the grid says.
+// Student's density with three degrees of freedom: a foot that slides far does so less surely than the grid says.
 double slide_density(double z) {
   const double tail = 1 + z * z / 3;
   return 0.3675525969478614 / (tail * tail);
@@ -30,7 +30,7 @@ METASTABLE_WIDE void find_area(std::size_t count, TouchSum::Ends& ends) {
   for (std::size_t k = 0; k < count; ++k) ends.area[k] = ends.z[k] * ends.below[k] + ends.density[k];
 }
 
-// Is what a cell adds by unit of mass.
+// The amount that a cell adds by unit of mass.
 struct OfCell {
   double middle, density, below, slope, curvature;  // the last two are the density's, in z
 };

@@ -15,9 +15,9 @@ std::vector<double> paper_leg_lengths();
 struct Wheel {
   std::vector<double> leg_length = paper_leg_lengths();  ///< L_i [m], in the order they land; 3 or more, each > 0
   double hub_mass = 1.39;                                ///< M [kg], > 0
-  /// Is the inertia about the stance foot, I [kg m^2], > 0. Where it is not given see stance_inertia().
+  /// The inertia about the stance foot, I [kg m^2], > 0. Where it is not given see stance_inertia().
   std::optional<double> inertia;
-  /// Is the radius of gyration about the hub, r_g [m], >= 0. Where it is not given, each law has its own default.
+  /// The radius of gyration about the hub, r_g [m], >= 0. Where it is not given, each law has its own default.
   std::optional<double> radius_of_gyration;
   double tip_radius = 0;               ///< r of the legs' round tips [m], in [0, shortest leg / 20]; `settled` only
   std::optional<double> contact_mass;  ///< m_c [kg] of the Kelvin-Voigt contact (25); default M

@@ -16,7 +16,7 @@ class MapError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Is a stochastic return map, in batches: n states in rows of `dimension` numbers, scores in rows of `scores`
+/// A stochastic return map, in batches: n states in rows of `dimension` numbers, scores in rows of `scores`
 /// independent standard normal numbers. The event at phase p is followed by the one at phase (p + 1) % phases.
 struct BatchMap {
   int dimension = 1;               ///< 1 to 4

@@ -21,7 +21,7 @@ class NoFailureFound : public MapError {
   using MapError::MapError;
 };
 
-/// Is a further state of phase 0 that a mesh grows from.
+/// A further state of phase 0 that a mesh grows from.
 struct MeshSource {
   std::vector<double> state;
   double action = 0;  ///< with which it starts, >= 0
@@ -39,7 +39,7 @@ struct MeshOptions {
   std::vector<MeshSource> sources = {};           ///< other gaits (OtherGaits)
   double start_action = 0;                        ///< of the start and its orbit
   double limit = 0;                               ///< > 0: nodes as far as this action, wherever failures are
-  /// Are states of phase 0 whose actions are asked for: if there are any, it grows until they and a failure are met.
+  /// States of phase 0 whose actions are asked for: if there are any, it grows until they and a failure are met.
   std::vector<std::vector<double>> targets = {};
 };
 

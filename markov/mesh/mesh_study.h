@@ -48,7 +48,7 @@ struct MeshStudy {
   double mixing_steps = 0;
   std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
   double cheapest_failure = 0;
-  /// Are states of phase 0 of other gaits that the noise leads to, and the shares of the expected steps taken there.
+  /// States of phase 0 of other gaits that the noise leads to, and the shares of the expected steps taken there.
   std::vector<std::vector<double>> other_gaits;
   std::vector<double> other_gait_share;
   /// Holds the relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization,
@@ -63,7 +63,7 @@ struct MeshStudy {
   std::string no_guided, no_simulated;
   /// Holds what was simulated where too few walks fail for an estimate: it may refute the mesh and confirms little.
   std::optional<FailureCount> walks;
-  /// Is empty, or says which ways disagree and that `steps` must not be used.
+  /// Empty, or a sentence that says which ways disagree and that `steps` must not be used.
   std::string disagreement;
 };
 
@@ -78,9 +78,10 @@ class Disagreement : public std::runtime_error {
 
 /// Solves `sizes` meshes of `shifts` shifts each, extrapolates ln T to spacing 0 (h^2 and h^4, with four sizes h^6) for
 /// each shift by itself. The interval joins, as a root of squares, the t-interval over the shifts and the
-/// discretization error; the bracket of what leaves the mesh is added, and on its side what blind spots may hold. The discretization error is the difference from
-/// the extrapolation without the coarsest size; with four sizes, at least that between the two triples'. Meshes coarser
-/// than the default count it by the square of the ratio of their spacings: the sizes show less and less of it.
+/// discretization error; the bracket of what leaves the mesh is added, and on its side what blind spots may hold. The
+/// discretization error is the difference from the extrapolation without the coarsest size; with four sizes, at least
+/// that between the two triples'. Meshes coarser than the default count it by the square of the ratio of their
+/// spacings: the sizes show less and less of it.
 ///
 /// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
 /// windows of it, and direct simulation: trials to failure where 100 or more fit into `simulated_steps`, else 512 walks

@@ -14,15 +14,16 @@ struct OtherGaits {
   std::vector<std::vector<double>> states;  ///< the start's own first; alone: there is no other
   std::vector<MeshSource> sources = {};     ///< for MeshOptions: of all but the start's own
   double start_action = 0, limit = 0;       ///< for MeshOptions; limit 0: there is no other gait
-  /// Is empty, or names a gait that can be slipped into and from which neither a failure nor another gait is found.
+  /// Empty, or a sentence that names a gait that can be slipped into and from which neither a failure nor another gait
+  /// is found.
   std::string trap = {};
 };
 
-/// Follows, without noise, states of a mesh and states that walks under two and four times the noise come through, until
-/// they fail, are within one sd of the start's orbit, or have gone 2300 revolutions: those are on other gaits. From each
-/// gait a coarse mesh is then grown until it meets the others and a failure, to an action of 60 at most. A mesh of
-/// several gaits grows from each of them as far as its last exit and `options.margin`: sources start with the action by
-/// which theirs is less than the farthest.
+/// Follows, without noise, states of a mesh and states that walks under two and four times the noise come through,
+/// until they fail, are within one sd of the start's orbit, or have gone 2300 revolutions: those are on other gaits.
+/// From each gait a coarse mesh is then grown until it meets the others and a failure, to an action of 60 at most. A
+/// mesh of several gaits grows from each of them as far as its last exit and `options.margin`: sources start with the
+/// action by which theirs is less than the farthest.
 /// @param mesh  grown with `options`
 /// @throws as Mesh does, but for NoFailureFound; MapError where there are more than eight other gaits
 OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& frames, std::span<const double> start,

@@ -23,7 +23,7 @@ double normal_mass(double low, double high) {
   return low > 0 ? tail(low) - tail(high) : tail(-high) - tail(-low);
 }
 
-/// Is the polynomial through up to four places, in Newton's form.
+/// The polynomial through up to four places, in Newton's form.
 class Cubic {
  public:
   template <class Places>

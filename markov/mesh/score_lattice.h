@@ -9,7 +9,7 @@
 
 namespace metastable::markov {
 
-/// Is a lattice of normal scores within a ball, moved by an offset: the sum of weight * f(scores) is E f by the
+/// A lattice of normal scores within a ball, moved by an offset: the sum of weight * f(scores) is E f by the
 /// trapezoid rule, whose error for smooth f is far below rounding at spacings up to 0.6; over offsets spread evenly, it
 /// is unbiased for any f that the ball holds.
 class ScoreLattice {

@@ -16,7 +16,7 @@ struct LastSteps {
   std::vector<std::vector<double>> share;
   /// fails_in[k][i] is the probability that a walker in state i fails in exactly its (k + 1)-th step from now.
   std::vector<std::vector<double>> fails_in;
-  /// Is the most likely path: the state in which each step begins, likeliest[k] that of step k.
+  /// The most likely path: the state in which each step begins, likeliest[k] that of step k.
   std::vector<std::uint32_t> likeliest;
 };
 

@@ -73,7 +73,7 @@ struct IteratedPair {
   bool settled = true;
 };
 
-/// Is true when no state can be visited twice: lambda_1 = 0.
+/// Says whether no state can be visited twice: lambda_1 = 0.
 bool never_returns(const Chain& chain) {
   const std::size_t n = chain.size();
   std::vector<std::size_t> sources(n, 0);

@@ -13,11 +13,11 @@ namespace metastable::markov {
 
 /// Describes how survivors of an absorbing chain behave (Byl & Tedrake 2009, their lambda_2 is lambda_1 here).
 struct QuasiStationary {
-  /// Is the left eigenvector of lambda_1 (size n), y Q = lambda_1 y, sum 1, which says what survivors look like. For
+  /// The left eigenvector of lambda_1 (size n), y Q = lambda_1 y, sum 1, which says what survivors look like. For
   /// period d > 1 survivors are in one cyclic class at a time, and the shares that classes have in it are those of
   /// walkers spread over all of them; what survivors in one class look like is its part, see shares_in_classes().
   std::vector<double> distribution;
-  /// Is the right eigenvector, max 1, which is the relative long-run survival from each state.
+  /// The right eigenvector, max 1, which is the relative long-run survival from each state.
   std::vector<double> survival_weight;
   /// It is 1 - lambda_1 per step, with relative accuracy near rounding: for period d, 1 - (lambda of the
   /// revolution)^(1/d), evaluated as -expm1(log1p(-rate of the revolution) / d).
@@ -25,7 +25,7 @@ struct QuasiStationary {
   /// It is 1 - lambda of one revolution (failure_rate when the period is 1).
   double revolution_failure_rate = 0;
   int iterations = 0;
-  /// Is the largest of: |y Q - lambda_1 y| and |Q x - lambda_1 x| entry by entry, relative to that entry times the
+  /// The largest of: |y Q - lambda_1 y| and |Q x - lambda_1 x| entry by entry, relative to that entry times the
   /// probability of leaving its state; and what is left of the error along other eigenvectors, relative, which these do
   /// not show where states change places slowly.
   double residual = 0;

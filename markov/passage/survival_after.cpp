@@ -57,7 +57,7 @@ std::vector<double> followed(const Chain& chain, std::span<const double> start, 
   return at;
 }
 
-/// Is the chain watched every 2^k steps.
+/// The chain watched every 2^k steps.
 class Doubled {
  public:
   explicit Doubled(const Chain& chain) : fails_(Eigen::VectorXd::Zero(size_of(chain))) {

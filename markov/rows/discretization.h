@@ -13,7 +13,7 @@
 
 namespace metastable::markov {
 
-/// Is a chain sampled from a return map, and what goes with it.
+/// A chain sampled from a return map, and what goes with it.
 ///
 /// A row is averaged over its cell: draw k starts at lower + width * offset[k] of every cell, with the cell offsets a
 /// further dimension of the same point set. All cells of one phase share their draws (common errors keep rows smooth in

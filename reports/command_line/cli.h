@@ -13,7 +13,7 @@ namespace metastable::reports {
 /// standard error); 3 a computation failed: a solver, memory, a program that is not there; 130 or 143 interrupted.
 int run(int argc, const char* const* argv);
 
-/// Is a program of commands of its own, parsed and ended in the same way.
+/// A program of commands of its own, parsed and ended in the same way.
 struct Program {
   std::string name, summary;
   std::vector<Command> commands;

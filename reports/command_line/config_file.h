@@ -7,7 +7,7 @@
 
 namespace metastable::reports {
 
-/// Is one key of a configuration file with its value(s) as the command line would spell them.
+/// One key of a configuration file with its value(s) as the command line would spell them.
 struct ConfigEntry {
   std::string key;
   std::vector<std::string> values;  ///< an array gives several

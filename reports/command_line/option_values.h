@@ -31,7 +31,7 @@ analysis::Spread spread_value(std::string_view name, std::string_view text, cons
 std::vector<double> range_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
 /// Reads "paper", one length (then `count` legs of it), or a comma list of 3 to 1000 [m].
 std::vector<double> legs_value(std::string_view name, std::string_view text, int count);
-/// Is it one length, of which a number of legs can be had?
+/// Says whether it is one length, of which a number of legs can be had.
 bool is_one_length(std::string_view text);
 /// Reads pairs from a CSV file with the header "restitution,friction"; errors name file, line and column.
 std::vector<dynamics::Contact> contact_list(const std::string& file);

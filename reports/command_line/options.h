@@ -88,7 +88,7 @@ class Options {
   std::set<std::string> several_;
 };
 
-/// Are options that no command line gives, but give().
+/// Options that give() gives, and no command line.
 class LooseOptions {
  public:
   explicit LooseOptions(const std::function<void(Options&)>& declare);

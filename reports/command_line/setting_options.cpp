@@ -224,7 +224,7 @@ namespace {
 
 constexpr std::size_t most_compared = 100;  // settings
 
-// Are the options of which several values make several settings, the first varying slowest; the others of the wheel
+// The options of which several values make several settings, the first varying slowest; the others of the wheel
 // are given once more for a further value.
 const std::vector<std::string> compared_by_commas{
     "slope",      "law",          "leg-count",       "mass",           "inertia",      "radius-of-gyration",

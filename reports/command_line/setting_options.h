@@ -24,7 +24,7 @@ void add_course(Options& options);
 void add_study(Options& options);
 void add_standard_errors(Options& options);
 
-/// Are contacts in the place of those in the file of --contact-list, which only has to be given then.
+/// Contacts in the place of those in the file of --contact-list, which only has to be given then.
 using Pairs = std::optional<std::vector<dynamics::Contact>>;
 
 /// Reads what the options above say, as far as the command has them: all but slope and launch speed.

@@ -11,7 +11,8 @@
 
 namespace metastable::reports {
 
-/// Is told of cases as they are done, by functions that may throw to stop; `check` and `done` from any thread.
+/// A listener that is told of cases as they are done, by functions that may throw to stop; `check` and `done` from any
+/// thread.
 struct CaseProgress {
   std::function<void(std::size_t all, std::size_t had)> begin;  ///< `had` of them were done before
   std::function<void()> check, done;

@@ -19,7 +19,7 @@ std::string trials_text(const analysis::Contrast& contrast, int collisions) {
                      *contrast.trials_needed, collisions);
 }
 
-// Is empty without standard errors, and where some side has no sensitivities.
+// Empty without standard errors, and where some side has no sensitivities.
 CompareExtras from_standard_errors(const CompareRequest& request, const analysis::Comparison& comparison,
                                    const BeginPart& begin) {
   if (request.standard_errors.empty()) return {};

@@ -8,7 +8,7 @@
 
 namespace metastable::reports {
 
-/// Is a folder that holds no experiment yet and gets one, whole or not at all.
+/// A folder that holds no experiment yet and gets one, whole or not at all.
 class ExperimentOutput {
  public:
   /// @throws OutputError if the folder holds a file of an experiment already, or nothing can be written there: at once

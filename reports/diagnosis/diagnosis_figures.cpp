@@ -53,7 +53,7 @@ bool two_phases(const Diagnosis& d) {
   return std::ranges::any_of(d.gap.recalibrated.cells, [](const GapCell& cell) { return cell.stance; });
 }
 
-// Is one line of a map's figure: the cells of one place, of all aspects and models.
+// One line of a map's figure: the cells of one place, of all aspects and models.
 struct Row {
   std::string facet, name, phase;  // phase: "" where there is one
   std::vector<double> scores;      // a column each; NaN: no such cell

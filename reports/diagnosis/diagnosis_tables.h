@@ -12,7 +12,7 @@ namespace metastable::reports {
 /// Causes less probable are in the files only, in no figure and on no terminal.
 inline constexpr double worded_probability = 0.0005;
 
-/// Is the adjusted p-value below which a cell of the map counts as beyond chance.
+/// The adjusted p-value below which a cell of the map counts as beyond chance.
 constexpr double where_level = 0.05;
 /// Lists the cells beyond chance, by rising adjusted p-value, then by falling statistic.
 std::vector<analysis::GapCell> beyond_chance(const analysis::GapMap& map);

@@ -12,10 +12,10 @@ namespace metastable::reports {
 /// Says what this build can do with MAT files: the library and its version, or "" where it was built without.
 std::string mat_library();
 
-/// Is this how a MAT file begins: of version 4, 5 to 7, or 7.3 (HDF5, with MATLAB's header or without)?
+/// Says whether a MAT file begins like this: of version 4, 5 to 7, or 7.3 (HDF5, with MATLAB's header or without).
 bool is_mat_file(std::string_view text);
 
-/// Is it one of version 7.3, whose dimensions other programs write the other way round?
+/// Says whether it is one of version 7.3, whose dimensions other programs write the other way round.
 bool is_hdf5_file(std::string_view text);
 
 /// @param text  all of the file

@@ -15,7 +15,7 @@
 namespace metastable::reports {
 namespace {
 
-// Is one array of numbers or one text, with the name that MATLAB would give it.
+// One array of numbers or one text, with the name that MATLAB would give it.
 struct Piece {
   std::string place;
   std::vector<double> numbers;

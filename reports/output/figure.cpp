@@ -26,7 +26,7 @@
 namespace metastable::reports {
 namespace {
 
-// Is Okabe and Ito's palette without its yellow, which is too light for lines.
+// Okabe and Ito's palette without its yellow, which is too light for lines.
 constexpr std::array<std::string_view, 7> palette{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
                                                   "#E69F00", "#56B4E9", "#000000"};
 constexpr std::array<int, 7> point_types{7, 5, 9, 11, 13, 6, 4};

@@ -37,18 +37,18 @@ struct Series {
   std::vector<double> y = {};  ///< a point that is not finite leaves a gap
   std::vector<double> lower = {};
   std::vector<double> upper = {};
-  /// Is 0, 1, 2, ... of the palette (Okabe and Ito: told apart by the colour-blind too). Not given, it is the series'
-  /// position. Give a band and its line the same.
+  /// The number, 0, 1, 2, ..., of a colour of the palette (Okabe and Ito: told apart by the colour-blind too). Not
+  /// given, it is the series' position. Give a band and its line the same.
   std::optional<int> colour = {};
 };
 
-/// Is a thin line across the whole figure, at a fixed x (vertical) or y.
+/// A thin line across the whole figure, at a fixed x (vertical) or y.
 struct ReferenceLine {
   bool vertical = true;
   double at = 0;
   std::string label = {};
 };
-/// Is the diagonal y = x over the range of the x axis, e.g. for a return map.
+/// The diagonal y = x over the range of the x axis, e.g. for a return map.
 enum class Diagonal { no, yes };
 
 /// Holds numbers on a grid as coloured, labelled cells: one row of `value` for each y, one column for each x. Cells

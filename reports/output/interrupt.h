@@ -6,11 +6,11 @@
 
 namespace metastable::reports {
 
-/// Is thrown by check_interrupt(). The command line turns it into exit code 130 (SIGINT) or 143 (SIGTERM).
+/// The exception of check_interrupt(). The command line turns it into exit code 130 (SIGINT) or 143 (SIGTERM).
 class Interrupted : public std::runtime_error {
  public:
   explicit Interrupted(int signal);
-  /// Is the same interruption, with what became of the work: "interrupted: ...".
+  /// The same interruption, with what became of the work: "interrupted: ...".
   Interrupted(const Interrupted& one, const std::string& more);
   int exit_code() const { return exit_code_; }
 

@@ -60,7 +60,7 @@ class OutputFolder {
   std::filesystem::path target_, temporary_;
 };
 
-/// Is a folder made before the work, with its parents, so that a place that cannot be written to is refused at once;
+/// A folder made before the work, with its parents, so that a place that cannot be written to is refused at once;
 /// what was made of them is gone again where the work puts nothing into it.
 class FolderIfFilled {
  public:

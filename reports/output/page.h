@@ -26,7 +26,7 @@ struct PageTable {
   std::vector<PageLink> files = {};
 };
 
-/// Is shown when the reader opens it: details, under one line that says what they are.
+/// Details that are shown when the reader opens them, under one line that says what they are.
 struct FoldedPart {
   std::string summary;  ///< that line
   std::vector<std::string> texts = {};

@@ -10,7 +10,7 @@ namespace metastable::reports {
 /// Returns the SHA-256 of the text as 64 hexadecimal digits. @throws std::runtime_error if the library fails
 std::string sha256(std::string_view text);
 
-/// Is one answer in the record: which case, when, the digest of its file, and a digest of all of it with the record
+/// One answer in the record: which case, when, the digest of its file, and a digest of all of it with the record
 /// before.
 struct RecordedAnswer {
   int number = 0;

@@ -40,16 +40,16 @@ inline Estimate with_error(double value, double standard_error) {
   const double half = analysis::normal_95 * standard_error;
   return {value, value - half, value + half};
 }
-/// Is rendered as the word "infinite".
+/// A value that is rendered as the word "infinite".
 struct Infinite {};
 
-/// Is a number that says too little to be shown: CSV has it, people read what there is to say.
+/// A number that says too little to be shown: CSV has it, people read what there is to say.
 struct NotShown {
   Estimate number;   ///< equal ends: without an interval
   std::string said;  ///< "not known: ..."
 };
 
-/// Is one cell: text, whole number, number, number with interval, or infinite. An empty text is an empty cell. An
+/// One cell: text, whole number, number, number with interval, or infinite. An empty text is an empty cell. An
 /// infinite double is shown as "infinite" too; a NaN is refused when the table is rendered.
 class Cell {
  public:

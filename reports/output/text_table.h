@@ -9,7 +9,7 @@
 
 namespace metastable::reports {
 
-/// Is the number of characters of a line where standard output is no terminal.
+/// The number of characters of a line where standard output is no terminal.
 inline constexpr std::size_t line_width = 100;
 
 /// Counts the characters of a line on standard output: the width of its terminal (COLUMNS where that does not tell it,

@@ -24,7 +24,7 @@ namespace {
 using Index = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using Number = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// Is a chain with its factors, made at the first question that needs them.
+/// A chain with its factors, made at the first question that needs them.
 class HeldChain {
  public:
   HeldChain(markov::Chain chain, int threads) : chain_(std::move(chain)), threads_(threads) {}

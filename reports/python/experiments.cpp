@@ -28,7 +28,7 @@
 namespace metastable::reports::python {
 namespace {
 
-/// Is an experiment with the texts it was read from.
+/// An experiment with the texts it was read from.
 struct Held {
   analysis::ExperimentSource source;
   analysis::Experiment experiment;

@@ -110,7 +110,7 @@ void take_failed(const py::object& returned, std::span<std::uint8_t> failed) {
   for (std::size_t i = 0; i < failed.size(); ++i) failed[i] = flags.data()[i] ? 1 : 0;
 }
 
-/// Is a simulator written in Python.
+/// A simulator written in Python.
 struct PythonMap {
   py::object step;
   std::string name;

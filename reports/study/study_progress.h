@@ -16,7 +16,8 @@ inline constexpr std::size_t study_units = 1000;
 /// The callback refers to `progress`; it throws Interrupted after Ctrl-C.
 std::function<void(double, const std::string&)> study_progress(Progress& progress);
 
-/// Is told the share of the work done and what is being done; may throw to stop. As analysis::StudyOptions::progress.
+/// A listener that is told the share of the work done and what is being done; it may throw to stop. As
+/// analysis::StudyOptions::progress.
 using Tell = std::function<void(double, const std::string&)>;
 /// Begins to show a part of the work under this name, and ends with the part before it.
 using BeginPart = std::function<Tell(const std::string& name)>;

@@ -13,7 +13,7 @@
 
 namespace metastable::analysis::test {
 
-// Is spread evenly over 0.1 to 0.2 s.
+// A time spread evenly over 0.1 to 0.2 s.
 inline double since_previous(std::size_t i) { return 0.1 + 0.1 * std::fmod(0.618034 * static_cast<double>(i), 1); }
 
 // Models y = mean + slope w + noise: everything about it is known in closed form.

@@ -7,7 +7,7 @@
 
 namespace metastable::dynamics::test {
 
-/// Is an executor (SettledMapOptions) on two threads.
+/// An executor (SettledMapOptions) on two threads.
 inline void two_threads(std::size_t count, const std::function<void(std::size_t)>& work) {
   const auto every_second = [&](std::size_t first) {
     for (std::size_t i = first; i < count; i += 2) work(i);

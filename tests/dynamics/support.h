@@ -28,7 +28,7 @@ inline Wheel even_wheel() {
   return wheel;
 }
 
-/// Is the paper's contact: eta and mu ~ N(0.4, 0.1^2).
+/// The paper's contact: eta and mu ~ N(0.4, 0.1^2).
 inline const ContactNoise paper_noise = ContactNoise::normal(0.4, 0.1, 0.4, 0.1);
 
 /// Returns the return map of eight equal legs.

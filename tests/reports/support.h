@@ -30,7 +30,7 @@ std::string printed(F f) {
   return testing::internal::GetCapturedStdout();
 }
 
-/// Is a test with an empty folder of its own, which goes with it.
+/// A test with an empty folder of its own, which goes with it.
 class InFolder : public testing::Test {
  protected:
   void SetUp() override {

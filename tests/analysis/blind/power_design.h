@@ -5,7 +5,7 @@
 
 namespace metastable::analysis::test {
 
-/// Is a steep ramp and a contact with which trials last, seen exactly, feet on the ground.
+/// A steep ramp and a contact with which trials last, seen exactly, feet on the ground.
 /// @param trials  >= 1
 inline PowerDesign steep_ramp(int trials) {
   PowerDesign design;

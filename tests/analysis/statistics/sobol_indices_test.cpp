@@ -11,7 +11,7 @@
 namespace metastable::analysis {
 namespace {
 
-// Is Ishigami and Homma's function (1990) with a = 7, b = 0.1: indices in closed form.
+// Ishigami and Homma's function (1990) with a = 7, b = 0.1: indices in closed form.
 void ishigami(std::span<const double> u, std::span<double> out) {
   double x[3];
   for (std::size_t i = 0; i < 3; ++i) x[i] = std::numbers::pi * (2 * u[i] - 1);

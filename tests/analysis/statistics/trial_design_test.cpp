@@ -12,7 +12,7 @@
 namespace metastable::analysis {
 namespace {
 
-// Is min(T, 17) of a geometric lifetime.
+// The lesser of 17 and a geometric lifetime T.
 std::vector<double> geometric(double failure) {
   std::vector<double> probability{0};
   double left = 1;

@@ -18,7 +18,7 @@ namespace {
 constexpr double in_radians = std::numbers::pi / 180;
 const StudyOptions brief_sampled{.brief = true}, brief_integrated{.method = Method::integrated, .brief = true};
 
-// Is a point mass on eight legs of 1 m under `plastic`: x' = x / 2 + 4 g sin(gamma) cos(beta), rest where x / 2 does not
+// A point mass on eight legs of 1 m under `plastic`: x' = x / 2 + 4 g sin(gamma) cos(beta), rest where x / 2 does not
 // pass the barrier 2 g (1 - sin(beta + gamma)).
 struct PointMass {
   double gain, barrier;

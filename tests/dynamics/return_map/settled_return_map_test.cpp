@@ -29,7 +29,7 @@ SettledReturnMap engine_wheel(const ContactNoise& noise, bool direct = false) {
   return {wheel, 7.02 * test::degree, noise, 6, options};
 }
 
-// Is mu ~ N(0.4, 0.03^2), eta ~ N(0.4, 0.05^2).
+// Contacts with mu ~ N(0.4, 0.03^2), eta ~ N(0.4, 0.05^2).
 ContactNoise engine_noise() { return ContactNoise::normal(0.4, 0.05, 0.4, 0.03, 0, most_settled_restitution); }
 
 TEST(SettledReturnMap, RowsAreDistributions) {

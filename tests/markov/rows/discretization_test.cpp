@@ -15,7 +15,7 @@
 namespace metastable::markov {
 namespace {
 
-// Is a third party's map, made without touching markov/: x' = a x + b + s z, rest below zero.
+// A third party's map, made without touching markov/: x' = a x + b + s z, rest below zero.
 struct LinearMap {
   double a = 0.5, b = 2.0, s = 1.0;
   std::pair<double, double> state_interval(int) const { return {0.0, INFINITY}; }
@@ -28,7 +28,7 @@ struct LinearMap {
   }
 };
 
-// Is the same with its probability of rest and a faster table.
+// The same with its probability of rest and a faster table.
 struct InformedMap : LinearMap {
   struct Table {
     std::vector<double> shift;
@@ -51,7 +51,7 @@ struct InformedMap : LinearMap {
   }
 };
 
-// Is the same dynamics seen every other step under another name: period two.
+// The same dynamics seen every other step under another name: period two.
 struct TwoPhaseMap : LinearMap {
   int phases() const { return 2; }
 };
@@ -219,7 +219,7 @@ TEST(ViolationRates, CountWhatTheMapReports) {
   EXPECT_NEAR(rates[1].back(), 1.0, 1e-12);  // the launch
 }
 
-// Is a map with a hole: what lands nowhere must not pass for rest.
+// A map with a hole: what lands nowhere must not pass for rest.
 struct MapWithAHole : LinearMap {
   std::optional<double> landing(double state, int phase, std::span<const double> noise) const {
     return state > 3 && state < 3.1 ? std::numeric_limits<double>::quiet_NaN()

@@ -187,7 +187,7 @@ class HangingGnuplot : public ::testing::Test {
     setenv("PATH", path.c_str(), 1);
     std::filesystem::remove_all(folder);
   }
-  /// Is true once neither runs any more; a zombie that waits for its parent does not.
+  /// Says whether neither runs any more; a zombie that waits for its parent does not.
   bool all_ended() const {
     for (int looks = 0; looks < 200; ++looks) {
       std::ifstream in(folder / "group");

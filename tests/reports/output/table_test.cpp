@@ -235,7 +235,7 @@ TEST(FormatNumber, GeneralAndFixed) {
   EXPECT_THROW(format_number(nan_value, NumberFormat::fixed, 2), std::invalid_argument);
 }
 
-/// Is a locale with decimal commas and grouped thousands, without one being installed.
+/// A locale with decimal commas and grouped thousands, without one being installed.
 struct CommaNumbers : std::numpunct<char> {
   char do_decimal_point() const override { return ','; }
   char do_thousands_sep() const override { return '.'; }
