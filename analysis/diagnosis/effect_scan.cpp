@@ -198,7 +198,7 @@ Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
   // Trials that scatter more than their transitions would by themselves widen it.
   const double trials = static_cast<double>(rows.rows());
   const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
-  const Eigen::ArrayXd own = scan.information.diagonal().array().max(1e-300);
+  const Eigen::ArrayXd own = scan.information.diagonal().cwiseMax(resolved_share * scan.whole).array().max(1e-300);
   const markov::SymmetricEigen split = markov::symmetric_eigen(scan.information);
   rows = split.values.cwiseMax(0).cwiseSqrt().asDiagonal() * split.vectors.transpose() *
          (scatter / own).max(1).sqrt().matrix().asDiagonal();

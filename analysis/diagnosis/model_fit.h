@@ -34,7 +34,8 @@ struct Fit {
 /// The share of a direction's information, before fitted parameters were projected out of it, that must be left for
 /// the data to resolve the direction beside them. Derivatives are differences over 0.05 of what the data resolve, along
 /// which a score's slope changes by some 2 % of itself per unit: they err by 0.001 of their size, so that of a direction
-/// which the fitted parameters take up altogether a share of about 0.001^2 seems to be left.
+/// which the fitted parameters take up altogether a share of about 0.001^2 seems to be left. Measured on wheels: 3e-6 of
+/// eight leg lengths beside an eccentric hub, 2e-3 and more of the parameters of one fit; 1e-16 of what is singular.
 inline constexpr double resolved_share = 1e-6;
 
 /// The information in units of a parameter's range that the data must hold for the parameter to be told from nothing:
