@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "markov/mesh/batch_map.h"
+#include "markov/mesh/coupled_passage.h"
 #include "markov/mesh/mesh.h"
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/noise_frame.h"
@@ -33,15 +34,19 @@ struct Tried {
 class Falls {
  public:
   Falls(const markov::BatchMap& map, std::span<const double> start, const std::vector<NamedNoise>& noises,
-        const markov::MeshOptions& options, int threads)
+        const markov::MeshOptions& options, const markov::OtherGaits& gaits, int threads)
       : map_(map),
         noises_(noises),
         threads_(threads),
         spacing_(options.spacing),
         lattice_(map.scores, map.scores == 1 ? score_spacing : score_spacing_of_several, score_reach),
         frames_(markov::noise_frames(map, start)),
-        mesh_(map, frames_, start, options),
-        passage_(markov::mesh_passage(mesh_, start)) {
+        mesh_(map, frames_, start, markov::with_gaits(options, gaits)),
+        passage_(gaits.states.size() < 2
+                     ? markov::mesh_passage(mesh_, start)
+                     : markov::coupled_passage(mesh_, start, markov::gait_classes(mesh_, gaits.states, frames_),
+                                               gaits.states.size())
+                           .passage) {
     const markov::Chain chain = mesh_.chain();
     last_ = markov::last_steps(chain, passage_.visits, steps_of_a_fall);
     std::vector<std::uint8_t> near_gait;
@@ -220,7 +225,7 @@ WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> st
   const double spacing = study.sizes.at(1).spacing;
   WalkerFalls falls =
       Falls(map, start, noises, {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes},
-            options.threads)
+            study.gaits, options.threads)
           .tell();
   falls.spacing = spacing;
   return falls;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "markov/mesh/score_lattice.h"
 #include "markov/parallel.h"
@@ -18,8 +19,8 @@ namespace {
 constexpr std::size_t kTogether = 128;  // trials followed side by side
 constexpr std::uint64_t kStream = 0x2000;
 
-/// Follows trials first .. first + count - 1 to their failures, `longest` steps at most; stops early once `spent` exceeds
-/// the limit of all.
+/// Follows trials first .. first + count - 1 to their failures, `longest` steps at most; stops early once `spent`
+/// exceeds the limit of all.
 void follow(const BatchMap& map, std::span<const double> start, const SimulationOptions& options, std::uint64_t longest,
             std::size_t first, std::span<std::uint64_t> steps, std::atomic<std::uint64_t>& spent) {
   const auto d = static_cast<std::size_t>(map.dimension), s = static_cast<std::size_t>(map.scores);
@@ -84,14 +85,20 @@ bool follow_all(const BatchMap& map, std::span<const double> start, std::uint64_
 
 std::optional<SimulatedSteps> simulate_steps(const BatchMap& map, std::span<const double> start,
                                              const SimulationOptions& options) {
+  std::vector<std::uint64_t> steps;
+  if (!follow_all(map, start, std::numeric_limits<std::uint64_t>::max(), options, steps)) return std::nullopt;
+  return summarize_steps(std::move(steps));
+}
+
+SimulatedSteps summarize_steps(std::vector<std::uint64_t> steps) {
   SimulatedSteps simulated;
-  simulated.trials = options.trials;
-  if (!follow_all(map, start, std::numeric_limits<std::uint64_t>::max(), options, simulated.steps)) return std::nullopt;
-  const auto n = static_cast<double>(options.trials);
+  simulated.trials = steps.size();
+  const auto n = static_cast<double>(steps.size());
   double squares = 0;
-  for (const std::uint64_t steps : simulated.steps) simulated.mean += static_cast<double>(steps) / n;
-  for (const std::uint64_t steps : simulated.steps) squares += std::pow(static_cast<double>(steps) - simulated.mean, 2);
+  for (const std::uint64_t s : steps) simulated.mean += static_cast<double>(s) / n;
+  for (const std::uint64_t s : steps) squares += std::pow(static_cast<double>(s) - simulated.mean, 2);
   simulated.standard_error = std::sqrt(squares / (n - 1) / n);
+  simulated.steps = std::move(steps);
   return simulated;
 }
 

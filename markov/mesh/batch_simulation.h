@@ -30,8 +30,11 @@ struct SimulatedSteps {
 std::optional<SimulatedSteps> simulate_steps(const BatchMap& map, std::span<const double> start,
                                              const SimulationOptions& options);
 
-/// Follows every trial from `start` until it fails, `longest` steps at most. Returns the step in which each failed, 0 for
-/// those that walk on. Scores are those of simulate_steps(). `options.most_steps` is not read.
+/// Returns mean and standard error of trials that all failed, two or more.
+SimulatedSteps summarize_steps(std::vector<std::uint64_t> steps);
+
+/// Follows every trial from `start` until it fails, `longest` steps at most. Returns the step in which each failed, 0
+/// for those that walk on. Scores are those of simulate_steps(). `options.most_steps` is not read.
 /// @param longest  >= 1
 /// @throws as simulate_steps()
 std::vector<std::uint64_t> follow_walks(const BatchMap& map, std::span<const double> start, std::uint64_t longest,

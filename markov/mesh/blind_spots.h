@@ -17,12 +17,12 @@ struct BlindSpots {
   double missed = 0, imagined = 0;
 };
 
-/// From 3000 random states between the nodes (half of them spread evenly over the nodes, however rarely they are visited,
-/// the others where walkers are and where they fail) it follows a curve in the first score as a mesh does, and steps 16
-/// scores spread evenly along it, the others drawn with twice the noise. A failure between two places that land is
-/// missed; so is one of a whole line in a cell whose nodes hardly fail. Every one counts with its probability: what
-/// matters to the answer is found wherever it lies, if it is about 1e-3 sd wide or more, also where simulation would
-/// meet it in 1e9 steps.
+/// From 3000 random states between the nodes (half of them spread evenly over the nodes, however rarely they are
+/// visited, the others where walkers are and where they fail) it follows a curve in the first score as a mesh does, and
+/// steps 16 scores spread evenly along it, the others drawn with twice the noise. A failure between two places that
+/// land is missed; so is one of a whole line in a cell whose nodes hardly fail. Every one counts with its probability:
+/// what matters to the answer is found wherever it lies, if it is about 1e-3 sd wide or more, also where simulation
+/// would meet it in 1e9 steps.
 /// @param visits  of each node from the start to failure (MeshPassage::visits)
 /// @param options  the mesh's
 BlindSpots find_blind_spots(const BatchMap& map, const std::vector<NoiseFrame>& frames, const Mesh& mesh,

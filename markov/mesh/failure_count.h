@@ -8,11 +8,12 @@
 
 namespace metastable::markov {
 
-/// The chance of calling a mesh refuted that is right: 1e-3, of either side half. It is the level at which two estimates
-/// disagree as well: 1.7 half-widths of 95 % are 3.33 sds, beyond which a normal number lies with 0.9e-3.
+/// The chance of calling a mesh refuted that is right: 1e-3, of either side half. It is the level at which two
+/// estimates disagree as well: 1.7 half-widths of 95 % are 3.33 sds, beyond which a normal number lies with 0.9e-3.
 inline constexpr double refutation_level = 1e-3;
 
-/// Holds what is foretold of walks from the start: the cumulative hazard H(n), so that exp(-H(n)) walk on after n steps.
+/// Holds what is foretold of walks from the start: the cumulative hazard H(n), so that exp(-H(n)) walk on after n
+/// steps.
 struct ForetoldHazard {
   std::vector<double> survival;  ///< [k]: share that walks on after k + 1 steps; beyond the last at `rate` a step
   double rate = 0;               ///< chance of failing in a step, once settled
@@ -22,8 +23,8 @@ struct ForetoldHazard {
   double at(std::uint64_t steps) const;
 };
 
-/// Holds walks of which each failed within so many steps or walked on. Whatever happens in a walk, walks are independent:
-/// their number of failures is binomial, also where failures come in clusters or very late.
+/// Holds walks of which each failed within so many steps or walked on. Whatever happens in a walk, walks are
+/// independent: their number of failures is binomial, also where failures come in clusters or very late.
 struct FailureCount {
   std::size_t walks = 0, failed = 0;
   std::uint64_t longest = 0;  ///< steps of a walk that did not fail

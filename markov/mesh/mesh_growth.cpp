@@ -327,10 +327,10 @@ void MeshGrowth::grow() {
     follow(std::move(spoken));
   }
   if (!(cheapest_failure_ < std::max(farthest, options_.limit)) && target_.empty())
-    throw NoFailureFound(
-        fmt::format("return map: no failure is found within an action of {} (half the sum of squares of the scores that "
-                    "lead to it) from {}, on a mesh of {} nodes",
-                    farthest, describe_state(map_, lattice_.frame(0).centre), sum(static_cast<double>(nodes()))));
+    throw NoFailureFound(fmt::format(
+        "return map: no failure is found within an action of {} (half the sum of squares of the scores that "
+        "lead to it) from {}, on a mesh of {} nodes",
+        farthest, describe_state(map_, lattice_.frame(0).centre), sum(static_cast<double>(nodes()))));
 }
 
 std::span<const std::uint32_t> MeshGrowth::columns(std::size_t row) const {

@@ -15,8 +15,8 @@ constexpr int kInARow = 3;
 
 }  // namespace
 
-MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double settled_change,
-                             int most_products, bool or_stop) {
+MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double settled_change, int most_products,
+                             bool or_stop) {
   const std::size_t n = rows.kill.size();
   const int phases = rows.phases;
   std::vector<double> y(n), before;

@@ -31,8 +31,8 @@ struct MassRows {
 
 /// Follows the distribution of survivors, from one over the nodes of phase 0 (`start`, own nodes), until it keeps its
 /// form: until the failures of a revolution change by no more than `settled_change` of themselves, three times running.
-/// Survivors that do not within `most_products` are an error, or are followed no further if `or_stop`: they then fail on
-/// as they last did.
+/// Survivors that do not within `most_products` are an error, or are followed no further if `or_stop`: they then fail
+/// on as they last did.
 /// @throws ConvergenceError in the first case
 MeshPassage follow_survivors(const MassRows& rows, std::vector<double> start, double settled_change = 1e-9,
                              int most_products = 20000, bool or_stop = false);

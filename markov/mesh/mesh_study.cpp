@@ -27,15 +27,14 @@ constexpr double kEven = 0.5;          // effective samples a sample: below, the
 constexpr double kSampledFrom = 100;   // expected steps above which guided samples settle before they fail
 constexpr double kWidest = 4;          // of the interval: its end over its beginning, beyond which it is no answer
 constexpr double kMostBlind = 0.1;     // of the failures, in blind spots: beyond, bands are stepped over
-constexpr double kFarReach = 12;       // scores on meshes of several gaits, of which some are left very rarely: 1e-32
 constexpr double kLeast = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double kRows = 5e-4;         // what reading rows off curves may leave, about so much
 constexpr std::size_t kFewestTrials = 100;
-constexpr std::size_t kWalks = 512;              // counted where trials would be fewer
-constexpr std::size_t kPilotShare = 16;          // trials for one of the pilot, which sees whether trials end,
+constexpr std::size_t kWalks = 512;      // counted where trials would be fewer
+constexpr std::size_t kPilotShare = 16;  // trials for one of the pilot, which sees whether trials end,
 constexpr std::size_t kPilotLeast = 8, kPilotMost = 128;
-constexpr double kPilotSteps = 4;                // within so many times the expected steps: of 8, 8 or 7 do.
-constexpr double kLongestTrial = 30;             // times the expected steps: one trial of 1e13 takes longer
+constexpr double kPilotSteps = 4;     // within so many times the expected steps: of 8, 8 or 7 do.
+constexpr double kLongestTrial = 30;  // times the expected steps: one trial of 1e13 takes longer
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
 double coarsest(int dimension) {
@@ -102,34 +101,20 @@ std::string disagreement(const char* one, const MeshEstimate& a, const char* oth
       a.value, a.lower, a.upper, other, b.value, b.lower, b.upper);
 }
 
-struct MeanAndError {
-  double mean = 0, error = 0;
-};
-
-MeanAndError mean_and_error(const std::vector<std::uint64_t>& steps) {
-  const auto n = static_cast<double>(steps.size());
-  MeanAndError found;
-  double squares = 0;
-  for (const std::uint64_t s : steps) found.mean += static_cast<double>(s) / n;
-  for (const std::uint64_t s : steps) squares += std::pow(static_cast<double>(s) - found.mean, 2);
-  found.error = std::sqrt(squares / (n - 1) / n);
-  return found;
-}
-
 /// Says what direct simulation finds where there is no mesh, and whether walks fail in it.
 std::pair<std::string, bool> walked_alone(const BatchMap& map, std::span<const double> start,
                                           const MeshStudyOptions& options) {
   const std::size_t walks = std::clamp<std::size_t>(options.simulated_steps, 2, kWalks);
   const std::uint64_t longest = std::max<std::uint64_t>(1, options.simulated_steps / walks);
-  const std::vector<std::uint64_t> walked =
+  std::vector<std::uint64_t> walked =
       follow_walks(map, start, longest, {.trials = walks, .seed = options.seed, .threads = options.threads});
-  const auto failed = static_cast<std::size_t>(std::count_if(walked.begin(), walked.end(), [](auto n) { return n > 0; }));
-  if (failed == 0) return {fmt::format("none of {} simulated walks of {} steps fails", walks, longest), false};
-  if (failed < walks)
-    return {fmt::format("{} of {} simulated walks fail within {} steps", failed, walks, longest), true};
-  const auto [mean, error] = mean_and_error(walked);
-  return {fmt::format("direct simulation: {} walks fail after {:.4g} steps in the mean (standard error {:.2g})", walks,
-                      mean, error),
+  const auto lasting = static_cast<std::size_t>(std::count(walked.begin(), walked.end(), 0U));
+  if (lasting == walks) return {fmt::format("none of {} simulated walks of {} steps fails", walks, longest), false};
+  if (lasting > 0)
+    return {fmt::format("{} of {} simulated walks fail within {} steps", walks - lasting, walks, longest), true};
+  const SimulatedSteps all = summarize_steps(std::move(walked));
+  return {fmt::format("{} of {} simulated walks fail, after {:.4g} steps in the mean (standard error {:.2g})", walks,
+                      walks, all.mean, all.standard_error),
           true};
 }
 
@@ -162,10 +147,10 @@ class Run {
     });
     join();
     if (study_.steps.upper > kWidest * study_.steps.lower)
-      study_.disagreement = fmt::format(
-          "the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}: no number is given", study_.steps.value,
-          study_.steps.lower, study_.steps.upper,
-          options_.simulated_steps > 0 ? "; " + walked_alone(map_, start_, options_).first : std::string());
+      study_.disagreement =
+          fmt::format("the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}: no number is given",
+                      study_.steps.value, study_.steps.lower, study_.steps.upper,
+                      options_.simulated_steps > 0 ? "; " + walked_alone(map_, start_, options_).first : std::string());
     if (study_.disagreement.empty()) simulate();
     if (study_.disagreement.empty()) see_blind_spots();
     if (!study_.disagreement.empty()) return std::move(study_);
@@ -192,23 +177,19 @@ class Run {
         options_.progress(done_ / all_work());
       };
     if (!several_gaits()) return one;
-    one.score_reach = kFarReach;
-    one.sources = gaits_.sources;
-    one.start_action = gaits_.start_action;
-    one.limit = gaits_.limit;
-    return one;
+    return with_gaits(one, study_.gaits);
   }
 
-  bool several_gaits() const { return gaits_.states.size() > 1; }
+  bool several_gaits() const { return study_.gaits.states.size() > 1; }
 
-  /// Looks for other gaits around the coarsest mesh, and solves that, grown anew where there are some. Returns its bytes.
+  /// Looks for other gaits around the coarsest mesh, and solves that, grown anew where there are some. Returns its
+  /// bytes.
   std::size_t begin() {
     const MeshOptions alone = mesh_options(0, 0);
     const Mesh mesh(map_, frames_, start_, alone);
-    gaits_ = find_other_gaits(map_, frames_, start_, mesh, alone);
-    if (!gaits_.trap.empty()) throw Disagreement("mesh study: " + gaits_.trap + ": no number is given");
+    study_.gaits = find_other_gaits(map_, frames_, start_, mesh, alone);
+    if (!study_.gaits.trap.empty()) throw Disagreement("mesh study: " + study_.gaits.trap + ": no number is given");
     if (!several_gaits()) return solve(mesh, 0, 0);
-    study_.other_gaits.assign(gaits_.states.begin() + 1, gaits_.states.end());
     return solve(Mesh(map_, frames_, start_, mesh_options(0, 0)), 0, 0);
   }
 
@@ -230,25 +211,26 @@ class Run {
   std::size_t solve(const Mesh& mesh, std::size_t size, std::size_t shift) {
     CoupledPassage coupled;
     if (several_gaits())
-      coupled = coupled_passage(mesh, start_, gait_classes(mesh, gaits_.states, frames_), gaits_.states.size());
+      coupled =
+          coupled_passage(mesh, start_, gait_classes(mesh, study_.gaits.states, frames_), study_.gaits.states.size());
     else
       coupled.passage = mesh_passage(mesh, start_);
     MeshPassage& passage = coupled.passage;
     steps_[shift][size] = std::log(passage.steps);
     rates_[shift][size] = std::log(passage.failure_rate);
     brackets_[shift][size] = 0.5 * std::log(passage.steps_upper / passage.steps_lower);
+    if (size == 0 && shift == 0)
+      study_.blind_spots = find_blind_spots(map_, frames_, mesh, passage.visits, mesh_options(0, 0));
     const std::lock_guard lock(mutex_);
     done_ += mesh_work(size);
     if (options_.progress) options_.progress(done_ / all_work());
-    if (size == 0 && shift == 0)
-      study_.blind_spots = find_blind_spots(map_, frames_, mesh, passage.visits, mesh_options(0, 0));
     if (shift > 0) return mesh.bytes();
     study_.sizes[size] = {mesh_options(size, 0).spacing, mesh.size(), mesh.entries(), {}};
     if (size + 1 < sizes_) return mesh.bytes();
     study_.mixing_steps = passage.mixing_steps;
     study_.survival = std::move(passage.survival);
     tail_rate_ = several_gaits() ? coupled.first_rate : passage.failure_rate;
-    if (several_gaits()) study_.other_gait_share.assign(coupled.share.begin() + 1, coupled.share.end());
+    study_.gait_share = std::move(coupled.share);
     study_.cheapest_failure = mesh.cheapest_failure();
     return mesh.bytes();
   }
@@ -285,7 +267,8 @@ class Run {
     const BlindSpots& blind = study_.blind_spots;
     if (blind.missed > kMostBlind || blind.imagined > kMostBlind)
       study_.disagreement = fmt::format(
-          "the mesh ({:.4g} steps) and random steps ({} of {} at random places end otherwise than those around them, and "
+          "the mesh ({:.4g} steps) and random steps ({} of {} at random places end otherwise than those around them, "
+          "and "
           "stand for {}) disagree: no number is given",
           study_.steps.value, blind.hits, blind.probes,
           blind.missed > blind.imagined
@@ -305,13 +288,13 @@ class Run {
   /// Follows walks, which may refute the mesh. Returns the steps of each.
   std::vector<std::uint64_t> count(std::size_t walks, double longest) {
     const auto steps = static_cast<std::uint64_t>(std::max(1.0, std::ceil(longest)));
-    std::vector<std::uint64_t> walked = follow_walks(
-        map_, start_, steps, {.trials = walks, .seed = options_.seed, .threads = options_.threads});
+    std::vector<std::uint64_t> walked =
+        follow_walks(map_, start_, steps, {.trials = walks, .seed = options_.seed, .threads = options_.threads});
     study_.walks = count_failures(walked, steps, hazard());
     if (study_.walks->refutes(hazard()))
-      study_.disagreement =
-          fmt::format("the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation ({}) disagree: no number is given",
-                      study_.steps.value, study_.steps.lower, study_.steps.upper, count_text(*study_.walks));
+      study_.disagreement = fmt::format(
+          "the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation ({}) disagree: no number is given",
+          study_.steps.value, study_.steps.lower, study_.steps.upper, count_text(*study_.walks));
     return walked;
   }
 
@@ -331,11 +314,12 @@ class Run {
     }
     count(std::clamp(trials / kPilotShare, kPilotLeast, kPilotMost), kPilotSteps * expected);
     if (!study_.disagreement.empty()) return;
-    const std::vector<std::uint64_t> steps = count(trials, kLongestTrial * expected);
+    std::vector<std::uint64_t> steps = count(trials, kLongestTrial * expected);
     if (!study_.disagreement.empty()) return;
     study_.walks.reset();
-    const auto [mean, error] = mean_and_error(steps);
-    study_.simulated = MeshEstimate{mean, mean - normal_95 * error, mean + normal_95 * error};
+    const SimulatedSteps all = summarize_steps(std::move(steps));
+    const double half = normal_95 * all.standard_error;
+    study_.simulated = MeshEstimate{all.mean, all.mean - half, all.mean + half};
     study_.simulated_trials = trials;
     study_.disagreement = disagreement("the mesh", study_.steps, "direct simulation", *study_.simulated);
   }
@@ -365,8 +349,8 @@ class Run {
       if (window == kLongestWindow) break;
     }
     study_.guided_samples = guided.samples;
-    study_.no_guided = guided.samples > 0 ? "too few of its samples lead to failure to tell"
-                                          : "not asked: failures are too frequent";
+    study_.no_guided =
+        guided.samples > 0 ? "too few of its samples lead to failure to tell" : "not asked: failures are too frequent";
     if (!(guided.rate > 0)) return;
     const double half = normal_95 * guided.standard_error / guided.rate * std::max(1.0, kEven / even);
     if (!(half < 1)) return;                                                   // it tells nothing
@@ -380,7 +364,6 @@ class Run {
   std::span<const double> start_;
   const MeshStudyOptions& options_;
   std::vector<NoiseFrame> frames_;
-  OtherGaits gaits_;
   std::size_t sizes_, shifts_;
   int threads_;
   std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]

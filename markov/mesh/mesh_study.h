@@ -14,6 +14,7 @@
 #include "markov/mesh/blind_spots.h"
 #include "markov/mesh/failure_count.h"
 #include "markov/mesh/mesh.h"
+#include "markov/mesh/other_gaits.h"
 
 namespace metastable::markov {
 
@@ -48,9 +49,8 @@ struct MeshStudy {
   double mixing_steps = 0;
   std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
   double cheapest_failure = 0;
-  /// States of phase 0 of other gaits that the noise leads to, and the shares of the expected steps taken there.
-  std::vector<std::vector<double>> other_gaits;
-  std::vector<double> other_gait_share;
+  OtherGaits gaits;
+  std::vector<double> gait_share;  ///< of the expected steps, by gait, the start's own first; empty: there is no other
   /// Holds the relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization,
   /// and what leaves the mesh.
   double shift_error = 0, discretization_error = 0, bracket = 0;
@@ -95,9 +95,10 @@ class Disagreement : public std::runtime_error {
 /// failures, or where the interval is wider than a factor of four.
 /// The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries
 /// with them, is foreseen from it.
-/// @throws Disagreement where meshes find no failure and simulation does; std::length_error before the other meshes are
-/// made if they would take more than most_bytes; as Mesh, noise_frames and mesh_passage do, with what simulation says
-/// where there is no orbit to centre a mesh on
+/// @param start  a state at phase 0
+/// @throws Disagreement where a gait is a trap, or meshes find no failure and simulation does; std::length_error before
+/// the other meshes are made if they would take more than most_bytes; as Mesh, noise_frames and mesh_passage do, with
+/// what simulation says where there is no orbit to centre a mesh on
 MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options = {});
 
 /// @param what  was studied, for the message

@@ -66,7 +66,7 @@ std::vector<VectorXd> settled_orbit(const BatchMap& map, const Probe& probe, std
     if (moved <= orbit_tolerance * (1 + state.cwiseAbs().maxCoeff())) return orbit;
   }
   throw NoOrbit(fmt::format("return map: without noise it does not settle; it was last at {}",
-                             describe_state(map, {state.data(), static_cast<std::size_t>(state.size())})));
+                            describe_state(map, {state.data(), static_cast<std::size_t>(state.size())})));
 }
 
 MatrixXd by_state(const BatchMap& map, const Probe& probe, int phase, const VectorXd& state) {
@@ -130,8 +130,7 @@ std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double
   const double growth = spectral_radius(revolution);
   if (!(growth < 1))
     throw NoOrbit(fmt::format("return map: without noise its orbit through {} is unstable (largest eigenvalue {:.6g})",
-                               describe_state(map, {orbit[0].data(), static_cast<std::size_t>(map.dimension)}),
-                               growth));
+                              describe_state(map, {orbit[0].data(), static_cast<std::size_t>(map.dimension)}), growth));
   MatrixXd covariance = MatrixXd::Zero(map.dimension, map.dimension);
   std::vector<NoiseFrame> frames(static_cast<std::size_t>(map.phases));
   const int revolutions = 10 + static_cast<int>(std::min(1e4, std::ceil(40 / -std::log(std::max(growth, 1e-6)))));

@@ -20,7 +20,8 @@ constexpr double kHeats[] = {2, 4};    // so many times the noise: what has an a
 constexpr int kHotSteps = 128, kKeptEvery = 8;
 constexpr double kHottest = 8;  // sds: no score is larger
 constexpr int kFirstRevolutions = 300, kMoreRevolutions = 2000, kOrbit = 32;
-constexpr double kNear = 1;  // stationary sds
+constexpr double kNear = 1;       // stationary sds
+constexpr double kFarReach = 12;  // scores on meshes of several gaits, some of them left very rarely: 1e-32
 constexpr std::size_t kMostGaits = 8, kMostStrays = 64;
 
 using State = std::vector<double>;
@@ -170,6 +171,15 @@ Ways ways_from(const BatchMap& map, const std::vector<NoiseFrame>& frames, const
 
 }  // namespace
 
+MeshOptions with_gaits(MeshOptions options, const OtherGaits& gaits) {
+  if (gaits.states.size() < 2) return options;
+  options.score_reach = kFarReach;
+  options.sources = gaits.sources;
+  options.start_action = gaits.start_action;
+  options.limit = gaits.limit;
+  return options;
+}
+
 OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& frames, std::span<const double> start,
                             const Mesh& mesh, const MeshOptions& options) {
   const Search search(map, frames);
@@ -191,7 +201,9 @@ OtherGaits find_other_gaits(const BatchMap& map, const std::vector<NoiseFrame>& 
   if (found.states.size() == 1) return found;
   std::vector<Ways> ways;
   for (std::size_t g = 0; g < found.states.size(); ++g)
-    ways.push_back(ways_from(map, frames, found.states, g, options));
+    ways.push_back(g == 0 || ways.front().to[g] <= MeshGrowth::farthest
+                       ? ways_from(map, frames, found.states, g, options)
+                       : Ways{});
   std::vector<double> limit(ways.size(), 0.0);
   std::vector<State> reached;
   for (std::size_t g = 0; g < ways.size(); ++g) {

@@ -19,6 +19,9 @@ struct OtherGaits {
   std::string trap = {};
 };
 
+/// Returns the options of a mesh that holds all gaits; of one alone, as they are.
+MeshOptions with_gaits(MeshOptions options, const OtherGaits& gaits);
+
 /// Follows, without noise, states of a mesh and states that walks under two and four times the noise come through,
 /// until they fail, are within one sd of the start's orbit, or have gone 2300 revolutions: those are on other gaits.
 /// From each gait a coarse mesh is then grown until it meets the others and a failure, to an action of 60 at most. A

@@ -9,7 +9,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kNarrowestGap = 1.0 / 512;      // of the spacing: gaps are halved so far, to find where failures begin
+constexpr double kNarrowestGap = 1.0 / 512;   // of the spacing: gaps are halved so far, to find where failures begin
 constexpr double kForetold = 1e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
                                               // afterwards a sixteenth is left
 constexpr double kExtrapolated = 40;          // times that, where a cubic had to look beyond its places
@@ -191,8 +191,8 @@ void ScoreCurve::answer(std::span<const Landing> landings, double unit) {
 }
 
 std::optional<ScoreCurve::Fate> ScoreCurve::fate(double score) const {
-  const auto right =
-      std::upper_bound(place_.begin(), place_.end(), score, [](double z, const Place& place) { return z < place.score; });
+  const auto right = std::upper_bound(place_.begin(), place_.end(), score,
+                                      [](double z, const Place& place) { return z < place.score; });
   if (right == place_.begin() || right == place_.end()) return std::nullopt;
   const Fate before = (right - 1)->landing.fate;
   return before == right->landing.fate ? std::optional(before) : std::nullopt;

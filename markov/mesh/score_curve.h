@@ -38,8 +38,8 @@ class ScoreCurve {
   /// @param unit  of the lattice's coordinates, in stationary sds
   void answer(std::span<const Landing> landings, double unit);
 
-  /// Returns what happens at a score between two places at which the same happens; nothing where different things do, in
-  /// the narrow gaps in which failures begin, and beyond the places.
+  /// Returns what happens at a score between two places at which the same happens; nothing where different things do,
+  /// in the narrow gaps in which failures begin, and beyond the places.
   std::optional<Fate> fate(double score) const;
 
   /// Adds to `parts` what each corner of the cells around all landings gets, in proportion to nearness on every axis

@@ -40,8 +40,8 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
     sizes.push_back(
         {{"spacing", size.spacing}, {"nodes", size.nodes}, {"entries", size.entries}, {"steps", size.steps}});
   WalkerJson gaits = WalkerJson::array();
-  for (std::size_t g = 0; g < s.other_gaits.size(); ++g)
-    gaits.push_back({{"state", s.other_gaits[g]}, {"share_of_steps", s.other_gait_share[g]}});
+  for (std::size_t g = 1; g < s.gait_share.size(); ++g)
+    gaits.push_back({{"state", s.gaits.states[g]}, {"share_of_steps", s.gait_share[g]}});
   return {{"setting", name},
           {"status", walker_status(s)},
           {"expected_steps", mesh_estimate_json(s.steps)},
@@ -49,8 +49,11 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
           {"survival", survival_json(s)},
           {"mixing_steps", s.mixing_steps},
           {"relative_errors",
-           {{"shifts", s.shift_error}, {"discretization", s.discretization_error}, {"leaving_mesh", s.bracket},
-            {"missed_failures", s.blind_spots.missed}, {"imagined_failures", s.blind_spots.imagined}}},
+           {{"shifts", s.shift_error},
+            {"discretization", s.discretization_error},
+            {"leaving_mesh", s.bracket},
+            {"missed_failures", s.blind_spots.missed},
+            {"imagined_failures", s.blind_spots.imagined}}},
           {"other_gaits", gaits},
           {"guided_sampling", s.guided ? mesh_estimate_json(*s.guided) : WalkerJson(nullptr)},
           {"direct_simulation", s.simulated ? mesh_estimate_json(*s.simulated) : WalkerJson(nullptr)},
@@ -104,10 +107,9 @@ Lines head_lines(const markov::MeshStudy& s) {
 
 Lines mesh_lines(const markov::MeshStudy& s) {
   Lines lines;
-  for (std::size_t g = 0; g < s.other_gaits.size(); ++g)
-    lines.emplace_back("another gait",
-                       fmt::format("at {:.6g}: {:.3g} of the steps", fmt::join(s.other_gaits[g], ", "),
-                                   s.other_gait_share[g]));
+  for (std::size_t g = 1; g < s.gait_share.size(); ++g)
+    lines.emplace_back("another gait", fmt::format("at {:.6g}: {:.3g} of the steps", fmt::join(s.gaits.states[g], ", "),
+                                                   s.gait_share[g]));
   lines.emplace_back("relative errors", fmt::format("shifts {:.2g}, discretization {:.2g}, leaving the mesh {:.2g}",
                                                     s.shift_error, s.discretization_error, s.bracket));
   const double blind = std::max(s.blind_spots.missed, s.blind_spots.imagined);

@@ -115,14 +115,14 @@ TEST(MeshStudy, RandomStepsRefuteBandsThatSimulationCannotSee) {
 
 TEST(MeshStudy, FollowsSlipsToAnotherGaitHoweverRare) {
   const std::vector<double> start{-1};
-  for (const TwoGaits gaits : {TwoGaits{1.2, 0.13, 0.9}, TwoGaits{1, 0.12, 0.85}, TwoGaits{1, 0.2, 0.9}}) {
-    const double exact = gaits.steps();  // 5.0e19, 4.07e12, 7.2e5
+  for (const TwoGaits gaits : {TwoGaits{1.2, 0.13, 0.9}, TwoGaits{1, 0.12, 0.85}}) {
+    const double exact = gaits.steps();  // 5.0e19, 4.07e12
     const MeshStudy study = mesh_study(gaits.batch(), start, quick());
     EXPECT_EQ(study.disagreement, "");
     EXPECT_LE(study.steps.lower, 1.003 * exact);
     EXPECT_GE(study.steps.upper, 0.997 * exact);
     EXPECT_LT(study.steps.upper / study.steps.lower, 1.05);
-    ASSERT_EQ(study.other_gaits.size(), 1u);
+    EXPECT_EQ(study.gaits.states.size(), 2u);
     EXPECT_FALSE(study.simulated || study.guided);  // they would start in one gait
   }
 }
@@ -144,7 +144,7 @@ TEST(MeshStudy, SaysOnlyWhatWasFound) {
   };
   const std::string at_once = text(damped_batch([](double, double, double) { return true; }));
   EXPECT_NE(at_once.find("even without noise it fails"), std::string::npos) << at_once;
-  EXPECT_NE(at_once.find("512 walks fail after 1 steps in the mean"), std::string::npos) << at_once;
+  EXPECT_NE(at_once.find("512 of 512 simulated walks fail, after 1 steps in the mean"), std::string::npos) << at_once;
   const std::string beside = text(damped_batch([](double, double z, double) { return z > 0.005 && z < 0.5; }));
   EXPECT_NE(beside.find("a noise of 0.01 sd makes it fail"), std::string::npos) << beside;
   EXPECT_EQ(beside.find("even without noise"), std::string::npos) << beside;
