@@ -23,7 +23,7 @@ struct SolvedChain {
   markov::ChainSolver solver;
   std::vector<double> mean;  ///< expected steps from every state
   markov::QuasiStationary quasi;
-  /// Is what survivors of the regime look like, each cyclic class (a landing leg) summing to one.
+  /// The distribution of the regime's survivors, each cyclic class (a landing leg) summing to one.
   std::vector<double> survivors;
   double from_start = 0;  ///< expected steps from the launch
 };

@@ -280,7 +280,7 @@ class LaunchCutter {
   std::map<double, double> ends_;  // steps at the ends of doubtful pieces
 };
 
-// Is how many launches take how many steps, as shares.
+// Shares of launches by the steps that they take.
 using Distribution = std::map<double, double>;
 
 std::vector<Quantile> quantiles_of(const Distribution& shares) {

@@ -40,7 +40,7 @@ struct Setting {
   int first_landing_leg = 0;
 
   dynamics::ContactNoise noise() const;
-  /// Are all collisions of a leg at one speed alike? (The launch may have a spread all the same.)
+  /// Says whether all collisions of a leg at one speed are alike. (The launch may have a spread all the same.)
   bool noise_free() const;
   dynamics::TruncatedNormal launch() const;
   /// Returns wheel, ramp and stances; under `settled` it says nothing about collisions.
