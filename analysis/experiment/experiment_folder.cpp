@@ -50,7 +50,7 @@ std::vector<dynamics::Trial> simulate_trials(const Setting& setting, const Simul
     throw std::invalid_argument(fmt::format("collisions: {} is outside 1..100000", options.collisions));
   setting.validate();
   const dynamics::WheelMap map = setting.map();
-  const dynamics::TruncatedNormal launch = setting.launch();
+  const dynamics::LaunchSpeed launch = setting.launch();
   const dynamics::TrialOptions trial{.first_landing_leg = setting.first_landing_leg,
                                      .max_collisions = options.collisions,
                                      .ramp_length = setting.ramp_length,

@@ -45,7 +45,7 @@ EnergyLosses energy_losses(const Setting& setting, const EnergyLossOptions& opti
   const dynamics::WheelMap map = setting.map();
   const std::optional<dynamics::SettledMotion> motion =
       setting.law == dynamics::Law::settled ? std::optional(setting.motion()) : std::nullopt;
-  const dynamics::TruncatedNormal launch = setting.launch();
+  const dynamics::LaunchSpeed launch = setting.launch();
   const dynamics::TrialOptions trial{.first_landing_leg = setting.first_landing_leg,
                                      .max_collisions = options.collisions,
                                      .ramp_length = std::numeric_limits<double>::infinity(),

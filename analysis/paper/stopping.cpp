@@ -53,7 +53,7 @@ RestingCurve resting_curve(const dynamics::SettledMap& map, int leg, double eta)
 Estimate rolled_steps(const Setting& setting, int trials, std::uint64_t seed, int threads) {
   const dynamics::SettledMotion motion = setting.motion();
   const dynamics::ContactNoise noise = setting.noise();
-  const dynamics::TruncatedNormal launch = setting.launch();
+  const dynamics::LaunchSpeed launch = setting.launch();
   std::vector<std::uint64_t> steps(static_cast<std::size_t>(trials));
   markov::parallel_for(steps.size(), threads, [&](std::size_t t) {
     steps[t] = dynamics::steps_to_rest(motion, noise, launch, setting.first_landing_leg, seed, t, longest_design + 1);

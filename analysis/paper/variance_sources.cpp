@@ -74,7 +74,7 @@ VarianceSources variance_of_trials(const Setting& setting, double leg_sd, const 
   const int course =
       std::max(last_steady, dynamics::last_collision_on_ramp(base, setting.first_landing_leg, setting.ramp_length));
   const auto count = static_cast<std::size_t>(course), legs = setting.wheel.leg_length.size();
-  const dynamics::TruncatedNormal launch = setting.launch();
+  const dynamics::LaunchSpeed launch = setting.launch();
   const dynamics::ContactNoise noise = setting.noise();
   const dynamics::TruncatedNormal length(setting.wheel.mean_leg_length(), leg_sd, 0);
   const double slope = setting.slope_deg * std::numbers::pi / 180;

@@ -130,7 +130,7 @@ std::vector<double> pathwise_slopes(const Setting& setting, const std::vector<Ne
   for (const Neighbours& pair : neighbours) maps.emplace_back(pair.minus.map(), pair.plus.map());
 
   std::vector<double> slopes(neighbours.size(), 0.0);
-  const dynamics::TruncatedNormal speed = setting.launch();
+  const dynamics::LaunchSpeed speed = setting.launch();
   for (int phase = 0; phase < space.phases(); ++phase) {
     const markov::Grid& grid = space.grid(phase);
     const MeanOfPhase mean(at, space, (phase + 1) % space.phases());

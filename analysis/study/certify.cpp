@@ -189,7 +189,6 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
     throw std::invalid_argument(fmt::format("tolerance: {} is not above 0", options.tolerance));
   setting.validate();
   const dynamics::WheelMap map = setting.map();
-  const dynamics::TruncatedNormal launch = setting.launch();
   const auto phase = static_cast<std::size_t>(setting.first_landing_leg % map.phases());
   CertifiedSteps result;
   result.upper = std::numeric_limits<double>::infinity();
@@ -197,6 +196,11 @@ CertifiedSteps certify(const Setting& setting, const CertifyOptions& options) {
     result.reason = "landings under settled are followed event by event, and of that there are no proven bounds";
     return result;
   }
+  if (setting.steady_launch) {
+    result.reason = "the speeds of a steady launch are computed, and of them there are no proven bounds";
+    return result;
+  }
+  const dynamics::TruncatedNormal launch = setting.launch().normal().value();
   try {
     std::vector<double> lowest;
     for (int p = 0; p < map.phases(); ++p) lowest.push_back(map.state_interval(p).first * (1 - 0x1p-44));

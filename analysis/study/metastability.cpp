@@ -16,6 +16,7 @@
 #include "analysis/study/landing_error.h"
 #include "analysis/study/pilot.h"
 #include "analysis/study/rest_reachability.h"
+#include "analysis/study/steady_launch.h"
 #include "markov/parallel.h"
 #include "markov/rows/chain_pool.h"
 #include "markov/rows/discretization.h"
@@ -381,8 +382,21 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
       options.progress(of_table + (1 - of_table) * share, what);
     };
   }
-  Metastability result = study(setting.problem({options.direct, options.threads, table_progress}), own);
-  result.setting = setting;
+  const Problem problem = setting.problem({options.direct, options.threads, table_progress});
+  if (!setting.steady_launch || setting.steady_speed) {
+    Metastability result = study(problem, own);
+    result.setting = setting;
+    return result;
+  }
+  // The regime takes one half of the work, the steps from it the other.
+  StudyOptions first = own, second = own;
+  if (own.progress) {
+    first.progress = [&](double share, const std::string& what) { own.progress(0.5 * share, "regime, " + what); };
+    second.progress = [&](double share, const std::string& what) { own.progress(0.5 + 0.5 * share, what); };
+  }
+  const Setting launched = steadily_launched(setting, first);
+  Metastability result = study(launched.problem({options.direct, options.threads, {}}), second);
+  result.setting = launched;
   return result;
 }
 
@@ -416,6 +430,8 @@ std::string status_text(Status status) {
       return "solver_failed";
     case Status::rest_unresolved:
       return "rest_unresolved";
+    case Status::no_regime:
+      return "no_regime";
   }
   throw std::logic_error("unknown status");
 }

@@ -68,6 +68,7 @@ enum class Status {
   rest_unreachable,   ///< expected steps are infinite
   solver_failed,      ///< only in sweeps: a solver did not converge at this point, see the message
   rest_unresolved,    ///< rest is possible, but beyond the draws: expected steps exceed from_start.lower
+  no_regime,          ///< only in sweeps: there is no metastable regime to launch from, see the message
 };
 
 /// A value below which a share `level` of all launches stay.
@@ -181,8 +182,9 @@ Metastability study(const Problem& problem, const StudyOptions& options = {});
 /// friction below 1e-3 that is not 0
 void check_setting(const Setting& setting, Method method);
 
-/// Does the same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer.
-/// @throws std::invalid_argument also as check_setting()
+/// Does the same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer; of a steady launch
+/// the speeds are found first (steadily_launched()), and are in that setting.
+/// @throws std::invalid_argument also as check_setting() and steadily_launched()
 Metastability study(const Setting& setting, const StudyOptions& options = {});
 
 /// Returns "converged", "tolerance_not_met", "rest_unreachable", ...: one word per status.

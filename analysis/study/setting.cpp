@@ -51,6 +51,22 @@ std::function<Run(double, int)> rolls(std::shared_ptr<const dynamics::SettledMot
   };
 }
 
+// Returns where the wheel without noise comes to at that phase; the last state there, or a fast one, where it rests.
+template <typename Map>
+double noise_free_state(const Map& map, int phase) {
+  constexpr int fewest_steps = 512;  // after which a wheel without noise has settled on its orbit
+  constexpr double fast = 16;        // times the slowest survivor's energy
+  const std::vector<double> no_noise(static_cast<std::size_t>(map.noise_dimension()), 0.0);
+  double state = fast * map.state_interval(phase).first, at_phase = state;
+  for (int step = 0; step < std::max(fewest_steps, 64 * map.phases()) || step % map.phases() != 0; ++step) {
+    const std::optional<double> next = map.landing(state, (phase + step) % map.phases(), no_noise);
+    if (!next) return at_phase;
+    state = *next;
+    if ((step + 1) % map.phases() == 0) at_phase = state;
+  }
+  return at_phase;
+}
+
 }  // namespace
 
 dynamics::ContactNoise Setting::noise() const {
@@ -71,11 +87,15 @@ dynamics::SettledMotion Setting::motion() const {
   return dynamics::SettledMotion(dynamics::settled_wheel(wheel, slope_deg * std::numbers::pi / 180.0));
 }
 
-dynamics::TruncatedNormal Setting::launch() const {
+dynamics::LaunchSpeed Setting::launch() const {
+  if (steady_launch) {
+    if (!steady_speed) throw std::logic_error("initial speed: of a steady launch it has to be found first");
+    return *steady_speed;
+  }
   if (!(initial_speed.mean >= 0))
     throw std::invalid_argument(fmt::format("initial speed: mean {} rad/s is below 0", initial_speed.mean));
   try {
-    return dynamics::TruncatedNormal(initial_speed.mean, initial_speed.sd, 0.0);
+    return {dynamics::TruncatedNormal(initial_speed.mean, initial_speed.sd, 0.0)};
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(fmt::format("initial speed: {}", error.what()));
   }
@@ -104,10 +124,10 @@ void Setting::validate() const {
   }
   for (std::size_t i = 0; i < pairs.size(); ++i)
     require_range(fmt::format("pairs[{}]: friction", i), pairs[i].friction, "", range::friction);
-  require_spread("initial speed", initial_speed, "rad/s", range::speed);
+  if (!steady_launch) require_spread("initial speed", initial_speed, "rad/s", range::speed);
   if (law == dynamics::Law::settled) {
     motion();
-    if (initial_speed.mean == 0 && initial_speed.sd == 0)
+    if (!steady_launch && initial_speed.mean == 0 && initial_speed.sd == 0)
       throw std::invalid_argument(
           "initial speed: 0 without spread is outside (0, 1000] rad/s, the range of law settled");
     if (pairs.empty() && restitution.mean > dynamics::most_settled_restitution)
@@ -119,7 +139,7 @@ void Setting::validate() const {
             fmt::format("pairs[{}]: restitution {} is outside [0, {}], the range of law settled", i,
                         pairs[i].restitution, dynamics::most_settled_restitution));
   }
-  launch();
+  if (!steady_launch) launch();
   if (ramp_length != std::numeric_limits<double>::infinity())
     require_range("ramp length:", ramp_length, "m", range::ramp_length);
   if (first_landing_leg < 0 || first_landing_leg >= wheel.legs())
@@ -129,15 +149,20 @@ void Setting::validate() const {
 
 Problem Setting::problem(const LandingOptions& landings) const {
   validate();
-  const dynamics::TruncatedNormal speed = launch();
-  const auto state = [speed](double score) {
-    const double omega = speed.at_score(score);
-    return omega * omega;
-  };
+  const bool found = !steady_launch || steady_speed;
+  const std::optional<dynamics::LaunchSpeed> speed = found ? std::optional(launch()) : std::nullopt;
   const auto problem_of = [&](const auto& map) {
-    Problem problem{map, {state, first_landing_leg % map.phases()}, [](double x) { return std::sqrt(x); }, {}, {}};
+    const int phase = first_landing_leg % map.phases();
+    Problem problem{map, {{}, phase}, [](double x) { return std::sqrt(x); }, {}, {}};
     problem.observed = "omega-";
     problem.observed_unit = " rad/s";
+    if (speed)
+      problem.launch.state = [speed](double score) {
+        const double omega = speed->at_score(score);
+        return omega * omega;
+      };
+    else
+      problem.launch.state = [state = noise_free_state(map, phase)](double) { return state; };
     std::vector<double> advance;
     for (int p = 0; p < map.phases(); ++p) advance.push_back(map.advance(p));
     if (std::isfinite(ramp_length))
@@ -151,7 +176,7 @@ Problem Setting::problem(const LandingOptions& landings) const {
   options.executor = markov::on_threads(landings.threads);
   Problem problem = problem_of([&] {
     try {
-      dynamics::SettledReturnMap map(wheel, slope_deg * std::numbers::pi / 180.0, noise(), speed.at_score(launch_reach),
+      dynamics::SettledReturnMap map(wheel, slope_deg * std::numbers::pi / 180.0, noise(), speed ? speed->at_score(launch_reach) : 0,
                                      std::move(options));
       if (const std::optional<int> leg = map.landings().untabulated())
         throw NotTabulated(fmt::format("at some restitution leg {} rests from every speed up to {} rad/s", *leg,
@@ -161,8 +186,9 @@ Problem Setting::problem(const LandingOptions& landings) const {
       throw NotTabulated(error.what());
     }
   }());
+  if (!found) return problem;
   problem.follow = [=, motion = motion(), noise = noise(), leg = first_landing_leg](auto seed, auto index, auto most) {
-    return dynamics::steps_to_rest(motion, noise, speed, leg, seed, index, most);
+    return dynamics::steps_to_rest(motion, noise, *speed, leg, seed, index, most);
   };
   if (noise_free()) problem.run = rolls(std::make_shared<const dynamics::SettledMotion>(motion()), noise());
   return problem;
@@ -183,8 +209,11 @@ std::string Setting::describe() const {
   std::string law_text = fmt::format("law {}", dynamics::law_name(law));
   if (law != dynamics::Law::published) law_text += fmt::format(" (r_g = {} m)", model.radius_of_gyration);
   if (law == dynamics::Law::coulomb && rebound_lost != 0) law_text += fmt::format(", rebound lost {}", rebound_lost);
-  std::string text = fmt::format("{} deg, {}, {}, {}, omega_0 ~ N({}, {}^2) rad/s", slope_deg, legs, law_text, contact,
-                                 initial_speed.mean, initial_speed.sd);
+  std::string launch_text = fmt::format("omega_0 ~ N({}, {}^2) rad/s", initial_speed.mean, initial_speed.sd);
+  if (steady_launch) launch_text = "omega_0 of the metastable regime";
+  if (steady_launch && steady_speed)
+    launch_text += fmt::format(" ({:.4g} rad/s, sd {:.3g})", steady_speed->mean(), steady_speed->sd());
+  std::string text = fmt::format("{} deg, {}, {}, {}, {}", slope_deg, legs, law_text, contact, launch_text);
   // What follows is said where it is not the paper's.
   const Setting paper;
   if (wheel.hub_mass != paper.wheel.hub_mass) text += fmt::format(", M = {} kg", wheel.hub_mass);

@@ -2,11 +2,13 @@
 // Describes one setting: a wheel, a ramp, a contact law with its noise, a launch. Defaults are the paper's.
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/study/problem.h"
+#include "dynamics/return_map/launch_speed.h"
 #include "dynamics/return_map/wheel_map.h"
 #include "dynamics/settled/settled_motion.h"
 
@@ -37,12 +39,17 @@ struct Setting {
   double correlation = 0;                ///< of the normal scores of eta and mu
   std::vector<dynamics::Contact> pairs;  ///< not empty: an empirical list instead of the normals
   Spread initial_speed{7.35, 0.19};      ///< omega_0 just before collision 1 [rad/s], truncated at 0
+  /// Says that omega_0 is that of wheels of this setting that still roll long after any launch, when the first landing
+  /// leg touches (steady_launch.h); initial_speed is then not read.
+  bool steady_launch = false;
+  std::shared_ptr<const dynamics::LaunchSpeed> steady_speed = {};  ///< those speeds, once they are found
   int first_landing_leg = 0;
 
   dynamics::ContactNoise noise() const;
   /// Says whether all collisions of a leg at one speed are alike. (The launch may have a spread all the same.)
   bool noise_free() const;
-  dynamics::TruncatedNormal launch() const;
+  /// @throws std::invalid_argument for initial_speed out of range; std::logic_error for a steady launch not yet found
+  dynamics::LaunchSpeed launch() const;
   /// Returns wheel, ramp and stances; under `settled` it says nothing about collisions.
   /// @throws std::invalid_argument, one line naming the quantity, its value and its range
   dynamics::WheelMap map() const;
@@ -52,7 +59,8 @@ struct Setting {
   /// @throws std::invalid_argument, one line naming the quantity, its value and its range
   void validate() const;
   /// Returns the generic problem behind it: return map, launch state omega_0^2, speed as observable, last collision on
-  /// the ramp. Under `settled` a table of landings is built, at most once for wheel and slope (SettledMap::of).
+  /// the ramp. Under `settled` a table of landings is built, at most once for wheel and slope (SettledMap::of). For a
+  /// steady launch not yet found the launch state is that of the wheel without noise, or a fast one where that rests.
   Problem problem(const LandingOptions& landings = {}) const;
   /// Returns one line that names every quantity, for captions and provenance.
   std::string describe() const;

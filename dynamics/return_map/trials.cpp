@@ -33,7 +33,7 @@ Contact contact_at(const ContactNoise& noise, std::uint64_t seed, std::uint64_t 
 // Follows one trial as it unfolds. Event 0 of a trial is the launch, event n its collision n.
 class Roll {
  public:
-  Roll(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg, std::uint64_t seed,
+  Roll(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg, std::uint64_t seed,
        std::uint64_t index)
       : map_(map), first_(first_landing_leg), seed_(seed), index_(index) {
     const double omega = launch.at_score(scores(seed, index, 0)[0]);
@@ -60,10 +60,6 @@ class Roll {
   double state_ = 0;
 };
 
-TruncatedNormal forwards(const TruncatedNormal& launch) {
-  return launch.lower() >= 0 ? launch : TruncatedNormal(launch.mean(), launch.sd(), 0, launch.upper());
-}
-
 void check_leg(int legs, int leg) {
   if (leg < 0 || leg >= legs)
     throw std::invalid_argument(fmt::format("first_landing_leg: {} is outside [0, {}]", leg, legs - 1));
@@ -82,13 +78,13 @@ void check_ramp(double ramp_length) {
 // Follows a trial under `settled` as it unfolds.
 class SettledTrial {
  public:
-  SettledTrial(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+  SettledTrial(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
                int first_landing_leg, std::uint64_t seed, std::uint64_t index)
       : noise_(noise),
         seed_(seed),
         index_(index),
         contact_(contact_at(noise, seed, index, 1)),
-        roll_(motion, first_landing_leg, forwards(launch).at_score(scores(seed, index, 0)[0]), contact_, contact_) {}
+        roll_(motion, first_landing_leg, launch.at_score(scores(seed, index, 0)[0]), contact_, contact_) {}
 
   const SettledRoll& roll() const { return roll_; }
   const Contact& contact() const { return contact_; }  // of the collision that comes
@@ -132,11 +128,11 @@ int last_collision_on_ramp(std::span<const double> advance, int first_phase, dou
   return number;
 }
 
-Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
+Trial simulate_trial(const WheelMap& map, const LaunchSpeed& launch, const TrialOptions& options,
                      std::uint64_t index) {
   check_collisions(options);
   const int last = last_collision_on_ramp(map, options.first_landing_leg, options.ramp_length);
-  Roll roll(map, forwards(launch), options.first_landing_leg, options.seed, index);
+  Roll roll(map, launch, options.first_landing_leg, options.seed, index);
   Trial trial;
   double time = 0, position = 0;
   for (;;) {
@@ -172,7 +168,7 @@ Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const T
   }
 }
 
-Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
                      const TrialOptions& options, std::uint64_t index) {
   check_collisions(options);
   check_ramp(options.ramp_length);
@@ -203,18 +199,27 @@ Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, con
   }
 }
 
-std::uint64_t steps_to_rest(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+std::uint64_t steps_to_rest(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
                             int first_landing_leg, std::uint64_t seed, std::uint64_t index, std::uint64_t limit) {
-  check_leg(motion.wheel().legs(), first_landing_leg);
-  SettledTrial of(motion, noise, launch, first_landing_leg, seed, index);
-  for (std::uint64_t number = 1;; ++number)
-    if (!of.step().touched || number >= limit) return number;
+  return roll_on(motion, noise, launch, first_landing_leg, seed, index, limit, std::numeric_limits<double>::infinity())
+      .steps;
 }
 
-std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,
+RolledOn roll_on(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
+                 int first_landing_leg, std::uint64_t seed, std::uint64_t index, std::uint64_t limit, double fastest) {
+  check_leg(motion.wheel().legs(), first_landing_leg);
+  SettledTrial of(motion, noise, launch, first_landing_leg, seed, index);
+  for (std::uint64_t number = 1;; ++number) {
+    if (!of.step().touched) return {number, Outcome::rest, false};
+    if (of.roll().spin() > fastest) return {number, Outcome::max_collisions, true};
+    if (number >= limit) return {number, Outcome::max_collisions, false};
+  }
+}
+
+std::uint64_t steps_to_rest(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg,
                             std::uint64_t seed, std::uint64_t index, std::uint64_t limit) {
   check_leg(map.wheel().legs(), first_landing_leg);
-  for (Roll roll(map, forwards(launch), first_landing_leg, seed, index);;) {
+  for (Roll roll(map, launch, first_landing_leg, seed, index);;) {
     const Stance& stance = map.stance(roll.phase());
     const double after = map.after_collision(roll.state(), roll.phase(), roll.contact());
     if (!(after >= stance.barrier) || roll.number() >= limit) return roll.number();

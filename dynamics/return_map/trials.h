@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
+#include "dynamics/return_map/launch_speed.h"
 #include "dynamics/return_map/wheel_map.h"
 #include "dynamics/settled/settled_motion.h"
 #include "dynamics/wheel/outcome.h"
-#include "dynamics/wheel/truncated_normal.h"
 
 namespace metastable::dynamics {
 
@@ -38,10 +38,10 @@ struct TrialOptions {
   std::uint64_t seed = 1;
 };
 
-/// Simulates trial `index` of a run: launch speed omega_0 ~ launch (truncated at 0) and (eta, mu) of each collision
+/// Simulates trial `index` of a run: launch speed omega_0 ~ launch and (eta, mu) of each collision
 /// come from Philox at counter (index, collision): the same bits whatever ran before and on however many threads.
 /// @throws std::invalid_argument for options out of range
-Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const TrialOptions& options,
+Trial simulate_trial(const WheelMap& map, const LaunchSpeed& launch, const TrialOptions& options,
                      std::uint64_t index);
 
 /// Does the same under `settled`: the wheel is rolled event by event, with whatever motion its feet still have when the
@@ -50,15 +50,26 @@ Trial simulate_trial(const WheelMap& map, const TruncatedNormal& launch, const T
 /// (potential); omega_plus is the speed after the first impact; a wheel that chatters on two feet without end counts as
 /// one at rest, and the end of the ramp is reached when the next foot touches beyond it.
 /// @throws std::invalid_argument for options out of range, and without the rest rule
-Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
                      const TrialOptions& options, std::uint64_t index);
 
 /// Counts the steps before failure of trial `index` without storing it, at most `limit` (returned when reached).
-std::uint64_t steps_to_rest(const WheelMap& map, const TruncatedNormal& launch, int first_landing_leg,
+std::uint64_t steps_to_rest(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg,
                             std::uint64_t seed, std::uint64_t index, std::uint64_t limit);
 
-std::uint64_t steps_to_rest(const SettledMotion& motion, const ContactNoise& noise, const TruncatedNormal& launch,
+std::uint64_t steps_to_rest(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
                             int first_landing_leg, std::uint64_t seed, std::uint64_t index, std::uint64_t limit);
+
+/// Says how a trial went that was not stored.
+struct RolledOn {
+  std::uint64_t steps = 0;
+  Outcome outcome = Outcome::max_collisions;  ///< rest, or max_collisions for one followed no further
+  bool ran_away = false;                      ///< it was followed no further for its speed
+};
+/// Does as steps_to_rest() and says whether the last step led to rest; a wheel that spins faster than `fastest` [rad/s]
+/// is not followed either. (From a restitution of about 0.8 on, wheels hop down a slope faster and faster.)
+RolledOn roll_on(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
+                 int first_landing_leg, std::uint64_t seed, std::uint64_t index, std::uint64_t limit, double fastest);
 
 /// Returns the number of the last collision on a ramp of that length (foot 1 at 0 m): who survives it reaches the end.
 int last_collision_on_ramp(const WheelMap& map, int first_landing_leg, double ramp_length);

@@ -86,7 +86,7 @@ void twice_the_nodes(benchmark::State& state) {
   setting.wheel.leg_length.assign(8, 0.1519);
   setting.restitution = {0.3, 0.05};
   setting.friction = {0.01 * static_cast<double>(state.range(0)), 0.03};
-  const dynamics::TruncatedNormal speed = setting.launch();
+  const dynamics::LaunchSpeed speed = setting.launch();
   const auto steps = [&](int times) {
     dynamics::SettledMapOptions options = on_threads(0);
     options.speeds *= times, options.restitutions *= times, options.frictions *= times;

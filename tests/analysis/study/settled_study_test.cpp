@@ -37,7 +37,7 @@ struct Rolled {
 Rolled roll(const Setting& setting, std::size_t trials) {
   const dynamics::SettledMotion motion = setting.motion();
   const dynamics::ContactNoise noise = setting.noise();
-  const dynamics::TruncatedNormal launch = setting.launch();
+  const dynamics::LaunchSpeed launch = setting.launch();
   std::vector<double> steps(trials);
   markov::parallel_for(trials, 0, [&](std::size_t t) {
     steps[t] =
