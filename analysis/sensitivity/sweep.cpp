@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "analysis/study/steady_launch.h"
 #include "markov/chain/chain.h"
 #include "markov/parallel.h"
 
@@ -17,6 +18,44 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t most_points = 1000000;  // an axis has 100000 at most, so that their product fits
+// Of the wheels rolled under `settled`. A landing costs 15 to 60 us, so that all together take 1 to 4 s of one processor.
+constexpr double most_rolled = 16;
+constexpr std::uint64_t all_collisions = 65536, fewest_collisions = 1024;
+
+// Returns how many values of each axis have wheels rolled.
+std::size_t rolled_values(const std::vector<SweepAxis>& axes) {
+  const double each = std::pow(most_rolled, 1.0 / static_cast<double>(axes.size()));
+  return std::max<std::size_t>(2, static_cast<std::size_t>(each + 1e-9));
+}
+
+// Is value `index` of `size` one of `count` that lie evenly, ends included?
+bool evenly(std::size_t index, std::size_t size, std::size_t count) {
+  if (size <= count) return true;
+  const std::size_t nearest = (index * (count - 1) + (size - 1) / 2) / (size - 1);
+  return (nearest * (size - 1) + (count - 1) / 2) / (count - 1) == index;
+}
+
+// Rolls wheels of the point's setting, where it has a launch.
+std::optional<RigidBodyCheck> rolled(const Metastability& study, const std::vector<SweepAxis>& axes,
+                                     const StudyOptions& options) {
+  const Setting& setting = *study.setting;
+  if (setting.steady_launch && !setting.steady_speed) return std::nullopt;
+  std::uint64_t points = 1;
+  for (const SweepAxis& axis : axes) points *= std::min(rolled_values(axes), axis.values.size());
+  return rigid_body_check(setting, {.collisions = std::max(fewest_collisions, all_collisions / points),
+                                    .seed = options.seed,
+                                    .threads = options.threads,
+                                    .progress = [&](double) {
+                                      if (options.progress) options.progress(0, "rigid bodies");
+                                    }});
+}
+
+void fail(SweepPoint& point, const Setting& setting, Status status, const std::exception& error) {
+  point.study.setting = setting;
+  point.study.status = status;
+  point.study.message = error.what();
+  point.failure = std::current_exception();
+}
 
 }  // namespace
 
@@ -69,8 +108,17 @@ std::string sweep_description(const Setting& base, const std::vector<SweepAxis>&
   return text;
 }
 
+bool rolled_at(const std::vector<SweepAxis>& axes, std::size_t index) {
+  for (std::size_t a = axes.size(); a-- > 0;) {
+    const std::size_t size = axes[a].values.size();
+    if (!evenly(index % size, size, rolled_values(axes))) return false;
+    index /= size;
+  }
+  return true;
+}
+
 SweepPoint sweep_point(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t index,
-                       const StudyOptions& options) {
+                       const StudyOptions& options, RigidBodies rigid_bodies) {
   StudyOptions single = options;
   single.threads = 1;
   single.brief = true;
@@ -80,16 +128,16 @@ SweepPoint sweep_point(const Setting& base, const std::vector<SweepAxis>& axes, 
   try {
     point.study = study(setting, single);
   } catch (const markov::ConvergenceError& error) {  // the other points are worth having
-    point.study.setting = setting;
-    point.study.status = Status::solver_failed;
-    point.study.message = error.what();
-    point.failure = std::current_exception();
+    fail(point, setting, Status::solver_failed, error);
+  } catch (const NoRegime& error) {
+    fail(point, setting, Status::no_regime, error);
   }
+  if (rigid_bodies == RigidBodies::asked && rolled_at(axes, index)) point.rigid_bodies = rolled(point.study, axes, single);
   return point;
 }
 
 void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t begin, const StudyOptions& options,
-           const std::function<void(std::size_t, const SweepPoint&)>& done) {
+           const std::function<void(std::size_t, const SweepPoint&)>& done, RigidBodies rigid_bodies) {
   const std::size_t size = sweep_size(axes);
   if (begin >= size) return;
   // The first table of landings is built by all threads together; on one slope it serves all points.
@@ -103,7 +151,7 @@ void sweep(const Setting& base, const std::vector<SweepAxis>& axes, std::size_t 
   std::size_t next = begin;
   bool stopped = false;  // done() threw: later points are not reported
   markov::parallel_for(size - begin, options.threads, [&](std::size_t k) {
-    SweepPoint point = sweep_point(base, axes, begin + k, options);
+    SweepPoint point = sweep_point(base, axes, begin + k, options, rigid_bodies);
     const std::scoped_lock lock(mutex);
     waiting.emplace(begin + k, std::move(point));
     while (!stopped && !waiting.empty() && waiting.begin()->first == next) {
