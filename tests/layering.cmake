@@ -27,7 +27,7 @@ set(ROOMS
   "analysis/blind: dynamics/wheel analysis/statistics analysis/diagnosis analysis/experiment analysis/likelihood"
   "analysis/motion_capture: markov dynamics/wheel dynamics/return_map analysis/statistics analysis/experiment"
   "analysis/paper: markov dynamics/wheel dynamics/settled dynamics/return_map analysis/statistics analysis/study analysis/experiment analysis/description"
-  "analysis/sensitivity: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/return_map analysis/statistics analysis/study"
+  "analysis/sensitivity: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/settled dynamics/return_map analysis/statistics analysis/study"
   "reports/output: analysis/statistics analysis/experiment"
   "reports/description: dynamics/wheel analysis/statistics analysis/description analysis/paper reports/output"
   "reports/diagnosis: dynamics/wheel analysis/statistics analysis/diagnosis analysis/blind reports/output"
