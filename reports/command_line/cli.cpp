@@ -97,9 +97,9 @@ Command sweep_command(const Sharing* sharing) {
             const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
             std::optional<std::string> launch;
             if (o.given("initial-speed")) launch = o.text("initial-speed");
-            if (!launch && !one_slope)
-              throw std::invalid_argument("--initial-speed: must be given when the slope varies");
-            request.setting.initial_speed = launch_for(request.setting.slope_deg, launch);
+            if (!launch && !one_slope) launch = "steady";  // one rule for all slopes
+            set_launch(request.setting, launch);
+            request.rigid_bodies = !o.given("law");
             request.study = study_options(o);
             request.out = o.text("out");
             request.json = o.text("json");
@@ -110,14 +110,27 @@ Command sweep_command(const Sharing* sharing) {
 
 namespace {
 
+Command solve() {
+  return {"solve", "Which value of a parameter gives the steps, or the survival, that are asked for", declare_solve,
+          [](const Options& o, const std::string& line) {
+            const std::string solved = o.text("PARAMETER");
+            if (asks_for_walker(o)) return run_solve(walker_solve_request(o, walker_solved_setting(o, solved), line));
+            if (solved == "slope" && o.given("slope"))
+              throw std::invalid_argument("--slope: is what is solved for");
+            analysis::Setting setting = one_setting(o);
+            // One rule for all slopes: the paper's launch is that of one of them.
+            if (solved == "slope" && !o.given("initial-speed")) setting.steady_launch = true;
+            run_solve(solve_request(o, setting, line));
+          }};
+}
+
 Command report() {
   return {
       "report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
       [](Options& o) {
         o.add("slopes", "DEG,DEG,...", "7.02,9.59",
               "Ramp slopes [deg], each from 0.001 to below half the angle between legs");
-        o.add("initial-speed", "MEAN,SD", "", "Once per slope, in order (default: the paper's at 7.02 and 9.59)",
-              dynamics::range::speed);
+        add_launch(o, "Once per slope, in order");
         add_wheel(o), add_contact(o), add_course(o), add_study(o);
         o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
         o.add("landings", "N", "40000",
@@ -209,7 +222,7 @@ std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
 }
 
 std::vector<Command> commands(const std::vector<ManualCommand>& manual) {
-  std::vector<Command> all{steps(), compare(), sweep_command()};
+  std::vector<Command> all{steps(), compare(), sweep_command(), solve()};
   for (const std::vector<Command>& more :
        {experiment_commands(), std::vector<Command>{report(), verify()}, blind_commands(), help_commands(manual)})
     all.insert(all.end(), more.begin(), more.end());

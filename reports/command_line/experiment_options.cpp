@@ -220,8 +220,7 @@ Command effects() {
 
 void declare_simulate(Options& o) {
   add_slope(o);
-  o.add("initial-speed", "MEAN,SD", "", "Just before collision 1 [rad/s] (default: the paper's at 7.02 and 9.59)",
-        dynamics::range::speed);
+  add_launch(o, "Just before collision 1 [rad/s]");
   add_wheel(o), add_contact(o), add_course(o);
   o.add_flag("stand-in",
              "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "

@@ -8,6 +8,7 @@
 #include "reports/command_line/options.h"
 #include "reports/command_line/setting_options.h"
 #include "reports/commands/request.h"
+#include "reports/commands/solve_command.h"
 #include "reports/commands/walker_command.h"
 
 namespace metastable::reports {
@@ -16,6 +17,7 @@ namespace metastable::reports {
 void declare_steps(Options& options);
 void declare_compare(Options& options);
 void declare_sweep(Options& options);
+void declare_solve(Options& options);
 void declare_simulate(Options& options);
 void declare_describe(Options& options);
 void declare_diagnose(Options& options);
@@ -30,6 +32,11 @@ CompareRequest compare_request(const Options& options, const std::vector<analysi
 /// Reads the axis of that name for a sweep of the setting. @throws std::invalid_argument if the setting has no use for
 /// it
 analysis::SweepAxis sweep_axis(const Options& options, const char* name, const analysis::Setting& setting);
+/// Reads what to solve for, of a wheel. @param setting  with any value of the parameter
+SolveRequest solve_request(const Options& options, const analysis::Setting& setting, const std::string& line);
+/// Reads it of a walker; where its setting is not that of the options it is @param setting
+SolveRequest walker_solve_request(const Options& options, const analysis::WalkerSetting& setting,
+                                  const std::string& line);
 /// @param pairs  as of one_setting()
 SimulateRequest simulate_request(const Options& options, const std::string& line, const Pairs& pairs = {});
 /// Reads the trials of a walker, of which the options tell.

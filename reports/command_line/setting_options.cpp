@@ -93,6 +93,13 @@ void add_slope(Options& options) {
   options.add("slope", "DEG", "7.02", "Ramp slope [deg], from 0.001 to below half the angle between legs");
 }
 
+void add_launch(Options& options, const std::string& whose) {
+  options.add("initial-speed", "MEAN,SD|steady", "",
+              whose + "; steady: of wheels that still roll long after any launch (default: the paper's at 7.02 and 9.59, "
+                      "elsewhere steady)",
+              range::speed);
+}
+
 void add_stated_wheel(Options& options) {
   options.add("legs", "paper|L|L1,L2,...", "paper",
               "Leg lengths [m]: the paper's, one for all, or a list in landing order", range::leg_length);
@@ -179,14 +186,11 @@ analysis::Setting common_setting(const Options& options, const Pairs& pairs) {
   return setting;
 }
 
-analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text) {
-  if (text) return spread_value("initial-speed", *text, range::speed);
-  const std::optional<analysis::Spread> paper = analysis::paper_launch(slope_deg);
-  if (!paper)
-    throw std::invalid_argument(fmt::format(
-        "--initial-speed: must be given at {} deg (the paper's launches are known at 7.02 and 9.59 deg only)",
-        slope_deg));
-  return *paper;
+void set_launch(analysis::Setting& setting, const std::optional<std::string>& text) {
+  const std::optional<analysis::Spread> paper = analysis::paper_launch(setting.slope_deg);
+  setting.steady_launch = text ? *text == "steady" : !paper;
+  if (setting.steady_launch) return;
+  setting.initial_speed = text ? spread_value("initial-speed", *text, range::speed) : *paper;
 }
 
 analysis::Setting one_setting(const Options& options, const Pairs& pairs, const char* slope_option) {
@@ -195,7 +199,7 @@ analysis::Setting one_setting(const Options& options, const Pairs& pairs, const 
   check_slope(slope_option, setting);
   std::optional<std::string> launch;
   if (options.given("initial-speed")) launch = options.text("initial-speed");
-  setting.initial_speed = launch_for(setting.slope_deg, launch);
+  set_launch(setting, launch);
   if (setting.correlation != 0 && (setting.restitution.sd == 0 || setting.friction.sd == 0))
     throw std::invalid_argument("--correlation: has a meaning where --restitution and --friction both have an sd");
   return checked(std::move(setting));
@@ -214,7 +218,7 @@ std::vector<analysis::Setting> several_settings(const Options& options, std::siz
     analysis::Setting setting = common_setting(options);
     setting.slope_deg = slopes[i];
     check_slope("slopes", setting);
-    setting.initial_speed = launch_for(slopes[i], launches.empty() ? std::nullopt : std::optional(launches[i]));
+    set_launch(setting, launches.empty() ? std::nullopt : std::optional(launches[i]));
     settings.push_back(checked(std::move(setting)));
   }
   return settings;

@@ -15,6 +15,8 @@
 namespace metastable::reports {
 
 void add_slope(Options& options);
+/// Adds --initial-speed. @param whose  what it is, or of which
+void add_launch(Options& options, const std::string& whose);
 /// Adds what experiment.toml can state of a wheel and its contact, and the rest.
 void add_stated_wheel(Options& options);
 void add_stated_contact(Options& options);
@@ -29,8 +31,9 @@ using Pairs = std::optional<std::vector<dynamics::Contact>>;
 
 /// Reads what the options above say, as far as the command has them: all but slope and launch speed.
 analysis::Setting common_setting(const Options& options, const Pairs& pairs = {});
-/// Reads `text` as the launch, or the paper's at this slope where it has one. @throws std::invalid_argument otherwise
-analysis::Spread launch_for(double slope_deg, const std::optional<std::string>& text);
+/// Reads `text` as the launch of a setting; without one it is the paper's at its slope, and steady where the paper has
+/// none. @throws std::invalid_argument for a text that is neither "steady" nor mean and sd
+void set_launch(analysis::Setting& setting, const std::optional<std::string>& text);
 /// Reads --slope and --initial-speed too, and checks them. @param slope_option  that a message on the slope names
 analysis::Setting one_setting(const Options& options, const Pairs& pairs = {}, const char* slope_option = "slope");
 /// Makes one setting a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.

@@ -22,8 +22,9 @@ void refuse_what_walkers_lack(const Options& o, const std::vector<std::string>& 
       throw std::invalid_argument(fmt::format("--{}: has no meaning with --walker", name));
 }
 
-analysis::WalkerSetting base_setting(const Options& o) {
-  if (!o.given("slope-sd")) throw std::invalid_argument("--slope-sd: is needed with --walker");
+// @param solved  is not given
+analysis::WalkerSetting base_setting(const Options& o, const std::string& solved = {}) {
+  if (!o.given("slope-sd") && solved != "slope-sd") throw std::invalid_argument("--slope-sd: is needed with --walker");
   analysis::WalkerSetting setting;
   setting.walker = analysis::walker_from_name(o.text("walker"));
   setting.slope_deg = analysis::walker_slope_deg(setting.walker);
@@ -114,6 +115,19 @@ WalkerRequest walker_request(const Options& o, const std::string& command_line, 
     request.settings.back().slope_sd_deg = sds[i];
   }
   return request;
+}
+
+analysis::WalkerSetting walker_solved_setting(const Options& o, const std::string& solved) {
+  if (o.given(solved)) throw std::invalid_argument(fmt::format("--{}: is what is solved for", solved));
+  analysis::WalkerSetting setting = base_setting(o, solved);
+  for (const auto& [name, value] :
+       {std::pair("slope", &setting.slope_deg), std::pair("slope-sd", &setting.slope_sd_deg)}) {
+    if (!o.given(name)) continue;
+    const std::vector<double> values = slopes_in(o, name);
+    if (values.size() > 1) throw std::invalid_argument(fmt::format("--{}: one number expected", name));
+    *value = values.front();
+  }
+  return setting;
 }
 
 WalkerRequest walker_sweep_request(const Options& o, const std::string& command_line) {

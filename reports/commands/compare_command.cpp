@@ -48,8 +48,13 @@ CompareAnswer answer_compare(const CompareRequest& request, const BeginPart& beg
   options.progress = begin("compare");
   CompareAnswer answer{analysis::compare(request.settings, options, request.collisions), {}, {}};
   answer.extras = from_standard_errors(request, answer.comparison, begin);
-  for (const analysis::Metastability& study : answer.comparison.studies)
+  for (const analysis::Metastability& study : answer.comparison.studies) {
     answer.thresholds.push_back(analysis::rest_thresholds(study));
+    if (!request.rigid_bodies) continue;
+    options.progress = begin("rigid bodies");
+    answer.extras.rigid_bodies.push_back(
+        analysis::beside_rigid_bodies(study, fmt::format("{} deg", study.setting->slope_deg), options));
+  }
   return answer;
 }
 
@@ -67,7 +72,8 @@ std::string compare_answer_text(const CompareRequest& request, const CompareAnsw
   for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
     const std::string& label = comparison.labels[i];
     if (!request.settings[i].describe().starts_with(label)) text += label + ": ";
-    text += study_text(comparison.studies[i], answer.thresholds[i]);
+        text += study_text(comparison.studies[i], answer.thresholds[i],
+                       extras.rigid_bodies.empty() ? nullptr : &extras.rigid_bodies[i]);
     if (!extras.steps.empty())
       text += fmt::format("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(extras.steps[i]));
     text += "\n";
@@ -78,6 +84,8 @@ std::string compare_answer_text(const CompareRequest& request, const CompareAnsw
     if (!extras.ratios.empty())
       text += fmt::format("  95 % interval of the ratio from standard errors: {}\n", propagated_text(extras.ratios[i]));
   }
+  if (!extras.rigid_bodies.empty())
+    text += analysis::rigid_body_sentence(extras.rigid_bodies, request.settings.front().law) + "\n";
   return text;
 }
 

@@ -14,6 +14,7 @@
 #include "analysis/sensitivity/rolled_steps.h"
 #include "analysis/sensitivity/sweep.h"
 #include "analysis/study/how_it_fails.h"
+#include "analysis/study/steady_launch.h"
 #include "dynamics/wheel/contact_law.h"
 #include "markov/parallel.h"
 #include "reports/output/interrupt.h"
@@ -123,6 +124,13 @@ class Report {
       provenance.settings += (provenance.settings.empty() ? "" : "\n") + setting.describe();
     return provenance;
   }
+
+  analysis::Setting launched(const analysis::Setting& setting) const {
+    analysis::StudyOptions options = request_.study;
+    options.progress = [](double, const std::string&) { check_interrupt(); };
+    return analysis::steadily_launched(setting, options);
+  }
+
   Provenance provenance_for_all() const {
     std::vector<analysis::Setting> settings;
     for (const Studied& one : studied_) settings.push_back(*one.study.setting);
@@ -142,7 +150,14 @@ class Report {
         }
         analysis::StudyOptions options = request_.study;
         options.progress = study_progress(progress_);
-        Studied one{analysis::study(setting, options), {}};
+        Studied one;
+        try {
+          one.study = analysis::study(setting, options);
+        } catch (const analysis::NoRegime&) {
+          if (law == request_.settings.front().law) throw;
+          options.progress(1, "");
+          continue;  // none rolls on under this law
+        }
         options.progress(1, "");
         one.thresholds = analysis::rest_thresholds(one.study);
         studied_.push_back(std::move(one));
@@ -363,7 +378,7 @@ class Report {
                      {density_figure(studied_, provenance_for_all())},
                      {}});
     for (const analysis::Setting& setting : request_.settings)
-      folds.back().figures.push_back(return_map_figure(setting, provenance_for({setting})));
+      folds.back().figures.push_back(return_map_figure(launched(setting), provenance_for({setting})));
     energies(folds);
     std::vector<std::string> settings;
     for (const analysis::Setting& setting : request_.settings) settings.push_back(setting.describe() + ".");
@@ -385,6 +400,7 @@ class Report {
     for (std::size_t k = 0; k < energy_spreads.size(); ++k) {
       analysis::Setting setting = request_.settings.front();
       setting.restitution.sd = setting.friction.sd = energy_spreads[k];
+      setting = launched(setting);
       losses.push_back(analysis::energy_losses(setting, {.trials = request_.energy_trials,
                                                          .collisions = energy_collisions,
                                                          .seed = request_.study.seed,

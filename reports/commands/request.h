@@ -31,6 +31,7 @@ struct StepsRequest {
   bool sensitivities = false;
   bool how_it_fails = false;
   std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to the expected steps
+  bool rigid_bodies = false;  ///< what the law `settled` gives as well: no law was named
 };
 
 /// Asks for `metastable compare`.
@@ -41,6 +42,7 @@ struct CompareRequest {
   std::string json;
   std::string command;
   std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to expected steps and ratios
+  bool rigid_bodies = false;                                  ///< as of StepsRequest
 };
 
 /// Asks for `metastable sweep`.
@@ -52,6 +54,7 @@ struct SweepRequest {
   std::string command;
   std::string json = {};                    ///< as of StepsRequest
   const struct Sharing* sharing = nullptr;  ///< with other processes
+  bool rigid_bodies = false;                ///< as of StepsRequest
 };
 
 /// Asks for `metastable simulate`.

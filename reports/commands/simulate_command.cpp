@@ -9,6 +9,7 @@
 
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/experiment/stand_in.h"
+#include "analysis/study/steady_launch.h"
 #include "reports/commands/experiment_output.h"
 #include "reports/output/answer.h"
 #include "reports/output/version.h"
@@ -27,9 +28,17 @@ std::optional<analysis::CameraOptions> filmed(std::optional<analysis::CameraOpti
   return camera;
 }
 
-analysis::SimulatedCondition one_condition(const SimulateRequest& request, const markov::Share& progress) {
-  return {fmt::format("{}", request.setting.slope_deg), request.setting,
-          analysis::simulate_trials(request.setting, {.trials = request.trials,
+// Returns the setting with a launch that trials can be drawn from.
+analysis::Setting launched(const analysis::Setting& setting, std::uint64_t seed, int threads, const BeginPart& begin) {
+  if (!setting.steady_launch) return setting;
+  return analysis::steadily_launched(setting, {.seed = seed, .threads = threads, .progress = begin("steady launch")});
+}
+
+analysis::SimulatedCondition one_condition(const SimulateRequest& request, const BeginPart& begin) {
+  const analysis::Setting setting = launched(request.setting, request.seed, request.threads, begin);
+  const markov::Share progress = begun(begin, "simulate");
+  return {fmt::format("{}", setting.slope_deg), setting,
+          analysis::simulate_trials(setting, {.trials = request.trials,
                                                       .collisions = request.collisions,
                                                       .seed = request.seed,
                                                       .threads = request.threads,
@@ -55,10 +64,10 @@ void run_into_folder(const Request& request) {
 SimulatedExperiment simulated_experiment(const SimulateRequest& request, const BeginPart& begin) {
   if (std::isinf(request.setting.ramp_length))  // experiment.toml states where the ramp ends
     throw std::invalid_argument("--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do");
-  const markov::Share progress = begun(begin, "simulate");
   const std::vector<analysis::SimulatedCondition> conditions =
-      request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads, progress)
-                       : std::vector<analysis::SimulatedCondition>{one_condition(request, progress)};
+      request.stand_in
+          ? analysis::stand_in(request.setting, request.seed, request.threads, begun(begin, "simulate"))
+          : std::vector<analysis::SimulatedCondition>{one_condition(request, begin)};
   Provenance provenance{request.command, {}, request.seed, version()};
   for (const analysis::SimulatedCondition& condition : conditions)
     provenance.settings += (provenance.settings.empty() ? "" : "\n") + condition.setting.describe();
@@ -79,7 +88,10 @@ SimulatedExperiment simulated_experiment(const SimulateRequest& request, const B
   return made;
 }
 
-SimulatedExperiment simulated_experiment(const RealityRequest& request, const BeginPart& begin) {
+SimulatedExperiment simulated_experiment(const RealityRequest& asked, const BeginPart& begin) {
+  RealityRequest request = asked;
+  for (analysis::RealityCondition& condition : request.conditions)
+    condition.setting = launched(condition.setting, request.reality.seed, request.reality.threads, begin);
   const dynamics::LaboratorySetup setup = analysis::laboratory_setup(request.conditions, request.reality);
   const std::vector<dynamics::LaboratoryTrial> trials =
       analysis::run_laboratory(setup, request.reality.threads, begun(begin, "simulate"));

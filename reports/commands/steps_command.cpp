@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <optional>
+#include <span>
 
 #include "analysis/study/certify.h"
 #include "analysis/study/consistency.h"
@@ -38,25 +39,32 @@ StepsAnswer answer_steps(const StepsRequest& request, const BeginPart& begin) {
   }
   if (request.how_it_fails) {
     options.progress = begin("how it fails");
-    extras.last_moments = analysis::how_it_fails(request.setting, study, options);
+    extras.last_moments = analysis::how_it_fails(study.setting.value(), study, options);
+  }
+  if (request.rigid_bodies) {
+    options.progress = begin("rigid bodies");
+    extras.rigid_bodies = analysis::beside_rigid_bodies(study, "", options);
   }
   return answer;
 }
 
 std::string steps_answer_json(const StepsRequest& request, const StepsAnswer& answer) {
   return steps_json(answer.study, answer.thresholds,
-                    {request.command, request.setting.describe(), request.study.seed, version()}, answer.extras);
+                    {request.command, answer.study.setting.value().describe(), request.study.seed, version()},
+                    answer.extras);
 }
 
 std::string steps_answer_text(const StepsRequest& request, const StepsAnswer& answer, std::size_t width) {
   const StepsExtras& extras = answer.extras;
-  std::string text = study_text(answer.study, answer.thresholds);
+  const analysis::BesideRigidBodies* beside = extras.rigid_bodies ? &*extras.rigid_bodies : nullptr;
+  std::string text = study_text(answer.study, answer.thresholds, beside);
   if (extras.certified)
     text += fmt::format("  {:<38}{}\n", "certificate", analysis::certificate_text(*extras.certified));
   if (extras.propagated)
     text += fmt::format("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(*extras.propagated));
   if (extras.sensitivities) text += "\n" + sensitivities_text(*extras.sensitivities);
   if (extras.last_moments) text += "\n" + last_moments_text(*extras.last_moments, "leg", width);
+  if (beside) text += "\n" + analysis::rigid_body_sentence(std::span(beside, 1), request.setting.law) + "\n";
   if (answer.study.status != analysis::Status::rest_unresolved)
     text += "\n" + words_text(answer.study, request.explain, width);
   return text;

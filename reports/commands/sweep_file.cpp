@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -66,10 +67,12 @@ std::vector<std::string> fields_of(std::string_view line) {
   return fields;
 }
 
+std::string by_law(const SweepFile& sweep) { return sweep.law.empty() ? "" : ", law " + sweep.law; }
+
 // Returns the rows as a table, those taken over from the file as those just computed: all are what the file holds. The
 // last line of the head names the columns.
 Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
-  Table table{.id = "sweep", .title = "Points of the sweep", .columns = {}};
+  Table table{.id = "sweep", .title = "Points of the sweep" + by_law(sweep), .columns = {}};
   const std::string_view head(sweep.head.data(), sweep.head.size() - 1);
   for (const std::string& name : fields_of(head.substr(head.rfind('\n') + 1))) table.columns.push_back({name});
   for (const std::string& row : rows) {
@@ -83,12 +86,32 @@ Table table_of(const SweepFile& sweep, const std::vector<std::string>& rows) {
   return table;
 }
 
+// Returns what wheels rolled under `settled` show where the one line, or line k of several, has them.
+std::optional<Series> rigid_bodies_of(const Table& table, const std::vector<double>& across, int colour,
+                                      const std::function<std::size_t(std::size_t)>& row) {
+  const auto first = std::ranges::find(table.columns, "rigid_bodies_steps", &Column::name);
+  if (first == table.columns.end()) return std::nullopt;
+  const auto column = static_cast<std::size_t>(first - table.columns.begin());
+  Series points{"rigid bodies (law settled)", Style::points, {}, {}, {}, {}, colour};
+  for (std::size_t i = 0; i < across.size(); ++i) {
+    const std::vector<Cell>& cells = table.rows[row(i)];
+    const double steps = value_of(cells[column]);
+    if (!std::isfinite(steps)) continue;
+    points.x.push_back(across[i]);
+    points.y.push_back(steps);
+    points.lower.push_back(value_of(cells[column + 1]));
+    points.upper.push_back(value_of(cells[column + 2]));
+  }
+  if (points.x.empty()) return std::nullopt;
+  return points;
+}
+
 // Returns nothing if no point has a finite number of steps.
 std::optional<Figure> figure_of(const SweepFile& sweep, const Table& table) {
   const std::vector<SweepFileAxis>& axes = sweep.axes;
   Figure figure;
   figure.id = "sweep";
-  figure.title = "Expected steps before failure";
+  figure.title = "Expected steps before failure" + by_law(sweep);
   figure.provenance = sweep.provenance;
   // These two axes are shown; further ones stay at their first value.
   const SweepFileAxis& across = axes.front();
@@ -120,10 +143,12 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const Table& table) {
   }
   figure.y = {"expected steps", "", true};
   const std::size_t shown = std::min(lines, most_lines);
+  bool rolled = false;  // has its place in the legend
   for (std::size_t j = 0; j < shown; ++j) {
     const std::size_t k = shown > 1 ? j * (lines - 1) / (shown - 1) : 0;
     Series band{"", Style::band, across.values, {}, {}, {}, static_cast<int>(j)};
     Series line{"", Style::line, across.values, {}, {}, {}, static_cast<int>(j)};
+    if (sweep.remark && second != 1) line.label = "law " + sweep.law;
     if (second == 1) line.label = fmt::format("{} {}", axes[1].label, axes[1].values[k]);
     for (std::size_t i = 0; i < across.values.size(); ++i) {
       line.y.push_back(number_at(i, k, 0));
@@ -133,6 +158,12 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const Table& table) {
     if (std::none_of(line.y.begin(), line.y.end(), [](double value) { return std::isfinite(value); })) continue;
     figure.series.push_back(std::move(band));
     figure.series.push_back(std::move(line));
+    if (auto points = rigid_bodies_of(table, across.values, static_cast<int>(shown == 1 ? 1 : j),
+                                      [&](std::size_t i) { return i * stride + (second == 1 ? k * stride_second : 0); })) {
+      if (rolled) points->label.clear();
+      rolled = true;
+      figure.series.push_back(std::move(*points));
+    }
   }
   if (figure.series.empty()) return std::nullopt;
   figure.legend = Legend::below;
@@ -204,6 +235,7 @@ void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
   if (drawn) write_file(picture, render_svg(*drawn));
   answer.say("{}: {} points ({} taken over); {}", out.string(), size, had,
              drawn ? picture.string() : "no figure: no point has a finite number of steps");
+  if (sweep.remark) answer.say("{}", sweep.remark(table));
   answer.table(std::move(table));
   answer.file(out.string());
   if (drawn) answer.file(picture.string());

@@ -21,10 +21,14 @@ struct SweepFile {
   std::vector<SweepFileAxis> axes;  ///< the first varies slowest
   Provenance provenance;            ///< of the figure
   std::string json = {};            ///< file, "-" for standard output, "" for none
+  std::string law = {};             ///< named in titles; "" for what has none
+  /// Says a last line about the table of all points.
+  std::function<std::string(const Table& points)> remark = {};
 };
 
 /// Computes the points from number `had` on and hands each row over, with its line end: one column an axis, then
-/// expected steps and the ends of their interval ("infinite", empty where a solver failed), then anything.
+/// expected steps and the ends of their interval ("infinite", empty where a solver failed), then anything. Columns
+/// "rigid_bodies_steps", and with "_low95" and "_high95" behind, are drawn too.
 using SweepRows = std::function<void(std::size_t had, const std::function<void(const std::string& row)>& add)>;
 
 /// Holds processes that share the points of a sweep. The first of them writes all files.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "dynamics/wheel/contact_law.h"
 #include "reports/study/last_moments_text.h"
@@ -69,6 +70,23 @@ Json propagated_json(const analysis::Propagated& propagated) {
           {"variance_shares", shares}};
 }
 
+// Says of the law of rigid bodies what a study beside it would: expected steps, or a bound, or why there are none.
+Json rigid_bodies_json(const analysis::BesideRigidBodies& beside) {
+  const analysis::RigidBodyCheck& check = beside.check;
+  Json json = {{"law", dynamics::law_name(dynamics::Law::settled)}};
+  if (!check.reason.empty()) {
+    json["reason"] = check.reason;
+    return json;
+  }
+  json["expected_steps"] = {{"from_start", check.at_least ? Json(nullptr) : number(check.steps.value)},
+                            {"interval_95", interval(check.steps)}};
+  json["verdict"] = analysis::verdict_text(beside.verdict());
+  json["wheels"] = check.wheels;
+  json["collisions"] = check.collisions;
+  json["rests"] = check.rests;
+  return json;
+}
+
 Json provenance_json(const Provenance& provenance) {
   return {{"command", provenance.command},
           {"settings", provenance.settings},
@@ -83,6 +101,9 @@ Json study_json(const analysis::Metastability& study, const analysis::RestThresh
   Json json;
   json["slope_deg"] = setting.slope_deg;
   json["law"] = dynamics::law_name(setting.law);
+  json["launch"] = {{"steady", setting.steady_launch},
+                    {"mean_rad_s", setting.initial_speed.mean},
+                    {"sd_rad_s", setting.initial_speed.sd}};
   json["method"] = analysis::method_name(study.method);
   json["status"] = analysis::status_text(study.status);
   if (!study.message.empty()) json["message"] = study.message;
@@ -151,6 +172,11 @@ std::string steps_json(const analysis::Metastability& study, const analysis::Res
   if (extras.sensitivities) json["sensitivities"] = sensitivities_json(*extras.sensitivities);
   if (extras.last_moments) json["how_it_fails"] = Json::parse(last_moments_json(*extras.last_moments));
   if (extras.propagated) json["from_standard_errors"] = propagated_json(*extras.propagated);
+  if (extras.rigid_bodies) {
+    json["rigid_bodies"] = rigid_bodies_json(*extras.rigid_bodies);
+    json["rigid_bodies"]["sentence"] =
+        analysis::rigid_body_sentence(std::span(&*extras.rigid_bodies, 1), study.setting.value().law);
+  }
   json["provenance"] = provenance_json(provenance);
   return json.dump(2) + "\n";
 }
@@ -163,6 +189,7 @@ std::string compare_json(const analysis::Comparison& comparison,
     json["settings"].push_back({{"label", comparison.labels[i]}});
     json["settings"].back().update(study_json(comparison.studies[i], thresholds[i]));
     if (!extras.steps.empty()) json["settings"].back()["from_standard_errors"] = propagated_json(extras.steps[i]);
+    if (!extras.rigid_bodies.empty()) json["settings"].back()["rigid_bodies"] = rigid_bodies_json(extras.rigid_bodies[i]);
   }
   const auto estimate = [](const std::optional<analysis::Estimate>& value) {
     return value ? Json{{"value", number(value->value)}, {"interval_95", interval(*value)}} : Json(nullptr);
@@ -181,6 +208,9 @@ std::string compare_json(const analysis::Comparison& comparison,
     if (!extras.ratios.empty())
       json["contrasts"].back()["ratio_from_standard_errors"] = propagated_json(extras.ratios[i]);
   }
+  if (!extras.rigid_bodies.empty())
+    json["rigid_bodies"] =
+        analysis::rigid_body_sentence(extras.rigid_bodies, comparison.studies.front().setting.value().law);
   json["provenance"] = provenance_json(provenance);
   return json.dump(2) + "\n";
 }

@@ -12,6 +12,7 @@
 #include "analysis/study/certify.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/rest_thresholds.h"
+#include "analysis/study/rigid_body_check.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {
@@ -22,12 +23,14 @@ struct StepsExtras {
   std::optional<analysis::Sensitivities> sensitivities = {};
   std::optional<analysis::LastMoments> last_moments = {};
   std::optional<analysis::Propagated> propagated = {};  ///< from the parameters' standard errors
+  std::optional<analysis::BesideRigidBodies> rigid_bodies = {};
 };
 
-/// Holds what `compare` finds beyond the comparison; empty without standard errors.
+/// Holds what `compare` finds beyond the comparison; the first two are empty without standard errors.
 struct CompareExtras {
   std::vector<analysis::Propagated> steps = {};   ///< a setting each
   std::vector<analysis::Propagated> ratios = {};  ///< a contrast each
+  std::vector<analysis::BesideRigidBodies> rigid_bodies = {};  ///< a setting each; empty where they were not asked for
 };
 
 /// Writes the result of `steps`, indented, with a final line end. "infinite" is written as a string; numbers have as

@@ -136,20 +136,24 @@ std::string thresholds_text(const analysis::RestThresholds& thresholds) {
   return text;
 }
 
-std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds) {
+std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds,
+                       const analysis::BesideRigidBodies* rigid_bodies) {
   const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
   const bool followed = study.method == analysis::Method::followed;
   const double error = relative_error(study.steps.from_start);
   std::string text = setting.describe() + "\n\n";
-  if (study.status == analysis::Status::rest_unresolved) return text + "  " + study.message + "\n";
+  const std::string beside =
+      rigid_bodies ? line("  of rigid bodies (law settled)", analysis::rigid_body_steps_text(rigid_bodies->check)) : "";
+  if (study.status == analysis::Status::rest_unresolved) return text + "  " + study.message + "\n" + beside;
   if (endless) {
-    text += line("expected steps before failure", study.message);
+    text += line("expected steps before failure", study.message) + beside;
   } else {
     text += line("expected steps before failure", estimate_text(study.steps.from_start));
     if (!followed) text += line("  from the metastable regime", estimate_text(study.steps.from_quasi_stationary));
     if (std::isfinite(study.steps.worst_start.upper))
       text += line("  from the worst start", estimate_text(study.steps.worst_start));
+    text += beside;
     if (!followed) text += line("failure rate per step", estimate_text(study.spectrum.failure_rate));
     text += line("steps", fmt::format("sd {}, {}", show(study.steps.distribution.sd, error),
                                       quantiles_text(study.steps.distribution, error)));

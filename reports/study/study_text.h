@@ -8,11 +8,13 @@
 #include "analysis/sensitivity/sensitivity.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/rest_thresholds.h"
+#include "analysis/study/rigid_body_check.h"
 
 namespace metastable::reports {
 
-/// Writes everything `metastable steps` prints.
-std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds);
+/// Writes everything `metastable steps` prints. @param rigid_bodies  shown too where it is there
+std::string study_text(const analysis::Metastability& study, const analysis::RestThresholds& thresholds,
+                       const analysis::BesideRigidBodies* rigid_bodies = nullptr);
 
 /// Says what the words of study_text() mean: a line each, or with `more` what stands behind them as well; lines of at
 /// most `width` characters.

@@ -76,7 +76,29 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"steps", "--bogus", "1"}, "--bogus"},
       {{"steps", "--slope", "abc"}, "--slope: 'abc' is not a number"},
       {{"steps", "--slope", "25", "--initial-speed", "7,0.1"}, "slope: 25 deg is outside [0.001, 22.5) deg"},
-      {{"steps", "--slope", "8"}, "--initial-speed: must be given at 8 deg"},
+      {{"steps", "--initial-speed", "steadily"}, "--initial-speed: 'steadily' is not"},
+      {{"steps", "--slope", "0.1", "--friction", "0.4,0.02"}, "initial speed: steady: fewer than 1e-12 of the wheels"},
+      {{"solve"}, "PARAMETER is required"},
+      {{"solve", "slope"}, "solve: one of --steps, --survive and --reach is needed, and no other"},
+      {{"solve", "slope", "--steps", "100", "--reach", "0.5"}, "solve: one of --steps, --survive and --reach"},
+      {{"solve", "slope", "--slope", "8", "--steps", "100"}, "--slope: is what is solved for"},
+      {{"solve", "slop", "--steps", "100"}, "PARAMETER: 'slop' is none of slope, restitution-mean"},
+      {{"solve", "slope", "--survive", "1000"}, "--survive: '1000' is not of the form STEPS:SHARE, as 1000:0.9"},
+      {{"solve", "slope", "--survive", "1000:1.5"}, "--survive: 1.5 is outside (0, 1)"},
+      {{"solve", "slope", "--survive", "0:0.5"}, "--survive: '0' is not a whole number in 1..1000000000"},
+      {{"solve", "slope", "--reach", "1"}, "--reach: 1 is outside (0, 1)"},
+      {{"solve", "slope", "--steps", "1"}, "--steps: 1 is outside (1, inf)"},
+      {{"solve", "slope", "--steps", "100", "--to", "30"}, "slope: 30 deg is outside [0.001, 22.5) deg"},
+      {{"solve", "friction-mean", "--steps", "100", "--from", "0.5", "--to", "0.4"}, "from: 0.5 is not below to: 0.4"},
+      {{"solve", "friction-mean", "--steps", "100", "--points", "2"}, "--points: '2' is not a whole number in 3..1000"},
+      {{"solve", "slope-sd", "--steps", "100"}, "PARAMETER: slope-sd has a meaning with --walker only"},
+      {{"solve", "friction-mean", "--walker", "compass", "--slope-sd", "0.4", "--steps", "100"},
+       "PARAMETER: 'friction-mean' is none of slope, slope-sd, which a walker has"},
+      {{"solve", "slope-sd", "--walker", "compass", "--slope-sd", "0.4", "--steps", "100"},
+       "--slope-sd: is what is solved for"},
+      {{"solve", "slope-sd", "--walker", "compass", "--reach", "0.4"}, "--reach: has no meaning with --walker"},
+      {{"solve", "tip-radius", "--steps", "100"}, "tip-radius has no meaning under this setting"},
+      {{"solve", "friction-mean", "--reach", "0.5", "--ramp-length", "inf"}, "reach: the ramp has no end"},
       {{"steps", "--slope", "22.5"}, "slope: 22.5 deg is outside [0.001, 22.5) deg"},
       {{"steps", "--rebound-lost", "0.5"}, "--rebound-lost: has a meaning under --law coulomb only"},
       {{"sweep", "--friction-mean", "0.2,0.3", "--contact-list", file("ok.csv", "restitution,friction\n0.4,0.3\n")},
@@ -170,6 +192,98 @@ TEST_F(CommandLine, StepsWritesTheKeysThatWerePromised) {
   EXPECT_TRUE(json.at("quasi_stationary").at("sd_rad_s").is_number());
   EXPECT_TRUE(json.at("error").at("discretization").is_number());
   EXPECT_TRUE(json.at("error").at("sampling").is_number());
+}
+
+// Where no law was named, the law of rigid bodies is asked too; where one was, nothing is added.
+TEST_F(CommandLine, StepsWithoutALawSaysWhatRigidBodiesGive) {
+  const std::vector<std::string> rubber = with({"steps", "--slope", "9.59", "--friction", "0.6,0.1"}, quick);
+  const Ran unnamed = metastable(with(rubber, {"--json", path("u.json")}));
+  ASSERT_EQ(unnamed.code, 0) << unnamed.err;
+  EXPECT_NE(unnamed.out.find("\n    of rigid bodies (law settled)"), std::string::npos) << unnamed.out;
+  EXPECT_NE(unnamed.out.find("times as many: trust settled for a real wheel, published for comparing with the paper."),
+            std::string::npos)
+      << unnamed.out;
+  const auto rigid = nlohmann::json::parse(read(path("u.json"))).at("rigid_bodies");
+  EXPECT_EQ(rigid.at("law"), "settled");
+  EXPECT_EQ(rigid.at("verdict"), "differs");
+  EXPECT_GT(rigid.at("expected_steps").at("interval_95")[0], 100);
+
+  const Ran named = metastable(with(rubber, {"--law", "published", "--json", path("n.json")}));
+  EXPECT_EQ(named.out.find("rigid bodies"), std::string::npos);
+  EXPECT_FALSE(nlohmann::json::parse(read(path("n.json"))).contains("rigid_bodies"));
+  const std::string config = file("law.toml", "law = \"published\"\n");
+  EXPECT_EQ(metastable(with(rubber, {"--config", config})).out, named.out);
+}
+
+TEST_F(CommandLine, CompareAndSweepSayItToo) {
+  const Ran compared = metastable(with({"compare"}, quick));
+  EXPECT_NE(compared.out.find("The law is published, as none was named; rigid bodies (law settled)"), std::string::npos)
+      << compared.out;
+  EXPECT_EQ(metastable(with({"compare", "--law", "published"}, quick)).out.find("rigid bodies"), std::string::npos);
+
+  const std::vector<std::string> rubber = with({"sweep", "--slope", "9.59", "--friction-mean", "0.4,0.5,0.6"}, quick);
+  const Ran swept = metastable(with(rubber, {"--out", path("s.csv")}));
+  ASSERT_EQ(swept.code, 0) << swept.err;
+  EXPECT_NE(swept.out.find("disagree in direction"), std::string::npos) << swept.out;
+  const std::string whole = read(path("s.csv"));
+  EXPECT_NE(whole.find(",status,rigid_bodies_steps,rigid_bodies_steps_low95,rigid_bodies_steps_high95\n"),
+            std::string::npos);
+  EXPECT_NE(read(path("s.svg")).find("law settled"), std::string::npos);
+  EXPECT_NE(read(path("s.svg")).find("law published"), std::string::npos);
+  // Points taken over from the file are in the line as well.
+  const Ran again = metastable(with(rubber, {"--out", path("s.csv")}));
+  EXPECT_EQ(again.out.substr(again.out.find('\n')), swept.out.substr(swept.out.find('\n')));
+  ASSERT_EQ(metastable(with(rubber, {"--law", "published", "--out", path("n.csv")})).code, 0);
+  EXPECT_EQ(read(path("n.csv")).find("rigid"), std::string::npos);
+}
+
+TEST_F(CommandLine, LaunchesAreSteadyWhereThePaperHasNone) {
+  const Ran text = metastable(with({"steps", "--slope", "8", "--law", "published"}, quick));
+  ASSERT_EQ(text.code, 0) << text.err;
+  EXPECT_NE(text.out.find("omega_0 of the metastable regime ("), std::string::npos) << text.out;
+  const Ran json = metastable(with({"steps", "--slope", "8", "--initial-speed", "steady", "--json", "-"}, quick));
+  const auto told = nlohmann::json::parse(json.out);
+  EXPECT_TRUE(told.at("launch").at("steady"));
+  EXPECT_NEAR(told.at("launch").at("mean_rad_s"), told.at("quasi_stationary").at("mean_rad_s"), 0.01);
+  EXPECT_NEAR(told.at("expected_steps").at("from_start").get<double>() /
+                  told.at("expected_steps").at("from_quasi_stationary").get<double>(),
+              1, 0.01);
+  EXPECT_FALSE(nlohmann::json::parse(metastable(with({"steps", "--json", "-"}, quick)).out).at("launch").at("steady"));
+
+  ASSERT_EQ(metastable(with({"sweep", "--law", "published", "--slope", "0.1,7,8", "--friction-sd", "0.02", "--out",
+                             path("s.csv")},
+                            quick))
+                .code,
+            0);
+  EXPECT_NE(read(path("s.csv")).find("0.1,,,,,,,,,no_regime\n"), std::string::npos) << read(path("s.csv"));
+  const Ran made = metastable({"simulate", "--slope", "8", "--legs", "0.1519", "--trials", "3", "--out", path("t")});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_NE(read(path("t/experiment.toml")).find("initial_speed_rad_s = [4."), std::string::npos)
+      << read(path("t/experiment.toml"));
+}
+
+TEST_F(CommandLine, SolveSaysTheValueOrThatItIsOutOfReach) {
+  const std::vector<std::string> asked = with({"solve", "friction-mean", "--steps", "10", "--points", "5"}, quick);
+  const Ran found = metastable(with(asked, {"--json", path("f.json")}));
+  ASSERT_EQ(found.code, 0) << found.err;
+  EXPECT_NE(found.out.find("friction-mean"), std::string::npos);
+  EXPECT_NE(found.out.find("10 expected steps"), std::string::npos) << found.out;
+  EXPECT_NE(found.out.find("The law is published, as none was named"), std::string::npos) << found.out;
+  const auto json = nlohmann::json::parse(read(path("f.json")));
+  ASSERT_EQ(json.at("solutions").size(), 1U);
+  const double value = json.at("solutions")[0].at("value");
+  EXPECT_LT(json.at("solutions")[0].at("interval_95")[0], value);
+  EXPECT_GT(json.at("solutions")[0].at("interval_95")[1], value);
+  EXPECT_EQ(json.at("scanned").size(), 5U);
+  const Ran there = metastable(with({"steps", "--friction", fmt::format("{},0.1", value), "--json", "-"}, quick));
+  EXPECT_NEAR(nlohmann::json::parse(there.out).at("expected_steps").at("from_start"), 10, 0.1);
+
+  const Ran none = metastable(with({"solve", "friction-mean", "--steps", "10", "--from", "0.6", "--to", "0.8", "--law",
+                                    "published", "--points", "3"},
+                                   quick));
+  EXPECT_EQ(none.code, 0);
+  EXPECT_NE(none.out.find("out of reach between 0.6 and 0.8: "), std::string::npos) << none.out;
+  EXPECT_EQ(none.out.find("rigid bodies"), std::string::npos);
 }
 
 TEST_F(CommandLine, InfiniteIsAWord) {

@@ -27,6 +27,7 @@ class EveryCommand : public test::InFolder {
         {"steps", {}},
         {"compare", {}},
         {"sweep", {"--friction-mean", "0.3,0.4", "--out", path("sweep.csv")}},
+        {"solve", {"slope", "--steps", "100"}},
         {"simulate", {"--out", path("new")}},
         {"import", {path("exp/collisions.csv"), "--description", path("exp/experiment.toml"), "--out", path("new")}},
         {"coast-down", {file("drum.txt", "1 2\n"), "--out", path("new")}},

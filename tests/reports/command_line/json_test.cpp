@@ -49,6 +49,7 @@ TEST_F(JsonOfEveryCommand, IsAllOfStandardOutput) {
       {"completion", "bash"},
       {"steps"},
       {"compare"},
+      {"solve", "friction-mean", "--steps", "5", "--points", "3"},
       {"sweep", "--friction-mean", "0.3,0.4", "--out", path("sweep.csv")},
       {"simulate", "--trials", "3", "--angle-rate", "120", "--out", path("plain")},
       {"simulate", "--reality", "--trials", "3", "--out", path("reality")},
@@ -59,7 +60,7 @@ TEST_F(JsonOfEveryCommand, IsAllOfStandardOutput) {
       {"blind", "make", path("run"), "--seed", "1", "--per-effect", "0", "--none", "1", "--pairs", "0", "--outside",
        "0", "--left-out", "0"}};
   for (std::vector<std::string>& words : all) {
-    if (words[0] == "steps" || words[0] == "compare" || words[0] == "sweep")
+    if (words[0] == "steps" || words[0] == "compare" || words[0] == "sweep" || words[0] == "solve")
       words.insert(words.end(), quick.begin(), quick.end());
     SCOPED_TRACE(fmt::format("{}", fmt::join(words, " ")));
     const Json told = answer(words);
@@ -81,7 +82,7 @@ TEST_F(JsonOfEveryCommand, IsAFileBesideWhatIsPrintedOrRefused) {
 // What is printed without it is told with it, and the files that were written.
 TEST_F(JsonOfEveryCommand, TellsWhatIsPrinted) {
   const std::vector<std::string> words{
-      "sweep", "--friction-mean", "0.3,0.4", "--cells", "16", "--samples", "64", "--replicates", "2", "--threads", "1",
+      "sweep", "--law", "published", "--friction-mean", "0.3,0.4", "--cells", "16", "--samples", "64", "--replicates", "2", "--threads", "1",
       "--out", path("sweep.csv")};
   const Json told = answer(words);
   std::string said;
