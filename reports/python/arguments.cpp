@@ -67,6 +67,7 @@ bool is_words(const std::string& value) {
 // Names what Python calls otherwise: with its unit, without a negation, in the plural.
 constexpr std::pair<const char*, const char*> other_names[] = {
     {"slope", "slope_deg"},  {"slopes", "slope_deg"}, {"slope-sd", "slope_sd_deg"}, {"memory", "memory_gb"},
+    {"from", "start"},       {"to", "stop"},
     {"no-flight", "flight"}, {"shuffle", "shuffled"}, {"effect", "effects"}};
 
 }  // namespace
@@ -147,9 +148,11 @@ void Arguments::give(Options& options) const {
       if (flag(name.c_str())) options.give(option, {"true"});
     } else if (is_words(wanted)) {
       options.give(option, {text(name.c_str())});
+    } else if (wanted.ends_with("|steady") && py::isinstance<py::str>(value)) {
+      options.give(option, {text(name.c_str())});
     } else if (wanted.find(',') != std::string::npos) {
       options.give(option,
-                   {list_text(name.c_str(), wanted == "MEAN,SD" ? "(mean, sd) or a number" : "numbers", object)});
+                   {list_text(name.c_str(), wanted.starts_with("MEAN,SD") ? "(mean, sd) or a number" : "numbers", object)});
     } else {
       options.give(option, {number_text(name.c_str(), "a number", object)});
     }

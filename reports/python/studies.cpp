@@ -55,6 +55,7 @@ py::dict study(const py::dict& setting, const py::dict& options, const Command& 
   const Arguments given(options);
   const LooseOptions asked = options_of(declare_steps, given);
   StepsRequest request = steps_request(*asked, setting_of(Arguments(setting)), command);
+  request.rigid_bodies = !Arguments(setting).given("law");
   request.standard_errors = standard_errors_of(given, request.setting);
   const auto found = std::make_shared<StepsAnswer>();
   Call call(progress);
@@ -63,7 +64,7 @@ py::dict study(const py::dict& setting, const py::dict& options, const Command& 
   py::dict arrays;
   arrays["survival"] = array_view(s.steps.survival.data(), s.steps.survival.size(), found);
   arrays["eigenvalue_moduli"] = array_view(s.spectrum.moduli.data(), s.spectrum.moduli.size(), found);
-  const Provenance provenance{command, request.setting.describe(), request.study.seed, version()};
+  const Provenance provenance{command, s.setting.value().describe(), request.study.seed, version()};
   py::dict all = answer(steps_answer_json(request, *found), steps_answer_text(request, *found, line_width),
                         to_html(ramps_table({{s, found->thresholds}}, provenance)), arrays);
   py::list regime;
@@ -81,10 +82,16 @@ py::dict compare(const py::list& settings, const py::dict& options, const Comman
                  const py::object& progress) {
   const Arguments given(options);
   std::vector<analysis::Setting> all;
-  for (const py::handle& one : settings) all.push_back(setting_of(Arguments(one.cast<py::dict>())));
+  bool named = false;
+  for (const py::handle& one : settings) {
+    const Arguments fields(one.cast<py::dict>());
+    named = named || fields.given("law");
+    all.push_back(setting_of(fields));
+  }
   const LooseOptions asked = options_of(declare_compare, given);
   CompareRequest request = compare_request(*asked, all, command);
   request.standard_errors = standard_errors_of(given, request.settings.front());
+  request.rigid_bodies = !named;
   CompareAnswer found;
   Call call(progress);
   call.run([&] { found = answer_compare(request, parts_of(call)); });
@@ -97,20 +104,42 @@ py::dict compare(const py::list& settings, const py::dict& options, const Comman
   std::string html = to_html(ramps_table(columns, {command, described, request.study.seed, version()}));
   for (const analysis::Contrast& contrast : found.comparison.contrasts)
     html += "<p>" + escape_html(contrast.sentence) + "</p>";
+  if (request.rigid_bodies)
+    html += "<p>" +
+            escape_html(analysis::rigid_body_sentence(found.extras.rigid_bodies, request.settings.front().law)) + "</p>";
   return answer(compare_answer_json(request, found), compare_answer_text(request, found), html);
 }
 
 // Holds the columns of a sweep, as the command line names them.
 struct Columns {
   std::vector<std::vector<double>> at;
-  std::vector<double> steps, low, high, quasi, rate, mean, sd, reach_end;
+  std::vector<double> steps, low, high, quasi, rate, mean, sd, reach_end, rigid, rigid_low, rigid_high;
+  std::vector<analysis::BesideRigidBodies> beside;
   std::vector<std::string> status, message;
 };
+
+// Adds what rolled wheels show at the point, NaN where none were rolled.
+void add_rigid_bodies(Columns& c, const std::vector<std::string>& names, const analysis::SweepPoint& point) {
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  const bool known = point.rigid_bodies && point.rigid_bodies->reason.empty();
+  const analysis::RigidBodyCheck check = known ? *point.rigid_bodies : analysis::RigidBodyCheck{};
+  c.rigid.push_back(known && !check.at_least ? check.steps.value : unknown);
+  c.rigid_low.push_back(known ? check.steps.lower : unknown);
+  c.rigid_high.push_back(known ? check.steps.upper : unknown);
+  if (!known || point.failure) return;
+  std::string name;
+  for (std::size_t a = 0; a < names.size(); ++a)
+    name += fmt::format("{}{} {}", a == 0 ? "" : ", ", names[a], point.at[a]);
+  c.beside.push_back({name, analysis::answered_steps(point.study), check});
+}
 
 py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& options, const py::object& progress) {
   const LooseOptions asked = options_of(declare_sweep, Arguments(options));
   analysis::StudyOptions study = study_options(*asked);
-  const analysis::Setting base = setting_of(Arguments(setting));
+  analysis::Setting base = setting_of(Arguments(setting));
+  // One rule for all slopes: the paper's launch is that of one of them.
+  if (axes.contains("slope_deg") && !Arguments(setting).given("initial_speed")) base.steady_launch = true;
+  const bool asked_rigid = !Arguments(setting).given("law");
   std::vector<analysis::SweepAxis> all;
   std::vector<std::string> names;
   for (const auto& [key, value] : axes) {
@@ -131,7 +160,7 @@ py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& op
   call.run([&] {
     analysis::sweep(base, all, 0, study, [&](std::size_t, const analysis::SweepPoint& point) {
       const analysis::Metastability& s = point.study;
-      const bool failed = s.status == analysis::Status::solver_failed;
+      const bool failed = point.failure != nullptr;
       const auto add = [&](std::vector<double>& column, double value) { column.push_back(failed ? unknown : value); };
       for (std::size_t a = 0; a < all.size(); ++a) c.at[a].push_back(point.at[a]);
       add(c.steps, s.steps.from_start.value), add(c.low, s.steps.from_start.lower);
@@ -140,9 +169,10 @@ py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& op
       add(c.reach_end, s.steps.reach_end.value_or(unknown));
       c.status.push_back(analysis::status_text(s.status));
       c.message.push_back(s.message);
+      add_rigid_bodies(c, names, point);
       ++done;
       study.progress(0, "");
-    });
+    }, asked_rigid ? analysis::RigidBodies::asked : analysis::RigidBodies::left_out);
   });
   py::dict columns;
   for (std::size_t a = 0; a < all.size(); ++a) columns[names[a].c_str()] = array_of(std::move(c.at[a]));
@@ -156,7 +186,57 @@ py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& op
   columns["reach_ramp_end"] = array_of(std::move(c.reach_end));
   columns["status"] = py::cast(c.status);
   columns["message"] = py::cast(c.message);
-  return columns;
+  py::dict result;
+  result["rigid_bodies"] = py::none();
+  if (asked_rigid) {
+    columns["rigid_bodies_steps"] = array_of(std::move(c.rigid));
+    columns["rigid_bodies_steps_low95"] = array_of(std::move(c.rigid_low));
+    columns["rigid_bodies_steps_high95"] = array_of(std::move(c.rigid_high));
+    result["rigid_bodies"] = analysis::rigid_body_sentence(c.beside, base.law);
+  }
+  result["columns"] = columns;
+  return result;
+}
+
+// Makes the request of a wheel or of a walker.
+SolveRequest solve_request_of(const py::dict& fields, bool is_walker, const std::string& parameter,
+                              const Arguments& given, const Command& command) {
+  LooseOptions asked(declare_solve);
+  given.without({"survive", "guided_samples"}).give(*asked);
+  const std::string solved = option_of(parameter);
+  asked->give("PARAMETER", {solved});
+  if (given.given("survive")) {
+    const std::vector<double> pair = given.numbers("survive");
+    if (pair.size() != 2) throw std::invalid_argument("survive: (steps, share) expected");
+    asked->give("survive", {fmt::format("{}:{}", pair[0], pair[1])});
+  }
+  if (!is_walker) {
+    asked->check_given();
+    asks_for_walker(*asked);
+    const Arguments setting(fields);
+    analysis::Setting base = setting_of(setting);
+    if (solved == "slope" && !setting.given("initial_speed")) base.steady_launch = true;
+    SolveRequest request = solve_request(*asked, base, command);
+    request.rigid_bodies = !setting.given("law");
+    return request;
+  }
+  asked->give("walker", {Arguments(fields).text("walker")});
+  asked->check_given();
+  SolveRequest request = walker_solve_request(*asked, walker_setting_of(Arguments(fields)), command);
+  read_guided_samples(given, request.meshes);
+  return request;
+}
+
+py::dict solve(const py::dict& setting, bool is_walker, const std::string& parameter, const py::dict& options,
+               const Command& command, const py::object& progress) {
+  const SolveRequest request = solve_request_of(setting, is_walker, parameter, Arguments(options), command);
+  SolveAnswer found;
+  Call call(progress);
+  call.run([&] { found = answer_solve(request, parts_of(call)); });
+  std::string html;
+  for (const std::string& sentence : found.solution.sentences())
+    html += fmt::format("<p>{}: {}</p>", escape_html(found.solution.parameter), escape_html(sentence));
+  return answer(solve_answer_json(request, found), solve_answer_text(request, found), html);
 }
 
 }  // namespace
@@ -165,11 +245,13 @@ void add_studies(py::module_& module) {
   module.def("describe_setting", [](const py::dict& fields) { return setting_of(Arguments(fields)).describe(); });
   module.def("launch", [](const py::dict& fields) {
     const analysis::Setting setting = setting_of(Arguments(fields));
-    return std::pair(setting.initial_speed.mean, setting.initial_speed.sd);
+    if (setting.steady_launch) return std::optional<std::pair<double, double>>();
+    return std::optional(std::pair(setting.initial_speed.mean, setting.initial_speed.sd));
   });
   module.def("study", study);
   module.def("compare", compare);
   module.def("sweep", sweep);
+  module.def("solve", solve);
 }
 
 }  // namespace metastable::reports::python

@@ -25,17 +25,17 @@ import numpy
 
 from metastable import _metastable, _progress, blind
 from metastable._errors import ComputationError, Contradiction, InputError, MapError
-from metastable._results import (Columns, Comparison, Description, Diagnosis, Record, Regime, Result, Study, Sweep,
-                                 Table, WalkerComparison, WalkerStudy, Walks)
+from metastable._results import (Columns, Comparison, Description, Diagnosis, Record, Regime, Result, Solution,
+                                 Study, Sweep, Table, WalkerComparison, WalkerStudy, Walks)
 
 __version__ = _metastable.version
 
 __all__ = [
     "Chain", "Columns", "Comparison", "ComputationError", "Contradiction", "Description", "Diagnosis", "Experiment",
     "FirstPassage", "InputError", "MapError", "Passage", "QuasiStationary", "Record", "Regime", "Result", "Setting",
-    "SimulatedSteps", "Study", "Sweep", "Table", "Walker", "WalkerComparison", "WalkerSetting", "WalkerStudy", "Walks",
+    "SimulatedSteps", "Solution", "Study", "Sweep", "Table", "Walker", "WalkerComparison", "WalkerSetting", "WalkerStudy", "Walks",
     "blind", "chain", "compare", "describe", "diagnose", "effects", "experiment", "read_experiment", "simulate",
-    "study", "sweep", "version_text", "walker",
+    "solve", "study", "sweep", "version_text", "walker",
 ]
 
 
@@ -60,8 +60,10 @@ class Setting:
     """A rimless wheel on a ramp, with its contact law and its noise. What is None is the paper's; `replace` changes.
 
     slope_deg           of the ramp [deg], from 0.001 to below half the angle between legs
-    initial_speed       (mean, sd) just before collision 1 [rad/s]; None: the paper's at 7.02 and 9.59 deg
-    law                 "published", "coulomb", "plastic" or "settled"
+    initial_speed       (mean, sd) just before collision 1 [rad/s], or "steady": of wheels that still roll long after
+                        any launch; None: the paper's at 7.02 and 9.59 deg, elsewhere "steady"
+    law                 "published", "coulomb", "plastic" or "settled"; None: "published", and answers then say as
+                        well what wheels rolled under the law of rigid bodies, "settled", give
     restitution         eta, (mean, sd) of a normal truncated to [0, 1], or a constant; None: (0.4, 0.1)
     friction            mu, (mean, sd) of a normal truncated to [0, inf), or a constant; None: (0.4, 0.1)
     correlation         of the normal scores of eta and mu, (-1, 1)
@@ -82,8 +84,8 @@ class Setting:
     """
 
     slope_deg: float = 7.02
-    initial_speed: Union[Tuple[float, float], float, None] = None
-    law: str = "published"
+    initial_speed: Union[Tuple[float, float], float, str, None] = None
+    law: Optional[str] = None
     restitution: Union[Tuple[float, float], float, None] = None
     friction: Union[Tuple[float, float], float, None] = None
     correlation: Optional[float] = None
@@ -111,7 +113,8 @@ class Setting:
 
     @property
     def launch(self):
-        """(mean, sd) of the speed just before collision 1 [rad/s], the paper's where it was not given."""
+        """(mean, sd) of the speed just before collision 1 [rad/s], the paper's where it was not given; None where it
+        is steady, which a study finds (its `launch`)."""
         return _metastable.launch(_fields(self))
 
     def describe(self):
@@ -316,7 +319,9 @@ def sweep(setting, *, slope_deg=None, restitution_mean=None, restitution_sd=None
           tip_radius=None, method=None, cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None,
           replicates=None, mixing_distance=None, eigenvalues=None, seed=1, threads=0, progress=None):
     """Expected steps over the product of ranges, rising values of what varies (units as in Setting): `metastable
-    sweep`. A slope that varies keeps the setting's launch, which then must be given. Returns a Sweep.
+    sweep`. A slope that varies keeps the setting's launch; where that is None, each is launched steadily. Returns a
+    Sweep. Where the setting's law is None, wheels are rolled under "settled" at up to 16 points, and `rigid_bodies` says
+    how the two compare.
 
     The other arguments are those of study().
     """
@@ -328,10 +333,43 @@ def sweep(setting, *, slope_deg=None, restitution_mean=None, restitution_sd=None
     options = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
                    tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
                    seed=seed, threads=threads)
-    if slope_deg is not None and setting.initial_speed is None:
-        raise InputError("initial_speed: must be given when the slope varies")
     with _progress.telling(progress, "sweep") as tell:
-        return Sweep(_metastable.sweep(_fields(setting), axes, options, tell), "expected steps over " + ", ".join(axes))
+        found = _metastable.sweep(_fields(setting), axes, options, tell)
+    return Sweep(found["columns"], "expected steps over " + ", ".join(axes), found["rigid_bodies"])
+
+
+def solve(setting, parameter, *, steps=None, survive=None, reach=None, start=None, stop=None, points=None, method=None,
+          cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None, replicates=None,
+          mixing_distance=None, eigenvalues=None, spacing=None, simulated_steps=None, guided_samples=None,
+          memory_gb=None, seed=1, threads=0, progress=None):
+    """Which value of a parameter gives the steps, or the survival, that are asked for: `metastable solve`. Returns a
+    Solution, with every value that the points looked at show; none where it is out of reach.
+
+    setting    a Setting or a WalkerSetting, with any value of the parameter
+    parameter  of a Setting what sweep() varies ("slope_deg", "friction_mean", ...); of a WalkerSetting "slope_deg" or
+               "slope_sd_deg"
+    steps      wanted: so many expected steps, above 1; or
+    survive    wanted: (n, p), a share p of all that takes more than n steps; or
+    reach      wanted: a share of all that reaches the end of the ramp
+    start      least value looked at; stop: the largest; None: by parameter
+    points     values looked at first, 3 to 1000; None: 17, of a walker 9
+
+    The interval of a value is what that of the expected steps leaves (tolerance). A slope that is solved for keeps the
+    setting's launch; where that is None, each is launched steadily. The other arguments are those of study().
+    """
+    if not isinstance(setting, (Setting, WalkerSetting)):
+        raise TypeError(f"setting: a Setting or WalkerSetting expected, not {type(setting).__name__}")
+    if not isinstance(parameter, str):
+        raise TypeError(f"parameter: a text expected, not {type(parameter).__name__}")
+    options = dict(steps=steps, survive=survive, reach=reach, start=start, stop=stop, points=points, method=method,
+                   cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws, tail=tail,
+                   replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues, spacing=spacing,
+                   simulated_steps=simulated_steps, guided_samples=guided_samples, memory_gb=memory_gb, seed=seed,
+                   threads=threads)
+    command = _called("solve", setting, parameter, **{key: value for key, value in options.items() if key != "threads"})
+    with _progress.telling(progress, "solve") as tell:
+        return Solution(_metastable.solve(_fields(setting), isinstance(setting, WalkerSetting), parameter, options,
+                                          command, tell))
 
 
 class Experiment:

@@ -100,6 +100,8 @@ class Study(Result):
     sensitivities: Optional[Any]
     how_it_fails: Optional[Record]
     from_standard_errors: Optional[Record]
+    launch: Record
+    rigid_bodies: Optional[Record]
     provenance: Provenance
     @property
     def regime(self) -> Tuple[Regime, ...]: ...
@@ -109,12 +111,26 @@ class Comparison(Result):
     schema: int
     settings: Tuple[Record, ...]
     contrasts: Tuple[Record, ...]
+    rigid_bodies: Optional[str]
     provenance: Provenance
 
 
 class MeshEstimate(Record):
     value: float
     interval_95: Interval
+
+
+class Solution(Result):
+    schema: int
+    parameter: str
+    unit: str
+    target: Record
+    range: Tuple[float, float]
+    solutions: Tuple[Record, ...]
+    scanned: Tuple[Record, ...]
+    sentences: Tuple[str, ...]
+    rigid_bodies: Optional[str]
+    provenance: Provenance
 
 
 class WalkerStudy(Result):
@@ -209,6 +225,11 @@ class Sweep(Columns):
     reach_ramp_end: Floats
     status: List[str]
     message: List[str]
+    rigid_bodies_steps: Floats
+    rigid_bodies_steps_low95: Floats
+    rigid_bodies_steps_high95: Floats
+    rigid_bodies: Optional[str]
+    def __init__(self, columns: Mapping[str, Any], title: str, rigid_bodies: Optional[str] = None) -> None: ...
 
 
 class Walks(Columns):
@@ -219,8 +240,8 @@ class Walks(Columns):
 
 class Setting:
     slope_deg: float
-    initial_speed: Optional[Spread]
-    law: str
+    initial_speed: Union[Spread, str, None]
+    law: Optional[str]
     restitution: Optional[Spread]
     friction: Optional[Spread]
     correlation: Optional[float]
@@ -236,7 +257,7 @@ class Setting:
     gravity: Optional[float]
     ramp_length: Optional[float]
     first_leg: int
-    def __init__(self, slope_deg: float = 7.02, initial_speed: Optional[Spread] = None, law: str = "published",
+    def __init__(self, slope_deg: float = 7.02, initial_speed: Union[Spread, str, None] = None, law: Optional[str] = None,
                  restitution: Optional[Spread] = None, friction: Optional[Spread] = None,
                  correlation: Optional[float] = None, contact_list: Optional[ArrayLike] = None,
                  rebound_lost: Optional[float] = None, legs: Optional[ArrayLike] = None, mass: Optional[float] = None,
@@ -245,7 +266,7 @@ class Setting:
                  contact_mass: Optional[float] = None, gravity: Optional[float] = None,
                  ramp_length: Optional[float] = None, first_leg: int = 0) -> None: ...
     @property
-    def launch(self) -> Tuple[float, float]: ...
+    def launch(self) -> Optional[Tuple[float, float]]: ...
     def describe(self) -> str: ...
     def replace(self, **changes: Any) -> Setting: ...
 
@@ -379,6 +400,17 @@ def sweep(setting: Setting, *, slope_deg: Optional[ArrayLike] = None, restitutio
           draws: Optional[str] = None, tail: Optional[float] = None, replicates: Optional[int] = None,
           mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None, seed: int = 1,
           threads: int = 0, progress: Progress = None) -> Sweep: ...
+
+
+def solve(setting: Union[Setting, WalkerSetting], parameter: str, *, steps: Optional[float] = None,
+          survive: Optional[Tuple[float, float]] = None, reach: Optional[float] = None, start: Optional[float] = None,
+          stop: Optional[float] = None, points: Optional[int] = None, method: Optional[str] = None,
+          cells: Optional[int] = None, samples: Optional[int] = None, tolerance: Optional[float] = None,
+          sequence: Optional[str] = None, draws: Optional[str] = None, tail: Optional[float] = None,
+          replicates: Optional[int] = None, mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None,
+          spacing: Optional[float] = None, simulated_steps: Optional[int] = None,
+          guided_samples: Optional[int] = None, memory_gb: Optional[float] = None, seed: int = 1, threads: int = 0,
+          progress: Progress = None) -> Solution: ...
 
 
 @overload

@@ -109,7 +109,7 @@ class Study(Result):
     """How long one setting of the wheel walks. Fields: `steps --json` of reports/README.md; beside them `regime`."""
 
     # What is there only where it was asked for, or where there is something to say.
-    message = certificate = sensitivities = how_it_fails = from_standard_errors = None
+    message = certificate = sensitivities = how_it_fails = from_standard_errors = rigid_bodies = None
 
     def __init__(self, answer):
         super().__init__(answer)
@@ -143,10 +143,23 @@ class Regime(Record):
 
 
 class Comparison(Result):
-    """Settings side by side on common random numbers: `settings`, and `contrasts` of each later one with the first."""
+    """Settings side by side on common random numbers: `settings`, and `contrasts` of each later one with the first;
+    `rigid_bodies` says in one line how the law of rigid bodies compares, None where a law was named."""
+
+    rigid_bodies = None
 
     def _headline(self):
         return " ".join(one.sentence for one in self.contrasts)
+
+
+class Solution(Result):
+    """Which values of a parameter give what was asked for: `solutions`, each with `value` and `interval_95`, none where
+    that is out of reach, and `sentences`. Fields: `solve --json` of reports/README.md."""
+
+    rigid_bodies = None
+
+    def _headline(self):
+        return f"{self.parameter}: {self.sentences[0]}"
 
 
 class WalkerStudy(Result):
@@ -250,7 +263,12 @@ class Columns:
 
 class Sweep(Columns):
     """Expected steps over ranges, a row a point, the last axis fastest; columns as in the command line's CSV.
-    Points whose solver failed are NaN, with the reason in `message`."""
+    Points whose solver failed, or that have no regime to launch from, are NaN, with the reason in `message`.
+    `rigid_bodies` says in one line how the law of rigid bodies compares; None where a law was named."""
+
+    def __init__(self, columns, title, rigid_bodies=None):
+        super().__init__(columns, title)
+        self.rigid_bodies = rigid_bodies
 
 
 class Walks(Columns):

@@ -36,8 +36,9 @@ class Settings(unittest.TestCase):
     def test_launches_as_the_paper_does_until_told(self):
         self.assertEqual(metastable.Setting().launch, (7.35, 0.19))
         self.assertEqual(metastable.Setting().replace(slope_deg=9.59).launch, (5.83, 0.28))
-        with self.assertRaisesRegex(metastable.InputError, "^initial_speed: must be given at 8 deg"):
-            metastable.Setting(slope_deg=8)
+        self.assertIsNone(metastable.Setting(slope_deg=8).launch)  # which is steady, and known once it is studied
+        with self.assertRaisesRegex(metastable.InputError, "^initial_speed: 'steadily' is not"):
+            metastable.Setting(initial_speed="steadily")
 
     def test_wrong_kinds_are_refused(self):
         for fields, sentence in ((dict(mass="heavy"), "mass: a number expected, not str"),

@@ -69,6 +69,40 @@ class SameAsTheCommandLine(unittest.TestCase):
             metastable.simulate(metastable.Setting(law="plastic"), trials=12).write(plain)  # no contact to fit
             self.assertEqual(metastable.describe(plain).to_dict()["tables"], command_line("describe", str(plain))["tables"])
 
+    def test_solve(self):
+        setting = metastable.Setting(legs=[0.15] * 8)
+        small = dict(points=3, cells=24, samples=256, replicates=3)
+        words = ("--legs", "0.15", "--points", "3", "--cells", "24", "--samples", "256", "--replicates", "3")
+        for parameter, name, wanted, option in (
+                ("friction_mean", "friction-mean", dict(steps=10), ("--steps", "10")),
+                ("slope_deg", "slope", dict(survive=(20, 0.5), start=6, stop=9),
+                 ("--survive", "20:0.5", "--from", "6", "--to", "9"))):
+            with self.subTest(parameter):
+                solution = metastable.solve(setting, parameter, **wanted, **small)
+                self.assertEqual(told(solution.to_dict()), command_line("solve", name, *option, *words))
+                self.assertTrue(solution.solutions, solution)
+
+    def test_launch_where_the_paper_has_none(self):
+        setting = metastable.Setting(slope_deg=8, legs=[0.15] * 8)
+        self.assertIsNone(setting.launch)
+        self.assertEqual(metastable.Setting(initial_speed="steady").launch, None)
+        study = metastable.study(setting, cells=24, samples=256)
+        self.assertTrue(study.launch.steady)
+        self.assertEqual(told(study.to_dict()),
+                         command_line("steps", "--slope", "8", "--legs", "0.15", "--cells", "24", "--samples", "256"))
+
+    def test_rigid_bodies_where_no_law_is_named(self):
+        rubber = metastable.Setting(slope_deg=9.59, friction=(0.6, 0.1), legs=[0.15] * 8)
+        small = dict(cells=24, samples=256)
+        self.assertEqual(metastable.study(rubber, **small).rigid_bodies.verdict, "differs")
+        self.assertIsNone(metastable.study(rubber.replace(law="published"), **small).rigid_bodies)
+        swept = metastable.sweep(rubber, friction_mean=[0.4, 0.6], **small)
+        self.assertIn("disagree in direction", swept.rigid_bodies)
+        self.assertGreater(swept.rigid_bodies_steps_low95[1], 100)
+        named = metastable.sweep(rubber.replace(law="published"), friction_mean=[0.4, 0.6], **small)
+        self.assertIsNone(named.rigid_bodies)
+        self.assertNotIn("rigid_bodies_steps", named.keys())
+
     def test_sweep(self):
         with tempfile.TemporaryDirectory() as folder:
             theirs = command_line("sweep", "--slope", "9.59", "--friction-mean", "0.35,0.45", "--cells", "24", "--samples",

@@ -63,7 +63,7 @@ def wrong_values(option, value):
         return [("leg_contct", "leg_contct")]
     if option == "outside":
         return [({"plank": 2.0}, "plank:2")] if value == "ID:SIZE" else [(-1, "-1")]
-    if value == "MEAN,SD":
+    if value.startswith("MEAN,SD"):
         return [((-10**9, 1), "-1000000000,1"), ((0.3, -1), "0.3,-1"), ((1, 2, 3), "1,2,3"), (-10**9, "-1000000000")]
     if value == "RANGE":
         return [([-10**9], "-1000000000"), ([2, 1], "2,1")]
