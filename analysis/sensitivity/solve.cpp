@@ -64,7 +64,7 @@ Answered answered(const Metastability& found, const Target& target, const StudyO
   return {rarer_than_draws ? Estimate{1, 1, 1} : probability(*found.steps.reach_end, found.steps.from_start), ""};
 }
 
-// Is a coarse answer so far from the target that a fine one lies on the same side of it?
+// A coarse answer so far from the target that a fine one lies on the same side of it?
 bool far_from(const Target& target, const Estimate& quantity) {
   constexpr double half_widths = 5, least = 0.3;  // of a few cells, whose error is their own estimate give or take
   const double wanted = on_scale(target, target.value), here = on_scale(target, quantity.value);

@@ -31,11 +31,11 @@ struct Target {
   void validate() const;
 };
 
-/// Is a probability that follows from expected steps known with an interval: its own, as -ln p is in proportion to
+/// A probability that follows from expected steps known with an interval: its own, as -ln p is in proportion to
 /// their inverse. @param p  in [0, 1]
 Estimate probability(double p, const Estimate& steps);
 
-/// Is the quantity of a target at one value of the parameter.
+/// The quantity of a target at one value of the parameter.
 struct Answered {
   Estimate quantity;
   std::string unknown;  ///< why there is none, empty otherwise
@@ -49,7 +49,7 @@ struct SolveOptions {
   std::function<void(std::size_t looked_at)> progress = {};  ///< may throw to stop
 };
 
-/// Is one value of the parameter looked at, with the target's quantity there.
+/// One value of the parameter looked at, with the target's quantity there.
 struct LookedAt {
   double at = 0;
   Answered answer;

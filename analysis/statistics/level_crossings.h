@@ -10,14 +10,14 @@
 
 namespace metastable::analysis {
 
-/// Is the curve at one place: lower <= value <= upper; ends may be infinite.
+/// The curve at one place: lower <= value <= upper; ends may be infinite.
 struct CurvePoint {
   double at = 0;
   Estimate height;
   std::string unknown;  ///< why there is no height, empty where there is one
 };
 
-/// Is a place where the curve crosses zero.
+/// A place where the curve crosses zero.
 struct Crossing {
   Estimate at;         ///< with the places between which the curve's interval holds zero
   bool rising = true;  ///< from below zero to above
@@ -37,7 +37,7 @@ struct Crossings {
   std::vector<Crossing> crossings;  ///< rising places
 };
 
-/// Is the curve's height at a place. @param threads  it may use. The bits must not depend on them.
+/// The curve's height at a place. @param threads  it may use. The bits must not depend on them.
 /// Where the point is unknown it says why; it may throw to stop all.
 using Curve = std::function<CurvePoint(double at, int threads)>;
 

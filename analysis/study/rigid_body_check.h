@@ -40,7 +40,7 @@ RigidBodyCheck rigid_body_check(const Setting& setting, const RigidBodyOptions& 
 /// Says whether two answers are within a factor of two of each other, for all that their intervals leave.
 enum class RigidBodyVerdict { within_twice, differs, open };
 
-/// Is one answer beside that of rigid bodies.
+/// One answer beside that of rigid bodies.
 struct BesideRigidBodies {
   std::string name;  ///< of the setting among several, "9.59 deg"; not read where it is alone
   Estimate steps;    ///< of the law that answered, as answered_steps()

@@ -40,8 +40,8 @@ std::function<Run(double, int)> rolls(std::shared_ptr<const dynamics::SettledMot
   const std::vector<double> middle(static_cast<std::size_t>(noise.dimension()));
   return [motion = std::move(motion), contact = noise.draw(middle)](double state, int phase) -> Run {
     const double omega = std::max(std::sqrt(state), slowest_roll);
-    return [motion, contact, roll = dynamics::SettledRoll(*motion, phase, omega, contact, contact),
-            seconds = 0.0, metres = 0.0]() mutable -> std::optional<FollowedEvent> {
+    return [motion, contact, roll = dynamics::SettledRoll(*motion, phase, omega, contact, contact), seconds = 0.0,
+            metres = 0.0]() mutable -> std::optional<FollowedEvent> {
       if (!roll.step().touched) return std::nullopt;
       roll.set_contact(contact);
       const FollowedEvent event{roll.spin() * roll.spin(), roll.time() - seconds, roll.position() - metres};
@@ -176,8 +176,8 @@ Problem Setting::problem(const LandingOptions& landings) const {
   options.executor = markov::on_threads(landings.threads);
   Problem problem = problem_of([&] {
     try {
-      dynamics::SettledReturnMap map(wheel, slope_deg * std::numbers::pi / 180.0, noise(), speed ? speed->at_score(launch_reach) : 0,
-                                     std::move(options));
+      dynamics::SettledReturnMap map(wheel, slope_deg * std::numbers::pi / 180.0, noise(),
+                                     speed ? speed->at_score(launch_reach) : 0, std::move(options));
       if (const std::optional<int> leg = map.landings().untabulated())
         throw NotTabulated(fmt::format("at some restitution leg {} rests from every speed up to {} rad/s", *leg,
                                        map.landings().range().omega_high));

@@ -14,7 +14,7 @@ TruncatedNormal forwards(const TruncatedNormal& normal) {
   return normal.lower() >= 0 ? normal : TruncatedNormal(normal.mean(), normal.sd(), 0, normal.upper());
 }
 
-// Is a piece of the curve at a share t of its width: the cubic with these values and slopes at its ends.
+// A piece of the curve at a share t of its width: the cubic with these values and slopes at its ends.
 struct Piece {
   double width, from, to, slope_from, slope_to;
   double value(double t) const {

@@ -8,7 +8,7 @@
 
 namespace metastable::dynamics {
 
-/// Is the distribution of omega_0, the speed just before collision 1 [rad/s], never below 0.
+/// The distribution of omega_0, the speed just before collision 1 [rad/s], never below 0.
 class LaunchSpeed {
  public:
   /// Takes a normal, cut off at 0 where it reaches below.

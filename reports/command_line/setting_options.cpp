@@ -95,8 +95,9 @@ void add_slope(Options& options) {
 
 void add_launch(Options& options, const std::string& whose) {
   options.add("initial-speed", "MEAN,SD|steady", "",
-              whose + "; steady: of wheels that still roll long after any launch (default: the paper's at 7.02 and 9.59, "
-                      "elsewhere steady)",
+              whose +
+                  "; steady: of wheels that still roll long after any launch (default: the paper's at 7.02 and 9.59, "
+                  "elsewhere steady)",
               range::speed);
 }
 
@@ -231,9 +232,9 @@ constexpr std::size_t most_compared = 100;  // settings
 // The options of which several values make several settings, the first varying slowest; the others of the wheel
 // are given once more for a further value.
 const std::vector<std::string> compared_by_commas{
-    "slope",      "law",          "leg-count",       "mass",           "inertia",      "radius-of-gyration",
-    "tip-radius", "gravity",      "ramp-stiffness",  "contact-mass",   "rebound-lost", "correlation",
-    "ramp-length", "first-leg",   "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"};
+    "slope",       "law",       "leg-count",        "mass",           "inertia",       "radius-of-gyration",
+    "tip-radius",  "gravity",   "ramp-stiffness",   "contact-mass",   "rebound-lost",  "correlation",
+    "ramp-length", "first-leg", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"};
 const std::vector<std::string> compared_by_repetition{"legs", "restitution", "friction", "contact-list",
                                                       "initial-speed"};
 
@@ -294,8 +295,7 @@ std::vector<std::string> compared_slopes(const Options& options, bool alone) {
 }  // namespace
 
 void add_compared(Options& options) {
-  options.add("restitution-mean", "MEAN", "", "Mean of eta, in the place of that of --restitution",
-              range::restitution);
+  options.add("restitution-mean", "MEAN", "", "Mean of eta, in the place of that of --restitution", range::restitution);
   options.add("restitution-sd", "SD", "", "Sd of eta, likewise", range::restitution);
   options.add("friction-mean", "MEAN", "", "Mean of mu, in the place of that of --friction", range::friction);
   options.add("friction-sd", "SD", "", "Sd of mu, likewise", range::friction);

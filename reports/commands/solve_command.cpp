@@ -72,7 +72,7 @@ Answered walker_answer(const SolveRequest& request, const analysis::WalkerSettin
   }
 }
 
-// Is a slope from where a walker hardly rolls to where its gait has gone; an sd from which it falls once in 1e10 steps
+// A slope from where a walker hardly rolls to where its gait has gone; an sd from which it falls once in 1e10 steps
 // or so to one with which it falls at once.
 analysis::SolveRange walker_range(const SolveRequest& request) {
   const double slope = request.walker->slope_deg;
