@@ -302,13 +302,12 @@ double residual_of(const Generator& generator, Extended rate, const std::vector<
   return static_cast<double>(largest);
 }
 
-void check_residual(const ChainSolver& solver, QuasiStationary& quasi) {
+/// Returns the larger residual of both vectors, and what is known of their error.
+double residual_of(const ChainSolver& solver, const QuasiStationary& quasi) {
   const Generator generator = generator_of(solver.chain());
-  for (const bool left : {true, false})
-    quasi.residual = std::max(quasi.residual, residual_of(generator, static_cast<Extended>(quasi.failure_rate),
-                                                          left ? quasi.distribution : quasi.survival_weight, left));
-  if (!(quasi.residual <= kWorstResidual))
-    throw ConvergenceError("inverse iteration", quasi.residual, "the vectors found are not those of the chain");
+  const auto rate = static_cast<Extended>(quasi.failure_rate);
+  return std::max({quasi.residual, residual_of(generator, rate, quasi.distribution, true),
+                   residual_of(generator, rate, quasi.survival_weight, false)});
 }
 
 std::vector<std::uint32_t> marked_states(const std::vector<std::uint8_t>& marked) {
@@ -371,15 +370,21 @@ QuasiStationary quasi_stationary(const ChainSolver& solver, FewSurvivors few) {
     IteratedPair last = last_survivors(solver.chain());
     return {std::move(last.left), std::move(last.right), 1, 1, last.iterations, 0};
   }
-  std::optional<QuasiStationary> quasi;
   if (unsettled || revolution.interpolated() || solver.chain().size() > kSmall) {
     const std::optional<IteratedPair> pair = iterate(revolution, solver.revolution_elimination(), few);
-    if (pair) quasi = of_all_classes(solver, *pair);
-    if (pair && (!pair->settled || revolution.interpolated())) return *quasi;
+    if (pair) {
+      QuasiStationary quasi = of_all_classes(solver, *pair);
+      if (unsettled || revolution.interpolated()) return quasi;
+      // Entries far below the largest settle later than the others, and are not watched.
+      quasi.residual = residual_of(solver, quasi);
+      if (quasi.residual <= kSameEnd) return quasi;
+    }
   }
-  if (!quasi) quasi = by_classes(solver);
-  check_residual(solver, *quasi);
-  return *quasi;
+  QuasiStationary quasi = by_classes(solver);
+  quasi.residual = residual_of(solver, quasi);
+  if (!(quasi.residual <= kWorstResidual))
+    throw ConvergenceError("inverse iteration", quasi.residual, "the vectors found are not those of the chain");
+  return quasi;
 }
 
 std::vector<double> shares_in_classes(const Period& period, std::vector<double> distribution) {

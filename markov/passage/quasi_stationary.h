@@ -38,8 +38,9 @@ enum class FewSurvivors { as_others, unsettled };
 /// Chains of up to 64 states, and those for which 500 iterations were not enough or the starts lead to different ends,
 /// take leading_pair(). A chain that cannot visit a state twice has lambda_1 = 0: failure_rate = 1, and the
 /// distribution is that of the last survivors of an even start. O(n^2) an iteration for full rows.
-/// @param few  unsettled: where hardly anybody survives (lambda_1 < 1e-6) the vectors are those of 500 iterations,
-/// settled or not (of 100 for lambda_1 < 1e-13), and mean little. Interpolated rows are always taken so.
+/// @param few  unsettled, for studies, where entries below 1e-12 of the largest do not matter: these may be unsettled,
+/// and where hardly anybody survives (lambda_1 < 1e-6) the vectors are those of 500 iterations, settled or not (of 100
+/// for lambda_1 < 1e-13), and mean little; the residual is the last change. Interpolated rows are always taken so.
 /// @throws NotUnique where the chain has several quasi-stationary distributions, or double precision does not tell;
 /// ConvergenceError("inverse iteration", residual, ...) after 10000 iterations of interpolated rows, or where the
 /// residual exceeds 1e-8.

@@ -79,6 +79,19 @@ TEST(WalkerFalls, QuantilesLieBetweenTheNodes) {
   }
 }
 
+// Medians that were nodes would move with these, by a tenth of the gait's sd.
+TEST(WalkerFalls, QuantilesDoNotMoveWithTheNodes) {
+  const WalkerSetting steady{Walker::simplest, 0.009 / degree, 0.001 / degree, dynamics::Terrain::fresh};
+  std::vector<Estimate> angle;
+  for (const double spacing : {0.6, 0.5}) {
+    WalkerStudy study;
+    study.passage.sizes.resize(2);
+    study.passage.sizes[1].spacing = spacing;
+    angle.push_back(how_it_falls(steady, study, {}).moments.regime.state[0]);
+  }
+  EXPECT_NEAR(angle[0].value, angle[1].value, 0.003 * (angle[1].upper - angle[1].lower));
+}
+
 TEST(WalkerTrials, DoNotHangOnThreadsAndAgreeWithBatches) {
   const std::vector<Walk> one = simulate_walks(garcia, {.trials = 600, .longest = 100000, .seed = 3, .threads = 1});
   const std::vector<Walk> two = simulate_walks(garcia, {.trials = 600, .longest = 100000, .seed = 3, .threads = 2});
