@@ -45,7 +45,7 @@ class Roller {
   std::optional<dynamics::SettledMotion> motion_;
   std::optional<dynamics::WheelMap> map_;
   dynamics::ContactNoise noise_;
-  dynamics::TruncatedNormal launch_;
+  dynamics::LaunchSpeed launch_;
   int first_;
 };
 
