@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "analysis/statistics/random.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 

@@ -8,7 +8,7 @@
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/reality.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 

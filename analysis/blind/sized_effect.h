@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "analysis/blind/blind_dice.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "analysis/description/landings.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 

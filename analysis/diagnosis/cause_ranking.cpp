@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "analysis/diagnosis/evidence.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {

@@ -25,7 +25,7 @@
 #include "analysis/diagnosis/verdict.h"
 #include "analysis/diagnosis/visibility.h"
 #include "analysis/statistics/interval_95.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 namespace {

@@ -8,7 +8,7 @@
 #include "analysis/diagnosis/map_columns.h"
 #include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/random.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "markov/dense_matrix.h"
 
 namespace metastable::analysis {

@@ -16,7 +16,7 @@
 #include "analysis/statistics/bounded_interval.h"
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "markov/dense_matrix.h"
 #include "markov/parallel.h"
 

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "analysis/statistics/median.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "markov/dense_matrix.h"
 
 namespace metastable::analysis {

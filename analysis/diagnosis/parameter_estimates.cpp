@@ -6,7 +6,7 @@
 
 #include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/effect_scan.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "markov/dense_matrix.h"
 
 namespace metastable::analysis {

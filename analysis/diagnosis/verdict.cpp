@@ -12,7 +12,7 @@
 #include "analysis/diagnosis/left_over.h"
 #include "analysis/diagnosis/parameter_estimates.h"
 #include "analysis/diagnosis/too_few.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 namespace {

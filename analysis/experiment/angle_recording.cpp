@@ -10,7 +10,7 @@
 
 #include "analysis/experiment/csv_field.h"
 #include "analysis/statistics/random.h"
-#include "dynamics/wheel/stance_motion.h"
+#include "dynamics/extended_wheel/stance_motion.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {

@@ -10,7 +10,7 @@
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/study/setting.h"
 #include "dynamics/laboratory/laboratory.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 

@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "analysis/statistics/random.h"
-#include "dynamics/wheel/effect_catalogue.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/catalogue/effect_catalogue.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "analysis/diagnosis/transition_model.h"
 #include "analysis/likelihood/wheel_runs.h"
-#include "dynamics/wheel/extended_wheel.h"
+#include "dynamics/extended_wheel/extended_wheel.h"
 
 namespace metastable::analysis {
 

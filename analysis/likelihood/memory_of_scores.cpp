@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "analysis/likelihood/speed_filter.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "dynamics/wheel/extended_wheel.h"
+#include "dynamics/extended_wheel/extended_wheel.h"
 
 namespace metastable::analysis {
 

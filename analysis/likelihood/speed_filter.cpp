@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

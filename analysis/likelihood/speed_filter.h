@@ -7,7 +7,7 @@
 #include "analysis/experiment/experiment.h"
 #include "analysis/likelihood/memory_of_scores.h"
 #include "analysis/likelihood/score_tilt.h"
-#include "dynamics/wheel/extended_wheel.h"
+#include "dynamics/extended_wheel/extended_wheel.h"
 
 namespace metastable::analysis {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/diagnosis/transition_model.h"
-#include "dynamics/wheel/extended_wheel.h"
+#include "dynamics/extended_wheel/extended_wheel.h"
 
 namespace metastable::analysis {
 

@@ -8,8 +8,8 @@
 
 #include "analysis/likelihood/contact_variation.h"
 #include "analysis/likelihood/score_tilt.h"
-#include "dynamics/wheel/collision_density.h"
-#include "dynamics/wheel/extended_wheel.h"
+#include "dynamics/step_density/collision_density.h"
+#include "dynamics/extended_wheel/extended_wheel.h"
 
 namespace metastable::analysis {
 

@@ -9,7 +9,7 @@
 #include "analysis/diagnosis/transition_model.h"
 #include "analysis/experiment/experiment.h"
 #include "analysis/likelihood/wheel_hypothesis.h"
-#include "dynamics/wheel/collision_density.h"
+#include "dynamics/step_density/collision_density.h"
 
 namespace metastable::analysis {
 

@@ -15,8 +15,8 @@
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
 #include "dynamics/settled/share_grid.h"
-#include "dynamics/wheel/settled_density.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/settled/settled_density.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

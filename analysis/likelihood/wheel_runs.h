@@ -10,8 +10,8 @@
 #include "analysis/diagnosis/transition_model.h"
 #include "analysis/experiment/experiment.h"
 #include "analysis/likelihood/memory_of_scores.h"
-#include "dynamics/wheel/extended_wheel.h"
-#include "dynamics/wheel/landing_shares.h"
+#include "dynamics/extended_wheel/extended_wheel.h"
+#include "dynamics/settled/landing_shares.h"
 
 namespace metastable::analysis {
 

@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "analysis/statistics/random.h"
-#include "dynamics/wheel/settled_density.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/settled/settled_density.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "dynamics/wheel/stance_motion.h"
+#include "dynamics/extended_wheel/stance_motion.h"
 
 namespace metastable::analysis {
 namespace {

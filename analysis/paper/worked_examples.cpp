@@ -7,7 +7,7 @@
 #include "analysis/experiment/stand_in.h"
 #include "analysis/paper/uncharged_sticking.h"
 #include "analysis/study/metastability.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 

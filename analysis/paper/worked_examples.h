@@ -7,7 +7,7 @@
 
 #include "analysis/experiment/experiment.h"
 #include "analysis/statistics/estimate.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 

@@ -9,7 +9,7 @@
 
 #include "analysis/sensitivity/parameter.h"
 #include "analysis/study/metastability.h"
-#include "analysis/study/rigid_body_check.h"
+#include "analysis/sensitivity/rigid_body_check.h"
 #include "analysis/study/setting.h"
 
 namespace metastable::analysis {

@@ -4,7 +4,7 @@
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
 
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

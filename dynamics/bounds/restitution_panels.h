@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "dynamics/bounds/interval.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::dynamics {
 

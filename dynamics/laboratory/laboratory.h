@@ -15,7 +15,7 @@
 #include "dynamics/laboratory/rolling_motion.h"
 #include "dynamics/wheel/contact_law.h"
 #include "dynamics/wheel/contact_noise.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 #include "dynamics/wheel/outcome.h"
 
 namespace metastable::dynamics {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "dynamics/laboratory/outside_effect.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::dynamics {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::dynamics {
 

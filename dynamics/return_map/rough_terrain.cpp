@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::dynamics {
 namespace {

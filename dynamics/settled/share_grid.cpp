@@ -8,7 +8,7 @@
 namespace metastable::dynamics {
 namespace {
 
-constexpr int speeds = 15, restitutions = 13;
+constexpr int speeds = 15, grid_restitutions = 13;
 constexpr double sds = 4, least_width = 0.3;  // of the restitutions around their mean; [1]
 constexpr double nearly_all = 2;              // of these sds above the mean, at which a foot must still come to stand
 constexpr double just_above = 1e-7;           // mu_r, of the first place
@@ -159,7 +159,7 @@ std::shared_ptr<const LandingShares> share_grid(
   const double mean = contact.restitution_mean, sd = contact.restitution_sd;
   const double reach = std::max(sds * sd, least_width / 2);
   const double top = std::clamp(mean + reach, least_width, most_settled_restitution);
-  grid->restitution = {std::clamp(mean - reach, 0.0, top - least_width), top, restitutions};
+  grid->restitution = {std::clamp(mean - reach, 0.0, top - least_width), top, grid_restitutions};
   double settles = slowest;
   for (int leg = 0; leg < wheel.legs(); ++leg) {
     LandingShares::Leg one = plain_leg(*map, leg);
@@ -178,21 +178,21 @@ std::shared_ptr<const LandingShares> share_grid(
   const std::shared_ptr<const SettledMap> map_of_more = SettledMap::of(more, options);
   LandingShares heavier = *grid;
   heavier.speed.count = (speeds - 1) / speed_stride + 1;
-  heavier.restitution.count = (restitutions - 1) / restitution_stride + 1;
+  heavier.restitution.count = (grid_restitutions - 1) / restitution_stride + 1;
   for (int leg = 0; leg < wheel.legs(); ++leg)
     heavier.legs[static_cast<std::size_t>(leg)] = plain_leg(*map_of_more, leg);
   heavier.resize();
-  const auto rows = static_cast<std::size_t>(restitutions),
+  const auto rows = static_cast<std::size_t>(grid_restitutions),
              coarse = static_cast<std::size_t>(heavier.restitution.count);
   const bool alike = std::all_of(wheel.leg_length.begin(), wheel.leg_length.end(),
                                  [&](double length) { return length == wheel.leg_length.front(); });
   const std::size_t followed = alike ? 1 : grid->legs.size();
   const auto work = [&](std::size_t i) {
     const auto leg = static_cast<int>(i / (rows + coarse)), row = static_cast<int>(i % (rows + coarse));
-    if (row < restitutions)
+    if (row < grid_restitutions)
       fill(*grid, *map, leg, row);
     else
-      fill(heavier, *map_of_more, leg, row - restitutions);
+      fill(heavier, *map_of_more, leg, row - grid_restitutions);
   };
   const std::size_t all = followed * (rows + coarse);
   if (executor)

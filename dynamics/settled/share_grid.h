@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "dynamics/settled/settled_wheel.h"
-#include "dynamics/wheel/collision_density.h"
-#include "dynamics/wheel/landing_shares.h"
+#include "dynamics/step_density/collision_density.h"
+#include "dynamics/settled/landing_shares.h"
 
 namespace metastable::dynamics {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::dynamics {
 

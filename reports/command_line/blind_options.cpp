@@ -1,6 +1,6 @@
 #include "reports/command_line/command.h"
 #include "reports/command_line/requests.h"
-#include "reports/commands/blind_command.h"
+#include "reports/experiment_commands/blind_command.h"
 
 namespace metastable::reports {
 

@@ -13,14 +13,14 @@
 #include "reports/command_line/requests.h"
 #include "reports/command_line/setting_options.h"
 #include "reports/command_line/walker_options.h"
-#include "reports/commands/coast_down_command.h"
-#include "reports/commands/collisions_command.h"
-#include "reports/commands/describe_command.h"
-#include "reports/commands/diagnose_command.h"
-#include "reports/commands/effects_command.h"
-#include "reports/commands/lessons_command.h"
-#include "reports/commands/simulate_command.h"
-#include "reports/commands/study_command.h"
+#include "reports/experiment_commands/coast_down_command.h"
+#include "reports/experiment_commands/collisions_command.h"
+#include "reports/experiment_commands/describe_command.h"
+#include "reports/experiment_commands/diagnose_command.h"
+#include "reports/experiment_commands/effects_command.h"
+#include "reports/experiment_commands/lessons_command.h"
+#include "reports/experiment_commands/simulate_command.h"
+#include "reports/experiment_commands/study_command.h"
 
 namespace metastable::reports {
 namespace {

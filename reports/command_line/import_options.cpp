@@ -11,7 +11,7 @@
 #include "reports/command_line/command.h"
 #include "reports/command_line/option_values.h"
 #include "reports/command_line/setting_options.h"
-#include "reports/commands/import_command.h"
+#include "reports/experiment_commands/import_command.h"
 
 namespace metastable::reports {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "analysis/experiment/suggestion.h"
 #include "analysis/sensitivity/sweep.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 #include "dynamics/wheel/wheel.h"
 #include "reports/output/input_file.h"
 

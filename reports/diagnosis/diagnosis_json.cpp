@@ -5,7 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 #include "reports/diagnosis/diagnosis_tables.h"
 
 namespace metastable::reports {

@@ -9,7 +9,7 @@
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/interval_95.h"
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::reports {
 namespace {

@@ -5,7 +5,7 @@
 #include <atomic>
 
 #include "reports/command_line/requests.h"
-#include "reports/commands/blind_command.h"
+#include "reports/experiment_commands/blind_command.h"
 #include "reports/output/table_json.h"
 #include "reports/output/text_table.h"
 #include "reports/python/answer.h"

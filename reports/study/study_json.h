@@ -12,7 +12,7 @@
 #include "analysis/study/certify.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/rest_thresholds.h"
-#include "analysis/study/rigid_body_check.h"
+#include "analysis/sensitivity/rigid_body_check.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {

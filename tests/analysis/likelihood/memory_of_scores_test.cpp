@@ -9,7 +9,7 @@
 
 #include "analysis/likelihood/speed_filter.h"
 #include "dynamics/settled/share_grid.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 
 namespace metastable::analysis {
 namespace {

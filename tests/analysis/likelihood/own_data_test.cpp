@@ -14,7 +14,7 @@
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/likelihood/wheel_transitions.h"
 #include "analysis/study/setting.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "analysis/likelihood/wheel_likelihood.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/diagnosed.h"
 
 namespace metastable::analysis {

@@ -10,8 +10,8 @@
 
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/statistics/random.h"
-#include "dynamics/wheel/stance_motion.h"
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/extended_wheel/stance_motion.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "tests/analysis/settings.h"
 
 namespace metastable::analysis {

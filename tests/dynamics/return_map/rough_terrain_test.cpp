@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "dynamics/wheel/truncated_normal.h"
+#include "dynamics/numerics/truncated_normal.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics::test {

@@ -1,4 +1,4 @@
-#include "dynamics/wheel/settled_density.h"
+#include "dynamics/settled/settled_density.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 
 #include "dynamics/settled/settled_motion.h"
 #include "dynamics/settled/share_grid.h"
-#include "dynamics/wheel/extended_wheel.h"
+#include "dynamics/extended_wheel/extended_wheel.h"
 
 namespace metastable::dynamics {
 namespace {

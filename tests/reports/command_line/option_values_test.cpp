@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "dynamics/wheel/effect_catalogue.h"
+#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::reports {
 namespace {

@@ -12,8 +12,8 @@
 #include <sstream>
 #include <string>
 
-#include "dynamics/wheel/effect_catalogue.h"
-#include "reports/commands/diagnose_command.h"
+#include "dynamics/catalogue/effect_catalogue.h"
+#include "reports/experiment_commands/diagnose_command.h"
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_json.h"
 #include "reports/diagnosis/diagnosis_tables.h"

@@ -1,0 +1,136 @@
+#include "reports/experiment_commands/diagnose_command.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <optional>
+
+#include "analysis/diagnosis/diagnosis_sentences.h"
+#include "analysis/likelihood/diagnose.h"
+#include "dynamics/wheel/contact_law.h"
+#include "reports/diagnosis/diagnosis_figures.h"
+#include "reports/diagnosis/diagnosis_json.h"
+#include "reports/diagnosis/diagnosis_tables.h"
+#include "reports/diagnosis/diagnosis_text.h"
+#include "reports/output/output_file.h"
+#include "reports/output/page_folder.h"
+#include "reports/output/standard_output.h"
+#include "reports/output/version.h"
+#include "reports/study/study_progress.h"
+
+namespace metastable::reports {
+namespace {
+
+// Adds provenance and the law, and leaves out what has nothing to show.
+class Sections {
+ public:
+  // @param law  that the models obey; "" of a machine without one
+  Sections(PageFolder& pages, const Provenance& provenance, std::string law)
+      : pages_(pages), provenance_(provenance), law_(law.empty() ? "" : fmt::format(" (law {})", law)) {}
+  void add(const std::string& id, const std::string& heading, const std::string& reading, std::vector<Figure> figures,
+           std::vector<Table> tables, std::vector<Fold> folded = {}) {
+    complete(figures, tables);
+    for (Fold& fold : folded) complete(fold.figures, fold.tables);
+    std::erase_if(folded, [](const Fold& fold) { return fold.figures.empty() && fold.tables.empty(); });
+    if (figures.empty() && tables.empty() && folded.empty()) return;
+    pages_.section(id, heading, reading, figures, std::move(tables), std::move(folded));
+  }
+
+ private:
+  void complete(std::vector<Figure>& figures, std::vector<Table>& tables) const {
+    std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
+    for (Figure& figure : figures) {
+      figure.provenance = provenance_;
+      if (!figure.title.empty()) figure.title += law_;
+    }
+    for (Table& table : tables) {
+      table.provenance = provenance_;
+      table.title += law_;
+    }
+  }
+
+  PageFolder& pages_;
+  const Provenance& provenance_;
+  std::string law_;
+};
+
+}  // namespace
+
+void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, const std::string& law,
+                     const Provenance& provenance, const std::string& folder) {
+  PageFolder pages(folder);
+  Page& page = pages.page();
+  page.title = fmt::format("{}Verdict: {}", title.empty() ? "" : title + ". ", analysis::verdict_name(d.verdict));
+  if (!d.sentences.empty()) {
+    page.lead = {d.sentences.front()};
+    page.intro.assign(d.sentences.begin() + 1, d.sentences.end());
+  }
+  page.intro.push_back("Next: " + analysis::next_step(d));
+  page.provenance = provenance;
+  Sections sections(pages, provenance, law);
+  sections.add("where", "Where the gap lies",
+               "The places where the recalibrated model is furthest from the measured speeds. A cell holds its score, "
+               "standard normal without a gap, under each model: red, the measured speeds are higher or more spread "
+               "than the model’s; blue, lower or less. Scores beyond 4 are rarely chance.",
+               furthest_figure(d), {},
+               {{"Cells beyond chance, after recalibration", {}, {}, {where_table(d)}},
+                {"The whole map", {}, map_figures(d), {map_table(d)}}});
+  sections.add(
+      "which", "Which effect",
+      "Probabilities over the effects of the catalogue, pairs, and their alternatives; the 95 % set is what "
+      "these data leave open.",
+      ranking_figures(d), {},
+      {{"All causes and their parameters", {}, {}, {causes_table(d), parameters_table(d), undecided_table(d)}}});
+  sections.add("how-far", "How far it shrinks",
+               "Measured on trials that the fit did not see; the line is the floor, what remains where the model is "
+               "right.",
+               shrinkage_figures(d), {steps_table(d)}, {{"The measures in numbers", {}, {}, {shrinkage_table(d)}}});
+  sections.add("profiles", "Speeds, measured and simulated",
+               "Bars are 95 % intervals of the measured means; the band holds the mean of as many simulated trials.",
+               profile_figures(d), {}, {{"The speeds in numbers", {}, {}, {profile_table(d)}}});
+  sections.add("next", "The next experiment", "Changes of the experiment that tell the remaining causes apart best.",
+               {}, {next_table(d)});
+  sections.add("details", "Details", "What stands behind the verdict, and what these data could not see.", {}, {},
+               {{"Is there a gap? The tests, and the recalibrated parameters",
+                 {"A small p says that chance does not make such a gap; recalibrated means that restitution, friction "
+                  "and the launch were fitted again."},
+                 {},
+                 {gap_table(d), contact_table(d)}},
+                {"What these data could not see",
+                 {"An effect smaller than its smallest size would have gone unnoticed; an effect with one alike may "
+                  "have been named in its place."},
+                 {},
+                 {visibility_table(d), missing_table(d), not_possible_table(d)}},
+                {"The data", {}, {}, {data_table(d)}}});
+  pages.write_index();
+}
+
+void run_diagnose(const DiagnoseRequest& request) {
+  const analysis::Experiment experiment = analysis::read_experiment(request.folder);
+  std::optional<FolderIfFilled> folder;
+  if (!request.out.empty()) folder.emplace(request.out);
+  std::optional<OutputFile> json;
+  if (!request.json.empty()) json.emplace(request.json);
+  const analysis::Diagnosis diagnosis = [&] {
+    Progress progress("diagnose", study_units);
+    analysis::DiagnosisOptions options = request.options;
+    options.progress = study_progress(progress);
+    return analysis::diagnose(experiment, options);
+  }();
+  const Provenance provenance{request.command, "experiment: " + experiment.title, request.options.seed, version()};
+  if (!request.out.empty()) {
+    const bool wheel = experiment.system == analysis::System::rimless_wheel;
+    write_diagnosis(diagnosis, experiment.title,
+                    wheel ? std::string(dynamics::law_name(experiment.contact.law)) : std::string(), provenance,
+                    request.out);
+  }
+  if (json) {
+    json->stream() << diagnosis_json(diagnosis, provenance);
+    json->commit();
+  }
+  if (request.json == "-") return;
+  say("{}", diagnosis_text(diagnosis, terminal_width()));
+  if (!request.out.empty()) say("\n{}\n", (std::filesystem::path(request.out) / "index.html").string());
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,33 @@
+#include "reports/experiment_commands/effects_command.h"
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "dynamics/catalogue/effect_catalogue.h"
+#include "reports/diagnosis/diagnosis_json.h"
+#include "reports/output/output_file.h"
+#include "reports/output/standard_output.h"
+
+namespace metastable::reports {
+namespace {
+
+std::string range_text(const dynamics::EffectParameter& p) {
+  const std::string unit = p.unit.empty() ? "" : " " + p.unit;
+  return fmt::format("{:.4g} to {:.4g}{}, {}", p.lower, p.upper, unit,
+                     p.neutral ? fmt::format("none at {:.4g}", *p.neutral) : "none at the stated value");
+}
+
+}  // namespace
+
+void run_effects(const EffectsRequest& request) {
+  if (!request.json.empty()) write_file(request.json, effects_json());
+  if (request.json == "-") return;
+  for (const dynamics::EffectInfo& info : dynamics::effect_catalogue()) {
+    say("{}: {}\n", info.id, info.summary);
+    for (const dynamics::EffectParameter& p : info.parameters)
+      say("  {:<20}{}{} ({})\n", p.name, p.meaning, p.per_leg ? ", one a leg" : "", range_text(p));
+  }
+}
+
+}  // namespace metastable::reports

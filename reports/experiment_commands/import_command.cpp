@@ -1,0 +1,194 @@
+#include "reports/experiment_commands/import_command.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "analysis/experiment/csv_reader.h"
+#include "analysis/experiment/experiment_folder.h"
+#include "reports/experiment_commands/experiment_output.h"
+#include "reports/import/csv_rows.h"
+#include "reports/import/imported_experiment.h"
+#include "reports/import/mat_file.h"
+#include "reports/output/input_file.h"
+#include "reports/output/standard_output.h"
+#include "reports/output/table.h"
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+namespace {
+
+// Holds what one file tells, whatever its kind.
+struct ForeignFile {
+  std::vector<ImportedRow> rows;
+  std::vector<MappedColumn> map;
+  std::vector<std::string> names;
+  std::vector<std::string> found = {};  // of its layout, a sentence each
+};
+
+ForeignFile read_csv(const ImportRequest& request, const std::string& text) {
+  if (request.orientation != TrialsIn::not_told)
+    throw std::invalid_argument("--trials-in: has a meaning for matrices of a MAT file only");
+  ForeignFile file;
+  analysis::Defects defects;
+  auto [form, found] = csv_form(text, request.form, [&](const std::vector<std::string>& names) {
+    try {
+      if (!request.columns.empty()) return names_all(request.columns, names, request.collisions_from);
+      const std::vector<MappedColumn> map = map_columns(request.columns, names, request.file, request.collisions_from);
+      return column_of(map, Role::omega_minus) != nullptr || column_of(map, Role::angle) != nullptr;
+    } catch (const std::invalid_argument&) {
+      return false;
+    }
+  });
+  file.found = std::move(found);
+  file.names = analysis::CsvReader::names(text, form);
+  if (request.form.separator && file.names.size() == 1)
+    for (const auto& [separator, name] : {std::pair(';', "';'"), std::pair('\t', "tab"), std::pair(',', "','")})
+      if (separator != *request.form.separator && file.names.front().find(separator) != std::string::npos)
+        throw std::invalid_argument(
+            fmt::format("{}:1: one column, which holds a {}; say --separator {}", request.file, name, name));
+  if (!file.names.empty()) file.map = map_columns(request.columns, file.names, request.file, request.collisions_from);
+  if (!file.names.empty() && column_of(file.map, Role::omega_minus) == nullptr &&
+      column_of(file.map, Role::angle) == nullptr)
+    throw std::invalid_argument(fmt::format("--columns: which column of {} is omega_minus (or angle)? It has {}",
+                                            request.file, fmt::join(file.names, ", ")));
+  file.rows = csv_rows(request.file, text, form, file.map, request.collisions_from, defects);
+  defects.check();
+  return file;
+}
+
+ForeignFile read_foreign(const ImportRequest& request) {
+  const std::string text = read_file(request.file);
+  if (!is_mat_file(text)) return read_csv(request, text);
+  if (request.form.separator || request.form.decimal || request.form.skip_rows || request.form.units_row)
+    throw std::invalid_argument(fmt::format(
+        "{}: is a MAT file; --separator, --decimal, --skip-rows and --units-row are for a CSV", request.file));
+  MatRows read = mat_rows(request.file, text, request.columns, request.orientation, request.collisions_from);
+  return {std::move(read.rows), std::move(read.map), std::move(read.names), std::move(read.found)};
+}
+
+// What of the map tells of angles is not told of collisions, and the other way round.
+void check_roles(const std::vector<MappedColumn>& map) {
+  if (column_of(map, Role::angle) == nullptr) return;
+  for (const Role role : {Role::omega_minus, Role::omega_plus, Role::collision, Role::leg, Role::position})
+    if (column_of(map, role) != nullptr)
+      throw std::invalid_argument(fmt::format(
+          "--columns: angle and {}: one file tells either collisions or what a camera saw", role_name(role)));
+  if (column_of(map, Role::time) == nullptr) throw std::invalid_argument("--columns: angle needs time");
+}
+
+std::string description_of(const ImportRequest& request, const std::vector<ImportedRow>& rows,
+                           const std::vector<std::string>& comment) {
+  if (!request.description.empty()) {
+    std::string text;
+    for (const std::string& line : comment) text += "# " + line + "\n";
+    return text + read_file(request.description);
+  }
+  std::vector<std::pair<std::string, double>> slopes = request.slopes;
+  if (slopes.empty()) {
+    for (const ImportedRow& row : rows)
+      if (row.condition &&
+          std::ranges::find(slopes, *row.condition, &std::pair<std::string, double>::first) == slopes.end())
+        slopes.emplace_back(*row.condition, request.setting.slope_deg);
+    if (slopes.empty()) slopes.emplace_back(fmt::format("{}", request.setting.slope_deg), request.setting.slope_deg);
+  }
+  std::string toml = analysis::wheel_description(request.setting, request.setting.restitution, request.setting.friction,
+                                                 request.title, comment);
+  for (const auto& [id, slope] : slopes) {
+    analysis::Setting setting = request.setting;
+    setting.slope_deg = slope;
+    toml += analysis::condition_description(id, setting, false);
+  }
+  if (request.sensor_noise) toml += fmt::format("\n[sensor]\nnoise_sd_rad_s = {}\n", *request.sensor_noise);
+  return toml;
+}
+
+struct Counted {
+  std::string id;
+  std::size_t trials = 0, collisions = 0;
+};
+
+std::vector<Counted> counted(const analysis::Experiment& experiment) {
+  std::vector<Counted> conditions;
+  for (const analysis::Condition& condition : experiment.conditions) conditions.push_back({condition.id});
+  for (const analysis::MeasuredTrial& trial : experiment.trials) {
+    ++conditions[trial.condition].trials;
+    conditions[trial.condition].collisions += trial.collisions.size();
+  }
+  return conditions;
+}
+
+std::vector<std::string> unused(const ForeignFile& file) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < file.names.size(); ++i)
+    if (std::ranges::none_of(file.map, [&](const MappedColumn& column) {
+          return std::ranges::find(column.columns, i) != column.columns.end() ||
+                 column.name.starts_with(file.names[i] + ".");
+        }))
+      names.push_back(file.names[i]);
+  return names;
+}
+
+std::string import_json(const ImportRequest& request, const ForeignFile& file, const Imported& imported,
+                        const Provenance& provenance) {
+  nlohmann::ordered_json json = {{"folder", request.out}, {"trials", imported.trials}, {"rows", imported.rows}};
+  for (const Counted& c : counted(imported.experiment))
+    json["conditions"].push_back({{"id", c.id}, {"trials", c.trials}, {"collisions", c.collisions}});
+  for (const MappedColumn& column : file.map)
+    json["columns"][std::string(role_name(column.role))] = {{"name", column.name}, {"unit", column.unit}};
+  json["unused"] = unused(file);
+  json["found"] = file.found;
+  json["assumed"] = imported.assumed;
+  json["notes"] = imported.experiment.notes;
+  json["provenance"] = provenance_lines(provenance);
+  return json.dump(2) + "\n";
+}
+
+void print_import(const ImportRequest& request, const ForeignFile& file, const Imported& imported) {
+  const bool angles = imported.source.angle_csv.has_value();
+  say("{}: {} trials, {} {}\n", request.out, imported.trials, imported.rows, angles ? "frames" : "collisions");
+  if (!angles && imported.experiment.conditions.size() > 1)
+    for (const Counted& c : counted(imported.experiment))
+      say("  {}: {} trials, {} collisions\n", c.id, c.trials, c.collisions);
+  for (const MappedColumn& column : file.map)
+    say("  {:<12} {}{}\n", role_name(column.role), column.name,
+        column.unit.empty() ? "" : fmt::format(" in {}", column.unit));
+  for (const std::string& sentence : file.found) say("found: {}\n", sentence);
+  for (const std::string& sentence : imported.assumed) say("assumed: {}\n", sentence);
+  if (const std::vector<std::string> names = unused(file); !names.empty())
+    say("not used: {}\n", fmt::join(names, ", "));
+  for (const std::string& note : imported.experiment.notes) say("note: {}\n", note);
+  say("next: metastable {} {}\n", angles ? "collisions" : "diagnose", request.out);
+}
+
+}  // namespace
+
+void run_import(const ImportRequest& request) {
+  ExperimentOutput folder(request.out);
+  const ForeignFile file = read_foreign(request);
+  check_roles(file.map);
+  const Provenance provenance{request.command, "imported from " + request.file, 0, version()};
+  ImportOptions options;
+  options.description = description_of(request, file.rows, provenance_lines(provenance));
+  options.description_file = request.description.empty() ? "what is stated of wheel and ramp" : request.description;
+  options.number_trials = request.number_trials;
+  options.first_collision = request.collisions_from;
+  options.first_leg = request.legs_from;
+  options.outcomes = request.outcomes;
+  const Imported imported = imported_experiment(request.file, file.rows, options);
+  std::optional<OutputFile> json;
+  if (!request.json.empty()) json.emplace(request.json);
+  folder.write(imported.source);
+  if (json) {
+    json->stream() << import_json(request, file, imported, provenance);
+    json->commit();
+  }
+  if (request.json != "-") print_import(request, file, imported);
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,140 @@
+#include "reports/experiment_commands/study_command.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iterator>
+#include <optional>
+#include <vector>
+
+#include "analysis/experiment/experiment.h"
+#include "analysis/paper/paper_claims.h"
+#include "analysis/paper/stopping.h"
+#include "reports/description/paper_figures.h"
+#include "reports/description/paper_tables.h"
+#include "reports/description/stopping_pages.h"
+#include "reports/output/page_folder.h"
+#include "reports/output/progress.h"
+#include "reports/output/version.h"
+
+namespace metastable::reports {
+namespace {
+
+using analysis::PaperExperiments;
+
+// Holds the panels of one figure of the paper: under the first variant, the paper's own, and under all others.
+struct Panels {
+  std::vector<Figure> papers, others;
+};
+
+template <typename Make>
+Panels all_variants(const Studies& studies, const Make& make) {
+  Panels all;
+  for (const analysis::VariantStudy& study : studies) {
+    std::vector<Figure> figures = make(study);
+    std::vector<Figure>& to = &study == &studies.front() ? all.papers : all.others;
+    to.insert(to.end(), std::make_move_iterator(figures.begin()), std::make_move_iterator(figures.end()));
+  }
+  return all;
+}
+
+// Shows the paper's own panels; other laws and all numbers are folded.
+void figure_section(PageFolder& pages, const std::string& id, const std::string& heading, const std::string& reading,
+                    Panels panels, Table table) {
+  std::vector<Table> tables;
+  tables.push_back(std::move(table));
+  pages.section(id, heading, reading, panels.papers, {},
+                {{"Under the other readings and laws", {}, std::move(panels.others), {}},
+                 {"In numbers", {}, {}, std::move(tables)}});
+}
+
+}  // namespace
+
+void run_study(const StudyRequest& request) {
+  const analysis::PaperStudyOptions& asked = request.options;
+  const PaperExperiments experiments = request.data.empty()
+                                           ? analysis::simulated_experiments(asked.seed, asked.threads)
+                                           : analysis::paper_experiments(analysis::read_experiment(request.data));
+  PageFolder pages(request.out);
+  Answer answer(request.json);
+  const std::vector<analysis::Variant> variants = analysis::paper_variants();
+  std::optional<Progress> progress(std::in_place, "study",
+                                   variants.size() * analysis::paper_study_units() + analysis::design_change_count());
+  analysis::PaperStudyOptions options = asked;
+  options.progress = [&] { progress->advance(); };
+  Studies studies;
+  for (const analysis::Variant& variant : variants)
+    studies.push_back(analysis::study_variant(variant, experiments, options));
+  const analysis::Setting stops = analysis::stopping_setting();
+  const analysis::Stopping stopping = analysis::stopping(stops, options.trials, options.seed, options.threads);
+  const std::vector<analysis::DesignChange> designs =
+      analysis::design_changes(stops, options.trials, options.seed, options.threads, options.progress);
+  progress.reset();
+
+  const Provenance provenance{
+      request.command,
+      fmt::format(
+          "the paper's wheel; {} trials of 16 collisions a profile; {} samples a variance share (settled: an eighth); "
+          "experiment: {}",
+          options.trials, options.samples, experiments.title),
+      options.seed, version()};
+  Page& page = pages.page();
+  page.title = "Dominant sources of variability in passive walking: the paper's study, regenerated";
+  page.intro = {
+      "T. Nanayakkara, K. Byl, H. Liu, X. Song, T. Villabona, “Dominant Sources of Variability in Passive Walking” "
+      "(ICRA "
+      "2012): its simulated figures and its claims, under its own contact law in two readings, under a law that is "
+      "consistent with Coulomb friction, and under the landings of a rigid body followed until they settle.",
+      experiments.stand_in ? "Its measurements are not public: what is called stand-in here is a simulation too."
+                           : "Measured trials: " + experiments.title + "."};
+  page.provenance = provenance;
+  const std::vector<analysis::Claim> claims = analysis::paper_claims(studies, experiments);
+  page.lead = claims_sentences(claims, studies);
+  pages.section(
+      "claims", "Claim by claim",
+      "How many of the paper’s claims come out under each law and reading; what counts is below.",
+      {claims_figure(claims, studies, provenance)}, {claims_count_table(claims, studies, provenance)},
+      {{"Each claim, its verdicts and the numbers behind them",
+        {"Each cell gives the verdict first and then the numbers behind it."},
+        {},
+        {claims_table(claims, studies, experiments, provenance)}},
+       {"What the law and the reading change", {}, {}, {changes_table(claims, studies, experiments, provenance)}},
+       {"What counts as reproduced", {}, {}, {readings_table(claims, provenance)}}},
+      Arrangement::beside);
+  pages.section("hypotheses", "The three hypotheses",
+                "A source that matters takes a large share of the variance with it.", {},
+                {hypotheses_table(analysis::paper_hypotheses(studies), studies, provenance)},
+                {{"All shares of the variance", {}, {}, {variance_table(studies, provenance)}}});
+  pages.section("stopping", "Why a wheel that rolls steadily stops: the law settled", stopping_story(stopping),
+                {sticking_figure(stopping, provenance), resting_figure(stopping, provenance)},
+                {design_table(designs, provenance)},
+                {{"Leg by leg in numbers", {}, {}, {stopping_table(stopping, provenance)}}});
+  Panels fig4 = all_variants(studies, [&](const auto& s) { return fig4_figures(s, provenance); });
+  fig4.papers.insert(fig4.papers.begin(), fig4_experiment_figure(experiments, provenance));
+  figure_section(pages, "fig4", "Fig. 4: two starts, one steady state",
+                 "Lines that meet forget their start; bands are standard errors.", std::move(fig4),
+                 fig4_table(studies, experiments, provenance));
+  figure_section(
+      pages, "fig6", "Fig. 6: launch speed and friction",
+      "Three launches at one friction each; a steady state that remembers its launch would keep the lines apart.",
+      all_variants(studies, [&](const auto& s) { return fig6_figures(s, experiments, provenance); }),
+      fig6_table(studies, provenance));
+  pages.section("equal-legs", "Sec. IV-A: leg lengths",
+                "The runs of Fig. 6 with the measured legs and with eight equal ones.", {}, {},
+                {{"In numbers", {}, {}, {equal_legs_table(studies, provenance)}}});
+  figure_section(pages, "fig7", "Fig. 7: spreads of restitution and friction",
+                 "From panel to panel friction scatters more, from line to line restitution does.",
+                 all_variants(studies, [&](const auto& s) { return fig7_figures(s, experiments, provenance); }),
+                 fig7_table(studies, experiments, provenance));
+  figure_section(pages, "fig8", "Fig. 8: energy losses", "Bars are standard deviations from collision to collision.",
+                 all_variants(studies, [&](const auto& s) { return fig8_figures(s, provenance); }),
+                 fig8_table(studies, provenance));
+  figure_section(pages, "fig9", "Fig. 9: means of restitution and friction",
+                 "From panel to panel friction grows, from line to line restitution does.",
+                 all_variants(studies, [&](const auto& s) { return fig9_figures(s, experiments, provenance); }),
+                 fig9_table(studies, provenance));
+  pages.write_index();
+  pages.finish(answer);
+}
+
+}  // namespace metastable::reports

@@ -1,0 +1,67 @@
+#include "dynamics/catalogue/effect_catalogue.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <stdexcept>
+
+#include "dynamics/wheel/wheel.h"
+
+namespace metastable::dynamics::test {
+namespace {
+
+const NominalValues nominal{0.4, 0.1, 0.3, 0.05, paper_leg_lengths()};
+
+std::string message(const std::string& text) {
+  try {
+    effect_from_text(text, nominal);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(EffectCatalogue, HoldsTwentyThreeEffectsWithNeutralValuesInRange) {
+  std::set<std::string> ids;
+  for (const EffectInfo& info : effect_catalogue()) {
+    ids.insert(info.id);
+    const Effect neutral = effect_from_values(info.id, {}, nominal);
+    std::size_t size = 0;
+    for (const EffectParameter& p : info.parameters) {
+      size += p.per_leg ? 8 : 1;
+      EXPECT_LT(p.lower, p.upper) << info.id;
+      EXPECT_FALSE(p.meaning.empty()) << info.id;
+    }
+    EXPECT_EQ(neutral.values.size(), size) << info.id;
+    // They go to text and back.
+    EXPECT_EQ(effect_from_text(effect_text(neutral), nominal).values, neutral.values) << effect_text(neutral);
+  }
+  EXPECT_EQ(ids.size(), 23U);
+}
+
+TEST(EffectCatalogue, WhatIsNotNamedIsNeutralOrAsStated) {
+  EXPECT_EQ(effect_from_text("leg_contact:leg=3,friction_ratio=1.4", nominal).values, (std::vector{3.0, 1.4, 1.0}));
+  EXPECT_EQ(effect_from_text("contact_distribution:friction_mean=0.5", nominal).values,
+            (std::vector{0.4, 0.1, 0.5, 0.05}));
+  EXPECT_EQ(effect_from_text("slip_reversal", nominal).values.size(), 0U);
+}
+
+TEST(EffectCatalogue, RefusesWhatItDoesNotUnderstand) {
+  EXPECT_NE(message("gravity").find("effect: \"gravity\" is none of contact_distribution, initial_speed"),
+            std::string::npos);
+  EXPECT_EQ(message("leg_contact:leg=8"), "effect leg_contact: leg: 8 is outside [0, 7]");
+  EXPECT_EQ(message("leg_contact:leg=1.5"), "effect leg_contact: leg: 1.5 is not a whole number");
+  EXPECT_EQ(message("inertia:ratio=3"), "effect inertia: ratio: 3 is outside [0.5, 2]");
+  EXPECT_EQ(message("inertia:ratio=nan"), "effect inertia: ratio: nan is outside [0.5, 2]");
+  EXPECT_EQ(message("inertia:ratio"), "effect inertia: \"ratio\" is not of the form parameter=value");
+  EXPECT_EQ(message("inertia:ratio=1x"), "effect inertia: \"1x\" is not a number");
+  EXPECT_EQ(message("inertia:ratio=1,ratio=1"), "effect inertia: ratio is given twice");
+  EXPECT_EQ(message("inertia:size=1"), "effect inertia: \"size\" is none of its parameters (ratio)");
+  EXPECT_EQ(message("leg_lengths:leg_lengths_m=0.15;0.15"),
+            "effect leg_lengths: leg_lengths_m: 2 values, 8 are needed");
+  EXPECT_EQ(message("friction_patch:from_m=2,to_m=1"),
+            "effect friction_patch: to_m: 1 m does not lie beyond from_m, 2 m");
+}
+
+}  // namespace
+}  // namespace metastable::dynamics::test
