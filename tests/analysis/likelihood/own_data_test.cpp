@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -141,7 +142,17 @@ TEST(OwnData, UnderSettledWithoutOmegaPlusFeetThatNeverSurelyStandAreRefused) {
 TEST(OwnData, UnderPlasticIsNoGapAndAMisreadSlopeIsOne) {
   Experiment own = own_experiment({.law = dynamics::Law::plastic, .trials = 20, .seed = 2});
   EXPECT_EQ(verdict_name(diagnosed(own).verdict), "no_gap");
-  own.conditions[0].slope_deg += 0.03;
+  std::mt19937_64 generator(1);
+  std::normal_distribution<double> noise(0, 0.01);
+  own.sensor.noise_sd = 0.01;
+  own.sensor.last_digit.reset();
+  for (MeasuredTrial& trial : own.trials)
+    for (MeasuredCollision& collision : trial.collisions) {
+      collision.omega_minus += noise(generator);
+      if (collision.omega_plus) *collision.omega_plus += noise(generator);
+    }
+  EXPECT_EQ(verdict_name(diagnosed(own).verdict), "no_gap");
+  own.conditions[0].slope_deg += 0.05;
   const Diagnosis d = diagnosed(own);
   EXPECT_EQ(verdict_name(d.verdict), "explained") << d.sentences.front();
   EXPECT_NE(std::ranges::find(d.causes.set, "slope_offset"), d.causes.set.end()) << d.sentences.front();
