@@ -59,7 +59,7 @@ Figure claims_figure(const std::vector<analysis::Claim>& claims, const std::vect
                       .high = 1.05 * static_cast<double>(claims.size())},
                 .y = {""},
                 .provenance = provenance};
-  BarChart bars{.name = {}, .value = {}, .digits = 2};
+  BarChart bars{.name = {}, .value = {}, .digits = 3, .format = NumberFormat::general};
   for (std::size_t v = 0; v < studies.size(); ++v) {
     bars.name.push_back(studies[v].variant.name);
     bars.value.push_back(static_cast<double>(std::ranges::count_if(claims, [&](const analysis::Claim& claim) {

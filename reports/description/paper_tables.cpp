@@ -73,11 +73,11 @@ std::size_t count(const std::vector<analysis::Claim>& claims, std::size_t varian
 }  // namespace
 
 std::vector<std::string> claims_sentences(const std::vector<analysis::Claim>& claims, const Studies& studies) {
-  using enum analysis::ClaimVerdict;
   std::vector<std::string> parts;
   for (std::size_t v = 0; v < studies.size(); ++v)
-    parts.push_back(fmt::format("{} under {}", count(claims, v, reproduced), studies[v].variant.name));
-  return {fmt::format("Of {} claims of the paper so many are reproduced: {}.", claims.size(), fmt::join(parts, "; "))};
+    parts.push_back(fmt::format("{}{} under “{}”", count(claims, v, analysis::ClaimVerdict::reproduced),
+                                v == 0 ? " come out" : "", studies[v].variant.name));
+  return {fmt::format("Of the paper’s {} claims {}.", claims.size(), fmt::join(parts, ", "))};
 }
 
 Table claims_count_table(const std::vector<analysis::Claim>& claims, const Studies& studies,

@@ -98,7 +98,7 @@ Figure map_figure(const std::vector<Row>& rows, const std::vector<std::string>& 
   }
   figure.heat_map = std::move(map);
   figure.width = map_width;
-  figure.height = 150 + row_height * static_cast<int>(rows.size());
+  figure.height = 140 + row_height * static_cast<int>(rows.size());
   return figure;
 }
 
@@ -110,7 +110,9 @@ std::vector<Figure> furthest_figure(const Diagnosis& d) {
   if (rows.empty()) return {};
   std::ranges::stable_sort(rows, [](const Row& a, const Row& b) { return a.furthest > b.furthest; });
   rows.resize(std::min(rows.size(), furthest_rows));
-  return {map_figure(rows, columns, "map-furthest", "Where measured and modelled speeds differ most", true)};
+  const bool mixed = std::ranges::any_of(rows, [&](const Row& row) { return row.phase != rows.front().phase; });
+  const std::string of = mixed || rows.front().phase.empty() ? "" : fmt::format(", {}s", rows.front().phase);
+  return {map_figure(rows, columns, "map-furthest", "Furthest from the model" + of, mixed)};
 }
 
 std::vector<Figure> map_figures(const Diagnosis& d) {

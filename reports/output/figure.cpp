@@ -189,14 +189,28 @@ struct LabelFit {
   int digits = 0;
 };
 
+/// Are what stands around the cells of a heat map [px].
+struct Margins {
+  double left, right, top, bottom;
+};
+
+Margins margins(const HeatMap& map, const Figure& figure) {
+  constexpr double letter = 7.4;  // mean width of a letter of names, in type of 15 px
+  std::size_t longest_y = 4, longest_x = 0;
+  for (const std::string& name : map.y_names) longest_y = std::max(longest_y, length(name));
+  for (const std::string& name : map.x_names) longest_x = std::max(longest_x, length(name));
+  const bool y_label = !figure.y.label.empty(), x_label = !figure.x.label.empty();
+  // Names of columns are turned by 25 deg: 0.42 of their length downwards.
+  return {22 + letter * static_cast<double>(longest_y) + (y_label ? 26 : 0), 104, figure.title.empty() ? 16.0 : 44.0,
+          30 + 0.42 * letter * static_cast<double>(longest_x) + (x_label ? 24 : 0)};
+}
+
 /// Finds the most digits, at most map.digits, with which every label fits its cell in a font one can read.
-LabelFit fit_labels(const HeatMap& map, int width, int height) {
+/// @param width, height of all cells together [px]
+LabelFit fit_labels(const HeatMap& map, double width, double height) {
   constexpr double glyph_width = 0.6;  // of a digit, by the font's size
-  std::size_t longest_name = 6;
-  for (const std::string& name : map.y_names) longest_name = std::max(longest_name, length(name));
-  const double margins = 148 + 7 * static_cast<double>(longest_name);  // beside the cells [px]
-  const double cell_width = (width - margins) / static_cast<double>(map.x.size());
-  const double cell_height = (height - 90) / static_cast<double>(map.y.size());
+  const double cell_width = width / static_cast<double>(map.x.size());
+  const double cell_height = height / static_cast<double>(map.y.size());
   for (int digits = map.digits; digits >= 1; --digits) {
     std::size_t longest = 1;
     for (const auto& row : map.value) {
@@ -212,7 +226,19 @@ LabelFit fit_labels(const HeatMap& map, int width, int height) {
   return {};
 }
 
-void append_heat_map(std::string& script, const HeatMap& map, const LabelFit& fit) {
+/// Sets the margins: gnuplot takes long names for much longer than they are drawn, and leaves too little to the cells.
+void append_margins(std::string& script, const HeatMap& map, const Figure& figure) {
+  const Margins m = margins(map, figure);
+  script += fmt::format(
+      "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset bmargin at screen {:.4f}\nset tmargin at screen "
+      "{:.4f}\n",
+      m.left / figure.width, 1 - m.right / figure.width, m.bottom / figure.height, 1 - m.top / figure.height);
+}
+
+void append_heat_map(std::string& script, const HeatMap& map, const Figure& figure) {
+  const Margins m = margins(map, figure);
+  const LabelFit fit = fit_labels(map, figure.width - m.left - m.right, figure.height - m.top - m.bottom);
+  append_margins(script, map, figure);
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (const auto& row : map.value) {
@@ -305,6 +331,15 @@ void check_bars(const Figure& figure, const BarChart& bars) {
                   bars.value.size(), bars.lower.size(), bars.upper.size(), bars.colour.size()));
 }
 
+/// Returns 1, 2 or 5 times a power of ten: five steps at most over the range, so that their numbers stand apart.
+double tick_step(double range) {
+  if (!(range > 0) || !std::isfinite(range)) return 1;
+  const double power = std::pow(10, std::floor(std::log10(range / 5)));
+  for (const double times : {1.0, 2.0, 5.0})
+    if (range / (times * power) <= 5) return times * power;
+  return 10 * power;
+}
+
 void append_bars(std::string& script, const BarChart& bars, const FigureAxis& x, const std::string& ends) {
   const std::size_t n = bars.name.size();
   std::string boxes = "$bars << END\n", labels = "$labels << END\n", whiskers;
@@ -321,8 +356,7 @@ void append_bars(std::string& script, const BarChart& bars, const FigureAxis& x,
       whiskers += fmt::format("{} {} {} {}\n", value, i, bars.lower[i], bars.upper[i]);
     }
     least = std::min(least, from), most = std::max(most, to);
-    labels += fmt::format("{} {} \"{}\"\n", std::max(to, 0.0), i,
-                          format_number(value, NumberFormat::significant, bars.digits));
+    labels += fmt::format("{} {} \"{}\"\n", std::max(to, 0.0), i, format_number(value, bars.format, bars.digits));
   }
   script += boxes + "END\n" + labels + "END\n";
   if (!whiskers.empty()) script += "$whiskers << END\n" + whiskers + "END\n";
@@ -330,6 +364,7 @@ void append_bars(std::string& script, const BarChart& bars, const FigureAxis& x,
   const double room = 0.15 * (most > least ? most - least : 1);
   script += x.low || x.high ? fmt::format("set xrange {}\n", ends)
                             : fmt::format("set xrange [{}:{}]\n", least < 0 ? least - 0.3 * room : 0, most + room);
+  script += fmt::format("set xtics {}\n", tick_step(x.high.value_or(most + room) - x.low.value_or(least)));
   script += fmt::format("set yrange [{}:-0.6]\nset ytics ({}) nomirror scale 0 noenhanced\n",
                         static_cast<double>(n) - 0.4, tics(bars.name));
   script +=
@@ -458,7 +493,7 @@ std::string gnuplot_script(const Figure& figure) {
 
   if (figure.heat_map) {
     check_heat_map(figure, *figure.heat_map);
-    append_heat_map(script, *figure.heat_map, fit_labels(*figure.heat_map, figure.width, figure.height));
+    append_heat_map(script, *figure.heat_map, figure);
     return script;
   }
 

@@ -76,6 +76,7 @@ struct BarChart {
   std::vector<double> lower = {}, upper = {};  ///< intervals as whiskers; empty: none. NaN: none at this bar
   std::vector<int> colour = {};                ///< of the palette, one a bar; empty: all alike
   int digits = 2;                              ///< significant digits of the values shown
+  NumberFormat format = NumberFormat::significant;
 };
 
 enum class Legend { top_right, top_left, bottom_right, bottom_left, below, none };

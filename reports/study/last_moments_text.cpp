@@ -142,6 +142,7 @@ std::vector<Figure> last_moments_figures(const LastMoments& moments, const std::
     figure.x.high = 0.0;
     figure.y = {name};
     figure.legend = Legend::below;
+    figure.height = 410;
     figure.provenance = provenance;
     Series band{"", Style::band, {}, {}, {}, {}, 1}, line{"median and middle 90 %", Style::line, {}, {}, {}, {}, 1};
     for (std::size_t k = moments.last.size(); k-- > 0;) {
@@ -155,7 +156,7 @@ std::vector<Figure> last_moments_figures(const LastMoments& moments, const std::
     const Estimate& regime = of(moments.regime);
     for (const double level : {regime.lower, regime.value, regime.upper}) {
       Series usual{
-          level == regime.value ? "all steps of the regime: the same" : "", Style::dashed, line.x, {}, {}, {}, 0};
+          level == regime.value ? "the same of all steps" : "", Style::dashed, line.x, {}, {}, {}, 0};
       usual.y.assign(line.x.size(), level);
       figure.series.push_back(std::move(usual));
     }

@@ -494,7 +494,8 @@ TEST_F(CommandLine, CoastDownTakesTheNominalLossOfAnotherFolder) {
 // The whole report, made on one thread and on two, has the same bytes in every file.
 TEST_F(CommandLine, ReportIsTheSameBytesOnAnyNumberOfThreads) {
   const auto report = [&](const std::string& name, const std::string& threads) {
-    return metastable(with({"report", "--out", path(name), "--threads", threads, "--energy-trials", "20", "--landings", "1000"}, quick));
+    return metastable(with(
+        {"report", "--out", path(name), "--threads", threads, "--energy-trials", "20", "--landings", "1000"}, quick));
   };
   const Ran one = report("one", "1"), two = report("two", "2");
   ASSERT_EQ(one.code, 0) << one.err;
