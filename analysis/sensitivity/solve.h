@@ -43,7 +43,7 @@ struct Answered {
 using AnswerAt = std::function<Answered(double value, int threads)>;
 
 struct SolveOptions {
-  std::optional<double> from, to;  ///< of the parameter; nothing: solve_range()
+  std::optional<double> from = {}, to = {};  ///< of the parameter; nothing: solve_range()
   std::size_t points = 17;         ///< looked at first, ends included, 3 .. 1000
   int threads = 0;                 ///< 0: all cores
   std::function<void(std::size_t looked_at)> progress = {};  ///< may throw to stop
