@@ -15,9 +15,9 @@ namespace metastable::markov {
 namespace {
 
 constexpr std::uint64_t kStates = 0x9000, kScores = 0xa000, kPlaces = 0xb000;
-constexpr std::size_t kProbeLines = 3000, kOnALine = 16, kProbeBatch = 64;
+constexpr std::size_t kLinesProbed = 3000, kOnALine = 16, kProbedTogether = 64;
 constexpr double kLeastReach = 6, kReach = 8.5;  // of a line [sds]: places of a curve hang on it
-constexpr double kProbeHeat = 2;                 // of the scores but the first
+constexpr double kOthersHeat = 2;                // of the scores but the first
 constexpr double kAboveNodes = 2;                // of one score: a line fails so much oftener than any node around,
 constexpr double kLineFails = 0.3, kNodesFail = 0.03;  // of several: more than the first where no node does the second,
                                                        // nor the first under the line's other scores
@@ -31,7 +31,7 @@ struct Sum {
     squares += x * x;
   }
   double bound() const {
-    const auto n = static_cast<double>(kProbeLines);
+    const auto n = static_cast<double>(kLinesProbed);
     const double mean = sum / n;
     return mean + kErrors * std::sqrt(std::max(0.0, squares / n - mean * mean) / n);
   }
@@ -59,12 +59,12 @@ class Probing {
 
   BlindSpots find() {
     std::vector<std::vector<Line>> of_phase(static_cast<std::size_t>(map_.phases));
-    for (std::size_t n = 0; n < kProbeLines; ++n) {
+    for (std::size_t n = 0; n < kLinesProbed; ++n) {
       Line line = draw(n);
       if (map_.inside && !map_.inside(line.phase, line.state)) continue;
       auto& waiting = of_phase[static_cast<std::size_t>(line.phase)];
       waiting.push_back(std::move(line));
-      if (waiting.size() == kProbeBatch) probe(waiting);
+      if (waiting.size() == kProbedTogether) probe(waiting);
     }
     for (auto& waiting : of_phase)
       if (!waiting.empty()) probe(waiting);
@@ -108,9 +108,9 @@ class Probing {
     line.reach = kLeastReach + (kReach - kLeastReach) * u[1];
     line.weight = visits_[node] / share_[node];
     for (const double v : numbers(kScores, number, s_ - 1)) {
-      const double z = kProbeHeat * normal_score(v);
+      const double z = kOthersHeat * normal_score(v);
       line.others.push_back(z);
-      line.weight *= kProbeHeat * std::exp(-0.5 * z * z * (1 - 1 / (kProbeHeat * kProbeHeat)));
+      line.weight *= kOthersHeat * std::exp(-0.5 * z * z * (1 - 1 / (kOthersHeat * kOthersHeat)));
     }
     const Mesh::Corners corners = mesh_.corners(line.phase, line.state);
     if (static_cast<std::size_t>(corners.count) <= d_) return line;  // at the edge of the mesh

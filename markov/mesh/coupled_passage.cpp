@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kProducts = 20000;      // of all rounds together
 constexpr int kSmoothing = 20;        // products between two solutions of the small chain
-constexpr double kStillSteps = 1e-8;  // what a round may change of the expected steps
+constexpr double kRoundStill = 1e-8;  // what a round may change of the expected steps
 constexpr double kBalanced = 1e-6;    // and of any class's visits, beyond what leaves it,
 constexpr int kStillRounds = 3;       // so many rounds running
 constexpr int kInverseRounds = 200;   // of the small chain's inverse iteration
@@ -207,7 +207,7 @@ CoupledPassage coupled_passage(const Mesh& mesh, std::span<const double> start, 
     aggregation.scale(y, visits);
     const double steps = std::accumulate(visits.begin(), visits.end(), 0.0);
     change = std::abs(steps - last) / steps;
-    still = change <= kStillSteps && aggregation.balanced(visits) ? still + 1 : 0;
+    still = change <= kRoundStill && aggregation.balanced(visits) ? still + 1 : 0;
     last = steps;
   }
   const std::vector<double> lower = aggregation.solve(start_by_class, true);

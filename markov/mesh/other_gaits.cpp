@@ -13,7 +13,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr std::uint64_t kWalkStream = 0x8000;
+constexpr std::uint64_t kHotStream = 0x8000;
 constexpr std::size_t kNodes = 1500;   // of the mesh, followed without noise
 constexpr std::size_t kHotWalks = 64;  // at each of
 constexpr double kHeats[] = {2, 4};    // so many times the noise: what has an action of 60 has one of 15 or 4 there
@@ -133,7 +133,7 @@ class Search {
       for (int phase = 0; phase < map_.phases; ++phase, ++number) {
         for (std::size_t i = 0; i < kHotWalks; ++i)
           for (std::size_t k = 0; k < s_; ++k)
-            scores[i * s_ + k] = std::clamp(heat * normal_score(uniforms(seed, kWalkStream + stream, i * s_ + k,
+            scores[i * s_ + k] = std::clamp(heat * normal_score(uniforms(seed, kHotStream + stream, i * s_ + k,
                                                                          static_cast<std::uint64_t>(number))[0]),
                                             -kHottest, kHottest);
         step(phase, states, scores);
