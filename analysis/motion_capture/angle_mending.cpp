@@ -3,13 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <map>
 #include <numbers>
 #include <optional>
-#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -286,24 +283,26 @@ class Mending {
     return least;
   }
 
+  // Returns how far a frame is off, in units of what is allowed.
+  double strayed(std::size_t i) const {
+    const double step = std::abs(usual_step(i, i + 1).value_or(0)),
+                 room = std::max(stray_noise * noise_, stray_share * std::max(step, least_step()));
+    return std::abs(off(i).value_or(0)) / room;
+  }
+
   void stray_frames() {
-    const auto most = static_cast<std::size_t>(most_mended * static_cast<double>(angle_.size())) + 1;
+    constexpr std::size_t seen_from = 6;  // frames to either side that a frame is judged by
+    if (angle_.size() < 3) return;
     std::vector<char> stray(angle_.size());
-    // A frame beside a stray one is seen badly from there: the worst is taken first, then all are looked at again.
-    for (std::size_t pass = 0; pass <= most; ++pass) {
-      std::size_t worst = 0;
-      double largest = 0, by = 0;
-      for (std::size_t i = 1; i + 1 < angle_.size(); ++i) {
-        const std::optional<double> from = off(i);
-        if (!from || stray[i]) continue;
-        const double step = std::abs(usual_step(i, i + 1).value_or(0)),
-                     room = std::max(stray_noise * noise_, stray_share * std::max(step, least_step()));
-        if (std::abs(*from) / room > largest) largest = std::abs(*from) / room, worst = i, by = std::abs(*from);
-      }
-      if (largest <= 1) return;
-      if (mended_.stray == 0 || time_[worst] < mended_.first_stray) mended_.first_stray = time_[worst];
-      mended_.largest_stray = std::max(mended_.largest_stray, by);
-      ++mended_.stray;
+    std::vector<double> share(angle_.size(), 0);
+    for (std::size_t i = 1; i + 1 < angle_.size(); ++i) share[i] = strayed(i);
+    const auto most = static_cast<std::size_t>(most_mended * static_cast<double>(angle_.size()));
+    // A frame beside a stray one is seen badly from there: the worst is taken first, and those around it judged anew.
+    while (mended_.stray <= most) {
+      const auto worst = static_cast<std::size_t>(std::ranges::max_element(share) - share.begin());
+      if (share[worst] <= 1) return;
+      if (mended_.stray++ == 0 || time_[worst] < mended_.first_stray) mended_.first_stray = time_[worst];
+      mended_.largest_stray = std::max(mended_.largest_stray, std::abs(off(worst).value_or(0)));
       stray[worst] = true;
       std::size_t from = worst, to = worst + 1;
       while (from > 1 && stray[from - 1]) --from;
@@ -311,6 +310,9 @@ class Mending {
       if (to - from > most_in_row)
         refuse_at(from, fmt::format("{} frames one after the other lie off the motion around them", to - from));
       bridge(from, to);
+      for (std::size_t i = from > seen_from ? from - seen_from : 1; i + 1 < std::min(to + seen_from, angle_.size());
+           ++i)
+        share[i] = stray[i] ? 0 : strayed(i);
     }
   }
 
