@@ -270,7 +270,7 @@ TEST(IntegratedStudy, RangesAreFoundWhereTheSurvivorsOfCellsDoNotSettle) {
 
 TEST(IntegratedStudy, LeavesUnreachableRestToTheSampledStudy) {
   Setting setting = equal_legs(9.59, {0.4, 0.1});
-  setting.law = dynamics::Law::plastic;
+  setting.law = dynamics::Law::coulomb;
   const Metastability result = integrated(setting, 0.01, 64);
   EXPECT_EQ(result.status, Status::rest_unreachable);
   EXPECT_EQ(result.method, Method::sampled);
