@@ -38,7 +38,7 @@ constexpr double resolved = 1e-12;  // relative, of the expected steps over the 
 constexpr double rarest = 1e-15;    // share of the launches that counts: what lies beyond `reach`
 constexpr std::size_t shown_launches = 1024, shown_runs = 64;  // for seconds, metres and speeds
 
-constexpr std::size_t checked_trials = 4096;
+constexpr std::size_t checked_trials = 4096, checked_steps = 64;
 constexpr double surprising = 4;  // standard errors
 constexpr std::size_t unresolved_trials = 64, unresolved_steps = 2000;
 constexpr double most_events = 2e7, most_rolled = 2e5;      // of a trial study: by the map, by Problem::follow
@@ -694,17 +694,24 @@ Metastability held_against_trials(const Problem& problem, Metastability study, c
     std::optional<Metastability> answer = trial_study(problem, options);
     return answer ? *std::move(answer) : study;
   }
-  const std::size_t most = std::min<std::size_t>(study.steps.survival.size(), 64);
+  const std::size_t most = std::min<std::size_t>(study.steps.survival.size(), checked_steps);
   const Trials trials = follow_trials(problem, options, 0, checked_trials, most, true);
   const MeanError found = mean_of(trials.steps);
   const Estimate& all = study.steps.from_start;
   // Survival is that of the finest chain, whose own mean is not extrapolated.
   const double extrapolated = all.value / study.steps.distribution.mean;
-  const double expected =
-      extrapolated * std::accumulate(study.steps.survival.begin(),
-                                     study.steps.survival.begin() + static_cast<std::ptrdiff_t>(most), 0.0);
+  double sum = 0, square = 0;
+  for (std::size_t n = 0; n < most; ++n) {
+    sum += study.steps.survival[n];
+    square += static_cast<double>(2 * n + 1) * study.steps.survival[n];
+  }
+  const double expected = extrapolated * sum;
   const double lower = expected * all.lower / all.value, upper = expected * all.upper / all.value;
-  const double slack = surprising * found.error;
+  // Where failures are rare the trials may hold none: their scatter is then that of the chain, and one failure more or
+  // less than it expects is no surprise.
+  const auto count = static_cast<double>(checked_trials);
+  const double error = std::max(found.error, std::sqrt(std::max(0.0, square - sum * sum) / count));
+  const double slack = surprising * error + static_cast<double>(most) / count;
   if (found.mean + slack >= lower && found.mean - slack <= upper) return study;
   if (std::optional<Metastability> answer = trial_study(problem, options)) {
     answer->steps.safe_state = study.steps.safe_state;
@@ -714,7 +721,7 @@ Metastability held_against_trials(const Problem& problem, Metastability study, c
   study.message = fmt::format(
       "tolerance {} not met: of the first {} steps the chain expects {:.5g}, and {} trials followed one by one take "
       "{:.5g} (standard error {:.2g}): its cells are too wide for this noise (in the interval)",
-      options.tolerance, most, expected, checked_trials, found.mean, found.error);
+      options.tolerance, most, expected, checked_trials, found.mean, error);
   Estimate& steps = study.steps.from_start;
   steps.lower = std::max(1.0, std::min(steps.lower, steps.value * (found.mean - slack) / expected));
   steps.upper = std::max(steps.upper, steps.value * (found.mean + slack) / expected);
