@@ -226,7 +226,7 @@ TEST(Metastability, FastLaunchesStayOnTheGridOnEveryLeg) {
   plastic.law = dynamics::Law::plastic;
   plastic.slope_deg = 4.2;
   plastic.initial_speed = {5, 0.2};
-  EXPECT_DOUBLE_EQ(study(plastic).steps.from_start.value, 15.0);
+  EXPECT_NEAR(study(plastic).steps.from_start.value, 15.0, 1e-5);  // slow launches of 3e-7 take 14
   Setting list = paper_setting(7.02, false);
   list.pairs = {{0.4, 0.4}, {0.3, 0.5}, {0.5, 0.2}, {0.45, 0.6}};
   const Metastability result = study(list);
