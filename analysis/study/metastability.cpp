@@ -364,7 +364,8 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
   check_setting(setting, options.method);
   // A table of landings takes part of the time.
   const bool tabulates = setting.law == dynamics::Law::settled && !options.direct && !setting.noise_free();
-  if (tabulates && fast_launch_rests(setting)) {  // a table is not worth its time where no launch passes
+  const bool launch_known = !setting.steady_launch || setting.steady_speed;
+  if (tabulates && launch_known && fast_launch_rests(setting)) {  // a table is not worth its time where no launch passes
     const Problem direct = setting.problem({.direct = true});
     if (rests_at_once(direct)) {
       Metastability result = followed_study(direct, options);

@@ -146,8 +146,7 @@ SolveRequest solve_request(const Options& o, const analysis::Setting& setting, c
 
 SolveRequest walker_solve_request(const Options& o, const analysis::WalkerSetting& setting, const std::string& line) {
   const std::string name = o.text("PARAMETER");
-  if (name != "slope" && name != "slope-sd")
-    throw std::invalid_argument(fmt::format("PARAMETER: '{}' is none of slope, slope-sd, which a walker has", name));
+  require_walker_parameter(name);
   SolveRequest request = asked_to_solve(o, 9, line);
   request.meshes = mesh_options(o, {"PARAMETER", "steps", "survive", "from", "to", "points"});
   request.solve.threads = request.meshes.threads;

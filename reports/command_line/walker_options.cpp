@@ -117,7 +117,13 @@ WalkerRequest walker_request(const Options& o, const std::string& command_line, 
   return request;
 }
 
+void require_walker_parameter(const std::string& name) {
+  if (name != "slope" && name != "slope-sd")
+    throw std::invalid_argument(fmt::format("PARAMETER: '{}' is none of slope, slope-sd, which a walker has", name));
+}
+
 analysis::WalkerSetting walker_solved_setting(const Options& o, const std::string& solved) {
+  require_walker_parameter(solved);
   if (o.given(solved)) throw std::invalid_argument(fmt::format("--{}: is what is solved for", solved));
   analysis::WalkerSetting setting = base_setting(o, solved);
   for (const auto& [name, value] :

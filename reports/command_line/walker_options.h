@@ -24,6 +24,8 @@ WalkerRequest walker_request(const Options& options, const std::string& command_
                              std::vector<std::string> own = {});
 /// Likewise what meshes are told, of walkers and of simulators of one's own; `own` as above.
 markov::MeshStudyOptions mesh_options(const Options& options, const std::vector<std::string>& own);
+/// @throws std::invalid_argument for a parameter to be solved for that is neither "slope" nor "slope-sd"
+void require_walker_parameter(const std::string& name);
 /// Reads the setting of a walker of which one of the two, "slope" or "slope-sd", is not given but solved for.
 analysis::WalkerSetting walker_solved_setting(const Options& options, const std::string& solved);
 WalkerRequest walker_sweep_request(const Options& options, const std::string& command_line);

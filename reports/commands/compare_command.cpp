@@ -48,12 +48,12 @@ CompareAnswer answer_compare(const CompareRequest& request, const BeginPart& beg
   options.progress = begin("compare");
   CompareAnswer answer{analysis::compare(request.settings, options, request.collisions), {}, {}};
   answer.extras = from_standard_errors(request, answer.comparison, begin);
-  for (const analysis::Metastability& study : answer.comparison.studies) {
+  for (std::size_t i = 0; i < answer.comparison.studies.size(); ++i) {
+    const analysis::Metastability& study = answer.comparison.studies[i];
     answer.thresholds.push_back(analysis::rest_thresholds(study));
     if (!request.rigid_bodies) continue;
     options.progress = begin("rigid bodies");
-    answer.extras.rigid_bodies.push_back(
-        analysis::beside_rigid_bodies(study, fmt::format("{} deg", study.setting->slope_deg), options));
+    answer.extras.rigid_bodies.push_back(analysis::beside_rigid_bodies(study, answer.comparison.labels[i], options));
   }
   return answer;
 }

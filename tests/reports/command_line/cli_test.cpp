@@ -82,13 +82,13 @@ TEST_F(CommandLine, WrongInputIsOneLineAndCodeTwo) {
       {{"solve", "slope"}, "solve: one of --steps, --survive and --reach is needed, and no other"},
       {{"solve", "slope", "--steps", "100", "--reach", "0.5"}, "solve: one of --steps, --survive and --reach"},
       {{"solve", "slope", "--slope", "8", "--steps", "100"}, "--slope: is what is solved for"},
-      {{"solve", "slop", "--steps", "100"}, "PARAMETER: 'slop' is none of slope, restitution-mean"},
+      {{"solve", "slop", "--steps", "100"}, "parameter: 'slop' is none of slope, restitution-mean"},
       {{"solve", "slope", "--survive", "1000"}, "--survive: '1000' is not of the form STEPS:SHARE, as 1000:0.9"},
       {{"solve", "slope", "--survive", "1000:1.5"}, "--survive: 1.5 is outside (0, 1)"},
       {{"solve", "slope", "--survive", "0:0.5"}, "--survive: '0' is not a whole number in 1..1000000000"},
       {{"solve", "slope", "--reach", "1"}, "--reach: 1 is outside (0, 1)"},
       {{"solve", "slope", "--steps", "1"}, "--steps: 1 is outside (1, inf)"},
-      {{"solve", "slope", "--steps", "100", "--to", "30"}, "slope: 30 deg is outside [0.001, 22.5) deg"},
+      {{"solve", "slope", "--steps", "100", "--to", "30"}, "slope: 30 deg is outside (0, 22.5) deg"},
       {{"solve", "friction-mean", "--steps", "100", "--from", "0.5", "--to", "0.4"}, "from: 0.5 is not below to: 0.4"},
       {{"solve", "friction-mean", "--steps", "100", "--points", "2"}, "--points: '2' is not a whole number in 3..1000"},
       {{"solve", "slope-sd", "--steps", "100"}, "PARAMETER: slope-sd has a meaning with --walker only"},
@@ -187,7 +187,7 @@ TEST_F(CommandLine, StepsWritesTheKeysThatWerePromised) {
   EXPECT_GT(steps.at("interval_95")[1].get<double>(), steps.at("from_start").get<double>());
   for (const char* key : {"failure_rate_per_step", "mixing_steps", "reach_ramp_end"})
     EXPECT_TRUE(json.at(key).is_number()) << key;
-  EXPECT_GE(json.at("eigenvalue_moduli").size(), 3u);
+  EXPECT_GE(json.at("eigenvalue_moduli").size(), 2u);
   EXPECT_TRUE(json.at("quasi_stationary").at("mean_rad_s").is_number());
   EXPECT_TRUE(json.at("quasi_stationary").at("sd_rad_s").is_number());
   EXPECT_TRUE(json.at("error").at("discretization").is_number());
@@ -255,10 +255,10 @@ TEST_F(CommandLine, LaunchesAreSteadyWhereThePaperHasNone) {
                             quick))
                 .code,
             0);
-  EXPECT_NE(read(path("s.csv")).find("0.1,,,,,,,,,no_regime\n"), std::string::npos) << read(path("s.csv"));
+  EXPECT_NE(read(path("s.csv")).find("0.1,0.02,,,,,,,,,no_regime\n"), std::string::npos) << read(path("s.csv"));
   const Ran made = metastable({"simulate", "--slope", "8", "--legs", "0.1519", "--trials", "3", "--out", path("t")});
   ASSERT_EQ(made.code, 0) << made.err;
-  EXPECT_NE(read(path("t/experiment.toml")).find("initial_speed_rad_s = [4."), std::string::npos)
+  EXPECT_NE(read(path("t/experiment.toml")).find("initial_speed_rad_s = { mean = 4."), std::string::npos)
       << read(path("t/experiment.toml"));
 }
 
@@ -336,7 +336,7 @@ TEST_F(CommandLine, CompareTakesSeveralValuesOfAnyParameter) {
   EXPECT_EQ(labels({"--friction-mean", "0.4,0.6"}), (Labels{"mu 0.4", "mu 0.6"}));
   EXPECT_EQ(labels({"--slope", "9.59", "--restitution-sd", "0.1,0.05,0.02"}),
             (Labels{"sd of eta 0.1", "sd of eta 0.05", "sd of eta 0.02"}));
-  EXPECT_EQ(labels({"--legs", "0.15", "--legs", "0.16"}), (Labels{"legs of 0.15 m", "legs of 0.16 m"}));
+  EXPECT_EQ(labels({"--legs", "0.15", "--legs", "0.16"}), (Labels{"legs of 0.15 m", "legs of 0.16 m", "legs of 0.1519 m"}));
   EXPECT_EQ(labels({"--mass", "1.39,2"}), (Labels{"M 1.39 kg", "M 2 kg"}));
   EXPECT_EQ(labels({"--law", "published,plastic", "--friction", "0.4,0.1"}),
             (Labels{"law published", "law plastic"}));

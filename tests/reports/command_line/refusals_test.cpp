@@ -174,7 +174,7 @@ TEST_F(Refusals, AreAnnouncedInTheHelp) {
              help.end());
   std::ranges::replace(help, '\n', ' ');
   for (const char* text :
-       {"rad/s] (default: the paper's at 7.02 and 9.59); in [0, 1000]", "landing order; in [0.001, 100]",
+       {"(default: the paper's at 7.02 and 9.59, elsewhere steady); in [0, 1000]", "landing order; in [0.001, 100]",
         "Hub mass M [kg]; in [1e-06, 1e+06]", "Ramp length [m], inf: without end; in [0.001, 100000]",
         "g [m/s^2]; in [0.001, 1000]", "K_r [N/m] (published); in [1, 1e+12]",
         "Ramp slope [deg], from 0.001 to below half the angle between legs", "expected steps, relative; in (0, 1)",

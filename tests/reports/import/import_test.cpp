@@ -305,7 +305,7 @@ TEST_F(Import, FindsTheLayoutAndSaysIt) {
   expect_same(told, 1e-15);
   EXPECT_EQ(told.out.find("found:"), std::string::npos) << told.out;
   expect_refused(import({path("units.csv"), "--columns", columns + "[rad/s]"}),
-                 "--columns: omega_minus: the name 'Omega 1 [deg/s]' says deg/s, not rad/s");
+                 "--columns: omega_minus: the name 'Omega 1 [\xC2\xB0/s]' says deg/s, not rad/s");
   EXPECT_EQ(import({path("de.csv"), "--decimal", "no", "--columns", columns}).code, 2);
 }
 
