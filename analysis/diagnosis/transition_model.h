@@ -51,8 +51,8 @@ struct Evaluation {
 };
 
 /// A parameter that is refitted with every hypothesis, held near its nominal value by a normal prior. Where a stated
-/// number may be another one altogether, the prior is (1 - misstated) exp(-d^2/2) + misstated, d sds from it: far off it
-/// neither pulls nor lets an effect gain by bringing the parameter back.
+/// number may be another one altogether, the prior is (1 - misstated) exp(-d^2/2) + misstated, d sds from it: far off
+/// it neither pulls nor lets an effect gain by bringing the parameter back.
 struct Nuisance {
   std::string name;
   double nominal = 0;

@@ -311,9 +311,15 @@ WheelCandidate slip_reversal(const WheelDesign& design) {
 }  // namespace
 
 std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
-  constexpr std::string_view of_contacts[] = {"leg_contact",    "speed_dependent_restitution", "speed_dependent_friction",
-                                              "contact_memory", "friction_patch",              "trial_drift",
-                                              "trial_spread",   "contact_outliers",            "bounce"};
+  constexpr std::string_view of_contacts[] = {"leg_contact",
+                                              "speed_dependent_restitution",
+                                              "speed_dependent_friction",
+                                              "contact_memory",
+                                              "friction_patch",
+                                              "trial_drift",
+                                              "trial_spread",
+                                              "contact_outliers",
+                                              "bounce"};
   constexpr const char* after_another = "collisions with one before them in their trial";
   constexpr const char* away = "collisions away from the start";
   // It needs a mean and a spread, or a trend, and as many again to judge them by.

@@ -228,8 +228,8 @@ void blur_digits(WheelRuns& measured, double digits) {
                   added, measured.noise));
 }
 
-// Under `plastic` nothing scatters but what is seen: where that repeats the model to rounding, the normal error of a good
-// sensor is added, against which the model's collisions can be held.
+// Under `plastic` nothing scatters but what is seen: where that repeats the model to rounding, the normal error of a
+// good sensor is added, against which the model's collisions can be held.
 void blur_exact(WheelRuns& measured) {
   constexpr double added = imagined_noise;
   const std::uint64_t seed = word_of(measured);
@@ -247,7 +247,8 @@ void blur_exact(WheelRuns& measured) {
   measured.noise_stated = true;
   measured.exact_stances = false;
   measured.notes.back() = fmt::format(
-      "collisions and stances repeat the model to rounding, as simulated ones do: a normal error of {:.2g} rad/s is added "
+      "collisions and stances repeat the model to rounding, as simulated ones do: a normal error of {:.2g} rad/s is "
+      "added "
       "to every speed",
       added);
 }
@@ -269,7 +270,8 @@ void estimate_noise(WheelRuns& measured, const Sensor& sensor) {
   for (const std::vector<double>& group : groups) residual.insert(residual.end(), group.begin(), group.end());
   const auto is_exact = [](double value) { return std::abs(value) < rounding; };
   const bool few = residual.size() < least_stances;
-  if (few && residual.size() >= least_exact && stated.value_or(0) < rounding && std::ranges::all_of(residual, is_exact)) {
+  if (few && residual.size() >= least_exact && stated.value_or(0) < rounding &&
+      std::ranges::all_of(residual, is_exact)) {
     measured.exact_stances = true;
     measured.noise = measured.noise_seen = least;
     measured.notes.push_back(repeat_the_model);
@@ -418,10 +420,10 @@ void tabulate_landings(WheelRuns& measured) {
       const auto same = std::find_if(measured.conditions.begin(), measured.conditions.begin() + static_cast<long>(c),
                                      [&](const Condition& other) { return other.slope_deg == slope; });
       const auto before = static_cast<std::size_t>(same - measured.conditions.begin());
-      measured.landings.push_back(
-          before < c ? measured.landings[before]
-                     : dynamics::share_grid(dynamics::settled_wheel(measured.wheel, slope * degree), low, high,
-                                            measured.contact, {}, measured.stands_by_plus));
+      measured.landings.push_back(before < c
+                                      ? measured.landings[before]
+                                      : dynamics::share_grid(dynamics::settled_wheel(measured.wheel, slope * degree),
+                                                             low, high, measured.contact, {}, measured.stands_by_plus));
     }
   };
   tabulate();

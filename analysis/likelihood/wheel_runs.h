@@ -74,10 +74,10 @@ inline constexpr double settled_slide_precision = 0.0002;
 void tabulate_landings(WheelRuns& measured);
 
 /// Marks the collisions for which the law `settled` holds: slow enough that the landed foot stands before the next one
-/// touches, as the one before was. Where restitution varies so much that few are, omega+ tells: a foot stands if it does
-/// with the largest restitution that can have left it so fast, that of a foot that sticks. A first impact then counts if
-/// the foot before stood, and what follows it if its own does, too. Both go by what was seen before, so that they choose
-/// no outcomes. Under other laws all count.
+/// touches, as the one before was. Where restitution varies so much that few are, omega+ tells: a foot stands if it
+/// does with the largest restitution that can have left it so fast, that of a foot that sticks. A first impact then
+/// counts if the foot before stood, and what follows it if its own does, too. Both go by what was seen before, so that
+/// they choose no outcomes. Under other laws all count.
 void mark_counted(const WheelRuns& measured, WheelRun& run);
 
 /// Reads an experiment. A missing leg is found from the stances where omega_plus is there, else legs of mean length are

@@ -114,11 +114,12 @@ WheelTransitions::WheelTransitions(const Experiment& experiment)
       })) {
     if (!measured_.landings.empty() &&
         std::ranges::any_of(measured_.runs, [](const WheelRun& run) { return run.collisions.size() > 1; }))
-      throw std::invalid_argument(fmt::format(
-          "contact.restitution: mean {} + 2 sd of {} leaves feet moving when the next one touches, at nearly every speed of "
-          "collisions.csv; `settled` holds for landings on feet that stand{}",
-          measured_.contact.restitution_mean, measured_.contact.restitution_sd,
-          measured_.speeds_after ? "" : " (omega_plus_rad_s would tell which do)"));
+      throw std::invalid_argument(
+          fmt::format("contact.restitution: mean {} + 2 sd of {} leaves feet moving when the next one touches, at "
+                      "nearly every speed of "
+                      "collisions.csv; `settled` holds for landings on feet that stand{}",
+                      measured_.contact.restitution_mean, measured_.contact.restitution_sd,
+                      measured_.speeds_after ? "" : " (omega_plus_rad_s would tell which do)"));
     throw std::invalid_argument(
         "collisions.csv: no trial has two collisions or omega_plus_rad_s: there is no transition");
   }
@@ -217,10 +218,10 @@ Evaluation WheelTransitions::evaluate(std::span<const double> nuisance, std::spa
   return wheel_likelihood(measured_, events_, hypothesis(nuisance, terms));
 }
 
-// A recalibration whose stated contact is far astray starts from a coarse lattice of means, too: there the likelihood is
-// flat, and no step from what is stated finds the way.
+// A recalibration whose stated contact is far astray starts from a coarse lattice of means, too: there the likelihood
+// is flat, and no step from what is stated finds the way.
 std::vector<FitStart> WheelTransitions::starts(std::span<const EffectTerm> terms) const {
-  constexpr double astray = 2;  // mean square of the scores as given, of independent standard normals if it is right
+  constexpr double astray = 2;   // mean square of the scores as given, of independent standard normals if it is right
   constexpr double wide = 0.08;  // sds of either, with which a mean between two of the lattice still shows
   if (!terms.empty()) return {};
   std::vector<double> values = nominal_values(*this);

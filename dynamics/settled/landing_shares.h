@@ -51,8 +51,8 @@ struct LandingShares {
   std::vector<float> settling;
 
   /// Returns up to which restitution every landing around a speed is read from feet that stand alone: the least of both
-  /// nodes, less one cell, in which values lie between those of feet that stand and of feet that do not (a next omega- is
-  /// 0.02 to 0.05 rad/s off there). 1 where it was not asked for. @param omega omega- [rad/s]
+  /// nodes, less one cell, in which values lie between those of feet that stand and of feet that do not (a next omega-
+  /// is 0.02 to 0.05 rad/s off there). 1 where it was not asked for. @param omega omega- [rad/s]
   double settling_restitution(int leg, double omega) const;
   /// Sizes the lists for `legs`, but for the changes.
   void resize();

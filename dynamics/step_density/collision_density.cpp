@@ -251,7 +251,7 @@ struct CoulombParts {
 // Holds the restitutions that lose as much as was lost: those between them lose more.
 struct RestitutionRoots {
   double low = 0, high = 0;
-  double root = 0;       // of the discriminant; 0: no restitution loses just as much
+  double root = 0;        // of the discriminant; 0: no restitution loses just as much
   bool all_more = false;  // where there is none: every restitution loses more, not less
 };
 
@@ -365,8 +365,8 @@ void sum_over_friction(const CoulombCollision& collision, const Friction& fricti
     for (int k = 1; k <= samples; ++k) {
       const double angle = std::numbers::pi * k / samples;
       const RestitutionRoots here = collision.slipping(at(angle));
-      const double restitution = std::max(std::abs(inside(here.low) - inside(before.low)),
-                                          std::abs(inside(here.high) - inside(before.high)));
+      const double restitution =
+          std::max(std::abs(inside(here.low) - inside(before.low)), std::abs(inside(here.high) - inside(before.high)));
       width += std::hypot((at(angle) - at(angle - std::numbers::pi / samples)) / friction.sd(),
                           restitution / restitution_sd);
       before = here;

@@ -44,8 +44,8 @@ struct SpeedDensity {
 /// term: Gauss-Legendre from break to break, which are the frictions at which the largest loss of all restitutions is
 /// the one that was lost (there the density of a single friction is an inverse square root) and those at which eta
 /// passes 0 or 1. Error below 1e-4 of the peak; one value costs some 4 microseconds. Where the truncated eta reaches 0
-/// the density itself has an integrable pole, at the loss of a sticking foot that does not spring: it is made as high as
-/// at eta = 0.03 and no higher, lest a likelihood has no bound.
+/// the density itself has an integrable pole, at the loss of a sticking foot that does not spring: it is made as high
+/// as at eta = 0.03 and no higher, lest a likelihood has no bound.
 ///
 /// LandingDensity is the exact, slower way.
 class CollisionDensity {

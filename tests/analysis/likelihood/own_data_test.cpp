@@ -51,8 +51,10 @@ Diagnosis diagnosed(const Experiment& experiment) {
 // At the true parameters normal scores are standard normal (Kolmogorov-Smirnov, sum of squares) and independent. The
 // spreads are such that hardly a foot jams, which has no score.
 TEST(OwnData, ScoresAtTheTrueParametersAreStandardNormalAndIndependent) {
-  for (const auto& [law, spread] : {std::pair{dynamics::Law::published, 0.03}, {dynamics::Law::published, 0.05},
-                                    {dynamics::Law::coulomb, 0.05}, {dynamics::Law::coulomb, 0.1}}) {
+  for (const auto& [law, spread] : {std::pair{dynamics::Law::published, 0.03},
+                                    {dynamics::Law::published, 0.05},
+                                    {dynamics::Law::coulomb, 0.05},
+                                    {dynamics::Law::coulomb, 0.1}}) {
     SCOPED_TRACE(std::string(dynamics::law_name(law)) + " " + std::to_string(spread));
     const auto model = own_model({.law = law, .spread = spread, .trials = 200});
     const Evaluation at_truth = model->evaluate(nominal_values(*model), {});
@@ -132,13 +134,16 @@ TEST(OwnData, UnderSettledWithoutOmegaPlusFeetThatNeverSurelyStandAreRefused) {
     wheel_transitions(own);
     ADD_FAILURE() << "taken";
   } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(std::string(error.what()),
-              "contact.restitution: mean 0.4 + 2 sd of 0.1 leaves feet moving when the next one touches, at nearly every "
-              "speed of collisions.csv; `settled` holds for landings on feet that stand (omega_plus_rad_s would tell which do)");
+    EXPECT_EQ(
+        std::string(error.what()),
+        "contact.restitution: mean 0.4 + 2 sd of 0.1 leaves feet moving when the next one touches, at nearly every "
+        "speed of collisions.csv; `settled` holds for landings on feet that stand (omega_plus_rad_s would tell which "
+        "do)");
   }
 }
 
-// Of a certain law speeds scatter by what is seen of them alone. A slope that is misread is found, and no contact blamed.
+// Of a certain law speeds scatter by what is seen of them alone. A slope that is misread is found, and no contact
+// blamed.
 TEST(OwnData, UnderPlasticIsNoGapAndAMisreadSlopeIsOne) {
   Experiment own = own_experiment({.law = dynamics::Law::plastic, .trials = 20, .seed = 2});
   EXPECT_EQ(verdict_name(diagnosed(own).verdict), "no_gap");
@@ -163,9 +168,10 @@ TEST(OwnData, UnderPlasticIsNoGapAndAMisreadSlopeIsOne) {
 TEST(OwnData, OfMisstatedContactIsRecalibratedAsWellAsFromTheTruth) {
   Experiment own = own_experiment({.spread = 0.05, .trials = 40, .seed = 5, .friction = 0.3});
   const std::vector<double> truth = nominal_values(*wheel_transitions(own));
-  for (const auto& [restitution, friction] :
-       {std::pair{Spread{0.4, 0.05}, Spread{0.7, 0.05}}, {Spread{0.4, 0.05}, Spread{1.2, 0.02}},
-        {Spread{0.1, 0.05}, Spread{0.3, 0.05}}, {Spread{0.8, 0.01}, Spread{0.3, 0.3}}}) {
+  for (const auto& [restitution, friction] : {std::pair{Spread{0.4, 0.05}, Spread{0.7, 0.05}},
+                                              {Spread{0.4, 0.05}, Spread{1.2, 0.02}},
+                                              {Spread{0.1, 0.05}, Spread{0.3, 0.05}},
+                                              {Spread{0.8, 0.01}, Spread{0.3, 0.3}}}) {
     SCOPED_TRACE(std::to_string(restitution.mean) + " " + std::to_string(friction.mean));
     own.contact.restitution = restitution;
     own.contact.friction = friction;

@@ -128,11 +128,10 @@ TEST(CollisionDensity, IsTheDerivativeOfItsDistribution) {
 // Frictions of which the largest loss is the one that was lost have an infinite density each: nodes between which it
 // lies must know of it, or densities and slopes are noise.
 TEST(CollisionDensity, UnderCoulombTheLargestLossOfAFrictionLeavesNoTrace) {
-  for (const auto& [contact, rebound_lost] : {std::pair{ContactSpread{0.4, 0.1, 0.4, 0.1}, 0.0},
-                                              std::pair{ContactSpread{0.4, 0.1, 0.3, 0.05}, 0.0},
-                                              std::pair{ContactSpread{0.3, 0.1, 0.2, 0.1}, 0.0},
-                                              std::pair{ContactSpread{0.4, 0.05, 0.3, 0.05}, 0.5},
-                                              std::pair{ContactSpread{0.4, 0.1, 0.2, 0.1}, 0.95}}) {
+  for (const auto& [contact, rebound_lost] :
+       {std::pair{ContactSpread{0.4, 0.1, 0.4, 0.1}, 0.0}, std::pair{ContactSpread{0.4, 0.1, 0.3, 0.05}, 0.0},
+        std::pair{ContactSpread{0.3, 0.1, 0.2, 0.1}, 0.0}, std::pair{ContactSpread{0.4, 0.05, 0.3, 0.05}, 0.5},
+        std::pair{ContactSpread{0.4, 0.1, 0.2, 0.1}, 0.95}}) {
     const WheelMap map = uneven(Law::coulomb, 9.59, contact);
     const CollisionDensity fast(map.contact_model(), contact);
     const double omega = 5.5, step = 5e-4;
@@ -175,8 +174,8 @@ TEST(CollisionDensity, UnderCoulombNoSpeedIsInfinitelyLikely) {
 // Scores of the law's own draws at the true contact are uniform: Kolmogorov-Smirnov, and the sum of their squares.
 TEST(CollisionDensity, UnderCoulombScoresOfItsOwnDrawsAreUniform) {
   constexpr int draws = 8000;
-  for (const ContactSpread& contact : {ContactSpread{0.4, 0.1, 0.4, 0.1}, ContactSpread{0.4, 0.1, 0.3, 0.05},
-                                       ContactSpread{0.4, 0.1, 0.2, 0.1}}) {
+  for (const ContactSpread& contact :
+       {ContactSpread{0.4, 0.1, 0.4, 0.1}, ContactSpread{0.4, 0.1, 0.3, 0.05}, ContactSpread{0.4, 0.1, 0.2, 0.1}}) {
     const WheelMap map = uneven(Law::coulomb, 9.59, contact);
     const CollisionDensity fast(map.contact_model(), contact);
     std::mt19937_64 generator(11);
