@@ -25,7 +25,7 @@ constexpr std::uint64_t longest_roll = 512;  // collisions of a wheel
 constexpr std::uint64_t early = 32;     // collisions after which the launch is forgotten (by the 12th in all studies)
 constexpr std::size_t wheels_a_batch = 16;       // wheels between two looks at what has been rolled
 constexpr double differing = 2;         // times as many or as few steps
-// Is how fast a wheel spins that hops away down the slope, for ever, times the speed sqrt(g / leg) at which gravity no
+// The speed at which a wheel spins that hops away down the slope, for ever, times the speed sqrt(g / leg) at which gravity no
 // longer holds a standing foot down: none with feet that settle comes near it.
 constexpr double hops_away = 10;
 

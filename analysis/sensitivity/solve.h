@@ -15,7 +15,7 @@
 
 namespace metastable::analysis {
 
-/// Is what is asked for.
+/// The quantity that is asked for.
 struct Target {
   enum class Of {
     steps,     ///< expected steps before failure from the launch

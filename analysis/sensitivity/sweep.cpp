@@ -28,7 +28,7 @@ std::size_t rolled_values(const std::vector<SweepAxis>& axes) {
   return std::max<std::size_t>(2, static_cast<std::size_t>(each + 1e-9));
 }
 
-// Is value `index` of `size` one of `count` that lie evenly, ends included?
+// Says whether value `index` of `size` is one of `count` that lie evenly, ends included.
 bool evenly(std::size_t index, std::size_t size, std::size_t count) {
   if (size <= count) return true;
   const std::size_t nearest = (index * (count - 1) + (size - 1) / 2) / (size - 1);

@@ -27,7 +27,7 @@ std::vector<double> axis_values(double first, double last, double step);
 struct SweepPoint {
   std::vector<double> at;           ///< one value per axis
   Metastability study;              ///< with its setting
-  /// Is set when a solver did not converge here, or there is no regime to launch from (study.status tells which).
+  /// Set when a solver did not converge here, or there is no regime to launch from (study.status tells which).
   std::exception_ptr failure = {};
   std::optional<RigidBodyCheck> rigid_bodies = {};  ///< where wheels were rolled
 };

@@ -28,7 +28,7 @@ struct CrossingOptions {
   std::size_t points = 17;   ///< looked at first, ends included, >= 3
   bool logarithmic = false;  ///< spaced evenly in the logarithm of the place, else in the place; from > 0 then
   int threads = 0;           ///< of the points looked at first, side by side; 0: all cores
-  /// Is told how many places have been looked at; may throw to stop. One call at a time.
+  /// A listener that is told how many places have been looked at; it may throw to stop. One call at a time.
   std::function<void(std::size_t)> progress = {};
 };
 

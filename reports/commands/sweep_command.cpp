@@ -51,7 +51,7 @@ std::string number(double value) {
   return std::isinf(value) ? "infinite" : fmt::format("{}", value);
 }
 
-// Is empty where no wheels were rolled; of what is bounded below alone it has the interval.
+// Empty where no wheels were rolled; of what is bounded below alone it has the interval.
 std::string rigid_bodies_columns(const std::optional<analysis::RigidBodyCheck>& check) {
   if (!check || !check->reason.empty()) return ",,,";
   return fmt::format(",{},{},{}", check->at_least ? "" : number(check->steps.value), number(check->steps.lower),

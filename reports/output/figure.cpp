@@ -189,7 +189,7 @@ struct LabelFit {
   int digits = 0;
 };
 
-/// Are what stands around the cells of a heat map [px].
+/// The margins around the cells of a heat map [px].
 struct Margins {
   double left, right, top, bottom;
 };
