@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <string>
 
 #include "markov/rows/return_map.h"
 #include "markov/rows/state_space.h"
@@ -34,7 +33,8 @@ struct Problem {
   /// states leave out. Not given: the map leaves nothing out.
   std::function<Run(double state, int phase)> run = {};
   /// Name what `observable` returns, in sentences.
-  std::string observed = "the state", observed_unit = {};
+  const char* observed = "the state";
+  const char* observed_unit = "";
 };
 
 }  // namespace metastable::analysis
