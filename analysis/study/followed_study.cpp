@@ -39,7 +39,8 @@ constexpr double rarest = 1e-15;    // share of the launches that counts: what l
 constexpr std::size_t shown_launches = 1024, shown_runs = 64;  // for seconds, metres and speeds
 
 constexpr std::size_t checked_trials = 4096, checked_steps = 64;
-constexpr double surprising = 4;  // standard errors
+constexpr double surprising = 4;     // standard errors
+constexpr double few_failures = 16;  // a count of as many is normal: 4 standard errors reach to none
 constexpr std::size_t unresolved_trials = 64, unresolved_steps = 2000;
 constexpr double most_events = 2e7, most_rolled = 2e5;      // of a trial study: by the map, by Problem::follow
 constexpr std::uint32_t of_trials = 1u << 24;               // the first of their randomisations
@@ -707,11 +708,12 @@ Metastability held_against_trials(const Problem& problem, Metastability study, c
   }
   const double expected = extrapolated * sum;
   const double lower = expected * all.lower / all.value, upper = expected * all.upper / all.value;
-  // Where failures are rare the trials may hold none: their scatter is then that of the chain, and one failure more or
-  // less than it expects is no surprise.
+  // Where failures are rare the trials may hold none: their scatter is then that of the chain, and where few are expected
+  // one more or less is no surprise.
   const auto count = static_cast<double>(checked_trials);
   const double error = std::max(found.error, std::sqrt(std::max(0.0, square - sum * sum) / count));
-  const double slack = surprising * error + static_cast<double>(most) / count;
+  const bool few = count * (1 - study.steps.survival[most - 1]) < few_failures;
+  const double slack = surprising * error + (few ? static_cast<double>(most) / count : 0);
   if (found.mean + slack >= lower && found.mean - slack <= upper) return study;
   if (std::optional<Metastability> answer = trial_study(problem, options)) {
     answer->steps.safe_state = study.steps.safe_state;
