@@ -43,7 +43,7 @@ class CriticalT {
   }
 
  private:
-  static constexpr std::size_t steps = 4096;
+  static constexpr std::size_t steps = 512;  // to 2e-5
   std::vector<double> value_;
 };
 
@@ -68,7 +68,7 @@ std::vector<double> drawn_power(const std::vector<double>& a, const std::vector<
     return static_cast<double>(std::min<std::ptrdiff_t>(at, std::ssize(below) - 1));
   };
   const std::vector<double> below_a = summed(a), below_b = summed(b);
-  const CriticalT critical;
+  static const CriticalT critical;
   const auto pairs = static_cast<std::uint64_t>(std::min(most_pairs, most_draws / static_cast<double>(most)));
   std::vector<double> power(most + 1);
   for (std::uint64_t pair = 0; pair < pairs; ++pair) {

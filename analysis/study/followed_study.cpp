@@ -22,9 +22,9 @@ namespace {
 constexpr double no_end = std::numeric_limits<double>::infinity();
 constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
 
-// How far a launch is followed. Heavy wheels of many legs forget a launch slowest: 1e7 events for 1000 legs and an
-// inertia of ten times the least. A landing of a map costs 0.1 us, one that is followed 50 us.
-constexpr std::uint64_t most_followed = 20'000'000, most_run = 20'000;
+// How far a launch is followed: where it neither rests nor shows a cycle within them, nothing is said. A landing of a
+// map costs 0.1 us, one that is followed 50 us. A limit shows long before an orbit is there, from its last changes.
+constexpr std::uint64_t most_followed = 2'000'000, most_run = 20'000;
 constexpr std::size_t longest_cycle = 8;  // revolutions
 constexpr int repeats = 8;                // of a cycle
 constexpr double same_state = 1e-13, same_run = 1e-10;

@@ -25,7 +25,7 @@ std::vector<double> geometric(double failure) {
 double tested_power(const std::vector<double>& a, const std::vector<double>& b, std::size_t trials) {
   std::mt19937_64 engine(7);
   std::discrete_distribution<int> of_a(a.begin(), a.end()), of_b(b.begin(), b.end());
-  constexpr int pairs = 4000;
+  constexpr int pairs = 1500;
   int apart = 0;
   std::vector<double> x(trials), y(trials);
   for (int k = 0; k < pairs; ++k) {
@@ -37,14 +37,14 @@ double tested_power(const std::vector<double>& a, const std::vector<double>& b, 
 }
 
 TEST(TrialDesign, HasThePowerItSays) {
-  constexpr double error = 4 * 0.0075;  // four standard errors of both
+  constexpr double error = 4 * 0.0107;  // four standard errors of both
   std::size_t small = 0;
-  for (const double rate : {0.9, 0.5, 0.25, 0.1, 0.05})
-    for (const double times : {0.02, 0.1, 0.3, 0.5}) {
+  for (const double rate : {0.9, 0.5, 0.2})
+    for (const double times : {0.02, 0.1, 0.4}) {
       const std::vector<double> a = geometric(rate), b = geometric(rate * times);
       const auto design = trials_for_power(a, b);
       ASSERT_TRUE(design);
-      if (design->trials > 100) continue;
+      if (design->trials > 40) continue;
       const auto trials = static_cast<std::size_t>(design->trials);
       EXPECT_NEAR(tested_power(a, b, trials), design->power, error) << rate << ' ' << times << ' ' << trials;
       EXPECT_GE(design->power, 0.8);
@@ -53,7 +53,7 @@ TEST(TrialDesign, HasThePowerItSays) {
       }
       small += trials <= 20;
     }
-  EXPECT_GE(small, 8u);
+  EXPECT_GE(small, 5u);
 }
 
 TEST(TrialDesign, ConstantsNeedTwo) {

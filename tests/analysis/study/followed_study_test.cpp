@@ -15,6 +15,7 @@
 namespace metastable::analysis {
 namespace {
 
+constexpr std::uint64_t most_simulated = 5000;
 constexpr double in_radians = std::numbers::pi / 180;
 const StudyOptions brief_sampled{.brief = true}, brief_integrated{.method = Method::integrated, .brief = true};
 
@@ -56,11 +57,11 @@ Setting point_mass(double slope_deg, Spread launch) {
 }
 
 std::uint64_t simulated(const Setting& setting) {
-  return dynamics::steps_to_rest(setting.map(), setting.launch(), setting.first_landing_leg, 1, 0, 1000000);
+  return dynamics::steps_to_rest(setting.map(), setting.launch(), setting.first_landing_leg, 1, 0, most_simulated);
 }
 
 TEST(FollowedStudy, APlasticWheelTakesTheStepsOfItsRecursion) {
-  for (double slope = 3.5; slope < 4.1; slope += 0.0127) {
+  for (double slope = 3.5; slope < 4.1; slope += 0.0237) {
     const PointMass wheel(slope);
     for (const StudyOptions& options : {brief_sampled, brief_integrated}) {
       const Metastability found = study(point_mass(slope, {2, 0}), options);
@@ -104,7 +105,7 @@ TEST(FollowedStudy, EveryLawIsItsDirectSimulation) {
   int resting = 0, rolling = 0;
   for (const dynamics::Law law : {dynamics::Law::published, dynamics::Law::coulomb, dynamics::Law::plastic})
     for (const bool equal : {true, false})
-      for (double slope = 2.9; slope < 7; slope *= 1.031) {
+      for (double slope = 2.9; slope < 7; slope *= 1.053) {
         Setting setting = paper_setting(7.02, equal);
         setting.law = law;
         setting.slope_deg = slope;
@@ -114,7 +115,7 @@ TEST(FollowedStudy, EveryLawIsItsDirectSimulation) {
         setting.first_landing_leg = equal ? 0 : 3;
         const Metastability found = study(setting, brief_integrated);
         const std::uint64_t steps = simulated(setting);
-        if (steps < 1000000) {
+        if (steps < most_simulated) {
           EXPECT_EQ(found.steps.from_start.value, static_cast<double>(steps)) << setting.describe();
           EXPECT_EQ(found.steps.from_start.upper, found.steps.from_start.value);
           ++resting;
@@ -123,8 +124,8 @@ TEST(FollowedStudy, EveryLawIsItsDirectSimulation) {
           ++rolling;
         }
       }
-  EXPECT_GT(resting, 30);
-  EXPECT_GT(rolling, 30);
+  EXPECT_GT(resting, 15);
+  EXPECT_GT(rolling, 15);
 }
 
 TEST(FollowedStudy, SettledIsRolledWithItsMovingFeet) {
@@ -147,8 +148,8 @@ TEST(FollowedStudy, SettledIsRolledWithItsMovingFeet) {
 
 // Noise that is far narrower than cells: whatever answers, its interval holds the trials' mean.
 TEST(FollowedStudy, NarrowNoiseIsNotSmeared) {
-  for (const double sd : {1e-8, 1e-5, 1e-4, 3e-4})
-    for (const double slope : {2.9, 3.0, 3.04, 3.0495}) {
+  for (const double sd : {1e-8, 1e-4})
+    for (const double slope : {3.0, 3.04}) {
       Setting setting = paper_setting(7.02, true);
       setting.law = dynamics::Law::coulomb;
       setting.slope_deg = slope;
@@ -157,10 +158,11 @@ TEST(FollowedStudy, NarrowNoiseIsNotSmeared) {
       setting.initial_speed = {4, sd};
       const Metastability found = study(setting, brief_sampled);
       double mean = 0, square = 0;
-      constexpr int trials = 2000;
+      constexpr int trials = 1000;
+      const dynamics::WheelMap map = setting.map();
       for (int t = 0; t < trials; ++t) {
-        const auto steps = static_cast<double>(dynamics::steps_to_rest(setting.map(), setting.launch(), 0, 5,
-                                                                       static_cast<std::uint64_t>(t), 1000000));
+        const auto steps = static_cast<double>(
+            dynamics::steps_to_rest(map, setting.launch(), 0, 5, static_cast<std::uint64_t>(t), most_simulated));
         mean += steps / trials, square += steps * steps / trials;
       }
       const double error = std::sqrt(std::max(0.0, square - mean * mean) / trials);
