@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -89,14 +90,12 @@ void check_speeds(const analysis::Experiment& experiment, const std::vector<anal
     const analysis::RollingSpeeds bounds = analysis::rolling_speeds(experiment, condition);
     const double middle = analysis::median(speeds);
     if (middle >= bounds.slowest && middle <= beyond_lifting * bounds.lifting) continue;
-    throw std::invalid_argument(
-        fmt::format("{}: condition '{}': half of the speeds before a collision are {} {:.3g} rad/s, where a wheel that "
-                    "comes over its "
-                    "legs on this ramp has {:.3g} at least and lifts its feet at {:.3g}: is time_s in seconds, is "
-                    "angle_rad in radians, "
-                    "and is the slope right?",
-                    file, experiment.conditions[condition].id, middle < bounds.slowest ? "below" : "above", middle,
-                    bounds.slowest / analysis::RollingSpeeds::room, bounds.lifting));
+    throw std::invalid_argument(fmt::format(
+        "{}: condition '{}': half of the speeds before a collision are {} {:.3g} rad/s, where a wheel that "
+        "comes over its legs on this ramp has {:.3g} at least and lifts its feet at {:.3g}: is time_s in seconds, "
+        "is angle_rad in radians, and is the slope right?",
+        file, experiment.conditions[condition].id, middle < bounds.slowest ? "below" : "above", middle,
+        bounds.slowest / analysis::RollingSpeeds::room, bounds.lifting));
   }
 }
 
@@ -201,7 +200,10 @@ void run_collisions(const CollisionsRequest& request) {
     details_file->commit();
   }
   collisions_file.commit();
-  if (to_terminal) return;
+  if (to_terminal) {  // where the collisions themselves are
+    for (const std::string& sentence : mended) fmt::print(stderr, "mended: {}\n", sentence);
+    return;
+  }
 
   std::size_t count = 0, bounces = 0, unfitted = 0;
   std::map<std::string, std::size_t> stopped;
