@@ -416,7 +416,8 @@ double angle_noise(const std::vector<double>& angle) {
   constexpr double share = 0.25, normal_quantile = 0.3186, of_third_difference = 4.4721;  // sqrt(20)
   std::vector<double> differences;
   for (std::size_t i = 3; i < angle.size(); ++i)
-    differences.push_back(std::abs(angle[i] - 3 * angle[i - 1] + 3 * angle[i - 2] - angle[i - 3]));
+    if (angle[i] != angle[i - 1] || angle[i - 1] != angle[i - 2])  // a copied frame has no noise of its own
+      differences.push_back(std::abs(angle[i] - 3 * angle[i - 1] + 3 * angle[i - 2] - angle[i - 3]));
   if (differences.empty()) return 0;
   const auto at = differences.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(differences.size()));
   std::ranges::nth_element(differences, at);
