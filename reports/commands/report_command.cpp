@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "analysis/paper/energy_losses.h"
+#include "analysis/sensitivity/rigid_body_check.h"
 #include "analysis/sensitivity/rolled_steps.h"
 #include "analysis/sensitivity/sweep.h"
 #include "analysis/study/how_it_fails.h"
@@ -34,7 +35,8 @@ constexpr int energy_collisions = 16;                                     // of 
 // Landings to each side of a parameter under `settled`, in landings of a cell of a map: with the 40000 of the default a
 // change by 1 % is known to 0.5 % of the steps where rests are frequent.
 constexpr double sensitivity_share = 1.5;
-constexpr double rare_tolerance = 0.1;               // of cells that the chain has to answer, where rests are rare
+constexpr std::uint64_t map_rests = 1000;            // of a cell under `settled`: its steps are then known to 6 %
+constexpr double rare_tolerance = 0.1;               // of cells that the chain has to answer, where nothing rests
 constexpr std::size_t map_units = study_units / 20;  // a cell's share of a study's work
 constexpr std::size_t map_cells = 16 + 12;           // of one ramp's two maps
 
@@ -270,13 +272,17 @@ class Report {
       return map;
     }
     map.steps.resize(analysis::sweep_size(axes));
+    const analysis::Setting from = launched(base);
     std::vector<char> rare(map.steps.size(), 0);
     markov::parallel_for(map.steps.size(), request_.study.threads, [&](std::size_t i) {
-      const auto steps = analysis::rolled_steps(
-          analysis::sweep_setting(base, axes, i),
-          {.landings = landings(1), .seed = request_.study.seed, .progress = [](double) { check_interrupt(); }});
-      if (steps) map.steps[i] = *steps;
-      rare[i] = !steps;
+      const analysis::RigidBodyCheck rolled = analysis::rigid_body_check(
+          analysis::sweep_setting(from, axes, i), {.collisions = static_cast<std::uint64_t>(request_.landings),
+                                                   .rests = map_rests,
+                                                   .seed = request_.study.seed,
+                                                   .threads = 1,
+                                                   .progress = [](double) { check_interrupt(); }});
+      map.steps[i] = rolled.steps;
+      rare[i] = rolled.at_least || !rolled.reason.empty();
       progress_.advance(map_units);
     });
     analysis::StudyOptions options = request_.study;
@@ -321,10 +327,9 @@ class Report {
       tables.push_back(
           grid_table(id, titled("expected steps over the " + what, one.base), down, across, one.steps, provenance));
       if (one.rolled)
-        tables.back().notes.push_back(
-            fmt::format("From wheels that are rolled, {} landings a cell; where fewer than 100 of them rest, from the "
-                        "chain.",
-                        request_.landings));
+        tables.back().notes.push_back(fmt::format(
+            "From wheels that are rolled, {} landings or {} rests a cell; where none rests, from the chain.",
+            request_.landings, map_rests));
     }
   }
 
