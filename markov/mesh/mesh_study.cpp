@@ -390,7 +390,13 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     frames = noise_frames(map, start);
   } catch (const NoOrbit& error) {
     if (options.simulated_steps == 0) throw;
-    throw NoOrbit(fmt::format("{}; {}", error.what(), walked_alone(map, start, options).first));
+    std::string walked;
+    try {
+      walked = walked_alone(map, start, options).first;
+    } catch (const MapError& broken) {  // a walk away from an unstable orbit may leave the finite numbers
+      walked = fmt::format("simulated walks end: {}", broken.what());
+    }
+    throw NoOrbit(fmt::format("{}; {}", error.what(), walked));
   }
   try {
     return Run(map, start, options, std::move(frames)).run();

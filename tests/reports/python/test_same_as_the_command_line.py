@@ -75,8 +75,8 @@ class SameAsTheCommandLine(unittest.TestCase):
         words = ("--legs", "0.15", "--points", "3", "--cells", "24", "--samples", "256", "--replicates", "3")
         for parameter, name, wanted, option in (
                 ("friction_mean", "friction-mean", dict(steps=10), ("--steps", "10")),
-                ("slope_deg", "slope", dict(survive=(20, 0.5), start=6, stop=9),
-                 ("--survive", "20:0.5", "--from", "6", "--to", "9"))):
+                ("slope_deg", "slope", dict(survive=(3, 0.5), start=6, stop=9),
+                 ("--survive", "3:0.5", "--from", "6", "--to", "9"))):
             with self.subTest(parameter):
                 solution = metastable.solve(setting, parameter, **wanted, **small)
                 self.assertEqual(told(solution.to_dict()), command_line("solve", name, *option, *words))
