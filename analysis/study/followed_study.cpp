@@ -29,9 +29,9 @@ constexpr std::size_t longest_cycle = 8;  // revolutions
 constexpr int repeats = 8;                // of a cycle
 constexpr double same_state = 1e-13, same_run = 1e-10;
 constexpr std::size_t settling = 4096;  // events by which a cycle's last digits are found
-constexpr int tried_states = 9;     // of an interval that leads into itself
-constexpr double endless = 1e30;    // states above it grow without limit
-constexpr double reach = 8.3;       // [sd] of a launch: less than 1e-16 is beyond
+constexpr int tried_states = 9;         // of an interval that leads into itself
+constexpr double endless = 1e30;        // states above it grow without limit
+constexpr double reach = 8.3;           // [sd] of a launch: less than 1e-16 is beyond
 constexpr std::size_t cuts = 512, cuts_of_runs = 128;
 constexpr std::size_t most_launches = 20000, launches_of_runs = 1500;
 constexpr double resolved = 1e-12;  // relative, of the expected steps over the launch
@@ -42,8 +42,8 @@ constexpr std::size_t checked_trials = 4096, checked_steps = 64;
 constexpr double surprising = 4;     // standard errors
 constexpr double few_failures = 16;  // a count of as many is normal: 4 standard errors reach to none
 constexpr std::size_t unresolved_trials = 64, unresolved_steps = 2000;
-constexpr double most_events = 2e7, most_rolled = 2e5;      // of a trial study: by the map, by Problem::follow
-constexpr std::uint32_t of_trials = 1u << 24;               // the first of their randomisations
+constexpr double most_events = 2e7, most_rolled = 2e5;  // of a trial study: by the map, by Problem::follow
+constexpr std::uint32_t of_trials = 1u << 24;           // the first of their randomisations
 constexpr std::size_t first_trials = 4096, most_trials = 1u << 20;
 
 double between(double low_score, double high_score) {
@@ -194,10 +194,10 @@ struct Piece {
 // Holds how many steps the launches take.
 struct Launches {
   std::vector<Piece> pieces;
-  Course typical;               // of the middle launch
-  std::optional<Course> ever;   // of one that never rests
-  bool undecided = false;       // of some launch it is not known whether it rests
-  double unsorted = 0;          // in steps: where steps do not rise with the launch
+  Course typical;              // of the middle launch
+  std::optional<Course> ever;  // of one that never rests
+  bool undecided = false;      // of some launch it is not known whether it rests
+  double unsorted = 0;         // in steps: where steps do not rise with the launch
 };
 
 // Cuts a launch with a spread into pieces.
@@ -494,9 +494,10 @@ void fill_expected(const Problem& problem, const Launches& launches, const Study
     result.steps.from_start = {no_end, no_end, no_end};
     const std::string settles = settles_text(problem, *launches.ever);
     result.message = 1 - never > rarest
-                         ? fmt::format("infinite: rest is unreachable for {:.6g} % of the launches, the others rest: "
-                                       "without noise what never rests {}",
-                                       100 * never, settles)
+                         ? fmt::format(
+                               "infinite: rest is unreachable for {:.6g} % of the launches, the others rest: "
+                               "without noise what never rests {}",
+                               100 * never, settles)
                          : fmt::format("infinite: rest is unreachable: without noise it never rests and {}", settles);
   } else {
     const double value = 0.5 * (lower + upper);
@@ -505,7 +506,8 @@ void fill_expected(const Problem& problem, const Launches& launches, const Study
     result.status =
         result.steps.discretization_error <= options.tolerance ? Status::converged : Status::tolerance_not_met;
     if (result.status == Status::tolerance_not_met)
-      result.message = fmt::format("tolerance {} not met: launches differ too finely in their steps", options.tolerance);
+      result.message =
+          fmt::format("tolerance {} not met: launches differ too finely in their steps", options.tolerance);
   }
   fill_steps(problem, shares, result);
 }
@@ -554,7 +556,8 @@ Metastability followed_study(const Problem& problem, const StudyOptions& options
   result.spectrum.moduli = {1 - failing};
   const double after = rests ? 1 : no_end;
   result.steps.from_quasi_stationary = {after, after, after};
-  result.steps.worst_start = rests && without_noise(problem) ? worst_start(problem) : result.steps.from_quasi_stationary;
+  result.steps.worst_start =
+      rests && without_noise(problem) ? worst_start(problem) : result.steps.from_quasi_stationary;
   describe_cycle(problem, rests ? std::vector<double>() : cycle, result);
   if (without_noise(problem)) result.steps.safe_state = safe_state(problem);
   if (options.progress) options.progress(0.9, "summary");
@@ -671,8 +674,8 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
   result.steps.from_start = {found.mean, std::max(1.0, found.mean - half), found.mean + half};
   result.steps.sampling_error = half / found.mean;
   result.status = result.steps.sampling_error <= options.tolerance ? Status::converged : Status::tolerance_not_met;
-  result.message = fmt::format("the noise is too narrow for cells of states: {} trials were followed instead",
-                               steps.size());
+  result.message =
+      fmt::format("the noise is too narrow for cells of states: {} trials were followed instead", steps.size());
   if (result.status == Status::tolerance_not_met)
     result.message += fmt::format("; tolerance {} not met", options.tolerance);
   Distribution shares;
@@ -699,17 +702,19 @@ Metastability held_against_trials(const Problem& problem, Metastability study, c
   const Trials trials = follow_trials(problem, options, 0, checked_trials, most, true);
   const MeanError found = mean_of(trials.steps);
   const Estimate& all = study.steps.from_start;
-  // Survival is that of the finest chain, whose own mean is not extrapolated.
-  const double extrapolated = all.value / study.steps.distribution.mean;
-  double sum = 0, square = 0;
+  // Survival is that of the finest chain, whose own mean is not extrapolated: its hazard goes with the ratio of means.
+  double expected = 0, lower = 0, upper = 0, sum = 0, square = 0;
   for (std::size_t n = 0; n < most; ++n) {
-    sum += study.steps.survival[n];
-    square += static_cast<double>(2 * n + 1) * study.steps.survival[n];
+    const double survival = std::max(0.0, study.steps.survival[n]);
+    const auto with_mean = [&](double mean) { return std::pow(survival, study.steps.distribution.mean / mean); };
+    expected += with_mean(all.value);
+    lower += with_mean(all.lower);
+    upper += with_mean(all.upper);
+    sum += survival;
+    square += static_cast<double>(2 * n + 1) * survival;
   }
-  const double expected = extrapolated * sum;
-  const double lower = expected * all.lower / all.value, upper = expected * all.upper / all.value;
-  // Where failures are rare the trials may hold none: their scatter is then that of the chain, and where few are expected
-  // one more or less is no surprise.
+  // Where failures are rare the trials may hold none: their scatter is then that of the chain, and where few are
+  // expected one more or less is no surprise.
   const auto count = static_cast<double>(checked_trials);
   const double error = std::max(found.error, std::sqrt(std::max(0.0, square - sum * sum) / count));
   const bool few = count * (1 - study.steps.survival[most - 1]) < few_failures;

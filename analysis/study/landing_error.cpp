@@ -16,7 +16,8 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t replicates = 8;
-constexpr std::size_t draws_a_replicate = 128;
+constexpr std::size_t fine_draws = 128, rough_draws = 32;  // of a replicate
+constexpr double rough_tolerance = 0.05;         // from it on rough draws do: their scatter is in the interval
 constexpr std::uint32_t of_landings = 1u << 20;  // the first of their randomisations
 constexpr double spread = 2;                     // [sd] of the scores by which memory is looked for
 
@@ -60,12 +61,13 @@ class Events {
   using Defect = std::function<double(double state, int phase, std::span<const double> score)>;
 
   Events(const Problem& problem, int phases, std::span<const double> states, const markov::SampledChain& sampled,
-         const SolvedChain& solved)
+         const SolvedChain& solved, std::size_t draws_a_replicate)
       : problem_(problem),
         states_(states),
         solved_(solved),
         phases_(phases),
         per_phase_(states.size() / static_cast<std::size_t>(phases)),
+        draws_a_replicate_(draws_a_replicate),
         visits_(solved.solver.solve_left(sampled.launch.after)) {
     std::partial_sum(visits_.begin(), visits_.end(), visits_.begin());
   }
@@ -81,10 +83,10 @@ class Events {
   // its place, so that threads change no bit.
   std::vector<double> sum(const std::vector<markov::Draws>& draws, int threads, const Defect& defect) const {
     const auto dimension = static_cast<std::size_t>(draws.front().dimension);
-    std::vector<double> part(draws.size() * draws_a_replicate);
+    std::vector<double> part(draws.size() * draws_a_replicate_);
     const double all_visits = visits_.back();
     markov::parallel_for(part.size(), threads, [&](std::size_t task) {
-      const std::size_t k = task % draws_a_replicate, r = task / draws_a_replicate;
+      const std::size_t k = task % draws_a_replicate_, r = task / draws_a_replicate_;
       const markov::Draws& of = draws[r];
       const auto score = std::span(of.score).subspan(k * dimension, dimension);
       if (r < replicates) {
@@ -98,7 +100,7 @@ class Events {
     });
     std::vector<double> change(replicates);
     for (std::size_t task = 0; task < part.size(); ++task)
-      change[task / draws_a_replicate % replicates] += part[task] / solved_.from_start;
+      change[task / draws_a_replicate_ % replicates] += part[task] / solved_.from_start;
     return change;
   }
 
@@ -107,7 +109,7 @@ class Events {
   std::span<const double> states_;
   const SolvedChain& solved_;
   int phases_;
-  std::size_t per_phase_;
+  std::size_t per_phase_, draws_a_replicate_;
   std::vector<double> visits_;  // summed up
 };
 
@@ -120,6 +122,7 @@ LandingError landing_error(const Problem& problem, int phases, std::span<const d
   const int dimension = map.noise_dimension();
   const std::vector<double> no_noise(static_cast<std::size_t>(2 * dimension), 0.0);
   const auto nothing = [](double) { return 0.0; };
+  const std::size_t draws_a_replicate = options.tolerance < rough_tolerance ? fine_draws : rough_draws;
   const auto draws = [&](auto&& make, int scores) {
     std::vector<markov::Draws> all;
     for (std::size_t r = 0; r < 2 * replicates; ++r)
@@ -129,7 +132,7 @@ LandingError landing_error(const Problem& problem, int phases, std::span<const d
                                                      .tail = options.tail}));
     return all;
   };
-  const Events events(problem, phases, states, sampled, solved);
+  const Events events(problem, phases, states, sampled, solved, draws_a_replicate);
   LandingError error;
   if (map.landing_defect(states[0], 0, std::span(no_noise).first(static_cast<std::size_t>(dimension)), nothing)) {
     const TInterval change =

@@ -171,6 +171,7 @@ void check_heat_map(const Figure& figure, const HeatMap& map) {
   if (map.x.empty() || map.y.empty()) fail("no cells");
   if (!map.x_names.empty() && map.x_names.size() != map.x.size()) fail("x and x_names differ in length");
   if (!map.y_names.empty() && map.y_names.size() != map.y.size()) fail("y and y_names differ in length");
+  if (!map.at_least.empty() && map.at_least.size() != map.y.size()) fail("at_least and y differ in length");
   if (map.value.size() != map.y.size()) fail(fmt::format("{} rows for {} values of y", map.value.size(), map.y.size()));
   for (const auto& row : map.value) {
     if (row.size() != map.x.size()) fail(fmt::format("{} cells in a row for {} values of x", row.size(), map.x.size()));
@@ -180,8 +181,13 @@ void check_heat_map(const Figure& figure, const HeatMap& map) {
   }
 }
 
-std::string cell_label(double value, NumberFormat format, int digits) {
+std::string number_label(double value, NumberFormat format, int digits) {
   return std::isinf(value) ? "∞" : format_number(value, format, digits);
+}
+
+std::string cell_label(const HeatMap& map, std::size_t i, std::size_t j, int digits) {
+  const std::string number = number_label(map.value[j][i], map.format, digits);
+  return map.at_least.empty() || !map.at_least[j][i] ? number : "≥ " + number;
 }
 
 struct LabelFit {
@@ -213,11 +219,9 @@ LabelFit fit_labels(const HeatMap& map, double width, double height) {
   const double cell_height = height / static_cast<double>(map.y.size());
   for (int digits = map.digits; digits >= 1; --digits) {
     std::size_t longest = 1;
-    for (const auto& row : map.value) {
-      for (const double value : row) {
-        if (!std::isnan(value)) longest = std::max(longest, length(cell_label(value, map.format, digits)));
-      }
-    }
+    for (std::size_t j = 0; j < map.y.size(); ++j)
+      for (std::size_t i = 0; i < map.x.size(); ++i)
+        if (!std::isnan(map.value[j][i])) longest = std::max(longest, length(cell_label(map, i, j, digits)));
     const double font =
         std::min({14.0, cell_height - 4, (cell_width - 4) / (glyph_width * static_cast<double>(longest))});
     const double smallest = digits > 1 ? 9 : 7;
@@ -235,31 +239,28 @@ void append_margins(std::string& script, const HeatMap& map, const Figure& figur
       m.left / figure.width, 1 - m.right / figure.width, m.bottom / figure.height, 1 - m.top / figure.height);
 }
 
-void append_heat_map(std::string& script, const HeatMap& map, const Figure& figure) {
-  const Margins m = margins(map, figure);
-  const LabelFit fit = fit_labels(map, figure.width - m.left - m.right, figure.height - m.top - m.bottom);
-  append_margins(script, map, figure);
-  double low = std::numeric_limits<double>::infinity();
-  double high = -low;
-  for (const auto& row : map.value) {
-    for (const double value : row) {
-      if (!std::isfinite(value)) continue;
-      low = std::min(low, value);
-      high = std::max(high, value);
-    }
+// Holds the scale of colours of a map.
+struct ColourScale {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  bool logarithmic = false;
+  double limit = 0;
+  explicit ColourScale(const HeatMap& map) : logarithmic(map.logarithmic), limit(map.limit) {
+    for (const auto& row : map.value)
+      for (const double value : row)
+        if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
+    if (low > high) low = high = 1;  // no finite cell
+    low = map.low.value_or(low), high = map.high.value_or(high);
   }
-  if (low > high) low = high = 1;  // no finite cell
-  low = map.low.value_or(low), high = map.high.value_or(high);
-  const auto scale = [&](double value) { return map.logarithmic ? std::log(value) : value; };
-  const auto shade = [&](double value) {
-    return high > low ? (scale(value) - scale(low)) / (scale(high) - scale(low)) : 0.5;
-  };
-  if (high == low) high = low == 0 ? 1 : low + std::abs(low) * 1e-6;
   // A light label belongs on a dark cell: the lower part of the one scale, both ends of the other.
-  const auto is_dark = [&](double value) {
-    return map.limit > 0 ? std::abs(value) > 0.7 * map.limit : shade(value) < 0.55;
-  };
+  bool is_dark(double value) const {
+    if (limit > 0) return std::abs(value) > 0.7 * limit;
+    const auto scale = [&](double v) { return logarithmic ? std::log(v) : v; };
+    return (high > low ? (scale(value) - scale(low)) / (scale(high) - scale(low)) : 0.5) < 0.55;
+  }
+};
 
+// Appends the cells as data, with their labels; returns whether some are infinite.
+bool append_cells(std::string& script, const HeatMap& map, const ColourScale& scale, int digits) {
   std::string finite = "$finite << END\n";
   std::string infinite_cells;
   std::string dark = "$dark << END\n";
@@ -268,46 +269,60 @@ void append_heat_map(std::string& script, const HeatMap& map, const Figure& figu
     for (std::size_t i = 0; i < map.x.size(); ++i) {
       const double value = map.value[j][i];
       if (std::isnan(value)) continue;
-      const std::string label =
-          fmt::format("{} {} \"{}\"\n", i, j, cell_label(value, map.format, std::max(fit.digits, 1)));
+      const std::string label = fmt::format("{} {} \"{}\"\n", i, j, cell_label(map, i, j, digits));
       if (std::isinf(value)) {
         infinite_cells += fmt::format("{} {}\n", i, j);
         dark += label;
       } else {
         finite += fmt::format("{} {} {}\n", i, j, value);
-        (is_dark(value) ? light : dark) += label;
+        (scale.is_dark(value) ? light : dark) += label;
       }
     }
   }
   script += finite + "END\n" + dark + "END\n" + light + "END\n";
   if (!infinite_cells.empty()) script += "$infinite << END\n" + infinite_cells + "END\n";
+  return !infinite_cells.empty();
+}
 
-  const double right = static_cast<double>(map.x.size()) - 0.5;
-  const double top = static_cast<double>(map.y.size()) - 0.5;
-  script += fmt::format("set xrange [-0.5:{}]\nset yrange [-0.5:{}]\n", right, top);
-  script +=
-      fmt::format("set xtics ({}) nomirror scale 0 noenhanced{}\nset ytics ({}) nomirror scale 0 noenhanced\n",
-                  tics(map.x, map.x_names), map.x_names.empty() ? "" : " rotate by 25 right", tics(map.y, map.y_names));
-  script += "unset grid\nset key off\nset style fill solid 1 border rgb '#fefefe'\n";
+void append_colours(std::string& script, const HeatMap& map, const ColourScale& scale) {
+  double low = scale.low, high = scale.high;
+  if (high == low) high = low == 0 ? 1 : low + std::abs(low) * 1e-6;
   script += map.limit > 0
                 ? "set palette defined (0 '#2166ac', 0.25 '#92c5de', 0.5 '#f7f7f7', 0.75 '#f4a582', 1 '#b2182b')\n"
                 : "set palette defined (0 '#440154', 0.25 '#3b528b', 0.5 '#21918c', 0.75 '#5ec962', 1 '#fde725')\n";
   if (map.limit > 0) low = -map.limit, high = map.limit;
   script += fmt::format("set cblabel {} noenhanced textcolor rgb '#222222'\nset cbrange [{}:{}]\n", quote(map.label),
                         low, high);
-  if (map.logarithmic && high / low >= 100) {
-    script += "set logscale cb\nset format cb '10^{%T}'\n";
-  } else if (map.logarithmic) {  // too few powers of ten to read a scale by
-    script += "set logscale cb\nset cbtics (";
-    constexpr int ticks = 5;  // evenly on the logarithmic scale, its ends included
-    for (int t = 0; t < ticks; ++t) {
-      const double at = low * std::pow(high / low, static_cast<double>(t) / (ticks - 1));
-      script += fmt::format("{}\"{}\" {}", t == 0 ? "" : ", ", cell_label(at, NumberFormat::significant, 2), at);
-    }
-    script += ")\n";
+  if (!map.logarithmic) return;
+  script += "set logscale cb\n";
+  if (high / low >= 100) {
+    script += "set format cb '10^{%T}'\n";
+    return;
   }
+  constexpr int ticks = 5;  // evenly on the logarithmic scale, its ends included: too few powers of ten to read it by
+  script += "set cbtics (";
+  for (int t = 0; t < ticks; ++t) {
+    const double at = low * std::pow(high / low, static_cast<double>(t) / (ticks - 1));
+    script += fmt::format("{}\"{}\" {}", t == 0 ? "" : ", ", number_label(at, NumberFormat::significant, 2), at);
+  }
+  script += ")\n";
+}
+
+void append_heat_map(std::string& script, const HeatMap& map, const Figure& figure) {
+  const Margins m = margins(map, figure);
+  const LabelFit fit = fit_labels(map, figure.width - m.left - m.right, figure.height - m.top - m.bottom);
+  append_margins(script, map, figure);
+  const ColourScale scale(map);
+  const bool infinite = append_cells(script, map, scale, std::max(fit.digits, 1));
+  script += fmt::format("set xrange [-0.5:{}]\nset yrange [-0.5:{}]\n", static_cast<double>(map.x.size()) - 0.5,
+                        static_cast<double>(map.y.size()) - 0.5);
+  script +=
+      fmt::format("set xtics ({}) nomirror scale 0 noenhanced{}\nset ytics ({}) nomirror scale 0 noenhanced\n",
+                  tics(map.x, map.x_names), map.x_names.empty() ? "" : " rotate by 25 right", tics(map.y, map.y_names));
+  script += "unset grid\nset key off\nset style fill solid 1 border rgb '#fefefe'\n";
+  append_colours(script, map, scale);
   script += "plot ";
-  if (!infinite_cells.empty()) {
+  if (infinite) {
     script +=
         "$infinite using 1:2:(0.5):(0.5) with boxxyerror fs solid 1 border rgb '#fefefe' lc rgb '#d0d0d0', \\\n     ";
   }

@@ -67,6 +67,7 @@ struct HeatMap {
   double limit = 0;
   /// Ends of the colour scale, e.g. of maps side by side; not given: the least and the largest value.
   std::optional<double> low = {}, high = {};
+  std::vector<std::vector<bool>> at_least = {};  ///< cells whose value is a lower bound; empty: none
 };
 
 /// Holds named horizontal bars from zero, the first on top, each with its value at the end.

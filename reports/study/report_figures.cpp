@@ -211,8 +211,12 @@ Figure grid_figure(const std::string& id, const std::string& title, const analys
   map.low = scale.first, map.high = scale.second;
   for (std::size_t i = 0; i < down.values.size(); ++i) {
     map.value.emplace_back();
-    for (std::size_t j = 0; j < across.values.size(); ++j)
-      map.value.back().push_back(steps[i * across.values.size() + j].value);
+    map.at_least.emplace_back();
+    for (std::size_t j = 0; j < across.values.size(); ++j) {
+      const Estimate& one = steps[i * across.values.size() + j];
+      map.value.back().push_back(one.value);
+      map.at_least.back().push_back(std::isfinite(one.value) && std::isinf(one.upper));
+    }
   }
   figure.heat_map = std::move(map);
   return figure;

@@ -294,6 +294,8 @@ Table grid_table(const std::string& id, const std::string& title, const analysis
     table.rows.push_back(std::move(row));
   }
   table.notes = {"Expected steps before failure from the launch, with 95 % intervals."};
+  if (std::ranges::any_of(steps, [](const Estimate& e) { return std::isfinite(e.value) && std::isinf(e.upper); }))
+    table.notes.push_back("Where an interval has no upper end the number is a 95 % lower bound.");
   return table;
 }
 
