@@ -30,7 +30,8 @@ constexpr double kMostBlind = 0.1;     // of the failures, in blind spots: beyon
 constexpr double kLeast = 0.25;        // of what the extrapolation's last order moved: its error
 constexpr double kRows = 5e-4;         // what reading rows off curves may leave, about so much
 constexpr std::size_t kFewestTrials = 100;
-constexpr std::size_t kWalks = 512;      // counted where trials would be fewer
+constexpr std::size_t kWalks = 512;      // counted where trials would be fewer,
+constexpr double kCounted = 0.5;         // with so much of the steps: an eighth of a quick study's time
 constexpr std::size_t kPilotShare = 16;  // trials for one of the pilot, which sees whether trials end,
 constexpr std::size_t kPilotLeast = 8, kPilotMost = 128;
 constexpr double kPilotSteps = 4;     // within so many times the expected steps: of 8, 8 or 7 do.
@@ -307,7 +308,7 @@ class Run {
     }
     if (trials < kFewestTrials || several_gaits()) {
       const std::size_t walks = std::clamp<std::size_t>(options_.simulated_steps, 2, kWalks);
-      count(walks, std::floor(allowed / static_cast<double>(walks)));
+      count(walks, std::floor(kCounted * allowed / static_cast<double>(walks)));
       study_.no_simulated =
           (several_gaits() ? "it would know one gait; " : "too few trials would fail; ") + count_text(*study_.walks);
       return;

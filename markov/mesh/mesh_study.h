@@ -85,7 +85,7 @@ class Disagreement : public std::runtime_error {
 ///
 /// Beside it stand importance sampling guided by the second coarsest mesh, where T is above 100 steps and above three
 /// windows of it, and direct simulation: trials to failure where 100 or more fit into `simulated_steps`, else 512 walks
-/// of so many steps together, whose failures are counted (FailureCount). Windows are lengthened
+/// of half so many steps together, whose failures are counted (FailureCount). Windows are lengthened
 /// until the samples' weights are even; where they stay uneven, the interval is widened in proportion, and beyond a
 /// factor of about two not given. Two ways disagree when they lie further apart than 1.7 times (99.9 %) their joint 95
 /// % half-width, and a count of failures when the mesh foretells one so far off with a chance below refutation_level.
