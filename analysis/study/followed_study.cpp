@@ -702,7 +702,9 @@ Metastability held_against_trials(const Problem& problem, Metastability study, c
   const Trials trials = follow_trials(problem, options, 0, checked_trials, most, true);
   const MeanError found = mean_of(trials.steps);
   const Estimate& all = study.steps.from_start;
-  // Survival is that of the finest chain, whose own mean is not extrapolated: its hazard goes with the ratio of means.
+  // Survival is that of the finest chain, whose own mean is not extrapolated. What that moves goes into the hazard
+  // where failures may come at any step, and into the length of the walk where they come at its end: one of the two, or
+  // between.
   double expected = 0, lower = 0, upper = 0, sum = 0, square = 0;
   for (std::size_t n = 0; n < most; ++n) {
     const double survival = std::max(0.0, study.steps.survival[n]);
@@ -713,6 +715,10 @@ Metastability held_against_trials(const Problem& problem, Metastability study, c
     sum += survival;
     square += static_cast<double>(2 * n + 1) * survival;
   }
+  const auto longer = [&](double mean) {
+    return std::min(sum * mean / study.steps.distribution.mean, static_cast<double>(most));
+  };
+  lower = std::min(lower, longer(all.lower)), upper = std::max(upper, longer(all.upper));
   // Where failures are rare the trials may hold none: their scatter is then that of the chain, and where few are
   // expected one more or less is no surprise.
   const auto count = static_cast<double>(checked_trials);
