@@ -23,12 +23,16 @@ set(ROOMS
   "dynamics/walkers:"
   "analysis/statistics: markov dynamics/numerics"
   "analysis/walkers: markov markov/passage markov/rows markov/mesh dynamics/walkers analysis/statistics"
-  "analysis/diagnosis: markov dynamics/numerics dynamics/catalogue analysis/statistics"
+  "analysis/fitting: markov dynamics/numerics analysis/statistics"
+  "analysis/gap: markov dynamics/numerics analysis/statistics analysis/fitting"
+  "analysis/diagnosis: markov dynamics/numerics analysis/statistics analysis/fitting analysis/gap"
   "analysis/study: markov markov/chain markov/passage markov/rows dynamics/numerics dynamics/wheel dynamics/settled dynamics/return_map dynamics/bounds analysis/statistics"
   "analysis/experiment: markov dynamics/catalogue dynamics/wheel dynamics/laboratory dynamics/extended_wheel dynamics/return_map analysis/statistics analysis/study"
   "analysis/description: markov dynamics/numerics dynamics/return_map analysis/statistics analysis/experiment"
-  "analysis/likelihood: dynamics/numerics dynamics/catalogue dynamics/step_density dynamics/settled dynamics/extended_wheel analysis/statistics analysis/diagnosis analysis/experiment"
-  "analysis/blind: dynamics/numerics dynamics/catalogue analysis/statistics analysis/diagnosis analysis/experiment analysis/likelihood"
+  "analysis/wheel_model: dynamics/numerics dynamics/catalogue dynamics/step_density dynamics/settled dynamics/extended_wheel analysis/statistics analysis/fitting analysis/experiment"
+  "analysis/drum_model: dynamics/numerics dynamics/catalogue analysis/statistics analysis/fitting analysis/experiment"
+  "analysis/experiment_model: analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model analysis/drum_model"
+  "analysis/blind: dynamics/numerics dynamics/catalogue analysis/statistics analysis/fitting analysis/diagnosis analysis/experiment analysis/wheel_model"
   "analysis/motion_capture: markov dynamics/extended_wheel dynamics/return_map analysis/statistics analysis/experiment"
   "analysis/paper: markov dynamics/numerics dynamics/catalogue dynamics/settled dynamics/return_map analysis/statistics analysis/study analysis/experiment analysis/description"
   "analysis/sensitivity: markov markov/chain markov/passage markov/rows dynamics/wheel dynamics/settled dynamics/return_map analysis/statistics analysis/study"
@@ -38,10 +42,10 @@ set(ROOMS
   "reports/study: markov/rows dynamics/wheel analysis/statistics analysis/walkers analysis/study analysis/experiment analysis/paper analysis/sensitivity reports/output"
   "reports/import: analysis/experiment analysis/motion_capture reports/output"
   "reports/commands: markov markov/passage markov/mesh dynamics/wheel analysis/statistics analysis/walkers analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/blind analysis/motion_capture analysis/paper analysis/sensitivity reports/output reports/study reports/import"
-  "reports/experiment_commands: markov dynamics/catalogue dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/likelihood analysis/blind analysis/motion_capture analysis/paper reports/output reports/description reports/diagnosis reports/study reports/import reports/commands"
+  "reports/experiment_commands: markov dynamics/catalogue dynamics/wheel analysis/statistics analysis/diagnosis analysis/study analysis/experiment analysis/description analysis/experiment_model analysis/blind analysis/motion_capture analysis/paper reports/output reports/description reports/diagnosis reports/study reports/import reports/commands"
   "reports/command_line: dynamics/catalogue dynamics/wheel analysis/study analysis/experiment analysis/sensitivity reports/output reports/commands reports/experiment_commands"
   "reports/ranks: markov/mesh markov/ranks analysis/walkers reports/output reports/commands reports/command_line"
-  "reports/python: markov/chain markov/passage markov/mesh analysis/walkers analysis/study analysis/experiment analysis/likelihood analysis/sensitivity reports/output reports/diagnosis reports/study reports/commands reports/experiment_commands reports/command_line")
+  "reports/python: markov/chain markov/passage markov/mesh analysis/walkers analysis/study analysis/experiment analysis/experiment_model analysis/sensitivity reports/output reports/diagnosis reports/study reports/commands reports/experiment_commands reports/command_line")
 
 # Where less than a whole room may be seen: who (a pattern of files), which room, which of its headers.
 set(NARROW
@@ -49,9 +53,9 @@ set(NARROW
   "analysis/experiment/.*:analysis/study:setting.h"
   "analysis/experiment/.*:dynamics/laboratory:laboratory.h"
   "analysis/experiment/(angle|coast|csv|experiment|input|stand|trial).*:dynamics/laboratory:"
-  "analysis/likelihood/(d[^i]|[^d]).*:analysis/diagnosis:transition_model.h"
-  "analysis/likelihood/diagnose.*:analysis/diagnosis:diagnosis.h"
-  "analysis/diagnosis/.*:dynamics/numerics:truncated_normal.h")
+  "analysis/(wheel|drum|experiment)_model/.*:analysis/fitting:transition_model.h"
+  "analysis/experiment_model/.*:analysis/diagnosis:diagnosis.h"
+  "analysis/(fitting|gap|diagnosis)/.*:dynamics/numerics:truncated_normal.h")
 
 set(HEAVY "mpi\\.h|petsc|slepc|openssl/|Spectra/|suitesparse/|klu\\.h|matio\\.h|nlohmann/|CLI/|toml\\+\\+/|toml\\.hpp|kainjow/")
 
@@ -157,8 +161,8 @@ set(samples
   "dynamics/wheel/a.h|dynamics/return_map/trials.h|no" "dynamics/laboratory/a.h|dynamics/return_map/trials.h|no"
   "dynamics/return_map/a.h|dynamics/bounds/interval.h|no" "dynamics/bounds/a.h|dynamics/return_map/trials.h|yes"
   "analysis/statistics/a.h|analysis/study/setting.h|no"   "analysis/study/a.h|analysis/statistics/estimate.h|yes"
-  "analysis/study/a.h|analysis/experiment/experiment.h|no" "analysis/description/a.h|analysis/likelihood/wheel_runs.h|no"
-  "analysis/likelihood/a.h|analysis/blind/blind_grade.h|no" "analysis/blind/a.h|analysis/likelihood/wheel_runs.h|yes"
+  "analysis/study/a.h|analysis/experiment/experiment.h|no" "analysis/description/a.h|analysis/wheel_model/wheel_runs.h|no"
+  "analysis/wheel_model/a.h|analysis/blind/blind_grade.h|no" "analysis/blind/a.h|analysis/wheel_model/wheel_runs.h|yes"
   "reports/output/a.h|reports/study/study_text.h|no"   "reports/study/a.h|reports/output/table.h|yes"
   "reports/commands/a.h|reports/command_line/cli.h|no" "reports/command_line/a.h|reports/commands/request.h|yes"
   # The narrower lines.
@@ -166,9 +170,9 @@ set(samples
   "analysis/experiment/reality.h|dynamics/laboratory/laboratory.h|yes" "analysis/experiment/experiment.cpp|dynamics/laboratory/laboratory.h|no"
   "analysis/experiment/reality.h|dynamics/laboratory/rolling_motion.h|no"
   "analysis/blind/a.cpp|dynamics/laboratory/laboratory.h|no"    "analysis/diagnosis/a.cpp|dynamics/laboratory/laboratory.h|no"
-  "reports/commands/a.cpp|dynamics/laboratory/laboratory.h|no"  "analysis/likelihood/a.h|analysis/diagnosis/transition_model.h|yes"
-  "analysis/likelihood/diagnose.h|analysis/diagnosis/diagnosis.h|yes"
-  "analysis/likelihood/a.h|analysis/diagnosis/diagnosis.h|no"   "analysis/diagnosis/a.h|dynamics/catalogue/effect_catalogue.h|yes"
+  "reports/commands/a.cpp|dynamics/laboratory/laboratory.h|no"  "analysis/wheel_model/a.h|analysis/fitting/transition_model.h|yes"
+  "analysis/experiment_model/diagnose.h|analysis/diagnosis/diagnosis.h|yes"
+  "analysis/wheel_model/a.h|analysis/diagnosis/diagnosis.h|no"   "analysis/diagnosis/a.h|dynamics/catalogue/effect_catalogue.h|no"
   "analysis/diagnosis/a.h|dynamics/numerics/truncated_normal.h|yes" "analysis/diagnosis/a.h|dynamics/extended_wheel/extended_wheel.h|no"
   "analysis/diagnosis/a.h|analysis/experiment/experiment.h|no"
   # Nothing outside the rooms.

@@ -5,9 +5,9 @@
 #include <stdexcept>
 
 #include "analysis/blind/outside_power.h"
-#include "analysis/diagnosis/model_fit.h"
-#include "analysis/likelihood/wheel_nuisances.h"
-#include "analysis/likelihood/wheel_transitions.h"
+#include "analysis/fitting/model_fit.h"
+#include "analysis/wheel_model/wheel_nuisances.h"
+#include "analysis/wheel_model/wheel_transitions.h"
 
 namespace metastable::analysis {
 namespace {

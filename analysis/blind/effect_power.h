@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "analysis/diagnosis/transition_model.h"
 #include "analysis/experiment/experiment.h"
 #include "analysis/experiment/reality.h"
+#include "analysis/fitting/transition_model.h"
 
 namespace metastable::analysis {
 

@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "analysis/blind/effect_power.h"
-#include "analysis/diagnosis/model_fit.h"
-#include "analysis/likelihood/wheel_hypothesis.h"
-#include "analysis/likelihood/wheel_likelihood.h"
-#include "analysis/likelihood/wheel_nuisances.h"
-#include "analysis/likelihood/wheel_runs.h"
-#include "analysis/likelihood/wheel_transitions.h"
+#include "analysis/fitting/model_fit.h"
+#include "analysis/wheel_model/wheel_hypothesis.h"
+#include "analysis/wheel_model/wheel_likelihood.h"
+#include "analysis/wheel_model/wheel_nuisances.h"
+#include "analysis/wheel_model/wheel_runs.h"
+#include "analysis/wheel_model/wheel_transitions.h"
 
 namespace metastable::analysis {
 namespace {

@@ -11,21 +11,20 @@
 #include <stdexcept>
 #include <utility>
 
-#include "analysis/diagnosis/cause_ranking.h"
-#include "analysis/diagnosis/collision_profile.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
-#include "analysis/diagnosis/fitted_variations.h"
-#include "analysis/diagnosis/gap_map.h"
-#include "analysis/diagnosis/gap_shrinkage.h"
 #include "analysis/diagnosis/gap_tests.h"
-#include "analysis/diagnosis/left_over.h"
 #include "analysis/diagnosis/missing_columns.h"
 #include "analysis/diagnosis/parameter_estimates.h"
 #include "analysis/diagnosis/too_few.h"
 #include "analysis/diagnosis/verdict.h"
 #include "analysis/diagnosis/visibility.h"
+#include "analysis/fitting/cause_ranking.h"
+#include "analysis/gap/collision_profile.h"
+#include "analysis/gap/fitted_variations.h"
+#include "analysis/gap/gap_map.h"
+#include "analysis/gap/gap_shrinkage.h"
+#include "analysis/gap/left_over.h"
 #include "analysis/statistics/interval_95.h"
-#include "dynamics/catalogue/effect_catalogue.h"
 
 namespace metastable::analysis {
 namespace {
@@ -57,23 +56,26 @@ StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std:
   return steps;
 }
 
-// Returns the one or two effects that an entry of the catalogue names. It throws for unknown ones.
+// Returns the one or two effects that an entry of the options names.
 std::vector<std::string> effects_of(const std::string& entry) {
   const auto plus = entry.find('+');
   std::vector<std::string> ids{entry.substr(0, plus)};
   if (plus != std::string::npos) ids.push_back(entry.substr(plus + 1));
-  for (const std::string& id : ids) dynamics::effect_info(id);
   if (ids.front() == ids.back() && ids.size() == 2)
     throw std::invalid_argument(fmt::format("effect: \"{}\" is not a pair of two effects", entry));
   return ids;
 }
 
-void check(const DiagnosisOptions& options) {
+void check(const TransitionModel& model, const DiagnosisOptions& options) {
   if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
   if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
   if (!(options.level > 0 && options.level < 0.5))
     throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
-  for (const std::string& entry : options.catalogue) effects_of(entry);
+  const std::vector<std::string> known = model.effect_ids();
+  for (const std::string& entry : options.catalogue)
+    for (const std::string& id : effects_of(entry))
+      if (std::ranges::find(known, id) == known.end())
+        throw std::invalid_argument(fmt::format("effect: \"{}\" is none of {}", id, fmt::join(known, ", ")));
 }
 
 // Pairs alone extend the whole catalogue; beside single effects they add theirs.
@@ -125,7 +127,10 @@ void describe_data(Diagnosis& d, const TransitionModel& model) {
   for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
   d.data.notes = model.notes();
   d.data.accepted_defects = model.accepted_defects();
+  d.data.step_name = model.step_name();
+  d.data.groups = model.groups();
   d.gap.refitted = model.recalibrated();
+  d.gap.recalibration_id = model.recalibration_id();
 }
 
 // What the data hold no information on is not decided, whatever its evidence.
@@ -203,7 +208,7 @@ Verdict verdict_from_name(std::string_view name) {
 std::string Cause::name() const { return fmt::format("{}", fmt::join(effects, "+")); }
 
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options) {
-  check(options);
+  check(model, options);
   const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
   const auto progress = [&](double share, const char* doing) {
     if (options.progress) options.progress(share, doing);

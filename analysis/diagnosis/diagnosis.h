@@ -10,10 +10,12 @@
 #include <string_view>
 #include <vector>
 
-#include "analysis/diagnosis/gap_cell.h"
-#include "analysis/diagnosis/left_over.h"
-#include "analysis/diagnosis/stepwise.h"
-#include "analysis/diagnosis/transition_model.h"
+#include "analysis/fitting/stepwise.h"
+#include "analysis/fitting/transition_model.h"
+#include "analysis/gap/collision_profile.h"
+#include "analysis/gap/gap_cell.h"
+#include "analysis/gap/gap_shrinkage.h"
+#include "analysis/gap/left_over.h"
 
 namespace metastable::analysis {
 
@@ -92,33 +94,6 @@ struct MissingColumn {
   std::vector<HiddenEffect> effects;  ///< empty: next to nothing is lost
 };
 
-/// A measure of the gap under the models compared, held out, and on data of the last model itself.
-struct Shrinkage {
-  std::string measure, unit;
-  double baseline = 0, recalibrated = 0, with_effect = 0, floor = 0;
-  /// The closed share (baseline - with_effect) / (baseline - floor), at most 1, as no model leaves less than nothing;
-  /// no value where the denominator's interval covers zero.
-  std::optional<double> closed, closed_lower, closed_upper;  ///< 90 % interval over trials
-  double baseline_lower = 0, baseline_upper = 0;             ///< 90 %
-  double with_effect_least = 0;  ///< of with_effect when trials are drawn anew, some hundred times
-};
-
-struct StepsBeforeFailure {
-  double observed = 0, observed_lower = 0,
-         observed_upper = 0;  ///< collisions at risk by rests, exact 90 %; 0: not known
-  double baseline = 0, recalibrated = 0, with_effect = 0;
-};
-
-/// Holds mean speed before each collision, measured and simulated.
-struct ProfilePoint {
-  std::size_t condition = 0;
-  int collision = 1;
-  std::size_t trials = 0;
-  double measured = 0, measured_error = 0;  ///< mean, standard error [rad/s]
-  double baseline = 0, with_effect = 0;     ///< simulated means [rad/s]
-  double band = 0;                          ///< half-width of the 95 % band of the mean of as many trials [rad/s]
-};
-
 /// An experiment that would tell the remaining causes apart.
 struct NextExperiment {
   std::string change;
@@ -148,6 +123,7 @@ struct Diagnosis {
     double p_variations = 1;     ///< of what varies most in a way that has no name, with the look elsewhere
     GapMap as_given, recalibrated, left;      ///< maps under the nominal, the refitted, and the chosen model
     std::string refitted;                     ///< what a recalibration refits (TransitionModel::recalibrated)
+    std::string recalibration_id;             ///< TransitionModel::recalibration_id()
     std::vector<EstimatedParameter> contact;  ///< recalibrated
   } gap;
 
@@ -187,8 +163,10 @@ struct Diagnosis {
   struct Data {
     std::size_t trials = 0, collisions = 0, events = 0;
     std::vector<std::string> condition_names;
-    std::vector<std::string> notes;  ///< what is not known, was assumed or is rough, a sentence each
-    std::string accepted_defects;    ///< TransitionModel::accepted_defects(), which the verdict repeats
+    std::string step_name = "step";   ///< TransitionModel::step_name()
+    std::vector<EffectGroup> groups;  ///< TransitionModel::groups()
+    std::vector<std::string> notes;   ///< what is not known, was assumed or is rough, a sentence each
+    std::string accepted_defects;     ///< TransitionModel::accepted_defects(), which the verdict repeats
   } data;
 };
 

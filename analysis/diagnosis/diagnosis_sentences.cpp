@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/diagnosis/evidence.h"
 #include "analysis/diagnosis/too_few.h"
 #include "analysis/diagnosis/verdict.h"
+#include "analysis/fitting/evidence.h"
 #include "analysis/statistics/number_text.h"
 
 namespace metastable::analysis {
@@ -30,17 +30,11 @@ std::string with_parameters(const Cause& cause) {
 }
 
 // Names what effects that act alike have in common, where the field has a word for it.
-std::string common_name(const std::vector<std::string>& alike) {
-  static const std::vector<std::pair<const char*, std::vector<std::string>>> names{
-      {"a constant torque", {"slope_offset", "rolling_resistance"}},
-      {"a torque that grows with speed", {"axle_drag_viscous", "air_drag"}},
-      {"a constant or growing torque", {"slope_offset", "rolling_resistance", "axle_drag_viscous", "air_drag"}},
-      {"legs that differ", {"leg_lengths", "leg_contact", "hub_eccentricity"}},
-      {"trials that differ", {"trial_drift", "trial_spread"}}};
-  for (const auto& [name, members] : names)
-    if (std::ranges::all_of(alike,
-                            [&](const std::string& id) { return std::ranges::find(members, id) != members.end(); }))
-      return name;
+std::string common_name(const Diagnosis& d, const std::vector<std::string>& alike) {
+  for (const EffectGroup& group : d.data.groups)
+    if (std::ranges::all_of(
+            alike, [&](const std::string& id) { return std::ranges::find(group.members, id) != group.members.end(); }))
+      return group.name;
   return "one and the same here";
 }
 
@@ -63,8 +57,8 @@ std::string grouped_set(const Diagnosis& d) {
     for (std::string& name : group)
       name = name.starts_with(common + "+") ? name.substr(common.size() + 1)
                                             : name.substr(0, name.size() - common.size() - 1);
-  std::string text =
-      fmt::format("{}{} ({})", common_name(group), common.empty() ? "" : " beside " + common, fmt::join(group, ", "));
+  std::string text = fmt::format("{}{} ({})", common_name(d, group), common.empty() ? "" : " beside " + common,
+                                 fmt::join(group, ", "));
   for (const std::string& name : d.causes.set)
     if (std::ranges::find(d.causes.alike, name) == d.causes.alike.end()) text += ", " + name;
   return text;
@@ -84,7 +78,7 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
   s.push_back(
       fmt::format("{} it acts by {}, on the {} of {}.",
                   most->beside.empty() ? "By itself" : fmt::format("Beside {}", fmt::join(most->beside, " and ")),
-                  facet->facet, facet->aspect, facet->stance ? "stances" : "collisions"));
+                  facet->facet, facet->aspect, facet->stance ? "stances" : d.data.step_name + "s"));
 }
 
 void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
@@ -165,8 +159,8 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
   const Shrinkage& log_score = d.shrinkage.measures[0];
   const std::string change =
       log_score.with_effect > 0
-          ? fmt::format("from {:.2g} to {:.2g} nats a collision", log_score.baseline, log_score.with_effect)
-          : fmt::format("from {:.2g} nats a collision to none", log_score.baseline);
+          ? fmt::format("from {:.2g} to {:.2g} nats a {}", log_score.baseline, log_score.with_effect, d.data.step_name)
+          : fmt::format("from {:.2g} nats a {} to none", log_score.baseline, d.data.step_name);
   if (closed_is_known(log_score)) {
     const DecimalEstimate percent = to_decimal(closed_percent(log_score), NumberFormat::general, 3);
     s.push_back(fmt::format("Held out, {} % of the gap closes (90 %: {} to {} %), {}.", plain_text(percent.value),

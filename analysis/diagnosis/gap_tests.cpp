@@ -4,8 +4,8 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <vector>
 
-#include "analysis/diagnosis/cause_ranking.h"
-#include "analysis/diagnosis/left_over.h"
+#include "analysis/fitting/cause_ranking.h"
+#include "analysis/gap/left_over.h"
 #include "markov/dense_matrix.h"
 
 namespace metastable::analysis {

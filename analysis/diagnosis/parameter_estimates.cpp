@@ -4,8 +4,8 @@
 #include <cmath>
 #include <tuple>
 
-#include "analysis/diagnosis/cause_ranking.h"
-#include "analysis/diagnosis/effect_scan.h"
+#include "analysis/fitting/cause_ranking.h"
+#include "analysis/fitting/effect_scan.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "markov/dense_matrix.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/diagnosis/map_cells.h"
+#include "analysis/gap/map_cells.h"
 
 namespace metastable::analysis {
 namespace {
@@ -48,8 +48,8 @@ std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& 
     const Shrinkage& s = d.shrinkage.measures[0];
     const double size = s.baseline - s.floor, half = 0.5 * (s.baseline_upper - s.baseline_lower);
     all.push_back({"the share of the gap that closes, held out",
-                   fmt::format("the held-out gap of {:.2g} {} a collision is not beyond its own uncertainty of {:.2g}",
-                               size, s.unit, half),
+                   fmt::format("the held-out gap of {:.2g} {} a {} is not beyond its own uncertainty of {:.2g}", size,
+                               s.unit, d.data.step_name, half),
                    size > 0 ? whole(1.1 * trials * half * half / (size * size)) : std::nullopt, true});
   }
   const auto speeds = static_cast<double>(d.data.collisions);
@@ -73,11 +73,12 @@ std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& 
   } else if (rests == 0) {
     const double steps = d.shrinkage.steps.with_effect, each = at_risk / trials;
     const bool known = std::isfinite(steps) && steps > 1;
-    all.push_back({"the observed steps before failure but for their lower end",
-                   known ? fmt::format("no trial came to rest in {:.0f} collisions; the model expects one in {:.3g}",
-                                       at_risk, steps)
-                         : fmt::format("no trial came to rest in {:.0f} collisions, nor does the model's", at_risk),
-                   known ? whole(std::log1p(-surely) / (each * std::log1p(-1 / steps))) : std::nullopt});
+    all.push_back(
+        {"the observed steps before failure but for their lower end",
+         known ? fmt::format("no trial came to rest in {:.0f} {}s; the model expects one in {:.3g}", at_risk,
+                             d.data.step_name, steps)
+               : fmt::format("no trial came to rest in {:.0f} {}s, nor does the model's", at_risk, d.data.step_name),
+         known ? whole(std::log1p(-surely) / (each * std::log1p(-1 / steps))) : std::nullopt});
   }
   return all;
 }

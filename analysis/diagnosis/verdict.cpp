@@ -6,13 +6,12 @@
 #include <string>
 #include <utility>
 
-#include "analysis/diagnosis/cause_ranking.h"
-#include "analysis/diagnosis/evidence.h"
-#include "analysis/diagnosis/gap_map.h"
-#include "analysis/diagnosis/left_over.h"
 #include "analysis/diagnosis/parameter_estimates.h"
 #include "analysis/diagnosis/too_few.h"
-#include "dynamics/catalogue/effect_catalogue.h"
+#include "analysis/fitting/cause_ranking.h"
+#include "analysis/fitting/evidence.h"
+#include "analysis/gap/gap_map.h"
+#include "analysis/gap/left_over.h"
 
 namespace metastable::analysis {
 namespace {
@@ -217,7 +216,7 @@ void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) 
   }
   if (!gap) {
     d.verdict = d.gap.p_recalibration < recalibration_level ? Verdict::recalibrate : Verdict::no_gap;
-    if (d.verdict == Verdict::recalibrate) d.causes.set = {std::string(dynamics::contact_distribution_id)};
+    if (d.verdict == Verdict::recalibrate) d.causes.set = {d.gap.recalibration_id};
     return;
   }
   if (none >= most_odds_of_none) {

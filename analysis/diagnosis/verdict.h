@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "analysis/diagnosis/cause_ranking.h"
 #include "analysis/diagnosis/diagnosis.h"
+#include "analysis/fitting/cause_ranking.h"
 
 namespace metastable::analysis {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
-#include "analysis/diagnosis/effect_scan.h"
+#include "analysis/fitting/effect_scan.h"
 
 namespace metastable::analysis {
 

@@ -180,12 +180,17 @@ const std::vector<EffectInfo>& effect_catalogue() {
   return catalogue;
 }
 
+std::vector<std::string> effect_ids() {
+  std::vector<std::string> ids;
+  for (const EffectInfo& info : effect_catalogue()) ids.push_back(info.id);
+  return ids;
+}
+
 const EffectInfo& effect_info(std::string_view id) {
   const auto& all = effect_catalogue();
   const auto found = std::find_if(all.begin(), all.end(), [id](const EffectInfo& info) { return info.id == id; });
   if (found != all.end()) return *found;
-  throw std::invalid_argument(
-      fmt::format("effect: \"{}\" is none of {}", id, fmt::join(all | std::views::transform(&EffectInfo::id), ", ")));
+  throw std::invalid_argument(fmt::format("effect: \"{}\" is none of {}", id, fmt::join(effect_ids(), ", ")));
 }
 
 Effect effect_from_values(std::string_view id, const std::map<std::string, std::vector<double>>& values,

@@ -33,6 +33,8 @@ inline constexpr std::string_view contact_distribution_id = "contact_distributio
 
 /// Lists all effects, in a fixed order.
 const std::vector<EffectInfo>& effect_catalogue();
+/// Lists their ids.
+std::vector<std::string> effect_ids();
 /// @throws std::invalid_argument naming the id and all known ones
 const EffectInfo& effect_info(std::string_view id);
 

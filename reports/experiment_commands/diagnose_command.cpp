@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "analysis/diagnosis/diagnosis_sentences.h"
-#include "analysis/likelihood/diagnose.h"
+#include "analysis/experiment_model/diagnose.h"
 #include "dynamics/wheel/contact_law.h"
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_json.h"

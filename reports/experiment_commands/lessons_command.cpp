@@ -13,7 +13,7 @@
 
 #include "analysis/diagnosis/diagnosis.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
-#include "analysis/likelihood/diagnose.h"
+#include "analysis/experiment_model/diagnose.h"
 #include "analysis/paper/step_balance.h"
 #include "analysis/paper/worked_examples.h"
 #include "analysis/statistics/interval_95.h"

@@ -11,14 +11,14 @@
 #include <stdexcept>
 
 #include "analysis/experiment/experiment.h"
-#include "analysis/likelihood/diagnose.h"
+#include "analysis/experiment_model/diagnose.h"
 #include "reports/command_line/requests.h"
-#include "reports/experiment_commands/describe_command.h"
-#include "reports/experiment_commands/experiment_output.h"
-#include "reports/experiment_commands/simulate_command.h"
 #include "reports/diagnosis/diagnosis_json.h"
 #include "reports/diagnosis/diagnosis_tables.h"
 #include "reports/diagnosis/diagnosis_text.h"
+#include "reports/experiment_commands/describe_command.h"
+#include "reports/experiment_commands/experiment_output.h"
+#include "reports/experiment_commands/simulate_command.h"
 #include "reports/output/table_json.h"
 #include "reports/output/text_table.h"
 #include "reports/output/version.h"

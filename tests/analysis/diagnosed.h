@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "analysis/diagnosis/transition_model.h"
 #include "analysis/experiment/experiment.h"
-#include "analysis/likelihood/wheel_transitions.h"
+#include "analysis/fitting/transition_model.h"
+#include "analysis/wheel_model/wheel_transitions.h"
 
 namespace metastable::analysis::test {
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/diagnosis/transition_model.h"
+#include "analysis/fitting/transition_model.h"
 
 namespace metastable::analysis::test {
 

@@ -1,7 +1,7 @@
 // Makes a study, a comparison, simulated trials, their diagnosis, a return map and a chain of one's own, through the
 // installed headers and libraries. consumer FOLDER: writes the simulated trials there as an experiment folder.
 #include <metastable/analysis/experiment/experiment_folder.h>
-#include <metastable/analysis/likelihood/diagnose.h>
+#include <metastable/analysis/experiment_model/diagnose.h>
 #include <metastable/analysis/sensitivity/comparison.h>
 #include <metastable/analysis/study/metastability.h>
 #include <metastable/markov/chain/solver.h>

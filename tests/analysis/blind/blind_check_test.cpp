@@ -9,7 +9,7 @@
 #include "analysis/blind/blind_cases.h"
 #include "analysis/blind/effect_power.h"
 #include "analysis/diagnosis/diagnosis.h"
-#include "analysis/likelihood/experiment_model.h"
+#include "analysis/experiment_model/experiment_model.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {

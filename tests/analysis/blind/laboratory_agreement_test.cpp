@@ -12,11 +12,11 @@
 
 #include "analysis/blind/effect_power.h"
 #include "analysis/blind/sized_effect.h"
-#include "analysis/diagnosis/gap_map.h"
-#include "analysis/diagnosis/model_fit.h"
 #include "analysis/experiment/stand_in.h"
-#include "analysis/likelihood/wheel_nuisances.h"
-#include "analysis/likelihood/wheel_transitions.h"
+#include "analysis/fitting/model_fit.h"
+#include "analysis/gap/gap_map.h"
+#include "analysis/wheel_model/wheel_nuisances.h"
+#include "analysis/wheel_model/wheel_transitions.h"
 #include "dynamics/laboratory/laboratory_changes.h"
 
 namespace metastable::analysis::test {
@@ -97,7 +97,7 @@ TEST(LaboratoryAgreement, EveryEffectOfTheCatalogueHasItsPlaces) {
         << info.id << " has no entry in dynamics/laboratory/laboratory_changes.cpp";
     if (info.id != dynamics::contact_distribution_id) {
       EXPECT_NO_THROW(fitted_term(*model, neutral))
-          << info.id << " has no entry in analysis/likelihood/wheel_candidates.cpp";
+          << info.id << " has no entry in analysis/wheel_model/wheel_candidates.cpp";
     }
     BlindDice dice(1, 1);
     EXPECT_NO_THROW(sized_effect(info.id, true_values, dice))

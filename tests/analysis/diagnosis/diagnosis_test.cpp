@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/drum_model/coast_down_transitions.h"
 #include "analysis/experiment/reality.h"
 #include "analysis/experiment/stand_in.h"
-#include "analysis/likelihood/coast_down_transitions.h"
-#include "analysis/likelihood/wheel_nuisances.h"
+#include "analysis/wheel_model/wheel_nuisances.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/line.h"
 #include "tests/analysis/rotor.h"

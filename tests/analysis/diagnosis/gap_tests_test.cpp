@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "analysis/diagnosis/cause_ranking.h"
-#include "analysis/diagnosis/left_over.h"
-#include "analysis/diagnosis/model_fit.h"
+#include "analysis/fitting/cause_ranking.h"
+#include "analysis/fitting/model_fit.h"
+#include "analysis/gap/left_over.h"
 #include "tests/analysis/line.h"
 
 namespace metastable::analysis {

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/diagnosis/cause_ranking.h"
-#include "analysis/diagnosis/model_fit.h"
+#include "analysis/fitting/cause_ranking.h"
+#include "analysis/fitting/model_fit.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/line.h"
 

@@ -1,0 +1,55 @@
+#pragma once
+// Finds which effect it is: every candidate is fitted, weighed and compared with chance, pairs where they earn it.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/fitting/effect_fit.h"
+#include "analysis/fitting/effect_scan.h"
+#include "analysis/fitting/model_fit.h"
+
+namespace metastable::analysis {
+
+/// A hypothesis supposes one effect or two.
+struct RankedCause {
+  std::vector<EffectTerm> terms;
+  Fit fit;
+  double gain = 0;  ///< 2 Delta penalised log likelihood over the recalibrated model
+  /// The probability of the gain by chance: of a single effect by the variants listed, before one between them was
+  /// sought; of a pair that of what the second effect earned beyond the first.
+  double p_value = 1;
+  double evidence = 0;  ///< log Bayes factor against the recalibrated model, prior odds of pairs included
+  double together =
+      1;  ///< of a pair: its gain over what its two effects gain alone, beside what each hides of the other
+  std::string not_decided;  ///< why, where the data cannot tell or the fit did not settle
+  bool candidate_undecided() const { return !terms[0].candidate->undecidable.empty(); }
+};
+
+struct CauseRanking {
+  EffectScan scan;                   ///< at the recalibrated model
+  std::vector<RankedCause> singles;  ///< every candidate, in the order of the catalogue
+  std::vector<RankedCause> pairs;
+  double p_value = 1;  ///< of the best single effect among those listed, with the look elsewhere
+};
+
+struct RankingOptions {
+  int threads = 0;
+  int draws = 2000;
+  std::uint64_t seed = 1;
+  std::vector<std::pair<const Candidate*, const Candidate*>> pairs = {};  ///< tried in any case
+  std::function<void(double)> progress;  ///< share done; called from any thread, one at a time; may throw to stop
+};
+
+/// Weighs hypotheses by their evidence (evidence.h); a second effect counts for what it earned. Candidates whose scores
+/// promise less than a fifth of a large best gain are not fitted.
+/// @param candidates  to be considered
+CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
+                         const std::vector<const Candidate*>& candidates, const RankingOptions& options);
+
+/// Returns the fit beyond which what `terms` gained may be off by an error of form: that of those of them that are
+/// exact, or `recalibrated`. @param singles  fitted causes
+const Fit& exact_part(const std::vector<RankedCause>& singles, const std::vector<EffectTerm>& terms,
+                      const Fit& recalibrated);
+
+}  // namespace metastable::analysis

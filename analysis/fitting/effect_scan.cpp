@@ -1,0 +1,272 @@
+#include "analysis/fitting/effect_scan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+#include "analysis/statistics/falling_order.h"
+#include "analysis/statistics/random.h"
+#include "markov/dense_matrix.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double largest_step = 0.1, small_step = 0.05;  // of a difference, in standard errors
+constexpr std::size_t most_scanned = 24;                 // variants of an effect that are scanned beside another one
+constexpr double far_out = 0.03;  // share of the draws beyond which a tail follows its law instead of their count
+
+// Returns the root of the inverse of an effect's information, that of its priors included, in the directions that the
+// data resolve. @param whole  the information's diagonal before the projection
+Eigen::MatrixXd root_with_priors(const Candidate& candidate, Eigen::MatrixXd info, Eigen::VectorXd whole) {
+  for (Eigen::Index p = 0; p < whole.size(); ++p) {
+    const FreeParameter& parameter = candidate.parameters[static_cast<std::size_t>(p)];
+    const double range = parameter.upper - parameter.lower;
+    const double prior = parameter.prior_sd > 0 ? 1 / (parameter.prior_sd * parameter.prior_sd) : 0;
+    info(p, p) += prior;
+    whole[p] = whole[p] * range * range > resolved_range ? whole[p] + prior : 0;
+  }
+  return markov::resolved_root(info, whole, resolved_share);
+}
+
+Eigen::MatrixXd root_of_variant(const EffectScan& scan, const Candidate& candidate, Eigen::Index first) {
+  const auto count = static_cast<Eigen::Index>(candidate.parameters.size());
+  return root_with_priors(candidate, scan.information.block(first, first, count, count),
+                          scan.whole.segment(first, count));
+}
+
+// Returns what the score `u` gains beside the prior; one parameter at its lower bound gains only upwards.
+double promised_gain(const Candidate& candidate, const Eigen::VectorXd& u, const Eigen::MatrixXd& root,
+                     Eigen::VectorXd* start) {
+  const Eigen::VectorXd along = root.transpose() * u;
+  if (start) *start = root * along;
+  if (u.size() == 1) {
+    const FreeParameter& p = candidate.parameters[0];
+    if ((p.lower >= p.neutral && u[0] < 0) || (p.upper <= p.neutral && u[0] > 0)) return 0;
+  }
+  const double gain = along.squaredNorm();
+  return std::isfinite(gain) ? gain : 0;
+}
+
+// Returns [variants] what the earlier scan promises of an effect once what the other one takes up is projected out.
+std::vector<double> promised_beside(const ScanBeside& beside, const ScannedEffect& effect, const ScannedEffect& other) {
+  const EffectScan& scan = *beside.earlier;
+  const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
+  const auto held = static_cast<Eigen::Index>(other.candidate->parameters.size());
+  const Eigen::Index at = other.first[other.best];
+  const Eigen::MatrixXd root =
+      markov::resolved_root(scan.information.block(at, at, held, held), scan.whole.segment(at, held), resolved_share);
+  std::vector<double> promised;
+  for (const Eigen::Index first : effect.first) {
+    const Eigen::MatrixXd cross = scan.information.block(at, first, held, count);
+    const Eigen::MatrixXd taken = root * (root.transpose() * cross);
+    const Eigen::MatrixXd left = scan.information.block(first, first, count, count) - cross.transpose() * taken;
+    promised.push_back(promised_gain(
+        *effect.candidate, scan.scores.segment(first, count) - taken.transpose() * scan.scores.segment(at, held),
+        root_with_priors(*effect.candidate, left, scan.whole.segment(first, count)), nullptr));
+  }
+  return promised;
+}
+
+// Returns a step that the earlier scan resolves well, where it is smaller than the parameter's own.
+double first_step(const ScanBeside& beside, const EffectTerm& term, std::size_t parameter) {
+  const double own = term.candidate->parameters[parameter].step;
+  const ScannedEffect* effect = beside.earlier ? beside.earlier->find(term.candidate) : nullptr;
+  if (!effect) return own;
+  const auto variant = std::ranges::find(term.candidate->variants, term.variant) - term.candidate->variants.begin();
+  const Eigen::Index column = effect->first[static_cast<std::size_t>(variant)] + static_cast<Eigen::Index>(parameter);
+  return std::min(own, small_step / std::sqrt(std::max(1e-300, beside.earlier->information(column, column))));
+}
+
+// Says by variant of a candidate whether it is scanned.
+std::vector<char> scanned_variants(const Candidate& candidate, const ScanBeside& beside) {
+  std::vector<char> scanned(candidate.variants.size(), true);
+  if (!beside.earlier || scanned.size() <= most_scanned) return scanned;
+  const ScannedEffect *effect = beside.earlier->find(&candidate), *other = beside.earlier->find(beside.effect);
+  if (!effect || !other) return scanned;
+  const std::vector<double> promised = promised_beside(beside, *effect, *other);
+  const std::vector<std::size_t> order = falling_order(promised);
+  for (std::size_t k = most_scanned; k < order.size(); ++k) scanned[order[k]] = false;
+  return scanned;
+}
+
+}  // namespace
+
+const ScannedEffect* EffectScan::find(const Candidate* candidate) const {
+  const auto found = std::ranges::find(effects, candidate, &ScannedEffect::candidate);
+  return found == effects.end() ? nullptr : &*found;
+}
+
+EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
+                        int threads, const ScanBeside& beside) {
+  EffectScan scan;
+  struct Work {
+    Eigen::Index first;  // of its columns
+    std::vector<EffectTerm> terms;
+  };
+  std::vector<Work> work;
+  Eigen::Index columns = 0;
+  for (const Candidate* candidate : candidates) {
+    if (candidate->parameters.empty() || !candidate->undecidable.empty()) continue;
+    ScannedEffect effect;
+    effect.candidate = candidate;
+    const std::vector<char> scanned = scanned_variants(*candidate, beside);
+    for (std::size_t v = 0; v < candidate->variants.size(); ++v) {
+      effect.first.push_back(columns);
+      columns += static_cast<Eigen::Index>(candidate->parameters.size());
+      if (!scanned[v]) continue;
+      EffectTerm term{candidate, candidate->variants[v], {}};
+      for (const FreeParameter& p : candidate->parameters) term.values.push_back(p.neutral);
+      Work one{effect.first.back(), fit.terms};
+      one.terms.push_back(term);
+      work.push_back(one);
+    }
+    scan.effects.push_back(std::move(effect));
+  }
+  const auto events = static_cast<Eigen::Index>(model.events().size());
+  Derivatives all{Eigen::MatrixXd::Zero(events, columns), Eigen::MatrixXd::Zero(events, columns)};
+  markov::parallel_for(work.size(), threads, [&](std::size_t i) {
+    const Work& one = work[i];
+    // Only the new term's parameters are moved, by a small share of what the data resolve.
+    const std::size_t count = one.terms.back().values.size();
+    for (std::size_t p = 0; p < count; ++p) {
+      const auto column = one.first + static_cast<Eigen::Index>(p);
+      double step = first_step(beside, one.terms.back(), p);
+      for (int attempt = 0; attempt < 2; ++attempt) {
+        std::vector<EffectTerm> moved = one.terms;
+        moved.back().values[p] += step;
+        const Evaluation there = model.evaluate(fit.nuisance, moved);
+        for (Eigen::Index k = 0; k < events; ++k) {
+          const auto event = static_cast<std::size_t>(k);
+          all.slope(k, column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
+          all.change(k, column) = (there.score[event] - fit.evaluation.score[event]) / step;
+        }
+        const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(column).squaredNorm()));
+        if (step < largest_step * resolved) break;
+        step = small_step * resolved;
+      }
+    }
+  });
+
+  // What the fitted parameters could take up is projected out of scores and information, which makes them efficient.
+  const Eigen::Map<const Eigen::VectorXd> z(fit.evaluation.score.data(), events);
+  const Eigen::MatrixXd stretch = all.slope + z.asDiagonal() * all.change;
+  const Derivatives& held = fit.derivatives;
+  const Eigen::MatrixXd held_stretch = held.slope + z.asDiagonal() * held.change;
+  const Eigen::MatrixXd cross =
+      held.change.transpose() * all.change + held_stretch.transpose() * stretch;  // [held x columns]
+  Eigen::MatrixXd weights = cross;
+  if (held.slope.cols() > 0) {
+    const Eigen::MatrixXd root = resolved_root(fit.information);
+    weights = root * (root.transpose() * cross);
+  }
+  scan.information = all.change.transpose() * all.change + stretch.transpose() * stretch;
+  scan.whole = scan.information.diagonal();
+  scan.information -= cross.transpose() * weights;
+  const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
+  scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
+  for (Eigen::Index k = 0; k < events; ++k)
+    scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
+  scan.trials_suffice = model.trials() >= enough_trials && model.events().size() >= enough_transitions * model.trials();
+  // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
+  scan.scores = all.slope.colwise().sum();
+
+  for (ScannedEffect& effect : scan.effects) {
+    const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
+    for (const Eigen::Index first : effect.first) {
+      Eigen::VectorXd start;
+      effect.gain.push_back(promised_gain(*effect.candidate, scan.scores.segment(first, count),
+                                          root_of_variant(scan, *effect.candidate, first), &start));
+      effect.start.push_back(start);
+    }
+    effect.best = falling_order(effect.gain).front();
+  }
+  return scan;
+}
+
+namespace {
+
+// Returns scores whose rows, multiplied by independent standard normals and summed, are a draw of chance.
+Eigen::MatrixXd rows_of_chance(const EffectScan& scan) {
+  // They are taken around their mean, so that a gap does not count as chance.
+  const Eigen::RowVectorXd mean = scan.by_trial.colwise().mean();
+  Eigen::MatrixXd rows = scan.by_trial.rowwise() - mean;
+  if (scan.trials_suffice) return rows;
+  // Trials that scatter more than their transitions would by themselves widen it.
+  const double trials = static_cast<double>(rows.rows());
+  const Eigen::ArrayXd scatter = rows.colwise().squaredNorm().transpose() * (trials / std::max(1.0, trials - 1));
+  const Eigen::ArrayXd own = scan.information.diagonal().cwiseMax(resolved_share * scan.whole).array().max(1e-300);
+  const markov::SymmetricEigen split = markov::symmetric_eigen(scan.information);
+  rows = split.values.cwiseMax(0).cwiseSqrt().asDiagonal() * split.vectors.transpose() *
+         (scatter / own).max(1).sqrt().matrix().asDiagonal();
+  return rows;
+}
+
+}  // namespace
+
+ChanceGains::ChanceGains(const EffectScan& scan, int draws, std::uint64_t seed) {
+  if (draws < 1) throw std::invalid_argument(fmt::format("draws: {} is below 1", draws));
+  const Eigen::MatrixXd rows = rows_of_chance(scan);
+  std::vector<std::vector<Eigen::MatrixXd>> roots(scan.effects.size());  // by effect and variant
+  for (std::size_t e = 0; e < scan.effects.size(); ++e)
+    for (const Eigen::Index first : scan.effects[e].first)
+      roots[e].push_back(root_of_variant(scan, *scan.effects[e].candidate, first));
+  std::vector<std::vector<double>> gains(scan.effects.size());  // by effect and draw
+  for (int draw = 0; draw < draws; ++draw) {
+    const std::vector<double> normals = normal_multipliers(
+        seed, static_cast<std::uint64_t>(draw), DrawStream::chance_of_effects, static_cast<std::size_t>(rows.rows()));
+    const Eigen::VectorXd multipliers = Eigen::VectorXd::Map(normals.data(), rows.rows());
+    const Eigen::VectorXd score = rows.transpose() * multipliers;
+    for (std::size_t e = 0; e < scan.effects.size(); ++e) {
+      const ScannedEffect& effect = scan.effects[e];
+      const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
+      double largest = 0;
+      for (std::size_t v = 0; v < roots[e].size(); ++v)
+        largest = std::max(
+            largest, promised_gain(*effect.candidate, score.segment(effect.first[v], count), roots[e][v], nullptr));
+      gains[e].push_back(largest);
+    }
+  }
+  for (std::size_t e = 0; e < gains.size(); ++e) {
+    const Candidate* effect = scan.effects[e].candidate;
+    effects_.push_back({effect, static_cast<double>(effect->parameters.size()), gains[e]});
+    std::sort(effects_[e].sorted.begin(), effects_[e].sorted.end(), std::greater<>());
+  }
+  for (int draw = 0; draw < draws; ++draw) {
+    double least = 1;
+    for (std::size_t e = 0; e < gains.size(); ++e)
+      least = std::min(least, effects_[e].p_value(gains[e][static_cast<std::size_t>(draw)]));
+    least_.push_back(least);
+  }
+  std::sort(least_.begin(), least_.end());
+}
+
+double ChanceGains::p_value(const Candidate* effect, double gain) const {
+  for (const ByChance& one : effects_)
+    if (one.effect == effect) return one.p_value(gain);
+  throw std::invalid_argument("ChanceGains::p_value: the effect was not scanned");
+}
+
+double ChanceGains::ByChance::p_value(double gain) const {
+  const auto draws = static_cast<double>(sorted.size());
+  const auto more = static_cast<double>(
+      std::lower_bound(sorted.begin(), sorted.end(), gain, [](double s, double g) { return s >= g; }) - sorted.begin());
+  const double counted = (more + 1) / (draws + 1);
+  // Beyond the largest few per cent the tail is taken as chi-squared.
+  const double anchor = sorted[static_cast<std::size_t>(far_out * draws)];
+  if (gain <= anchor || anchor <= 0) return counted;
+  return std::min(1.0, far_out * std::pow(gain / anchor, degrees / 2 - 1) * std::exp(-(gain - anchor) / 2));
+}
+
+double ChanceGains::look_elsewhere(double p) const {
+  const auto draws = static_cast<double>(least_.size());
+  const auto fewer = static_cast<double>(std::upper_bound(least_.begin(), least_.end(), p) - least_.begin());
+  const double anchor = least_[static_cast<std::size_t>(far_out * draws)];
+  if (p >= anchor) return (fewer + 1) / (draws + 1);
+  return std::min(1.0, far_out * p / anchor);
+}
+
+}  // namespace metastable::analysis

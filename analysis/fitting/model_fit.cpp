@@ -1,0 +1,339 @@
+#include "analysis/fitting/model_fit.h"
+
+#include <algorithm>
+#include <boost/math/tools/minima.hpp>
+#include <cmath>
+#include <iterator>
+
+#include "markov/dense_matrix.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double worth_a_step = 0.003;  // rise of the log likelihood; less is the optimum
+// Where no step rises, a promised rise of the log likelihood below this, plus this share of what the fit has risen, is
+// what differences do not resolve.
+constexpr double unresolved = 0.5, unresolved_share = 1e-4;
+// Shares of the information's diagonal that are added to it. Where a step rises by less than this share of what it
+// promised, the next one is damped more.
+constexpr double dampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 1}, least_kept = 0.25;
+// Share of what a step foretold by which its rise may differ, for what it leaves to be next to nothing: of the order of
+// that share squared.
+constexpr double as_foretold = 0.1;
+constexpr int most_halvings = 7, few_halvings = 3;  // of a step; of one that is damped more where another failed
+constexpr double difference_share = 0.05;           // step of a difference, of what the data resolve
+
+// Holds all parameters of a hypothesis in one vector.
+class Point {
+ public:
+  Point(const TransitionModel& model, std::vector<double> nuisance, std::vector<EffectTerm> terms, bool with_nuisances)
+      : model_(model), nuisance_(std::move(nuisance)), terms_(std::move(terms)) {
+    if (with_nuisances)
+      for (std::size_t i = 0; i < nuisance_.size(); ++i) {
+        const Nuisance& n = model.nuisances()[i];
+        slots_.push_back({&nuisance_[i], n.step, n.step, n.lower, n.upper, n, true});
+      }
+    for (EffectTerm& term : terms_)
+      for (std::size_t i = 0; i < term.values.size(); ++i) {
+        const FreeParameter& p = term.candidate->parameters[i];
+        Nuisance prior;
+        prior.nominal = p.neutral;
+        prior.prior_sd = p.prior_sd;
+        slots_.push_back({&term.values[i], p.step, p.step, p.lower, p.upper, prior, false});
+      }
+  }
+  Point(const Point&) = delete;
+  Point& operator=(const Point&) = delete;
+
+  struct Slot {
+    double* value;
+    double step, largest_step, lower, upper;
+    Nuisance prior;  // of sd 0: there is none
+    bool of_nuisance;
+  };
+  std::vector<Slot>& slots() { return slots_; }
+  const std::vector<double>& nuisance() const { return nuisance_; }
+  const std::vector<EffectTerm>& terms() const { return terms_; }
+  Evaluation evaluate() const { return model_.evaluate(nuisance_, terms_); }
+  double log_prior() const {
+    double sum = 0;
+    for (const Slot& s : slots_)
+      if (s.prior.prior_sd > 0) sum -= s.prior.cost(*s.value);
+    return sum;
+  }
+
+ private:
+  const TransitionModel& model_;
+  std::vector<double> nuisance_;
+  std::vector<EffectTerm> terms_;
+  std::vector<Slot> slots_;
+};
+
+Derivatives differences(Point& point, const Evaluation& here, bool both_sides = false) {
+  const auto events = static_cast<Eigen::Index>(here.score.size());
+  auto& slots = point.slots();
+  Derivatives d{Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())),
+                Eigen::MatrixXd(events, static_cast<Eigen::Index>(slots.size())), std::vector<double>(slots.size())};
+  for (std::size_t p = 0; p < slots.size(); ++p) {
+    const double value = *slots[p].value;
+    const auto moved_to = [&](double there) {
+      *slots[p].value = there;
+      Evaluation moved = point.evaluate();
+      *slots[p].value = value;
+      return moved;
+    };
+    const bool above = value + slots[p].step <= slots[p].upper, below = value - slots[p].step >= slots[p].lower;
+    double step = above ? slots[p].step : -slots[p].step;
+    const Evaluation moved = moved_to(value + step);
+    d.steps[p] = step;
+    Evaluation other;
+    if (both_sides && above && below) {
+      other = moved_to(value - step);
+      step *= 2;
+      d.steps[p] = 0;
+    }
+    const Evaluation& from = d.steps[p] == 0 ? other : here;
+    for (Eigen::Index i = 0; i < events; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      // Events at the floor of the density have no slope there.
+      d.slope(i, static_cast<Eigen::Index>(p)) =
+          std::clamp((moved.log_density[k] - from.log_density[k]) / step, -1e9, 1e9);
+      d.change(i, static_cast<Eigen::Index>(p)) = std::clamp((moved.score[k] - from.score[k]) / step, -1e9, 1e9);
+    }
+  }
+  return d;
+}
+
+double counted(const Evaluation& e, const Eigen::VectorXd& weights) {
+  return Eigen::Map<const Eigen::VectorXd>(e.log_density.data(), weights.size()).dot(weights);
+}
+
+Eigen::VectorXd picked(const Eigen::VectorXd& all, const std::vector<Eigen::Index>& part) {
+  Eigen::VectorXd some(static_cast<Eigen::Index>(part.size()));
+  for (std::size_t a = 0; a < part.size(); ++a) some[static_cast<Eigen::Index>(a)] = all[part[a]];
+  return some;
+}
+
+// Solves with a diagonal that is so much larger: where a ridge bends, undamped steps along it leave it. No step goes
+// along what the data do not resolve.
+Eigen::VectorXd gauss_newton(const Eigen::MatrixXd& information, const Eigen::VectorXd& gradient,
+                             const std::vector<Eigen::Index>& part, double damping) {
+  const auto size = static_cast<Eigen::Index>(part.size());
+  Eigen::MatrixXd block(size, size);
+  for (Eigen::Index a = 0; a < size; ++a)
+    for (Eigen::Index b = 0; b < size; ++b)
+      block(a, b) = information(part[static_cast<std::size_t>(a)], part[static_cast<std::size_t>(b)]);
+  block.diagonal() *= 1 + damping;
+  const Eigen::MatrixXd root = resolved_root(block);
+  return root * (root.transpose() * picked(gradient, part));
+}
+
+// Halves the step until the penalised likelihood rises above `best`; the point stays where it was if it never does.
+void search(Point& point, const std::vector<Eigen::Index>& part, const Eigen::VectorXd& step,
+            const Eigen::VectorXd& weights, int halvings, double& best, Evaluation& evaluation) {
+  auto& slots = point.slots();
+  std::vector<double> before;
+  for (const Eigen::Index p : part) before.push_back(*slots[static_cast<std::size_t>(p)].value);
+  double share = 1;
+  for (int halving = 0; halving < halvings; ++halving, share /= 2) {
+    for (std::size_t a = 0; a < part.size(); ++a) {
+      const Point::Slot& s = slots[static_cast<std::size_t>(part[a])];
+      *s.value = std::clamp(before[a] + share * step[static_cast<Eigen::Index>(a)], s.lower, s.upper);
+    }
+    Evaluation tried = point.evaluate();
+    const double value = counted(tried, weights) + point.log_prior();
+    if (value > best) {
+      best = value;
+      evaluation = std::move(tried);
+      return;
+    }
+  }
+  for (std::size_t a = 0; a < part.size(); ++a) *slots[static_cast<std::size_t>(part[a])].value = before[a];
+}
+
+// Returns the gradient of the penalised likelihood at the point where result.derivatives were taken. The prior goes
+// into the information, too, and the slots get the steps of their next differences.
+Eigen::VectorXd penalised_gradient(std::vector<Point::Slot>& slots, const Eigen::VectorXd& weights, Fit& result) {
+  Eigen::VectorXd gradient = result.derivatives.slope.transpose() * weights;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const auto p = static_cast<Eigen::Index>(k);
+    Point::Slot& s = slots[k];
+    double& resolved = result.information(p, p);
+    if (resolved > 0) s.step = std::min(s.largest_step, difference_share / std::sqrt(resolved));
+    // A forward difference is the slope half a step on: taken back by the curvature, which matters along ridges.
+    gradient[p] += 0.5 * result.derivatives.steps[k] * resolved;
+    if (s.prior.prior_sd > 0) {
+      gradient[p] -= s.prior.pull(*s.value);
+      resolved += s.prior.information(*s.value);
+    }
+  }
+  return gradient;
+}
+
+// Holds the indices of the parameters that may move: one held at a bound by the gradient stays there.
+struct FreeParts {
+  std::vector<Eigen::Index> all, of_nuisances, of_terms;
+};
+
+FreeParts free_parts(const std::vector<Point::Slot>& slots, const Eigen::VectorXd& gradient,
+                     const Eigen::MatrixXd& information) {
+  FreeParts parts;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const auto p = static_cast<Eigen::Index>(k);
+    const Point::Slot& s = slots[k];
+    const bool held = (*s.value <= s.lower && gradient[p] <= 0) || (*s.value >= s.upper && gradient[p] >= 0);
+    const double range = s.upper - s.lower;
+    if (held || !(information(p, p) * range * range > resolved_range)) continue;
+    parts.all.push_back(p);
+    (s.of_nuisance ? parts.of_nuisances : parts.of_terms).push_back(p);
+  }
+  return parts;
+}
+
+}  // namespace
+
+Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& information) {
+  return markov::resolved_root(information, information.diagonal(), resolved_share);
+}
+
+Eigen::VectorXd event_weights(const TransitionModel& model, const std::vector<char>& count) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.events().size()));
+  if (!count.empty())
+    for (std::size_t i = 0; i < model.events().size(); ++i)
+      weights[static_cast<Eigen::Index>(i)] = count[model.events()[i].trial] ? 1 : 0;
+  return weights;
+}
+
+Eigen::MatrixXd information(const Derivatives& columns, const Evaluation& here, const Eigen::VectorXd& weights) {
+  const Eigen::Map<const Eigen::VectorXd> z(here.score.data(), weights.size());
+  const Eigen::MatrixXd stretch = columns.slope + z.asDiagonal() * columns.change;
+  return columns.change.transpose() * weights.asDiagonal() * columns.change +
+         stretch.transpose() * weights.asDiagonal() * stretch;
+}
+
+Derivatives derivatives(const TransitionModel& model, const std::vector<double>& nuisance,
+                        const std::vector<EffectTerm>& terms, const Evaluation& here, bool with_nuisances) {
+  Point point(model, nuisance, terms, with_nuisances);
+  return differences(point, here);
+}
+
+Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
+        const FitOptions& options) {
+  Point point(model, nuisance, terms, options.refit_nuisances);
+  auto& slots = point.slots();
+  const Eigen::VectorXd weights = event_weights(model, options.count);
+  Fit result;
+  result.evaluation = options.from ? options.from->evaluation : point.evaluate();
+  double best = counted(result.evaluation, weights) + point.log_prior();
+  const double start = best;
+  std::size_t level = 0;    // of damping
+  bool both_sides = false;  // are differenced: at a kink of some event's density one side promises what is not there
+  const bool finite = std::isfinite(best);
+  result.converged = slots.empty() && finite;
+  if (!finite) result.reason = "its likelihood is not finite";
+  for (int iteration = 0; finite && iteration < options.most_iterations + both_sides && !slots.empty(); ++iteration) {
+    result.derivatives =
+        options.from && iteration == 0 ? options.from->derivatives : differences(point, result.evaluation, both_sides);
+    result.information = information(result.derivatives, result.evaluation, weights);
+    result.gradient = penalised_gradient(slots, weights, result);
+    const FreeParts parts = free_parts(slots, result.gradient, result.information);
+    if (parts.all.empty()) {
+      result.converged = true;
+      break;
+    }
+    // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves, and all of them
+    // by steps that are damped more.
+    const double before = best;
+    double foretold = 0;  // rise by the last step
+    const auto step_of = [&](const std::vector<Eigen::Index>& part, std::size_t damped) {
+      const Eigen::VectorXd step = gauss_newton(result.information, result.gradient, part, dampings[damped]);
+      foretold = 0.5 * step.dot(picked(result.gradient, part));
+      return step;
+    };
+    const auto rises = [&](const std::vector<Eigen::Index>& part, std::size_t damped, int halvings) {
+      if (part.empty()) return false;
+      const Eigen::VectorXd step = step_of(part, damped);
+      if (foretold > worth_a_step) search(point, part, step, weights, halvings, best, result.evaluation);
+      return best - before >= worth_a_step;
+    };
+    step_of(parts.all, 0);
+    const double promised = foretold;
+    // What is promised below this differences do not resolve.
+    const double settled = unresolved + unresolved_share * (best - start);
+    bool better = !(promised > worth_a_step) || rises(parts.all, level, most_halvings);
+    const bool at_the_top = both_sides && promised < settled;
+    if (!better && !at_the_top)
+      better = rises(parts.of_terms, 0, most_halvings) || rises(parts.of_nuisances, 0, most_halvings);
+    for (std::size_t damped = 0; !better && !at_the_top && damped < std::size(dampings); ++damped)
+      if (damped != level && (damped == 0 || promised > settled) && rises(parts.all, damped, few_halvings)) {
+        better = true;
+        level = damped;
+      }
+    result.promised = promised;
+    if (options.from && better && std::abs(best - before - foretold) < as_foretold * foretold) {
+      result.converged = true;
+      break;
+    }
+    if (!better && promised >= settled && !both_sides) {
+      both_sides = true;
+      continue;
+    }
+    if (best - before < least_kept * foretold)
+      level = std::min(level + 1, std::size(dampings) - 1);
+    else if (level > 0)
+      --level;
+    if (!(promised > worth_a_step)) {
+      result.converged = std::isfinite(promised);
+      if (!result.converged) result.reason = "its information matrix is singular";
+      break;
+    }
+    if (!better) {
+      // This is the optimum, up to what the differences resolve.
+      result.converged = promised < settled;
+      if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
+      break;
+    }
+  }
+  if (!result.converged && result.reason.empty())
+    result.reason = "the likelihood was still rising after " + std::to_string(options.most_iterations) + " steps";
+  result.nuisance = point.nuisance();
+  result.terms = point.terms();
+  result.log_likelihood = counted(result.evaluation, weights);
+  result.penalised = best;
+  return result;
+}
+
+std::vector<double> given_values(const TransitionModel& model) {
+  constexpr int bits = 10;  // of the best value
+  std::vector<double> values = nominal_values(model);
+  for (std::size_t p = 0; p < values.size(); ++p) {
+    const Nuisance& n = model.nuisances()[p];
+    if (!n.assumed) continue;
+    const auto cost = [&](double value) {
+      values[p] = value;
+      return n.cost(value) - model.evaluate(values, {}).total();
+    };
+    values[p] = boost::math::tools::brent_find_minima(cost, n.lower, n.upper, bits).first;
+  }
+  return values;
+}
+
+Fit best_fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
+             const FitOptions& options) {
+  Fit best = fit(model, nuisance, terms, options);
+  const std::vector<FitStart> starts = model.starts(terms);
+  for (const FitStart& start : starts) {
+    std::vector<EffectTerm> moved = terms;
+    for (std::size_t i = 0; i < moved.size(); ++i) moved[i].values = start.values[i];
+    Fit tried = fit(model, start.nuisance, moved, options);
+    if (tried.penalised > best.penalised || !std::isfinite(best.penalised)) best = std::move(tried);
+  }
+  if (!starts.empty() && !best.converged && std::isfinite(best.penalised)) {  // the last stretch of the way
+    FitOptions longer = options;
+    longer.most_iterations *= 3;
+    best = fit(model, best.nuisance, best.terms, longer);
+  }
+  return best;
+}
+
+}  // namespace metastable::analysis

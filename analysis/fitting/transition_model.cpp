@@ -1,0 +1,54 @@
+#include "analysis/fitting/transition_model.h"
+
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace metastable::analysis {
+
+double Nuisance::cost(double value) const {
+  const double off = (value - nominal) / prior_sd, square = off * off / 2;
+  return misstated > 0 ? -std::log((1 - misstated) * std::exp(-square) + misstated) : square;
+}
+
+double Nuisance::pull(double value) const { return (value - nominal) * information(value); }
+
+double Nuisance::information(double value) const {
+  const double off = (value - nominal) / prior_sd, stated = (1 - misstated) * std::exp(-off * off / 2);
+  const double belief = misstated > 0 ? stated / (stated + misstated) : 1;  // that it was stated rightly
+  return belief / (prior_sd * prior_sd);
+}
+
+double Evaluation::total() const { return std::accumulate(log_density.begin(), log_density.end(), 0.0); }
+
+EffectTerm term_of(const Candidate& candidate, const std::vector<double>& catalogue_values) {
+  FittedForm form = candidate.form_of ? candidate.form_of(catalogue_values)
+                                      : FittedForm{candidate.variants.front(), catalogue_values};
+  return {&candidate, std::move(form.variant), std::move(form.values)};
+}
+
+std::vector<FitStart> TransitionModel::starts(std::span<const EffectTerm>) const { return {}; }
+
+std::vector<std::string> TransitionModel::effect_ids() const {
+  std::vector<std::string> ids;
+  for (const Candidate& candidate : candidates()) ids.push_back(candidate.id);
+  return ids;
+}
+
+const std::vector<Variation>& TransitionModel::variations() const {
+  static const std::vector<Variation> none;
+  return none;
+}
+
+std::string TransitionModel::size_in_words(std::span<const EffectTerm>) const { return {}; }
+
+std::vector<double> TransitionModel::rest_chances(std::span<const double>, std::span<const EffectTerm>) const {
+  return std::vector<double>(events().size(), 0);
+}
+
+std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> TransitionModel::completed(
+    std::span<const double>, std::uint64_t) const {
+  return {};
+}
+
+}  // namespace metastable::analysis

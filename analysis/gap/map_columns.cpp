@@ -1,0 +1,211 @@
+#include "analysis/gap/map_columns.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include "analysis/statistics/median.h"
+#include "dynamics/numerics/truncated_normal.h"
+#include "markov/dense_matrix.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double tail_score = 2.2;
+constexpr double central_score = 1.5;          // below it an event is in the middle of its distribution
+constexpr double least_rests = 3;              // seen or expected, for a statement on them
+constexpr std::size_t least_successions = 20;  // of two scores in a trial, for a statement on memory
+
+EventResidual residual(EventKind kind, double score, double log_density) {
+  const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
+  if (kind != EventKind::rest && kind != EventKind::survival) {
+    const double s = std::clamp(score, -6.0, 6.0);
+    return {s, (s * s - 1) / std::numbers::sqrt2, (std::abs(s) > tail_score ? 1 : 0) - share_beyond};
+  }
+  const bool rested = kind == EventKind::rest;
+  const double chance = std::clamp(rested ? std::exp(log_density) : -std::expm1(log_density), 1e-12, 1 - 1e-12);
+  const double edge = dynamics::normal_quantile(chance), density = dynamics::normal_density(edge);
+  const double beyond = dynamics::normal_cdf(std::min(edge, -tail_score)) +
+                        std::max(0.0, dynamics::normal_cdf(edge) - dynamics::normal_cdf(tail_score));
+  const double weight = rested ? 1 / chance : -1 / (1 - chance);
+  return {-density * weight, -edge * density * weight / std::numbers::sqrt2, (beyond - share_beyond * chance) * weight};
+}
+
+EventKind phase_of(EventKind kind) { return is_contact(kind) ? EventKind::collision : kind; }
+
+// Returns [rad/s] by phase, contacts as collisions, what a unit of score is in the middle of its distribution. Where a
+// cell's events are far out it is more there, and would exaggerate the shift that brought them out. Where none is in
+// the middle it is the usual one.
+std::map<EventKind, double> units_of_score(const std::vector<Event>& events, const Evaluation& evaluation) {
+  std::map<EventKind, std::pair<double, double>> sums;  // and their number
+  std::map<EventKind, std::vector<double>> all;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    all[phase_of(events[i].kind)].push_back(evaluation.unit[i]);
+    if (std::abs(evaluation.score[i]) < central_score) {
+      auto& [sum, number] = sums[phase_of(events[i].kind)];
+      sum += evaluation.unit[i];
+      ++number;
+    }
+  }
+  std::map<EventKind, double> units;
+  for (auto& [phase, some] : all) units[phase] = median(std::move(some));
+  for (const auto& [phase, sum] : sums) units[phase] = sum.first / sum.second;
+  return units;
+}
+
+// Adds mean, spread and, of whole phases, tail share of every cell; contrasts have a mean only.
+void add_cells(MapColumns& all, const TransitionModel& model, const std::vector<EventResidual>& residuals,
+               const std::map<EventKind, double>& units) {
+  const double share_beyond = 2 * dynamics::normal_cdf(-tail_score);
+  for (const MapCell& cell : map_cells(model)) {
+    const auto n = static_cast<double>(cell.events.size());
+    const auto unit = units.find(phase_of(model.events()[cell.events.front()].kind));
+    const double in_speed = unit != units.end() ? unit->second : 1;  // [rad/s] of a score of one
+    if (!cell.weights.empty()) {
+      MapColumn weighted{Measure::shift, {}, 0, cell.weights};
+      for (std::size_t k = 0; k < cell.events.size(); ++k) {
+        weighted.terms.emplace_back(cell.events[k], cell.weights[k] * residuals[cell.events[k]].mean);
+        weighted.variance += cell.weights[k] * cell.weights[k];
+      }
+      all.add(cell, "mean", "rad/s", in_speed, std::move(weighted));
+      continue;
+    }
+    MapColumn mean{Measure::shift, {}, n, {}}, spread{Measure::spread, {}, n, {}};
+    MapColumn tail{Measure::tail, {}, n * share_beyond * (1 - share_beyond), {}};
+    double beyond = 0;
+    for (const std::size_t i : cell.events) {
+      mean.terms.emplace_back(i, residuals[i].mean);
+      spread.terms.emplace_back(i, residuals[i].spread);
+      tail.terms.emplace_back(i, residuals[i].tail);
+      beyond += residuals[i].tail;
+    }
+    all.add(cell, "mean", "rad/s", in_speed, std::move(mean));  // the size follows with the statistic
+    all.add(cell, "spread", "of the model's", 0, std::move(spread));
+    if (cell.facet == "phase") all.add(cell, "tail", "share", beyond / n, std::move(tail));
+  }
+}
+
+// Adds memory: successive scores of a trial; and trials that differ as a whole. It goes by correlation, so that a model
+// far off does not pass for either.
+void add_memory(MapColumns& all, const std::vector<Event>& events, const std::vector<EventResidual>& residuals,
+                bool stance) {
+  std::vector<std::size_t> members;
+  for (std::size_t i = 0; i < events.size(); ++i)
+    if (stance ? is_stance(events[i].kind) : is_contact(events[i].kind)) members.push_back(i);
+  double middle = 0, square = 0;
+  for (const std::size_t i : members) {
+    middle += residuals[i].mean / static_cast<double>(members.size());
+    square += residuals[i].mean * residuals[i].mean / static_cast<double>(members.size());
+  }
+  const double sd = std::sqrt(std::max(1.0, square - middle * middle));
+  MapColumn memory{Measure::correlation, {}, 0, {}}, whole{Measure::correlation, {}, 0, {}};
+  MapCell successive{"collision", stance ? "successive stances" : "successive collisions", {}, stance};
+  MapCell trials{"trial", stance ? "trials as a whole, stance" : "trials as a whole", {}, stance};
+  double sum = 0, between = 0, pairs = 0, in_trial = 0, partial = 0, before = 0;
+  std::optional<std::size_t> previous;
+  for (const std::size_t i : members) {
+    const double s = (residuals[i].mean - middle) / sd;
+    if (previous && events[*previous].trial == events[i].trial) {
+      memory.terms.emplace_back(i, s * before);
+      sum += s * before;
+      successive.events.push_back(i);
+      whole.terms.emplace_back(i, s * partial);  // adds up to half of (sum^2 - sum of squares)
+      between += s * partial;
+      trials.events.push_back(i);
+      pairs += in_trial;
+    } else {
+      partial = in_trial = 0;
+    }
+    partial += s;
+    ++in_trial;
+    before = s;
+    previous = i;
+  }
+  if (memory.terms.size() < least_successions) return;
+  memory.variance = static_cast<double>(memory.terms.size());
+  whole.variance = pairs;
+  const double correlation = sum / memory.variance;
+  all.add(successive, "memory", "correlation", correlation, std::move(memory));
+  all.add(trials, "spread", "correlation", between / pairs, std::move(whole));
+}
+
+// Puts rests against what the model expects at the same speeds.
+void add_rests(MapColumns& all, const TransitionModel& model, const Fit& fit) {
+  const auto& events = model.events();
+  const std::vector<double> chance_of_rest = model.rest_chances(fit.nuisance, fit.terms);
+  std::map<std::size_t, MapCell> outcomes;
+  for (std::size_t i = 0; i < events.size(); ++i)
+    if (events[i].rested) {
+      MapCell& cell = outcomes[events[i].condition];
+      cell.facet = "outcome";
+      cell.at = "rests in " + model.condition_name(events[i].condition);
+      cell.events.push_back(i);
+    }
+  for (auto& [condition, cell] : outcomes) {
+    MapColumn column{Measure::rests, {}, 0, {}};
+    double excess = 0, expected = 0, rests = 0;
+    for (const std::size_t i : cell.events) {
+      column.terms.emplace_back(i, (*events[i].rested ? 1 : 0) - chance_of_rest[i]);
+      excess += column.terms.back().second;
+      expected += chance_of_rest[i];
+      rests += *events[i].rested;
+      column.variance += chance_of_rest[i] * (1 - chance_of_rest[i]);
+    }
+    if (std::max(expected, rests) < least_rests) continue;
+    all.add(cell, "mean", "share of collisions", excess / static_cast<double>(cell.events.size()), std::move(column));
+  }
+}
+
+}  // namespace
+
+std::vector<EventResidual> residuals(const TransitionModel& model, const Evaluation& evaluation) {
+  std::vector<EventResidual> all;
+  for (std::size_t i = 0; i < model.events().size(); ++i)
+    all.push_back(residual(model.events()[i].kind, evaluation.score[i], evaluation.log_density[i]));
+  return all;
+}
+
+MapColumns map_columns(const TransitionModel& model, const Fit& fit) {
+  const std::vector<EventResidual> left = residuals(model, fit.evaluation);
+  MapColumns all;
+  add_cells(all, model, left, units_of_score(model.events(), fit.evaluation));
+  for (const bool stance : {false, true}) add_memory(all, model.events(), left, stance);
+  add_rests(all, model, fit);
+  return all;
+}
+
+// Parameters move no further than their priors let them.
+EfficientColumns project(const std::vector<MapColumn>& columns, const TransitionModel& model, const Fit& fit) {
+  const auto count = static_cast<Eigen::Index>(model.events().size());
+  EfficientColumns all{Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(columns.size())), {}, {}};
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    for (const auto& [i, value] : columns[c].terms)
+      all.dense(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c)) = value;
+  all.whole_norm = all.dense.colwise().squaredNorm();
+  all.sums = all.dense.colwise().sum();
+  if (fit.derivatives.slope.cols() == 0) return all;
+  const Eigen::MatrixXd& held = fit.derivatives.slope;
+  Eigen::MatrixXd gram = held.transpose() * held;
+  Eigen::VectorXd left = fit.gradient;  // next to nothing
+  for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
+    const Nuisance& n = model.nuisances()[p];
+    const auto at = static_cast<Eigen::Index>(p);
+    gram(at, at) += n.information(fit.nuisance[p]);
+    if (fit.nuisance[p] <= n.lower || fit.nuisance[p] >= n.upper) left[at] = 0;
+  }
+  auto at = static_cast<Eigen::Index>(fit.nuisance.size());
+  for (const EffectTerm& term : fit.terms)
+    for (const FreeParameter& p : term.candidate->parameters) {
+      if (p.prior_sd > 0) gram(at, at) += 1 / (p.prior_sd * p.prior_sd);
+      ++at;
+    }
+  const Eigen::MatrixXd root = resolved_root(gram);
+  const Eigen::MatrixXd weights = root * (root.transpose() * (held.transpose() * all.dense));
+  all.dense -= held * weights;
+  all.sums -= left.transpose() * weights;
+  return all;
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,42 @@
+// Judges the diagnosis by rigid bodies that this tree did not make.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "analysis/diagnosis/diagnosis.h"
+#include "analysis/experiment_model/diagnose.h"
+#include "tests/analysis/experiment_model/engine_wheel.h"
+
+namespace metastable::analysis {
+namespace {
+
+const EstimatedParameter& parameter(const std::vector<EstimatedParameter>& all, const std::string& name) {
+  return *std::ranges::find(all, name, &EstimatedParameter::name);
+}
+
+TEST(EngineDiagnosis, ARigidBodyIsNoGapOrARecalibrationOfAFewPerCent) {
+  const Diagnosis d = diagnose(test::engine_experiment({.seed = 11}));
+  EXPECT_TRUE(d.verdict == Verdict::no_gap || d.verdict == Verdict::recalibrate) << verdict_name(d.verdict);
+  EXPECT_NEAR(parameter(d.gap.contact, "restitution_mean").value, 0.4, 0.015);
+  EXPECT_NEAR(parameter(d.gap.contact, "friction_mean").value, 0.4, 0.01);
+}
+
+TEST(EngineDiagnosis, AnOddLegIsNamedWithItsFriction) {
+  const Diagnosis d = diagnose(test::engine_experiment({.seed = 12, .odd_leg = 5, .friction_ratio = 0.88}));
+  ASSERT_EQ(d.causes.set, std::vector<std::string>{"leg_contact"});
+  EXPECT_NEAR(parameter(d.causes.ranked.front().parameters.front(), "friction_ratio").value, 0.88, 0.03);
+  EXPECT_EQ(parameter(d.causes.ranked.front().parameters.front(), "leg").value, 5);
+}
+
+TEST(EngineDiagnosis, ADragAtTheAxleIsInTheSetWithItsSize) {
+  const Diagnosis d = diagnose(test::engine_experiment({.seed = 13, .viscous_drag = 0.004}));
+  ASSERT_EQ(d.verdict, Verdict::explained);
+  EXPECT_LE(d.causes.set.size(), 3u);
+  const auto drag = std::ranges::find(d.causes.ranked, "axle_drag_viscous", &Cause::name);
+  ASSERT_NE(drag, d.causes.ranked.end());
+  EXPECT_NE(std::ranges::find(d.causes.set, drag->name()), d.causes.set.end());
+  EXPECT_NEAR(parameter(drag->parameters.front(), "n_m_s").value, 0.004, 0.0006);
+}
+
+}  // namespace
+}  // namespace metastable::analysis

@@ -1,0 +1,130 @@
+#include "analysis/gap/gap_shrinkage.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "analysis/drum_model/coast_down_transitions.h"
+#include "analysis/fitting/model_fit.h"
+#include "analysis/statistics/random.h"
+#include "tests/analysis/diagnosed.h"
+#include "tests/analysis/line.h"
+#include "tests/analysis/rotor.h"
+
+namespace metastable::analysis {
+namespace {
+
+Fit as_given(const TransitionModel& model) {
+  Fit given;
+  given.evaluation = model.evaluate(nominal_values(model), {});
+  return given;
+}
+
+// There is a torque that the nominal losses lack: held out, its fit closes the gap; recalibration alone does not.
+TEST(GapShrinkage, TheTrueEffectClosesTheGap) {
+  const auto design = coast_down_transitions(test::coasting_rotor());
+  const EffectTerm truth = test::term(*design, "rolling_resistance", {}, {0.02});
+  const auto data = design->simulate(nominal_values(*design), std::vector{truth}, 5);
+  const Fit recalibrated = fit(*data, nominal_values(*data), {});
+  const Fit with = fit(*data, recalibrated.nuisance, {test::term(*data, "rolling_resistance", {}, {0.01})});
+  const auto shrinkage = gap_shrinkage(*data, as_given(*data), recalibrated, {&with}, 4, 1, 1);
+  ASSERT_EQ(shrinkage.size(), 2U);
+  for (const Shrinkage& one : shrinkage) {
+    EXPECT_LT(one.with_effect, one.recalibrated) << one.measure;
+    ASSERT_TRUE(one.closed) << one.measure;
+    EXPECT_NEAR(*one.closed, 1, 0.1) << one.measure;
+    EXPECT_LE(*one.closed_lower, *one.closed_upper);
+    EXPECT_LE(one.baseline_lower, one.baseline_upper);
+  }
+}
+
+TEST(GapShrinkage, WithoutRivalsTheLastModelIsTheRecalibratedOne) {
+  const auto design = coast_down_transitions(test::coasting_rotor());
+  const auto data = design->simulate(nominal_values(*design), {}, 6);
+  const Fit recalibrated = fit(*data, nominal_values(*data), {});
+  for (const Shrinkage& one : gap_shrinkage(*data, as_given(*data), recalibrated, {}, 4, 1, 1))
+    EXPECT_EQ(one.with_effect, one.recalibrated) << one.measure;
+}
+
+// 40 rests come in 10,000 collisions; 20 expected as given, 39 with the effect. Poisson limits of 40: 30.2 and 52.07.
+TEST(RestShrinkage, SharesAreThoseOfCounts) {
+  StepsBeforeFailure steps;
+  steps.observed_lower = 10000 / 52.07;
+  steps.observed_upper = 10000 / 30.2;
+  steps.baseline = 500;
+  steps.recalibrated = 400;
+  steps.with_effect = 10000.0 / 39;
+  const Shrinkage s = rest_shrinkage(10000, 40, steps);
+  EXPECT_NEAR(s.baseline, 0.002, 1e-12);
+  EXPECT_NEAR(s.baseline_lower, 0.00102, 1e-9);
+  EXPECT_NEAR(s.baseline_upper, 0.003207, 1e-9);
+  EXPECT_NEAR(s.recalibrated, 0.0015, 1e-12);
+  EXPECT_NEAR(s.with_effect, 0.0001, 1e-12);
+  EXPECT_NEAR(s.floor * 10000, 4.972152, 1e-5);  // sum over k of |k - 39| Poisson(k; 39)
+  ASSERT_TRUE(s.closed);
+  EXPECT_EQ(*s.closed, 1);  // 19 / (20 - 4.97) is more than all
+  EXPECT_NEAR(*s.closed_lower, (10.2 - 8.8) / (10.2 - s.floor * 10000), 1e-3);
+  EXPECT_EQ(*s.closed_upper, 1);
+}
+
+// Where the observed share agrees with the model as given there is nothing to close.
+TEST(RestShrinkage, SaysNoShareWhereTheGapMayBeNone) {
+  StepsBeforeFailure steps;
+  steps.observed_lower = 10000 / 52.07;
+  steps.observed_upper = std::numeric_limits<double>::infinity();
+  steps.baseline = 10000.0 / 35;
+  steps.recalibrated = steps.with_effect = std::numeric_limits<double>::infinity();
+  const Shrinkage s = rest_shrinkage(10000, 40, steps);
+  EXPECT_EQ(s.baseline_lower, 0);
+  EXPECT_EQ(s.floor, 0);
+  EXPECT_NEAR(s.with_effect, 0.004, 1e-12);
+  EXPECT_FALSE(s.closed);
+}
+
+// Says the model which error was added to each value.
+class Blurred : public test::Line {
+ public:
+  Blurred(std::vector<double> y, std::vector<double> w, const std::vector<double>& added)
+      : Line(std::move(y), std::move(w)) {
+    for (std::size_t i = 0; i < added.size(); ++i) events_[i].added = added[i];
+  }
+};
+
+// Errors that are drawn evenly hardly move the sum of a cell: taken for chance they were a gap below none, of -.003.
+TEST(GapShrinkage, ErrorsThatWereAddedAreNoChance) {
+  constexpr std::size_t trials = 100;
+  constexpr int seeds = 40;
+  double sum = 0;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal;
+    std::vector<double> y(4 * trials), w(4 * trials), added(4 * trials);
+    for (std::size_t number = 0; number < 4; ++number) {
+      const std::vector<double> even = even_normals(seed, number, trials);
+      for (std::size_t t = 0; t < trials; ++t) {
+        const std::size_t i = 4 * t + number;
+        w[i] = normal(generator);
+        added[i] = 0.5 * even[t];
+        y[i] = 3 + added[i] + 0.2 * normal(generator);
+      }
+    }
+    const Blurred model(y, w, added);
+    sum += gap_shrinkage(model, as_given(model), fit(model, {3, 0}, {}), {}, 4, 1, seed)[0].with_effect;
+  }
+  EXPECT_NEAR(sum / seeds, 0, 0.0007);
+}
+
+TEST(GapShrinkage, NeedsTwoFolds) {
+  const auto design = coast_down_transitions(test::coasting_rotor());
+  for (const int folds : {-1, 0, 1})
+    EXPECT_THROW(gap_shrinkage(*design, {}, {}, {}, folds, 1, 1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace metastable::analysis
