@@ -19,11 +19,13 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, BlindKind>, 5> kinds{{{"none", BlindKind::none},
+constexpr std::array<std::pair<std::string_view, BlindKind>, 7> kinds{{{"none", BlindKind::none},
                                                                        {"effect", BlindKind::effect},
                                                                        {"pair", BlindKind::pair},
                                                                        {"outside", BlindKind::outside},
-                                                                       {"left_out", BlindKind::left_out}}};
+                                                                       {"left_out", BlindKind::left_out},
+                                                                       {"mixed", BlindKind::mixed},
+                                                                       {"many", BlindKind::many}}};
 
 // It is the nuisances of every model, which recalibration removes: no candidate to be left out or paired.
 constexpr std::string_view recalibration = dynamics::contact_distribution_id;
@@ -100,7 +102,8 @@ std::string_view blind_kind_name(BlindKind kind) { return kinds[static_cast<std:
 BlindKind blind_kind(std::string_view name) {
   for (const auto& [known, kind] : kinds)
     if (known == name) return kind;
-  throw std::invalid_argument(fmt::format("kind: \"{}\" is none of none, effect, pair, outside, left_out", name));
+  throw std::invalid_argument(
+      fmt::format("kind: \"{}\" is none of none, effect, pair, outside, left_out, mixed, many", name));
 }
 
 bool can_be_had(std::string_view effect, dynamics::Law law) {
@@ -117,7 +120,9 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
         {"none", size.none},
         {"pairs", size.pairs},
         {"outside", size.outside},
-        {"left_out_per_effect", size.left_out_per_effect}})
+        {"left_out_per_effect", size.left_out_per_effect},
+        {"mixed", size.mixed},
+        {"many", size.many}})
     if (count < 0) throw std::invalid_argument(fmt::format("{}: {} is below 0", name, count));
   if (size.laws.empty()) throw std::invalid_argument("laws: none is given");
   for (const dynamics::Law law : size.laws)
@@ -128,7 +133,8 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
   std::map<BlindKind, std::size_t> turn;
   const auto add = [&](BlindPlan one) {
     const auto had = [&](dynamics::Law law) {
-      return std::ranges::all_of(one.effects, [&](const std::string& id) { return can_be_had(id, law); });
+      return (one.outside.empty() || can_be_had(one.outside, law)) &&
+             std::ranges::all_of(one.effects, [&](const std::string& id) { return can_be_had(id, law); });
     };
     one.law = size.laws[turn[one.kind] % size.laws.size()];
     if (!had(one.law)) {
@@ -149,19 +155,21 @@ std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed) {
     // An effect without a size is there or not: it cannot be made as visible as another one beside it.
     if (!info.parameters.empty()) paired.push_back(info.id);
   }
-  for (int p = 0; p < size.pairs; ++p) {
-    std::vector<std::string> two;
-    while (two.size() < 2) {
+  const auto several = [&](std::size_t count) {
+    std::vector<std::string> drawn;
+    while (drawn.size() < count) {
       const std::string& id = paired[static_cast<std::size_t>(dice.whole(0, static_cast<int>(paired.size()) - 1))];
-      if (two.empty() || two.front() != id) two.push_back(id);
+      if (std::ranges::find(drawn, id) == drawn.end()) drawn.push_back(id);
     }
-    add({BlindKind::pair, two, 2});
-  }
+    return drawn;
+  };
+  for (int p = 0; p < size.pairs; ++p) add({BlindKind::pair, several(2), 2});
   const auto& outside = dynamics::outside_effects();
+  const auto family = [&](int n) { return outside[static_cast<std::size_t>(n) % outside.size()].id; };
   for (int o = 0; o < size.outside; ++o)
-    add({BlindKind::outside,
-         {outside[static_cast<std::size_t>(o) % outside.size()].id},
-         static_cast<std::size_t>(o) / outside.size() % 2 == 0 ? 2 : 4});
+    add({BlindKind::outside, {}, static_cast<std::size_t>(o) / outside.size() % 2 == 0 ? 2 : 4, {}, family(o)});
+  for (int m = 0; m < size.mixed; ++m) add({BlindKind::mixed, several(m % 2 == 0 ? 1 : 2), 2, {}, family(m)});
+  for (int m = 0; m < size.many; ++m) add({BlindKind::many, several(3), 2});
   for (std::size_t i = plan.size(); i > 1; --i)
     std::swap(plan[i - 1], plan[static_cast<std::size_t>(dice.whole(0, static_cast<int>(i) - 1))]);
   return plan;
@@ -196,14 +204,13 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   std::vector<SizedEffect> sized;
   std::set<std::string> needed;
   const dynamics::OutsideInfo* outside = nullptr;
-  if (plan.kind == BlindKind::outside) {
-    outside = &dynamics::outside_info(plan.effects.front());
+  if (!plan.outside.empty()) {
+    outside = &dynamics::outside_info(plan.outside);
     needed = columns_needed(outside->id);
-  } else {
-    for (const std::string& id : plan.effects) {
-      sized.push_back(sized_effect(id, contact, dice));
-      needed.insert(sized.back().needs.begin(), sized.back().needs.end());
-    }
+  }
+  for (const std::string& id : plan.effects) {
+    sized.push_back(sized_effect(id, contact, dice));
+    needed.insert(sized.back().needs.begin(), sized.back().needs.end());
   }
   design.dropped = draw_dropped(needed, dice);
   const double target = 16 * plan.strength * plan.strength;
@@ -213,15 +220,17 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   }
   if (!truth.effects.empty()) truth.power = power(design, truth.effects);
   if (outside) {
+    // Beside effects of the catalogue it is half as strong to twice as strong as each of them.
+    const double of_outside = plan.effects.empty() ? target : target * std::exp2(dice.uniform(-1, 1));
     const auto power_of = [&](double size) {
       design.reality.outside = {{outside->id, size}};
       return power(design, {});
     };
     // Twice the size is four times the power: 0.4 of the range stands for 2x where no likelihood says so.
     const bool weighed = can_be_weighed(outside->id);
-    const double size = weighed ? find_size(0.03 * outside->upper, outside->upper, target, power_of)
+    const double size = weighed ? find_size(0.03 * outside->upper, outside->upper, of_outside, power_of)
                                 : 0.2 * outside->upper * plan.strength * dice.uniform(0.85, 1.15);
-    if (weighed) truth.power = power_of(size);
+    if (weighed) truth.power += power_of(size);
     truth.outside = {outside->id, size};
     design.reality.outside = {*truth.outside};
   }
@@ -264,16 +273,20 @@ void complete_truth(BlindCase& made) {
   if (truth.effects.empty() && !outside) return;
   const Experiment experiment = parse_experiment(source_of(made.files.files, fmt::format("case {}", truth.number)));
   const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length);
-  truth.left = outside ? outside_power_left(experiment, contact, *truth.outside)
-                       : power_left(experiment, contact, truth.effects);
+  truth.left = truth.effects.empty() ? outside_power_left(experiment, contact, *truth.outside)
+                                     : power_left(experiment, contact, truth.effects);
 }
 
-void complete_pair(BlindTruth& truth, const Experiment& experiment) {
+void complete_each(BlindTruth& truth, const Experiment& experiment) {
   truth.left_by_effect.clear();
-  if (truth.kind != BlindKind::pair) return;
+  if (truth.kind == BlindKind::mixed && truth.effects.size() == 1) truth.left_by_effect = {truth.left};
+  if (truth.effects.size() < 2) return;
   const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, experiment.wheel.leg_length);
-  for (const std::size_t other : {1, 0})
-    truth.left_by_effect.push_back(power_left(experiment, contact, truth.effects, {truth.effects.at(other)}));
+  for (std::size_t one = 0; one < truth.effects.size(); ++one) {
+    std::vector<dynamics::Effect> others = truth.effects;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(one));
+    truth.left_by_effect.push_back(power_left(experiment, contact, truth.effects, others));
+  }
 }
 
 }  // namespace metastable::analysis

@@ -19,6 +19,8 @@ enum class BlindKind {
   pair,      ///< two
   outside,   ///< an effect that no catalogue holds
   left_out,  ///< one effect, and a catalogue without it
+  mixed,     ///< one effect or two of the catalogue, and one that no catalogue holds
+  many,      ///< three effects of the catalogue
 };
 std::string_view blind_kind_name(BlindKind kind);
 /// @throws std::invalid_argument for an unknown name
@@ -34,6 +36,8 @@ struct BlindSize {
   /// Laws that the cases of every kind obey in turn: published, or settled (by the laboratory's rigid body). Effects
   /// that no rigid body has (can_be_had()) stay with published; without it among the laws they have no case.
   std::vector<dynamics::Law> laws = {dynamics::Law::published};
+  int mixed = 0;
+  int many = 0;
 };
 /// Says whether the laboratory has cases of an effect, of the catalogue or outside, under a law. Under settled it has
 /// none of what acts on the loss of a collision, of slip_reversal, sloshing_fluid, and of inertia, which is
@@ -50,8 +54,8 @@ struct BlindTruth {
   int strength = 0;  ///< 1, 2, 4; by size alone where an outside effect cannot be weighed; 0: not defined (none)
   double power = 0;  ///< expected 2 Delta log likelihood, true contact known
   double left = 0;   ///< realised, after recalibration; 0 until complete_truth()
-  /// Of a pair, by effect, it is what was realised after recalibration with the other effect in the model. Not sealed,
-  /// for it follows from the rest and the case; empty until complete_pair().
+  /// Of several effects, by effect, it is what was realised after recalibration with the others in the model. Not
+  /// sealed, for it follows from the rest and the case; empty until complete_each().
   std::vector<double> left_by_effect = {};
   bool nominal_is_true = true;
   Spread restitution, friction;  ///< true
@@ -74,24 +78,26 @@ using Power = std::function<double(const PowerDesign&, const std::vector<dynamic
 /// Says what each case of a run is, without its data: kinds, effects and strengths in an order drawn from the seed.
 struct BlindPlan {
   BlindKind kind;
-  std::vector<std::string> effects;  ///< ids; of `outside` the family
+  std::vector<std::string> effects;  ///< ids of the catalogue
   int strength = 0;
   dynamics::Law law = dynamics::Law::published;
+  std::string outside = {};  ///< id of what no catalogue holds; empty: nothing
 };
 /// @throws std::invalid_argument naming a count below 0, or a law that is neither published nor settled
 std::vector<BlindPlan> blind_plan(const BlindSize& size, std::uint64_t seed);
 
-/// Draws case `number` (from 1) of a plan. Sizes are found by a search on `power` for 16, 64, 256 (each effect of a
-/// pair for 64); an effect that cannot be made so strong within its range keeps its largest size, and truth.power
-/// tells. An outside effect that cannot be weighed (outside_power.h) has its strength by its size alone. truth.left is
-/// not worked out: a case that is graded takes complete_truth() too.
+/// Draws case `number` (from 1) of a plan. Sizes are found by a search on `power` for 16, 64, 256 (each of several
+/// effects for 64, and what no catalogue holds beside them for half of that to twice as much); an effect that cannot be
+/// made so strong within its range keeps its largest size, and truth.power tells. An outside effect that cannot be
+/// weighed (outside_power.h) has its strength by its size alone. truth.left is not worked out: a case that is graded
+/// takes complete_truth() too.
 BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, const Power& power);
 
 /// Sets truth.left from the case's own files; a case without an effect that can be weighed keeps 0. A fit takes about a
 /// second.
 void complete_truth(BlindCase& made);
-/// Sets truth.left_by_effect of a pair by two fits; other kinds stay as they are.
+/// Sets truth.left_by_effect of a case of several effects, by a fit each; other kinds stay as they are.
 /// @param experiment  the case as it was written
-void complete_pair(BlindTruth& truth, const Experiment& experiment);
+void complete_each(BlindTruth& truth, const Experiment& experiment);
 
 }  // namespace metastable::analysis

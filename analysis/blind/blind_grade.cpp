@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
+#include "analysis/blind/at_work_grade.h"
 #include "analysis/blind/sized_effect.h"
 #include "analysis/statistics/interval_95.h"
 
@@ -33,7 +35,7 @@ std::vector<std::string> members(const std::string& name) {
 using Answer = std::optional<BlindAnswer>;
 
 bool is(const Answer& a, Verdict verdict) { return a && a->verdict == verdict; }
-bool gap(const Answer& a) { return is(a, Verdict::explained) || is(a, Verdict::unexplained); }
+bool gap(const Answer& a) { return a && is_gap(a->verdict); }
 bool taken_for_contact(const Answer& a) { return is(a, Verdict::recalibrate) || is(a, Verdict::no_gap); }
 bool confident(const Answer& a) { return is(a, Verdict::explained) && a->cause_set.size() == 1; }
 
@@ -55,6 +57,10 @@ std::string asked(const BlindTruth& truth) {
       return "outside: " + truth.outside->id;
     case BlindKind::left_out:
       return "left out";
+    case BlindKind::mixed:
+      return "mixed";
+    case BlindKind::many:
+      return "three effects";
   }
   throw std::logic_error("unknown kind");
 }
@@ -196,7 +202,7 @@ Groups ambiguity_groups(const std::vector<BlindTruth>& truths, const std::vector
 // Lists the effects that one way of answering names.
 std::vector<std::string> named_by(const std::string& way, const BlindAnswer& answer) {
   if (const auto found = answer.stepwise.find(way); found != answer.stepwise.end()) return found->second;
-  if (answer.verdict != Verdict::explained || answer.cause_set.empty()) return {};
+  if (answer.cause_set.empty() || !is_gap(answer.verdict)) return {};
   return members(answer.cause_set.front());
 }
 
@@ -220,15 +226,22 @@ void count_way(WayGrade& grade, const BlindTruth& truth, const std::vector<std::
       return grade.outside.count(!named.empty());
     case BlindKind::left_out:
       return;
+    case BlindKind::mixed:
+      grade.mixed.count(right == truth.effects.size());
+      return grade.mixed_wrong.count(named.size() > right);
+    case BlindKind::many:
+      grade.three.count(right == truth.effects.size());
+      return grade.two_of_three.count(right + 1 >= truth.effects.size());
   }
 }
 
 // Sets the diagnosis beside the criteria that all answers tell of, over the cases that were answered.
 std::vector<WayGrade> ways(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
-  std::vector<WayGrade> all{{"diagnosis, first of its set", {}, {}, {}, {}, {}, {}, {}}};
+  std::vector<WayGrade> all(1);
+  all.front().way = "diagnosis, first of its set";
   for (const Answer& answer : answers)
     if (answer) {
-      for (const auto& [criterion, effects] : answer->stepwise) all.push_back({criterion, {}, {}, {}, {}, {}, {}, {}});
+      for (const auto& [criterion, effects] : answer->stepwise) all.emplace_back().way = criterion;
       break;
     }
   for (std::size_t i = 0; i < truths.size(); ++i)
@@ -329,9 +342,13 @@ BlindGrades grade(const std::vector<BlindTruth>& truths, const std::vector<std::
       case BlindKind::left_out:
         count_left_out(tally, truth, answer, result.alike);
         break;
+      case BlindKind::mixed:
+      case BlindKind::many:
+        break;  // at_work_grades() has them
     }
   }
   result.grades = measures(tally);
+  std::ranges::move(at_work_grades(truths, answers), std::back_inserter(result.grades));
   for (const auto& [strength, size] : {std::pair{1, &result.mean_set_size_1x}, {2, &result.mean_set_size_2x}})
     if (tally.set_size[strength].second > 0) *size = tally.set_size[strength].first / tally.set_size[strength].second;
   if (const int sets = tally.set_size[2].second; sets > 0)

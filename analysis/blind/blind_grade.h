@@ -32,6 +32,12 @@ struct BlindAnswer {
   };
   std::vector<ClaimedPlace> where;
   std::optional<double> closed_lower, closed_upper;  ///< share of the gap that was closed, 90 %
+  struct SaidAtWork {
+    std::vector<std::string> effects;  ///< one, or a group that the data cannot tell apart
+    double probability = 0;
+  };
+  std::vector<SaidAtWork> at_work = {};
+  double p_unnamed = 0;
   /// Lists by criterion (AICc, BIC) the effects that stepwise selection over the same models names.
   std::map<std::string, std::vector<std::string>> stepwise = {};
 };
@@ -55,10 +61,12 @@ struct Grade {
 /// effects.
 struct WayGrade {
   std::string way;
-  Proportion alarms;            ///< named something where there is no gap
-  Proportion exact, in, wrong;  ///< one effect, power left: named it alone; named it; named something else (too)
-  Proportion both, third;       ///< two effects: named both; named something that neither is
-  Proportion outside;           ///< named something for what no catalogue holds
+  Proportion alarms;               ///< named something where there is no gap
+  Proportion exact, in, wrong;     ///< one effect, power left: named it alone; named it; named something else (too)
+  Proportion both, third;          ///< two effects: named both; named something that neither is
+  Proportion outside;              ///< named something for what no catalogue holds
+  Proportion three, two_of_three;  ///< three effects: named all of them; at least two
+  Proportion mixed, mixed_wrong;   ///< beside what no catalogue holds: named all that are there; named another one
 };
 
 struct CalibrationBin {
@@ -80,7 +88,8 @@ struct BlindGrades {
   std::map<std::string, std::vector<std::string>> alike;  ///< ambiguity groups: what shares the cause sets of an effect
 };
 
-/// @param truths   whole: complete_truth() when the case was made, complete_pair() for pairs. An effect whose `left` is
+/// @param truths   whole: complete_truth() when the case was made, complete_each() for several effects. An effect whose
+/// `left` is
 ///                 below 9 counts as absorbed by recalibration, a pair without left_by_effect as not findable
 /// @param answers  one a truth; nothing: not answered, counted as a failure of every measure it belongs to
 /// @throws std::invalid_argument if they are not as many as the truths

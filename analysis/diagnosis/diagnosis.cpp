@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/diagnosis/at_work.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/diagnosis/gap_tests.h"
 #include "analysis/diagnosis/missing_columns.h"
@@ -192,6 +193,8 @@ std::string verdict_name(Verdict verdict) {
       return "recalibrate";
     case Verdict::explained:
       return "explained";
+    case Verdict::partly_explained:
+      return "partly_explained";
     case Verdict::unexplained:
       return "unexplained";
   }
@@ -199,10 +202,11 @@ std::string verdict_name(Verdict verdict) {
 }
 
 Verdict verdict_from_name(std::string_view name) {
-  for (const Verdict verdict : {Verdict::no_gap, Verdict::recalibrate, Verdict::explained, Verdict::unexplained})
+  for (const Verdict verdict :
+       {Verdict::no_gap, Verdict::recalibrate, Verdict::explained, Verdict::partly_explained, Verdict::unexplained})
     if (verdict_name(verdict) == name) return verdict;
   throw std::invalid_argument(
-      fmt::format("verdict: \"{}\" is none of no_gap, recalibrate, explained, unexplained", name));
+      fmt::format("verdict: \"{}\" is none of no_gap, recalibrate, explained, partly_explained, unexplained", name));
 }
 
 std::string Cause::name() const { return fmt::format("{}", fmt::join(effects, "+")); }
@@ -276,31 +280,36 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
     std::ranges::move(varied, std::back_inserter(alone.facets));
     alone.evidence = evidence_of_more(alone.facets);
   }
-  Chosen chosen{&recalibrated};
+  Chosen chosen{&recalibrated, {}};
   if (gap && !ordered.empty() && ordered.front()->evidence > 0 && !ordered.front()->fit.nuisance.empty()) {
     progress(0.68, "what is left");
     chosen = choose(d, model, ranking, ordered, recalibrated, options);
   } else {
     d.gap.left = d.gap.recalibrated;
-    if (gap) chosen.none = certain_odds;  // something stands out, and no effect does
+    if (gap) chosen.unnamed.alone = certain_odds;  // something stands out, and no effect does
   }
   progress(0.7, "how far it shrinks");
   const bool named = chosen.fit != &recalibrated;
   if (named) d.causes.size = model.size_in_words(chosen.fit->terms);
+  HeldOutGap held_out;
   if (d.data.trials >= trials_for_folds(options.folds))
-    d.shrinkage.measures =
+    held_out =
         gap_shrinkage(model, given, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
                       options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
+  d.shrinkage.measures = held_out.measures;
   // Even a cause that closes nearly all of a huge gap may leave a large one.
   if (named && !d.shrinkage.measures.empty() && leaves_gap_held_out(d, chosen.bent, 0)) {
     const double by_itself = gap_by_itself(model, *chosen.fit, options.folds, options.threads, options.seed,
                                            [&] { progress(0.85, "how far it shrinks"); });
-    if (leaves_gap_held_out(d, chosen.bent, std::max(0.0, by_itself)))
-      chosen.none = std::max(chosen.none, certain_odds);
+    if (leaves_gap_held_out(d, chosen.bent, std::max(0.0, by_itself))) chosen.unnamed.left = certain_odds;
   }
-  if (gap && trials_to_explain(d)) chosen.none = std::max(chosen.none, even_odds);
-  const double share_of_effects = share_probabilities(d, model, ranking, ordered, candidates.size(), gap, chosen.none);
-  give_verdict(d, gap, chosen.none, share_of_effects);
+  if (gap && trials_to_explain(d)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, even_odds);
+  const double share_of_effects =
+      share_probabilities(d, model, ranking, ordered, candidates.size(), gap, chosen.unnamed);
+  give_verdict(d, gap, chosen.unnamed, share_of_effects);
+  if (!d.causes.at_work.empty() && !held_out.gap.empty())
+    add_closed_shares(d, model, ranking, given, recalibrated, held_out.gap, options,
+                      [&] { progress(0.86, "what each effect closes"); });
 
   progress(0.88, "steps before failure");
   d.shrinkage.steps = steps_before_failure(model, nominal, recalibrated, *chosen.fit, options.seed);

@@ -16,6 +16,7 @@
 #include "analysis/gap/gap_cell.h"
 #include "analysis/gap/gap_shrinkage.h"
 #include "analysis/gap/left_over.h"
+#include "analysis/statistics/estimate.h"
 
 namespace metastable::analysis {
 
@@ -32,7 +33,15 @@ struct DiagnosisOptions {
   std::function<void(double, const std::string&)> progress = {};
 };
 
-enum class Verdict { no_gap, recalibrate, explained, unexplained };
+enum class Verdict {
+  no_gap,            ///< nothing beyond chance
+  recalibrate,       ///< other parameters of the model as it is remove the gap
+  explained,         ///< effects, or a group that these data cannot tell apart, and nothing else
+  partly_explained,  ///< likewise, and something without a name beside them
+  unexplained        ///< a gap, and no effect that is likely to be at work
+};
+/// Says whether it is a gap that no recalibration removes.
+inline bool is_gap(Verdict verdict) { return verdict >= Verdict::explained; }
 std::string verdict_name(Verdict verdict);
 /// @throws std::invalid_argument for an unknown name
 Verdict verdict_from_name(std::string_view name);
@@ -54,6 +63,27 @@ struct Cause {
   std::vector<std::vector<EstimatedParameter>> parameters;  ///< by effect
   std::string not_decided;   ///< why, if the fit failed or the data cannot tell; empty otherwise
   std::string name() const;  ///< "a" or "a+b"
+};
+
+/// One effect, or several that these data cannot tell apart, whatever else is at work.
+struct AtWork {
+  std::string name;                  ///< the effect's id, or what the group has in common
+  std::vector<std::string> effects;  ///< ids
+  double probability = 0;            ///< that it is, or that one of them is, given all hypotheses
+  /// Of the likeliest of them, averaged over the hypotheses that hold it; what lies between these is in the intervals.
+  std::vector<EstimatedParameter> parameters;
+  /// Shares of the held-out gap as given that it closes, 90 %: added to the model as given, nothing else refitted; and
+  /// added last, to the recalibrated model with the others at work.
+  std::optional<Estimate> closes_alone, closes_beside;
+};
+
+/// Where something without a name acts, beside what is at work or alone.
+struct UnnamedFacet {
+  std::string facet, aspect;
+  bool stance = false;
+  double probability = 0;
+  std::optional<double> size;  ///< of the largest cell of the map there, as GapCell's; none: no cell shows it
+  std::string unit;
 };
 
 /// Supposes something that has no name beside a hypothesis or alone.
@@ -106,6 +136,10 @@ struct NextExperiment {
 /// that cancel). Beyond this ratio a pair describes and does not explain.
 inline constexpr double most_together = 1.2;
 
+/// Pairs whose own data were drawn with both have gained up to 1.41 times as much together; pairs that imitate what no
+/// catalogue holds 1.6 times and more. Between the two ratios both are at work with something without a name.
+inline constexpr double surely_bent = 1.5;
+
 /// Holds the answer for one experiment.
 struct Diagnosis {
   std::shared_ptr<const TransitionModel> model;  ///< diagnosed; nothing where it was passed by reference
@@ -141,7 +175,10 @@ struct Diagnosis {
     std::string size;                      ///< of the likeliest beside the nominal model, a sentence; or empty
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
-    double together = 1;  ///< of the best hypothesis, if a pair: see most_together
+    double together = 1;                       ///< of the best hypothesis, if a pair: see most_together
+    std::vector<AtWork> at_work;               ///< by falling probability
+    std::vector<UnnamedFacet> unnamed_facets;  ///< likewise
+    double p_unnamed = 0;                      ///< that something without a name is at work, alone or beside effects
   } causes;
 
   /// Says how far the gap shrinks.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/diagnosis/at_work.h"
 #include "analysis/diagnosis/too_few.h"
 #include "analysis/diagnosis/verdict.h"
 #include "analysis/fitting/evidence.h"
@@ -27,15 +28,6 @@ std::string with_parameters(const Cause& cause) {
     if (!inside.empty() && inside.size() <= most_parameters) text += fmt::format(" ({})", fmt::join(inside, ", "));
   }
   return text;
-}
-
-// Names what effects that act alike have in common, where the field has a word for it.
-std::string common_name(const Diagnosis& d, const std::vector<std::string>& alike) {
-  for (const EffectGroup& group : d.data.groups)
-    if (std::ranges::all_of(
-            alike, [&](const std::string& id) { return std::ranges::find(group.members, id) != group.members.end(); }))
-      return group.name;
-  return "one and the same here";
 }
 
 // Returns what all causes of a group have in common, if they are pairs that do; else nothing.
@@ -81,6 +73,52 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
                   facet->facet, facet->aspect, facet->stance ? "stances" : d.data.step_name + "s"));
 }
 
+std::string percent(double share) {
+  const double rounded = std::round(100 * share);
+  return share > 0 && rounded < 1 ? "less than 1 %" : fmt::format("{:.0f} %", rounded + 0.0);
+}
+
+std::string with_size(const AtWork& one) {
+  std::vector<std::string> inside;
+  for (const EstimatedParameter& p : one.parameters)
+    inside.push_back(p.fitted ? fmt::format("{} {:.3g} ({:.3g} to {:.3g})", p.name, p.value, p.lower, p.upper)
+                              : fmt::format("{} {:.3g}", p.name, p.value));
+  std::string text = one.name;
+  if (one.effects.size() > 1) text += fmt::format(" ({})", fmt::join(one.effects, ", "));
+  if (!inside.empty() && inside.size() <= most_parameters) text += fmt::format(", {}", fmt::join(inside, ", "));
+  return text;
+}
+
+// Says what is at work with the shares that it closes.
+void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
+  std::vector<std::string> all;
+  for (const AtWork& one : d.causes.at_work) {
+    if (one.probability < least_at_work) continue;
+    std::string closes;
+    if (one.closes_alone)
+      closes = fmt::format(", closes {} of the gap alone", percent(std::max(0.0, one.closes_alone->value)));
+    if (one.closes_alone && one.closes_beside)
+      closes += fmt::format(" and {} as the last", percent(std::max(0.0, one.closes_beside->value)));
+    all.push_back(with_size(one) + closes);
+  }
+  if (!all.empty()) s.push_back(fmt::format("At work: {}.", fmt::join(all, "; ")));
+}
+
+// Says how much of the gap stays without a name, and where.
+void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
+  std::string where;
+  if (!d.causes.unnamed_facets.empty()) {
+    const UnnamedFacet& facet = d.causes.unnamed_facets.front();
+    where = fmt::format(" It acts by {}, on the {} of {}{}.", facet.facet, facet.aspect,
+                        facet.stance ? "stances" : d.data.step_name + "s",
+                        facet.size ? fmt::format(" ({:+.2g} {})", *facet.size, facet.unit) : "");
+  }
+  const bool known = !d.shrinkage.measures.empty() && d.shrinkage.measures[0].closed;
+  s.push_back(fmt::format("Something without a name stays{}, with probability {:.2f}.{}",
+                          known ? fmt::format(", {} of the gap", percent(1 - *d.shrinkage.measures[0].closed)) : "",
+                          d.causes.p_unnamed, where));
+}
+
 void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::no_gap:
@@ -108,6 +146,11 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
             fmt::format("It leaves {} {} of the map beyond chance, by no more than the {:.0f} % of its own size "
                         "that the form of a cause is allowed to be off.",
                         left, left == 1 ? "cell" : "cells", 100 * model_error));
+      break;
+    case Verdict::partly_explained:
+      s.push_back("There is a gap that recalibration does not remove, and part of it has a name.");
+      say_what_is_at_work(s, d);
+      say_what_stays(s, d);
       break;
     case Verdict::unexplained:
       if (const auto would_do = trials_to_explain(d)) {
@@ -141,8 +184,8 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
 }
 
 void say_where(std::vector<std::string>& s, const Diagnosis& d) {
-  const GapMap& map = d.verdict == Verdict::unexplained ? d.gap.left : d.gap.recalibrated;
-  if (d.verdict == Verdict::explained || d.verdict == Verdict::unexplained) {
+  const GapMap& map = d.verdict == Verdict::explained ? d.gap.recalibrated : d.gap.left;
+  if (is_gap(d.verdict)) {
     const auto largest = std::min_element(map.cells.begin(), map.cells.end(), [](const GapCell& a, const GapCell& b) {
       return std::abs(a.statistic) > std::abs(b.statistic);
     });
@@ -189,6 +232,14 @@ void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
 
 }  // namespace
 
+std::string common_name(const Diagnosis& d, const std::vector<std::string>& alike) {
+  for (const EffectGroup& group : d.data.groups)
+    if (std::ranges::all_of(
+            alike, [&](const std::string& id) { return std::ranges::find(group.members, id) != group.members.end(); }))
+      return group.name;
+  return "one and the same here";
+}
+
 bool closed_is_known(const Shrinkage& s) {
   return s.closed && s.closed_lower && s.closed_upper && *s.closed_upper - *s.closed_lower <= 1;
 }
@@ -221,6 +272,15 @@ std::string next_step(const Diagnosis& d) {
             d.limits.next.front().change);
       return "Tell the causes apart before changing the model: with more trials, or with a column under “What missing "
              "columns hide”.";
+    case Verdict::partly_explained: {
+      std::vector<std::string> names;
+      for (const AtWork& one : d.causes.at_work)
+        if (one.probability >= least_at_work) names.push_back(one.name);
+      return fmt::format(
+          "Give the model {}, or take it out of the machine, and diagnose new trials: what stays is then the whole gap "
+          "and shows more clearly.",
+          fmt::join(names, " and "));
+    }
     case Verdict::unexplained:
       if (const auto would_do = trials_to_explain(d))
         return fmt::format("Run {} trials like these, or longer ones, and diagnose them together.", *would_do);

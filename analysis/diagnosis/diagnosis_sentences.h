@@ -21,4 +21,7 @@ bool closed_is_known(const Shrinkage& shrinkage);
 /// Says "not known: 90 % interval −141 to 142 %, wider than the gap" of a share that is not.
 std::string closed_unknown(const Shrinkage& shrinkage);
 
+/// Names what effects that act alike have in common, where the field has a word for it.
+std::string common_name(const Diagnosis& d, const std::vector<std::string>& alike);
+
 }  // namespace metastable::analysis

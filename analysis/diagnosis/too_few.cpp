@@ -31,7 +31,7 @@ std::optional<std::size_t> trials_to_explain(const Diagnosis& d) {
 std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& d, const DiagnosisOptions& options) {
   std::vector<NotPossible> all;
   const auto trials = static_cast<double>(d.data.trials);
-  const bool gap = d.verdict == Verdict::explained || d.verdict == Verdict::unexplained;
+  const bool gap = is_gap(d.verdict);
   if (const auto would_do = trials_to_explain(d))
     all.push_back({"what causes a gap",
                    fmt::format("{} {} with {} {} of a speed; causes are named from {} trials and {} transitions on",

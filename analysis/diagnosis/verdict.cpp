@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "analysis/diagnosis/at_work.h"
 #include "analysis/diagnosis/parameter_estimates.h"
 #include "analysis/diagnosis/too_few.h"
 #include "analysis/fitting/cause_ranking.h"
@@ -52,11 +53,11 @@ bool extends_likelier(const RankedCause& cause, const std::vector<const RankedCa
   return false;
 }
 
-// Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds to all hypotheses; few
-// trials cannot show that events scatter as they would by themselves, and facets are then not judged.
-double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
-                       const std::vector<const RankedCause*>& ordered, const Fit& recalibrated) {
-  if (!ranking.scan.trials_suffice) return 0;
+// Supposes something without a name alone and beside the likeliest hypotheses. Returns its odds; few trials cannot show
+// that events scatter as they would by themselves, and facets are then not judged.
+Odds odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
+                     const std::vector<const RankedCause*>& ordered, const Fit& recalibrated) {
+  if (!ranking.scan.trials_suffice) return {};
   const double top = ordered.front()->evidence;
   double all = 0;
   std::vector<const RankedCause*> joined;  // hypotheses beside which it is supposed
@@ -87,8 +88,8 @@ double odds_of_unnamed(Diagnosis& d, const TransitionModel& model, const CauseRa
     beside += std::exp(std::min(largest_log_odds, unnamed[i].evidence - top));
   }
   alone.evidence = evidence_of_more(alone.facets);
-  const double odds = unnamed_alone * std::exp(std::min(largest_log_odds, alone.evidence - top)) / all +
-                      (of_joined > 0 ? unnamed_beside * beside / of_joined : 0);
+  const Odds odds{unnamed_alone * std::exp(std::min(largest_log_odds, alone.evidence - top)) / all,
+                  of_joined > 0 ? unnamed_beside * beside / of_joined : 0};
   std::ranges::move(unnamed, std::back_inserter(d.causes.unnamed));
   return odds;
 }
@@ -152,7 +153,7 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
               const std::vector<const RankedCause*>& ordered, const Fit& recalibrated,
               const DiagnosisOptions& options) {
   const RankedCause& best = *ordered.front();
-  Chosen chosen{&best.fit};
+  Chosen chosen{&best.fit, {}};
   d.gap.left = gap_map(model, best.fit, options.draws, options.seed + 1);
   const Fit& exact = exact_part(ranking.singles, best.terms, recalibrated);
   PhaseGain gained = phase_gain(model, best.fit, exact);
@@ -165,11 +166,15 @@ Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ra
   if (all > 0) chosen.bent = std::clamp((best.fit.log_likelihood - exact.log_likelihood) / all, 0.0, 1.0);
   const double tolerated = model_error * model_error;
   const double beyond = d.gap.left.largest_beyond(tolerated * gained.collisions, tolerated * gained.stances);
+  chosen.unnamed = odds_of_unnamed(d, model, ranking, ordered, recalibrated);
+  double& left = chosen.unnamed.left;
   if (d.gap.left.p_value < left_over_level && beyond > left_over_square)
-    chosen.none = std::exp(std::min(largest_log_odds, 0.5 * (beyond - left_over_square)));
-  chosen.none = std::max(chosen.none, odds_of_unnamed(d, model, ranking, ordered, recalibrated));
+    left = std::exp(std::min(largest_log_odds, 0.5 * (beyond - left_over_square)));
   d.causes.together = best.together;
-  if (d.causes.together > most_together) chosen.none = std::max(chosen.none, certain_odds);
+  if (d.causes.together > surely_bent)
+    chosen.unnamed.alone = std::max(chosen.unnamed.alone, certain_odds);
+  else if (d.causes.together > most_together)
+    left = std::max(left, even_odds);
   return chosen;
 }
 
@@ -184,7 +189,7 @@ bool leaves_gap_held_out(const Diagnosis& d, double bent, double by_itself) {
 
 double share_probabilities(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
                            const std::vector<const RankedCause*>& ordered, std::size_t candidates, bool gap,
-                           double none) {
+                           const Odds& unnamed) {
   const double top = ordered.empty() ? 0 : std::max(0.0, ordered.front()->evidence);
   const double effects = std::max<double>(1, static_cast<double>(candidates));
   const double weight_null = std::exp(-top);
@@ -192,7 +197,7 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const Cau
   for (const RankedCause* cause : ordered) given_gap += std::exp(cause->evidence - top) / effects;
   // The tests decide whether there is a gap, because their levels are calibrated and the evidence's are not: where both
   // disagree, the odds of a gap go no further than even.
-  none = std::max(none, none_prior);
+  const double none = std::max(unnamed.none(), none_prior);
   const double even = weight_null / (1 + none);
   double share = 1;
   if (given_gap > 0 && (gap ? given_gap < even : given_gap > even)) share = even / given_gap;
@@ -208,7 +213,7 @@ double share_probabilities(Diagnosis& d, const TransitionModel& model, const Cau
   return share * given_gap / sum;
 }
 
-void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) {
+void give_verdict(Diagnosis& d, bool gap, const Odds& unnamed, double share_of_effects) {
   if (trials_to_explain(d)) {
     const bool any = gap || d.gap.p_recalibration < recalibration_level;
     d.verdict = any ? Verdict::unexplained : Verdict::no_gap;
@@ -219,11 +224,10 @@ void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) 
     if (d.verdict == Verdict::recalibrate) d.causes.set = {d.gap.recalibration_id};
     return;
   }
-  if (none >= most_odds_of_none) {
-    d.verdict = Verdict::unexplained;
-    return;
-  }
-  d.verdict = Verdict::explained;
+  d.verdict = Verdict::unexplained;
+  d.causes.p_unnamed = (1 - d.causes.p_no_gap - d.causes.p_recalibrate) * unnamed.of_unnamed();
+  const bool whole = unnamed.none() < most_odds_of_none;
+  if (!whole && unnamed.of_catalogue() < least_at_work) return;
   double covered = 0;
   for (const Cause& cause : d.causes.ranked) {
     if (covered >= set_share * share_of_effects ||
@@ -233,6 +237,17 @@ void give_verdict(Diagnosis& d, bool gap, double none, double share_of_effects) 
     covered += cause.probability;
   }
   list_alike(d);
+  list_at_work(d, unnamed);
+  const bool any =
+      std::ranges::any_of(d.causes.at_work, [](const AtWork& one) { return one.probability >= least_at_work; });
+  if (whole) {
+    d.verdict = Verdict::explained;  // by one of the set, whichever it is
+  } else if (any) {
+    d.verdict = Verdict::partly_explained;
+  } else {
+    d.causes.set.clear();
+    d.causes.alike.clear();
+  }
 }
 
 }  // namespace metastable::analysis

@@ -11,8 +11,8 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "analysis/fitting/effect_fit.h"
 #include "analysis/gap/gap_map.h"
+#include "analysis/gap/held_out.h"
 #include "analysis/statistics/bounded_interval.h"
 #include "analysis/statistics/median.h"
 #include "analysis/statistics/random.h"
@@ -26,7 +26,6 @@ namespace {
 constexpr double cell_shift_sd = 0.15;   // prior of a cell's shift, in scores
 constexpr double parameter_price = 1.5;  // log likelihood that a rival pays for a parameter of its effects
 constexpr int interval_draws = 400;      // of the bootstrap over trials
-constexpr int fold_steps = 3;            // of a fit that starts from the optimum of all trials
 constexpr double bounded_score = 6;      // scores further out count as this one to the flexible model
 constexpr double farthest_score = 12;    // and as this one to the CRPS
 
@@ -79,20 +78,24 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
   s.recalibrated = here[1];
   s.with_effect = here[2];
   s.floor = here[3];
-  std::vector<double> gaps, left, baselines;  // left: shares of the gap
+  std::vector<double> gaps, left, baselines, with_effect;  // left: shares of the gap
   s.with_effect_least = s.with_effect;
   for (std::uint64_t draw = 0; draw < interval_draws; ++draw) {  // trials drawn anew, by exponential weights
     const auto mean = average([&](std::size_t t) { return exponential_weight(seed, draw, t); });
     baselines.push_back(mean[0]);
     gaps.push_back(mean[0] - mean[3]);
     s.with_effect_least = std::min(s.with_effect_least, mean[2]);
+    with_effect.push_back(mean[2]);
     if (gaps.back() > 0) left.push_back((mean[2] - mean[3]) / gaps.back());
   }
   std::sort(baselines.begin(), baselines.end());
+  std::sort(with_effect.begin(), with_effect.end());
   std::sort(gaps.begin(), gaps.end());
   std::sort(left.begin(), left.end());
   s.baseline_lower = baselines[interval_draws * 5 / 100];
   s.baseline_upper = baselines[interval_draws * 95 / 100];
+  s.with_effect_lower = with_effect[interval_draws * 5 / 100];
+  s.with_effect_upper = with_effect[interval_draws * 95 / 100];
   if (gaps[interval_draws * 5 / 100] > 0 && left.size() > interval_draws / 2) {
     // No model leaves less than nothing.
     const double share = (s.with_effect - s.floor) / (s.baseline - s.floor);
@@ -106,24 +109,6 @@ Shrinkage summarise(const std::vector<HeldOut>& trials, std::uint64_t seed, cons
     s.closed_upper = lower > 0 ? 1 - std::max(0.0, at(lower - estimate)) : 1;
   }
   return s;
-}
-
-// Returns [trials] their folds: trials go to folds in turn, in an order of their own.
-std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t seed) {
-  std::vector<std::size_t> order(trials);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [seed](std::size_t a, std::size_t b) { return shuffling_key(seed, a) < shuffling_key(seed, b); });
-  std::vector<int> fold(trials);
-  for (std::size_t k = 0; k < trials; ++k) fold[order[k]] = static_cast<int>(k % static_cast<std::size_t>(folds));
-  return fold;
-}
-
-// Fits the trials counted from a fit of all.
-Fit fit_from(const Fit& start, const TransitionModel& model, const Fit& recalibrated, FitOptions options) {
-  options.most_iterations = start.converged ? fold_steps : effort_for(model, recalibrated).most_iterations;
-  if (start.converged) options.from = &start;
-  return fit(model, start.nuisance, start.terms, options);
 }
 
 // Returns the rival that does best on the trials counted; without any, `plain`.
@@ -201,9 +186,9 @@ Flexible flexible_model(const TransitionModel& model, const Fit& chosen, const E
 
 }  // namespace
 
-std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& given, const Fit& recalibrated,
-                                     const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
-                                     const std::function<void()>& heartbeat) {
+HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const Fit& recalibrated,
+                         const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
+                         const std::function<void()>& heartbeat) {
   if (folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", folds));
   const std::size_t trials = model.trials();
   const Eigen::MatrixXd cells = mean_columns(model);
@@ -245,7 +230,9 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& gi
     }
   });
 
-  std::vector<Shrinkage> all;
+  HeldOutGap result;
+  for (const HeldOut& h : held) result.gap.push_back(h.log_score[2] + h.flexible - h.log_score[0] - h.flexible_floor);
+  std::vector<Shrinkage>& all = result.measures;
   all.push_back(summarise(held, seed, "held-out log score per collision", "nats", [](const HeldOut& h, double* v) {
     const double best = h.log_score[2] + h.flexible;
     for (int m = 0; m < 3; ++m) v[m] = best - h.log_score[m] - h.flexible_floor;
@@ -255,7 +242,7 @@ std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& gi
     for (int m = 0; m < 3; ++m) v[m] = h.crps[m];
     v[3] = h.crps_floor;
   }));
-  return all;
+  return result;
 }
 
 double gap_by_itself(const TransitionModel& model, const Fit& chosen, int folds, int threads, std::uint64_t seed,
@@ -266,7 +253,7 @@ double gap_by_itself(const TransitionModel& model, const Fit& chosen, int folds,
     if (heartbeat) heartbeat();
     const auto drawn = model.simulate(chosen.nuisance, chosen.terms, seed + draw);
     const Fit fitted = fit(*drawn, chosen.nuisance, chosen.terms);
-    sum += gap_shrinkage(*drawn, fitted, fitted, {}, folds, threads, seed, heartbeat).front().with_effect;
+    sum += gap_shrinkage(*drawn, fitted, fitted, {}, folds, threads, seed, heartbeat).measures.front().with_effect;
   }
   return sum / static_cast<double>(draws);
 }

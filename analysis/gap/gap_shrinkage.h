@@ -21,6 +21,7 @@ struct Shrinkage {
   /// no value where the denominator's interval covers zero.
   std::optional<double> closed, closed_lower, closed_upper;  ///< 90 % interval over trials
   double baseline_lower = 0, baseline_upper = 0;             ///< 90 %
+  double with_effect_lower = 0, with_effect_upper = 0;       ///< 90 %
   double with_effect_least = 0;  ///< of with_effect when trials are drawn anew, some hundred times
 };
 
@@ -28,6 +29,12 @@ struct StepsBeforeFailure {
   double observed = 0, observed_lower = 0,
          observed_upper = 0;  ///< collisions at risk by rests, exact 90 %; 0: not known
   double baseline = 0, recalibrated = 0, with_effect = 0;
+};
+
+/// The measures, and what of the first each trial says.
+struct HeldOutGap {
+  std::vector<Shrinkage> measures;
+  std::vector<double> gap;  ///< [trials] log score of the flexible model over that of the model as given [nats]
 };
 
 /// Cross-validates by trial: in every fold nuisances and each of `rivals` are refitted to the other trials, the rival
@@ -40,9 +47,9 @@ struct StepsBeforeFailure {
 /// @param rivals  fits of the same model; none: the recalibrated model stands for the chosen one
 /// @param folds  >= 2 @throws std::invalid_argument for fewer
 /// @param heartbeat  called before every fit, from any thread, one at a time; may throw to stop
-std::vector<Shrinkage> gap_shrinkage(const TransitionModel& model, const Fit& given, const Fit& recalibrated,
-                                     const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
-                                     const std::function<void()>& heartbeat = {});
+HeldOutGap gap_shrinkage(const TransitionModel& model, const Fit& given, const Fit& recalibrated,
+                         const std::vector<const Fit*>& rivals, int folds, int threads, std::uint64_t seed,
+                         const std::function<void()>& heartbeat = {});
 
 /// Returns what held-out trials show as a gap where there is none [nats a collision]: the mean of the log score's
 /// measure over two experiments drawn from the model of `chosen`, refitted. A likelihood that reads its landings from a

@@ -15,6 +15,8 @@ void declare_blind(Options& o) {
   o.add("pairs", "N", "50", "make: cases with two effects, 0..5000");
   o.add("outside", "N", "50", "make: cases with an effect that no catalogue holds, 0..5000");
   o.add("left-out", "N", "3", "make: cases of each effect with a catalogue that lacks it, 0..1000");
+  o.add("mixed", "N", "0", "make: cases with one or two effects and one that no catalogue holds, 0..5000");
+  o.add("many", "N", "0", "make: cases with three effects, 0..5000");
   o.add("law", "published|settled|both", "published",
         "make: law of the cases: published (first laboratory), settled (second one, a rigid body), both in turn");
   o.add("tool", "PROGRAM", "", "answer: run 'PROGRAM diagnose CASE --json FILE ...' (default: this program)");
@@ -35,6 +37,8 @@ BlindRequest blind_request(const Options& o, const std::string& line) {
   request.size.pairs = o.count("pairs", 0, 5000);
   request.size.outside = o.count("outside", 0, 5000);
   request.size.left_out_per_effect = o.count("left-out", 0, 1000);
+  request.size.mixed = o.count("mixed", 0, 5000);
+  request.size.many = o.count("many", 0, 5000);
   if (o.text("law") == "both")
     request.size.laws = {dynamics::Law::published, dynamics::Law::settled};
   else

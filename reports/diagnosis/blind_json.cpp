@@ -94,6 +94,11 @@ analysis::BlindAnswer read_answer(const std::string& file, std::string_view text
       }
     }
     if (j.contains("cause_set_alike")) answer.alike = j.at("cause_set_alike").get<std::vector<std::string>>();
+    if (j.contains("at_work"))
+      for (const ordered_json& one : j.at("at_work"))
+        answer.at_work.push_back(
+            {one.at("effects").get<std::vector<std::string>>(), one.at("probability").get<double>()});
+    answer.p_unnamed = j.value("p_unnamed", 0.0);
     if (j.contains("stepwise"))
       answer.stepwise = j.at("stepwise").get<std::map<std::string, std::vector<std::string>>>();
     for (const ordered_json& w : j.at("where"))

@@ -62,7 +62,11 @@ Table ways(const analysis::BlindGrades& grades, const Provenance& provenance) {
           {"something else instead of the effect or beside it", way.wrong},
           {"both of two effects", way.both},
           {"a third beside or instead of two", way.third},
-          {"something for what no catalogue holds", way.outside}}) {
+          {"something for what no catalogue holds", way.outside},
+          {"all of three effects", way.three},
+          {"two of them at least", way.two_of_three},
+          {"all effects beside what no catalogue holds", way.mixed},
+          {"another one beside them", way.mixed_wrong}}) {
       if (count.of == 0) continue;
       const auto [low, high] = analysis::wilson(count);
       table.rows.push_back(

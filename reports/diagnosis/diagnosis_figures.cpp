@@ -44,8 +44,7 @@ struct ModelMap {
 // Lists the models that the map is told under.
 std::vector<ModelMap> models_of(const Diagnosis& d) {
   std::vector<ModelMap> models{{"as given", &d.gap.as_given}, {"recalibrated", &d.gap.recalibrated}};
-  if (d.verdict == analysis::Verdict::explained || d.verdict == analysis::Verdict::unexplained)
-    models.push_back({"with effect", &d.gap.left});
+  if (analysis::is_gap(d.verdict)) models.push_back({"with effect", &d.gap.left});
   return models;
 }
 

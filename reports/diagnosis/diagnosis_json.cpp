@@ -107,6 +107,50 @@ Json unnamed_json(const analysis::Unnamed& one) {
   return {{"beside", one.beside}, {"log_bayes_factor", number(one.evidence)}, {"facets", facets}};
 }
 
+Json share_json(const std::optional<Estimate>& share) { return share ? Json(number(share->value)) : Json(nullptr); }
+
+Json interval_json(const std::optional<Estimate>& share) {
+  return share ? Json{number(share->lower), number(share->upper)} : Json(nullptr);
+}
+
+Json at_work_json(const analysis::AtWork& one) {
+  const NamedParameters parameters = named_parameters(one.effects.front(), one.parameters);
+  return {
+      {"name", one.name},
+      {"effects", one.effects},
+      {"probability", number(one.probability)},
+      {"parameters", parameters.values},
+      {"interval_90", parameters.intervals},
+      {"closes",
+       {{"alone", share_json(one.closes_alone)},
+        {"beside", share_json(one.closes_beside)},
+        {"interval_90", {{"alone", interval_json(one.closes_alone)}, {"beside", interval_json(one.closes_beside)}}}}}};
+}
+
+// Lists where something without a name acts; what it would close is what stays, said of the likeliest place.
+Json unnamed_facets_json(const analysis::Diagnosis& d) {
+  Json all = Json::array();
+  for (const analysis::UnnamedFacet& one : d.causes.unnamed_facets) {
+    Json closes = nullptr;
+    if (all.empty() && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
+      closes = number(1 - *d.shrinkage.measures.front().closed);
+    all.push_back({{"facet", one.facet},
+                   {"aspect", one.aspect},
+                   {"of", one.stance ? "stances" : "collisions"},
+                   {"size", one.size ? Json(number(*one.size)) : Json(nullptr)},
+                   {"unit", one.unit},
+                   {"probability", number(one.probability)},
+                   {"closes", closes}});
+  }
+  return all;
+}
+
+Json left_json(const analysis::Diagnosis& d) {
+  if (d.shrinkage.measures.empty()) return {{"nats", nullptr}, {"interval_90", nullptr}};
+  const analysis::Shrinkage& s = d.shrinkage.measures.front();
+  return {{"nats", number(s.with_effect)}, {"interval_90", {number(s.with_effect_lower), number(s.with_effect_upper)}}};
+}
+
 Json where_json(const std::vector<analysis::GapCell>& cells) {
   Json list = Json::array();
   for (const analysis::GapCell& cell : cells)
@@ -194,7 +238,11 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   json["causes"] = causes_json(d);
   json["cause_set"] = d.causes.set;
   json["cause_set_alike"] = d.causes.alike;
-  json["unnamed"] = list_json(d.causes.unnamed, unnamed_json);
+  json["at_work"] = list_json(d.causes.at_work, at_work_json);
+  json["unnamed"] = unnamed_facets_json(d);
+  json["p_unnamed"] = number(d.causes.p_unnamed);
+  json["left"] = left_json(d);
+  json["unnamed_supposed"] = list_json(d.causes.unnamed, unnamed_json);
   json["stepwise"] = Json::object();
   for (const auto& choice : d.causes.stepwise) json["stepwise"][choice.criterion] = choice.effects;
   json["not_decided"] = list_json(d.causes.not_decided, [](const auto& cause) {

@@ -171,6 +171,31 @@ Table map_table(const Diagnosis& d) {
   return table;
 }
 
+Table at_work_table(const Diagnosis& d) {
+  Table table{
+      .id = "at-work",
+      .title = "What is at work",
+      .notes = {"Probability: over all hypotheses that hold it, whatever else is at work. Alone: the share of the "
+                "held-out gap that it closes in the model as given; last: added to the recalibrated model with "
+                "the others."},
+      .columns = {{"effect"},
+                  {"probability", "", NumberFormat::fixed, 3},
+                  {"parameters (90 % intervals)"},
+                  {"closes alone", "%", NumberFormat::significant, 2},
+                  {"closes last", "%", NumberFormat::significant, 2}}};
+  const auto percent = [](const std::optional<Estimate>& share) {
+    return share ? Cell(Estimate{100 * share->value, 100 * share->lower, 100 * share->upper}) : Cell("");
+  };
+  for (const analysis::AtWork& one : d.causes.at_work) {
+    std::string name = one.name;
+    if (one.effects.size() > 1) name += fmt::format(" ({})", fmt::join(one.effects, ", "));
+    table.rows.push_back({name, one.probability, parameters_text(one.parameters), percent(one.closes_alone),
+                          percent(one.closes_beside)});
+  }
+  if (!table.rows.empty()) table.rows.push_back({"something without a name", d.causes.p_unnamed, "", "", ""});
+  return table;
+}
+
 Table causes_table(const Diagnosis& d) {
   Table table{.id = "causes",
               .title = "Which effect",

@@ -27,6 +27,7 @@ Table contact_table(const analysis::Diagnosis& diagnosis);  ///< recalibrated pa
 Table where_table(const analysis::Diagnosis& diagnosis);    ///< beyond chance after recalibration
 /// Lists every cell under the nominal, the refitted and the chosen model.
 Table map_table(const analysis::Diagnosis& diagnosis);
+Table at_work_table(const analysis::Diagnosis& diagnosis);     ///< effect by effect, and where something unnamed acts
 Table causes_table(const analysis::Diagnosis& diagnosis);      ///< with "no gap", "recalibration", "none of these"
 Table parameters_table(const analysis::Diagnosis& diagnosis);  ///< of every cause
 Table shrinkage_table(const analysis::Diagnosis& diagnosis);

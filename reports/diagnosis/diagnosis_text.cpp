@@ -73,6 +73,7 @@ std::string diagnosis_text(const analysis::Diagnosis& d, std::size_t width) {
   text +=
       where.rows.empty() ? "\nWhere it lies, after recalibration: no cell is beyond chance\n" : part(where, most_cells);
 
+  text += part(at_work_table(d));
   Table causes = causes_table(d);
   const std::string nearest = d.causes.ranked.empty() ? "" : d.causes.ranked.front().name();
   std::erase_if(causes.rows, [&](const std::vector<Cell>& row) {

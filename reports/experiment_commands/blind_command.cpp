@@ -184,9 +184,13 @@ BlindMade make_blind(const BlindRequest& request, const CaseProgress& progress) 
   for (const dynamics::Law law : size.laws) laws += fmt::format("law {}\n", dynamics::law_name(law));
   if (size.laws == analysis::BlindSize{}.laws) laws.clear();  // as plans were written when there was one law
   const auto plan_text = [&](std::uint64_t with) {
-    return fmt::format("seed {}\neffect {}\nnone {}\npairs {}\noutside {}\nleft_out {}\n{}", with,
-                       size.per_effect_and_strength, size.none, size.pairs, size.outside, size.left_out_per_effect,
-                       laws);
+    std::string text =
+        fmt::format("seed {}\neffect {}\nnone {}\npairs {}\noutside {}\nleft_out {}\n", with,
+                    size.per_effect_and_strength, size.none, size.pairs, size.outside, size.left_out_per_effect);
+    // Plans without these kinds are written as they were before there were any.
+    if (size.mixed > 0) text += fmt::format("mixed {}\n", size.mixed);
+    if (size.many > 0) text += fmt::format("many {}\n", size.many);
+    return text + laws;
   };
   if (analysis::blind_plan(size, seed).empty())
     throw std::invalid_argument("blind make: no case of any kind is asked for");
@@ -349,8 +353,8 @@ BlindOpened open_blind(const BlindRequest& request, Unanswered unanswered) {
   }
   markov::parallel_for(reached.size(), request.threads, [&](std::size_t i) {
     analysis::BlindTruth& truth = reached[i];
-    if (truth.kind != analysis::BlindKind::pair) return;
-    analysis::complete_pair(truth, analysis::read_experiment(places.case_folder(truth.number)));
+    if (truth.effects.size() < 2 && truth.kind != analysis::BlindKind::mixed) return;
+    analysis::complete_each(truth, analysis::read_experiment(places.case_folder(truth.number)));
   });
 
   const analysis::BlindGrades grades = analysis::grade(reached, answers);

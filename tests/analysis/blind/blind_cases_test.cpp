@@ -41,7 +41,7 @@ TEST(BlindCases, PlanHasTheSizeAskedFor) {
   for (const BlindPlan& p : plan) {
     ++count[p.kind];
     if (p.kind == BlindKind::effect) ++effect[p.effects.front()];
-    if (p.kind == BlindKind::outside) ++family[p.effects.front()];
+    if (p.kind == BlindKind::outside) ++family[p.outside];
     if (p.kind == BlindKind::pair) {
       EXPECT_NE(p.effects[0], p.effects[1]);
     }
@@ -160,7 +160,8 @@ TEST(BlindCases, LeftOutEffectsAreNotInTheCatalogueGiven) {
   EXPECT_EQ(made.catalogue.size(), 22U);
   for (const std::string& id : made.catalogue) EXPECT_NE(id, "inertia");
   EXPECT_EQ(made.truth.left_out, std::vector<std::string>{"inertia"});
-  const BlindCase outside = blind_case({BlindKind::outside, {"planks"}, 2}, 2, 9, square_power);
+  const BlindCase outside =
+      blind_case({BlindKind::outside, {}, 2, dynamics::Law::published, "planks"}, 2, 9, square_power);
   ASSERT_TRUE(outside.truth.outside);
   EXPECT_GT(outside.truth.outside->size, 0);
   EXPECT_THROW(blind_kind("some"), std::invalid_argument);
@@ -204,14 +205,14 @@ TEST(EffectPower, OfAPairEachEffectIsWeighedBesideTheOther) {
                                 return expected_power(design, effects, 1);
                               });
   complete_truth(made);
-  complete_pair(made.truth, read(made));
+  complete_each(made.truth, read(made));
   ASSERT_EQ(made.truth.left_by_effect.size(), 2U);
   for (const double left : made.truth.left_by_effect) {
     EXPECT_GT(left, 16);
     EXPECT_LT(left, made.truth.left);
   }
   BlindTruth none;
-  complete_pair(none, read(made));
+  complete_each(none, read(made));
   EXPECT_TRUE(none.left_by_effect.empty());
 }
 
@@ -219,7 +220,7 @@ TEST(EffectPower, OfAPairEachEffectIsWeighedBesideTheOther) {
 // monotone ended there.
 TEST(BlindCases, AnOutsideEffectHasThePowerAskedForBeforeItStopsTheWheel) {
   for (const double usual : {0.002, 0.02, 0.1}) {  // size of a power of 16
-    const BlindCase made = blind_case({BlindKind::outside, {"two_crews"}, 2}, 1, 5,
+    const BlindCase made = blind_case({BlindKind::outside, {}, 2, dynamics::Law::published, "two_crews"}, 1, 5,
                                       [usual](const PowerDesign& design, const std::vector<dynamics::Effect>&) {
                                         const double times = design.reality.outside.front().size / usual;
                                         return times < 2.4 ? 16 * times * times : 0.0;

@@ -37,7 +37,7 @@ std::unique_ptr<TransitionModel> data(
 // Where the verdict is a gap, a gap is the likelier; where it is none, none is.
 void expect_probabilities_to_agree(const Diagnosis& d) {
   const double null = d.causes.p_no_gap + d.causes.p_recalibrate;
-  const bool gap = d.verdict == Verdict::explained || d.verdict == Verdict::unexplained;
+  const bool gap = is_gap(d.verdict);
   EXPECT_TRUE(gap ? null <= 0.5 + 1e-9 : null >= 0.5 - 1e-9) << verdict_name(d.verdict) << " " << null;
   double sum = null + d.causes.p_none;
   for (const Cause& cause : d.causes.ranked) sum += cause.probability;

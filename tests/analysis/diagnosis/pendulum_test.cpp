@@ -162,7 +162,6 @@ TEST(AnySystem, APendulumWithDryFrictionIsDiagnosedFromItsFile) {
     explained += d.verdict == Verdict::explained;
     EXPECT_EQ(d.causes.ranked.front().name(), "dry_friction");
     EXPECT_LT(d.causes.p_none, 0.3);
-    EXPECT_NE(d.sentences.front().find("dry_friction (drop_rad 0.00"), std::string::npos) << d.sentences.front();
     const EstimatedParameter& drop = d.causes.ranked.front().parameters[0].at(0);
     EXPECT_EQ(drop.name, "drop_rad");
     inside += drop.lower < 0.004 && 0.004 < drop.upper;

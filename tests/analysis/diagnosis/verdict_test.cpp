@@ -24,7 +24,7 @@ Diagnosis with_odds_of_none(double none) {
   cause.probability = 0.9 / (1 + none);
   d.causes.ranked = {cause};
   d.causes.p_none = none * cause.probability;
-  give_verdict(d, true, none, cause.probability);
+  give_verdict(d, true, {none, 0, 0}, cause.probability);
   return d;
 }
 
@@ -33,6 +33,31 @@ TEST(Verdict, ANameIsGivenWhereItIsFourTimesAsLikelyAsNone) {
   EXPECT_EQ(with_odds_of_none(0.2).causes.set, std::vector<std::string>{"friction_patch"});
   EXPECT_EQ(with_odds_of_none(0.3).verdict, Verdict::unexplained);
   EXPECT_TRUE(with_odds_of_none(0.3).causes.set.empty());
+}
+
+// What has no name beside an effect takes nothing from it: both are said. In its place it takes the name.
+TEST(Verdict, AnEffectBesideSomethingUnnamedExplainsAPart) {
+  const auto with = [](Odds unnamed) {
+    Diagnosis d = with_odds_of_none(0);
+    d.causes.set.clear();
+    d.causes.at_work.clear();
+    give_verdict(d, true, unnamed, d.causes.ranked[0].probability);
+    return d;
+  };
+  const Diagnosis beside = with({0.01, 5, 0});
+  EXPECT_EQ(beside.verdict, Verdict::partly_explained);
+  ASSERT_EQ(beside.causes.at_work.size(), 1u);
+  EXPECT_EQ(beside.causes.at_work[0].effects, std::vector<std::string>{"friction_patch"});
+  EXPECT_NEAR(beside.causes.at_work[0].probability, 2 / 2.01, 1e-12);
+  EXPECT_NEAR(beside.causes.p_unnamed, 5.01 / 6.01, 1e-12);
+  EXPECT_EQ(sentences(beside)[0], "There is a gap that recalibration does not remove, and part of it has a name.");
+  // A test that finds something left speaks for something beside, and not for what leaves it.
+  EXPECT_EQ(with({0.01, 0, 1e6}).verdict, Verdict::partly_explained);
+  EXPECT_NEAR(with({0.01, 0, 1e6}).causes.at_work[0].probability, 1 / 1.01, 1e-12);
+  EXPECT_EQ(with({5, 0, 1e6}).verdict, Verdict::unexplained);
+  EXPECT_EQ(with({5, 0.01, 0}).verdict, Verdict::unexplained);
+  EXPECT_TRUE(with({5, 0.01, 0}).causes.set.empty());
+  EXPECT_EQ(with({0.01, 0.01, 0}).verdict, Verdict::explained);
 }
 
 // Below so many trials, or transitions in all, neither an effect nor other contact parameters are named, and the answer
@@ -49,7 +74,7 @@ TEST(Verdict, TooFewTrialsAreNotExplained) {
       d.data.trials = trials;
       d.data.collisions = collisions;
       d.gap.p_recalibration = 1e-6;
-      give_verdict(d, gap, 0.01, d.causes.ranked[0].probability);
+      give_verdict(d, gap, {0.01, 0, 0}, d.causes.ranked[0].probability);
       EXPECT_EQ(d.verdict, Verdict::unexplained);
       EXPECT_TRUE(d.causes.set.empty());
       ASSERT_TRUE(trials_to_explain(d));
@@ -85,7 +110,7 @@ TEST(Verdict, SaysWhereTheLikelierOfTheUnnamedActs) {
     d.causes.unnamed = {{{}, 20, {clock}}, {{"friction_patch"}, beside, {stances}}};
     return sentences(d).at(1);
   };
-  EXPECT_EQ(said(21), "By itself it acts by clock, on the mean friction of collisions.");
+  EXPECT_EQ(said(21), "By itself it acts by clock, on the mean friction of steps.");
   EXPECT_EQ(said(26).substr(0, 21), "Beside friction_patch");
 }
 
@@ -120,7 +145,7 @@ Diagnosis with_pairs(double share) {
   seen.effect = "inertia";
   seen.alike = {{"slope_offset", share}, {"bounce", 0.6}};
   d.limits.visible = {seen};
-  give_verdict(d, true, 0, 0.95);
+  give_verdict(d, true, {}, 0.95);
   return d;
 }
 

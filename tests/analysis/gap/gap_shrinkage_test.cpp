@@ -33,7 +33,7 @@ TEST(GapShrinkage, TheTrueEffectClosesTheGap) {
   const auto data = design->simulate(nominal_values(*design), std::vector{truth}, 5);
   const Fit recalibrated = fit(*data, nominal_values(*data), {});
   const Fit with = fit(*data, recalibrated.nuisance, {test::term(*data, "rolling_resistance", {}, {0.01})});
-  const auto shrinkage = gap_shrinkage(*data, as_given(*data), recalibrated, {&with}, 4, 1, 1);
+  const auto shrinkage = gap_shrinkage(*data, as_given(*data), recalibrated, {&with}, 4, 1, 1).measures;
   ASSERT_EQ(shrinkage.size(), 2U);
   for (const Shrinkage& one : shrinkage) {
     EXPECT_LT(one.with_effect, one.recalibrated) << one.measure;
@@ -48,7 +48,7 @@ TEST(GapShrinkage, WithoutRivalsTheLastModelIsTheRecalibratedOne) {
   const auto design = coast_down_transitions(test::coasting_rotor());
   const auto data = design->simulate(nominal_values(*design), {}, 6);
   const Fit recalibrated = fit(*data, nominal_values(*data), {});
-  for (const Shrinkage& one : gap_shrinkage(*data, as_given(*data), recalibrated, {}, 4, 1, 1))
+  for (const Shrinkage& one : gap_shrinkage(*data, as_given(*data), recalibrated, {}, 4, 1, 1).measures)
     EXPECT_EQ(one.with_effect, one.recalibrated) << one.measure;
 }
 
@@ -115,7 +115,7 @@ TEST(GapShrinkage, ErrorsThatWereAddedAreNoChance) {
       }
     }
     const Blurred model(y, w, added);
-    sum += gap_shrinkage(model, as_given(model), fit(model, {3, 0}, {}), {}, 4, 1, seed)[0].with_effect;
+    sum += gap_shrinkage(model, as_given(model), fit(model, {3, 0}, {}), {}, 4, 1, seed).measures[0].with_effect;
   }
   EXPECT_NEAR(sum / seeds, 0, 0.0007);
 }

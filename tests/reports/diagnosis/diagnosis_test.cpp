@@ -13,11 +13,11 @@
 #include <string>
 
 #include "dynamics/catalogue/effect_catalogue.h"
-#include "reports/experiment_commands/diagnose_command.h"
 #include "reports/diagnosis/diagnosis_figures.h"
 #include "reports/diagnosis/diagnosis_json.h"
 #include "reports/diagnosis/diagnosis_tables.h"
 #include "reports/diagnosis/diagnosis_text.h"
+#include "reports/experiment_commands/diagnose_command.h"
 #include "reports/output/text_table.h"
 
 namespace metastable::reports {
@@ -110,9 +110,9 @@ TEST(DiagnosisJson, HasTheKeysOfTheSchema) {
     EXPECT_TRUE(json.at("shrinkage").contains(key)) << key;
   EXPECT_EQ(json.at("shrinkage").at("closed_interval_90"), (std::vector<double>{0.88, 1.0}));
   EXPECT_EQ(json.at("not_decided").at(0).at("reason"), "the fit did not converge");
-  EXPECT_EQ(json.at("unnamed").at(0).at("beside"), std::vector<std::string>{"leg_contact"});
-  EXPECT_EQ(json.at("unnamed").at(0).at("facets").at(0).at("chi_squared"), 12);
-  EXPECT_EQ(json.at("unnamed").at(0).at("facets").at(0).at("of"), "collisions");
+  EXPECT_EQ(json.at("unnamed_supposed").at(0).at("beside"), std::vector<std::string>{"leg_contact"});
+  EXPECT_EQ(json.at("unnamed_supposed").at(0).at("facets").at(0).at("chi_squared"), 12);
+  EXPECT_EQ(json.at("unnamed_supposed").at(0).at("facets").at(0).at("of"), "collisions");
   EXPECT_TRUE(json.at("missing_columns").at(0).at("effects").at(0).at("smallest").is_null());
   EXPECT_EQ(json.at("missing_columns").at(0).at("effects").at(0).at("not_told_from").at(0), "friction_patch");
   EXPECT_EQ(json.at("not_possible").at(0).at("trials"), 3);

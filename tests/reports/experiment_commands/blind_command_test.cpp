@@ -110,7 +110,7 @@ TEST(BlindAnswer, VerdictsAreRead) {
   };
   EXPECT_EQ(read_answer("a.json", answer("unexplained")).verdict, analysis::Verdict::unexplained);
   EXPECT_EQ(message_of([&] { read_answer("a.json", answer("perhaps")); }),
-            "a.json: verdict: \"perhaps\" is none of no_gap, recalibrate, explained, unexplained");
+            "a.json: verdict: \"perhaps\" is none of no_gap, recalibrate, explained, partly_explained, unexplained");
 }
 
 // No alarm in two cases is not enough to say that there are at most 9 % of them.

@@ -1,0 +1,116 @@
+#include "analysis/blind/at_work_grade.h"
+
+#include <algorithm>
+#include <string>
+#include <tuple>
+
+#include "analysis/diagnosis/at_work.h"
+#include "dynamics/catalogue/effect_catalogue.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double power_of_one = 9, power_of_several = 16;  // left beside the others: less is not asked for
+constexpr double unnamed_said = 0.2;                       // probability of something without a name
+
+using Answer = std::optional<BlindAnswer>;
+
+bool is_there(const BlindTruth& truth, const BlindAnswer::SaidAtWork& said) {
+  return std::ranges::any_of(truth.effects, [&](const dynamics::Effect& effect) {
+    return std::ranges::find(said.effects, effect.id) != said.effects.end();
+  });
+}
+
+bool is_said(const BlindAnswer& answer, const std::string& effect) {
+  return std::ranges::any_of(answer.at_work, [&](const BlindAnswer::SaidAtWork& said) {
+    return said.probability >= least_at_work && std::ranges::find(said.effects, effect) != said.effects.end();
+  });
+}
+
+bool says_a_false_one(const BlindTruth& truth, const BlindAnswer& answer) {
+  return std::ranges::any_of(answer.at_work, [&](const BlindAnswer::SaidAtWork& said) {
+    return said.probability >= least_at_work && !is_there(truth, said);
+  });
+}
+
+std::size_t said_of(const BlindTruth& truth, const BlindAnswer& answer) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(truth.effects, [&](const dynamics::Effect& effect) { return is_said(answer, effect.id); }));
+}
+
+struct AtWorkTally {
+  Proportion none, outside, one, second, both, third, three, two, fourth, mixed, mixed_unnamed, mixed_false;
+  Proportion likely, surely;  // said with 0.8 to 0.95, with 0.95 and more
+};
+
+bool all_have_power(const BlindTruth& truth) {
+  return !truth.left_by_effect.empty() &&
+         std::ranges::all_of(truth.left_by_effect, [](double left) { return left >= power_of_several; });
+}
+
+void count_kind(AtWorkTally& tally, const BlindTruth& truth, const Answer& answer) {
+  const std::size_t right = answer ? said_of(truth, *answer) : 0;
+  const bool wrong = !answer || says_a_false_one(truth, *answer);
+  switch (truth.kind) {
+    case BlindKind::none:
+      return tally.none.count(wrong);
+    case BlindKind::outside:
+      return tally.outside.count(wrong);
+    case BlindKind::effect:
+      if (truth.strength < 2 || truth.left < power_of_one ||
+          truth.effects.front().id == dynamics::contact_distribution_id)
+        return;
+      tally.one.count(right == 1);
+      return tally.second.count(wrong);
+    case BlindKind::pair:
+      if (!all_have_power(truth)) return;
+      tally.both.count(right == 2);
+      return tally.third.count(wrong);
+    case BlindKind::many:
+      if (!all_have_power(truth)) return;
+      tally.three.count(right == 3);
+      tally.two.count(right >= 2);
+      return tally.fourth.count(wrong);
+    case BlindKind::mixed:
+      if (!all_have_power(truth)) return;
+      tally.mixed.count(right == truth.effects.size());
+      tally.mixed_unnamed.count(answer && answer->p_unnamed >= unnamed_said);
+      return tally.mixed_false.count(wrong);
+    case BlindKind::left_out:
+      return;
+  }
+}
+
+}  // namespace
+
+std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths, const std::vector<Answer>& answers) {
+  AtWorkTally tally;
+  for (std::size_t i = 0; i < truths.size(); ++i) {
+    count_kind(tally, truths[i], answers[i]);
+    if (!answers[i] || truths[i].kind == BlindKind::left_out) continue;
+    for (const BlindAnswer::SaidAtWork& said : answers[i]->at_work)
+      if (said.probability >= least_at_work)
+        (said.probability < 0.95 ? tally.likely : tally.surely).count(is_there(truths[i], said));
+  }
+  std::vector<Grade> grades;
+  for (const auto& [measure, proportion, low, high] :
+       {std::tuple<const char*, const Proportion&, double, double>{"at work: anything where there is no gap",
+                                                                   tally.none, 0, 0.05},
+        {"at work: an effect of the catalogue where one outside acts alone", tally.outside, 0, 0.1},
+        {"at work: the effect, 2x and 4x, with power left", tally.one, 0.95, 1},
+        {"  a false second", tally.second, 0, 0.05},
+        {"at work: both of two effects, each with power beside the other", tally.both, 0.85, 1},
+        {"  a false third", tally.third, 0, 0.05},
+        {"at work: all of three effects, likewise", tally.three, 0.6, 1},
+        {"  at least two of them", tally.two, 0.9, 1},
+        {"  a false fourth", tally.fourth, 0, 0.1},
+        {"at work: those named beside an outside effect", tally.mixed, 0.8, 1},
+        {"  and something unnamed is said", tally.mixed_unnamed, 0.8, 1},
+        {"  a false name", tally.mixed_false, 0, 0.1},
+        {"said to be at work with 0.8 to 0.95: true", tally.likely, 0.75, 1},
+        {"said to be at work with 0.95 and more: true", tally.surely, 0.93, 1}})
+    grades.push_back({measure, proportion, low, high});
+  return grades;
+}
+
+}  // namespace metastable::analysis

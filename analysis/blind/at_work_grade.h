@@ -1,0 +1,17 @@
+#pragma once
+// Grades what is said to be at work, effect by effect.
+
+#include <optional>
+#include <vector>
+
+#include "analysis/blind/blind_grade.h"
+
+namespace metastable::analysis {
+
+/// Says how often what is said to be at work (a probability of 0.8 and more) is, by kinds of case, and how often
+/// probabilities come true. A group counts as right where it holds the effect. Cases without an answer fail.
+/// @param truths, answers  as grade() takes them
+std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths,
+                                  const std::vector<std::optional<BlindAnswer>>& answers);
+
+}  // namespace metastable::analysis

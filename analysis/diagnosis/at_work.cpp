@@ -1,0 +1,182 @@
+#include "analysis/diagnosis/at_work.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "analysis/diagnosis/diagnosis_sentences.h"
+#include "analysis/fitting/cause_ranking.h"
+#include "analysis/gap/held_out.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double half_90 = 1.6448536269514722;  // of a two-sided interval of a normal estimate, in sds
+constexpr double least_listed = 0.05;           // probability of an effect or a facet that is listed
+
+bool holds(const Cause& cause, const std::string& effect) {
+  return std::ranges::find(cause.effects, effect) != cause.effects.end();
+}
+
+// Averages an effect's parameters over the hypotheses that hold it: their intervals are those of a mixture of normals.
+std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const std::string& effect) {
+  std::vector<EstimatedParameter> mean;
+  std::vector<double> variance;
+  double weights = 0;
+  for (const Cause& cause : ranked) {
+    const auto at = std::ranges::find(cause.effects, effect);
+    if (at == cause.effects.end()) continue;
+    const std::vector<EstimatedParameter>& own = cause.parameters[static_cast<std::size_t>(at - cause.effects.begin())];
+    if (mean.empty()) {
+      mean = own;
+      for (EstimatedParameter& p : mean) p.value = 0;
+      variance.assign(own.size(), 0);
+    }
+    const auto same_variant = [&] {
+      if (own.size() != mean.size()) return false;
+      for (std::size_t k = 0; k < own.size(); ++k)
+        if (own[k].name != mean[k].name || (!mean[k].fitted && own[k].lower != mean[k].lower)) return false;
+      return true;
+    };
+    if (own.empty() || !same_variant()) continue;
+    weights += cause.probability;
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      const double sd = (own[k].upper - own[k].lower) / (2 * half_90);
+      mean[k].value += cause.probability * own[k].value;
+      variance[k] += cause.probability * (sd * sd + own[k].value * own[k].value);
+    }
+  }
+  for (std::size_t k = 0; k < mean.size(); ++k) {
+    EstimatedParameter& p = mean[k];
+    if (weights > 0) p.value /= weights;
+    if (!p.fitted) continue;
+    const double half = half_90 * std::sqrt(std::max(0.0, variance[k] / weights - p.value * p.value));
+    p.lower = p.value - half;
+    p.upper = p.value + half;
+  }
+  return mean;
+}
+
+// Where something without a name acts, were it beside the likeliest hypothesis that it was supposed beside, or alone.
+std::vector<UnnamedFacet> facets_by_probability(const Diagnosis& d, const Odds& unnamed, double p_unnamed) {
+  const Unnamed* supposed = nullptr;
+  for (const Unnamed& one : d.causes.unnamed)
+    if (one.beside.empty() == (unnamed.alone > unnamed.beside + unnamed.left) &&
+        (!supposed || one.evidence > supposed->evidence))
+      supposed = &one;
+  std::vector<UnnamedFacet> all;
+  if (!supposed) return all;
+  double most = 0, sum = 0;
+  for (const LeftInFacet& facet : supposed->facets) most = std::max(most, facet.evidence);
+  for (const LeftInFacet& facet : supposed->facets) sum += std::exp(facet.evidence - most);
+  for (const LeftInFacet& facet : supposed->facets) {
+    UnnamedFacet one{facet.facet, facet.aspect, facet.stance, p_unnamed * std::exp(facet.evidence - most) / sum, {},
+                     ""};
+    if (one.probability < least_listed) continue;
+    for (const GapCell& cell : d.gap.left.cells)
+      if (cell.facet == facet.facet && cell.aspect == facet.aspect &&
+          (!one.size || std::abs(cell.size) > std::abs(*one.size)))
+        one.size = cell.size, one.unit = cell.unit;
+    all.push_back(std::move(one));
+  }
+  std::ranges::stable_sort(all, std::ranges::greater{}, &UnnamedFacet::probability);
+  return all;
+}
+
+}  // namespace
+
+void list_at_work(Diagnosis& d, const Odds& unnamed) {
+  const std::vector<Cause>& ranked = d.causes.ranked;
+  const double of_gap = 1 - d.causes.p_no_gap - d.causes.p_recalibrate;
+  double sum = 0;
+  for (const Cause& cause : ranked) sum += cause.probability;
+  if (!(sum > 0)) return;
+  const auto probability = [&](const std::vector<std::string>& effects) {
+    double share = 0;
+    for (const Cause& cause : ranked)
+      if (std::ranges::any_of(effects, [&](const std::string& id) { return holds(cause, id); }))
+        share += cause.probability / sum;
+    return of_gap * share * unnamed.of_catalogue();
+  };
+  // Effects of the first hypothesis, each with what stands in its place in those that are alike to it.
+  std::vector<std::string> listed;
+  for (const std::string& effect : ranked.front().effects) {
+    AtWork one{effect, {effect}, probability({effect}), averaged(ranked, effect), {}, {}};
+    if (one.probability < least_at_work) {
+      for (const Cause& cause : ranked) {
+        if (std::ranges::find(d.causes.alike, cause.name()) == d.causes.alike.end() || holds(cause, effect)) continue;
+        for (const std::string& other : cause.effects)
+          if (!holds(ranked.front(), other) && std::ranges::find(one.effects, other) == one.effects.end())
+            one.effects.push_back(other);
+      }
+      if (one.effects.size() > 1) {
+        one.probability = probability(one.effects);
+        one.name = common_name(d, one.effects);
+      }
+    }
+    listed.insert(listed.end(), one.effects.begin(), one.effects.end());
+    d.causes.at_work.push_back(std::move(one));
+  }
+  for (const Cause& cause : ranked)
+    for (const std::string& effect : cause.effects) {
+      if (std::ranges::find(listed, effect) != listed.end()) continue;
+      listed.push_back(effect);
+      if (const double p = probability({effect}); p >= least_listed)
+        d.causes.at_work.push_back({effect, {effect}, p, averaged(ranked, effect), {}, {}});
+    }
+  std::ranges::stable_sort(d.causes.at_work, std::ranges::greater{}, &AtWork::probability);
+  d.causes.unnamed_facets = facets_by_probability(d, unnamed, d.causes.p_unnamed);
+}
+
+void add_closed_shares(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking, const Fit& given,
+                       const Fit& recalibrated, const std::vector<double>& gap, const DiagnosisOptions& options,
+                       const std::function<void()>& heartbeat) {
+  const Cause& first = d.causes.ranked.front();
+  const auto fit_of = [&](const std::vector<std::string>& effects) -> const Fit* {
+    if (effects.empty()) return &recalibrated;
+    for (const auto* causes : {&ranking.singles, &ranking.pairs})
+      for (const RankedCause& one : *causes)
+        if (one.terms.size() == effects.size() && !one.fit.nuisance.empty() &&
+            std::ranges::all_of(one.terms, [&](const EffectTerm& term) {
+              return std::ranges::find(effects, term.candidate->id) != effects.end();
+            }))
+          return &one.fit;
+    return nullptr;
+  };
+  const Fit* all = fit_of(first.effects);
+  if (!all) return;
+  struct Asked {
+    AtWork* whose;
+    std::optional<Estimate> AtWork::*which;
+  };
+  std::vector<GapPart> parts;
+  std::vector<Asked> asked;
+  std::deque<Fit> alone;  // the effect in the model as given
+  for (AtWork& one : d.causes.at_work) {
+    const auto own = std::ranges::find_if(all->terms, [&](const EffectTerm& term) {
+      return std::ranges::find(one.effects, term.candidate->id) != one.effects.end();
+    });
+    if (own == all->terms.end() || one.probability < least_at_work) continue;
+    alone.push_back({});
+    alone.back().nuisance = given.nuisance;
+    alone.back().terms = {*own};
+    alone.back().converged = false;  // it is a start, not a fit
+    parts.push_back({&alone.back(), &given, false});
+    asked.push_back({&one, &AtWork::closes_alone});
+    std::vector<std::string> others = first.effects;
+    std::erase(others, own->candidate->id);
+    if (const Fit* without = fit_of(others)) {
+      parts.push_back({all, without, true});
+      asked.push_back({&one, &AtWork::closes_beside});
+    }
+  }
+  if (parts.empty()) return;
+  const std::vector<Estimate> closed =
+      parts_closed(model, recalibrated, gap, parts, options.folds, options.threads, options.seed, heartbeat);
+  for (std::size_t k = 0; k < parts.size(); ++k) asked[k].whose->*asked[k].which = closed[k];
+}
+
+}  // namespace metastable::analysis

@@ -1,0 +1,92 @@
+#include "analysis/gap/held_out.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numeric>
+#include <utility>
+
+#include "analysis/fitting/effect_fit.h"
+#include "analysis/statistics/random.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr int fold_steps = 3;                 // of a fit that starts from the optimum of all trials
+constexpr std::uint64_t closing_draws = 400;  // of the bootstrap over trials
+
+}  // namespace
+
+std::vector<int> folds_of_trials(std::size_t trials, int folds, std::uint64_t seed) {
+  std::vector<std::size_t> order(trials);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [seed](std::size_t a, std::size_t b) { return shuffling_key(seed, a) < shuffling_key(seed, b); });
+  std::vector<int> fold(trials);
+  for (std::size_t k = 0; k < trials; ++k) fold[order[k]] = static_cast<int>(k % static_cast<std::size_t>(folds));
+  return fold;
+}
+
+Fit fit_from(const Fit& start, const TransitionModel& model, const Fit& recalibrated, FitOptions options) {
+  options.most_iterations = start.converged ? fold_steps : effort_for(model, recalibrated).most_iterations;
+  if (start.converged) options.from = &start;
+  return fit(model, start.nuisance, start.terms, options);
+}
+
+std::vector<Estimate> parts_closed(const TransitionModel& model, const Fit& recalibrated,
+                                   const std::vector<double>& gap, const std::vector<GapPart>& parts, int folds,
+                                   int threads, std::uint64_t seed, const std::function<void()>& heartbeat) {
+  using Refitted = std::pair<const Fit*, bool>;
+  std::vector<Refitted> fits;  // each once, with whether its nuisances are refitted
+  for (const GapPart& part : parts)
+    for (const Refitted& one : {Refitted{part.with, part.recalibrated}, Refitted{part.without, part.recalibrated}})
+      if (std::ranges::find(fits, one) == fits.end()) fits.push_back(one);
+  const std::size_t trials = model.trials();
+  const std::vector<int> fold = folds_of_trials(trials, folds, seed);
+  std::vector<std::vector<double>> score(fits.size(), std::vector<double>(trials));
+  std::mutex speaking;
+  markov::parallel_for(fits.size() * static_cast<std::size_t>(folds), threads, [&](std::size_t task) {
+    if (heartbeat) {
+      const std::lock_guard lock(speaking);
+      heartbeat();
+    }
+    const std::size_t k = task / static_cast<std::size_t>(folds);
+    const auto f = static_cast<int>(task % static_cast<std::size_t>(folds));
+    FitOptions options;
+    options.count.resize(trials);
+    for (std::size_t t = 0; t < trials; ++t) options.count[t] = fold[t] != f;
+    options.refit_nuisances = fits[k].second;
+    const bool nothing_free = !fits[k].second && fits[k].first->terms.empty();
+    const Fit fitted = nothing_free ? *fits[k].first : fit_from(*fits[k].first, model, recalibrated, options);
+    for (std::size_t i = 0; i < model.events().size(); ++i) {
+      const std::size_t trial = model.events()[i].trial;
+      if (fold[trial] == f) score[k][trial] += fitted.evaluation.log_density[i];
+    }
+  });
+  const auto of = [&](const Fit* one, bool refitted) {
+    return static_cast<std::size_t>(std::ranges::find(fits, Refitted{one, refitted}) - fits.begin());
+  };
+  std::vector<Estimate> closed;
+  for (const GapPart& part : parts) {
+    const std::vector<double>& with = score[of(part.with, part.recalibrated)];
+    const std::vector<double>& without = score[of(part.without, part.recalibrated)];
+    const auto share = [&](auto weight_of) {
+      double closes = 0, all = 0;
+      for (std::size_t t = 0; t < trials; ++t) {
+        closes += weight_of(t) * (with[t] - without[t]);
+        all += weight_of(t) * gap[t];
+      }
+      return closes / all;
+    };
+    std::vector<double> drawn;
+    for (std::uint64_t draw = 0; draw < closing_draws; ++draw)
+      drawn.push_back(share([&](std::size_t t) { return exponential_weight(seed, draw, t); }));
+    std::ranges::sort(drawn);
+    closed.push_back(
+        {share([](std::size_t) { return 1.0; }), drawn[closing_draws * 5 / 100], drawn[closing_draws * 95 / 100]});
+  }
+  return closed;
+}
+
+}  // namespace metastable::analysis
