@@ -260,8 +260,12 @@ bool CsvReader::read(std::size_t column, std::int64_t least, std::int64_t most, 
     whole = static_cast<std::int64_t>(number);
     good = true;
   }
-  if (!good || whole < least || whole > most) {
+  if (!good) {
     refuse(column, fmt::format("{} is not a whole number in {}..{}", shown_text(field), least, most));
+    return false;
+  }
+  if (whole < least || whole > most) {
+    refuse(column, fmt::format("{} is outside {}..{}", whole, least, most));
     return false;
   }
   value = whole;

@@ -71,8 +71,12 @@ class Keys {
     const toml::node* node = find(key, required);
     if (node == nullptr) return std::nullopt;
     const auto* value = node->as_integer();
-    if (value != nullptr && value->get() >= least && value->get() <= most) return value->get();
-    report(*node, fmt::format("{}: a whole number in {}..{} is expected", path(key), least, most));
+    if (value == nullptr)
+      report(*node, fmt::format("{}: a whole number in {}..{} is expected", path(key), least, most));
+    else if (value->get() < least || value->get() > most)
+      report(*node, fmt::format("{}: {} is outside {}..{}", path(key), value->get(), least, most));
+    else
+      return value->get();
     return std::nullopt;
   }
 
@@ -141,8 +145,10 @@ void read_wheel(Keys& root, dynamics::Wheel& wheel, dynamics::Law law, const Def
   if (const auto mass = keys->number("hub_mass_kg", true, range::mass)) wheel.hub_mass = *mass;
   if (const toml::node* node = keys->find("leg_lengths_m", true)) {
     const toml::array* list = node->as_array();
-    if (list == nullptr || list->size() < 3 || list->size() > 1000) {
+    if (list == nullptr) {
       keys->report(*node, "wheel.leg_lengths_m: a list of 3 to 1000 numbers [m] is expected");
+    } else if (list->size() < 3 || list->size() > 1000) {
+      keys->report(*node, fmt::format("wheel.leg_lengths_m: {} legs are outside 3..1000", list->size()));
     } else {
       std::vector<double> lengths;
       for (std::size_t i = 0; i < list->size(); ++i)

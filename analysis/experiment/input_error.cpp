@@ -2,22 +2,31 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace metastable::analysis {
 
 InputError::InputError(std::vector<std::string> lines)
     : std::invalid_argument(fmt::format("{}", fmt::join(lines, "\n"))), lines_(std::move(lines)) {}
 
-void Defects::add(std::string_view file, TextPosition place, std::string_view what) {
-  if (++count_ > most_shown) return;
-  if (place.line == 0)
-    lines_.push_back(fmt::format("{}: {}", file, what));
+void Defects::add(std::string_view file, TextPosition place, std::string_view what, std::string_view group) {
+  ++count_;
+  const auto same = std::ranges::find_if(shown_, [&](const Defect& d) { return d.what == what && d.group == group; });
+  if (same != shown_.end())
+    ++same->rows;
+  else if (shown_.size() == most_shown)
+    ++left_out_;
   else
-    lines_.push_back(fmt::format("{}:{}:{}: {}", file, place.line, place.column, what));
+    shown_.push_back({std::string(group),
+                      place.line == 0 ? fmt::format("{}: {}", file, what)
+                                      : fmt::format("{}:{}:{}: {}", file, place.line, place.column, what),
+                      std::string(what)});
 }
 
 std::vector<std::string> Defects::lines() const {
-  std::vector<std::string> all = lines_;
-  if (count_ > most_shown) all.push_back(fmt::format("... and {} more", count_ - most_shown));
+  std::vector<std::string> all;
+  for (const Defect& d : shown_) all.push_back(d.rows == 1 ? d.line : fmt::format("{} (in {} rows)", d.line, d.rows));
+  if (left_out_ > 0) all.push_back(fmt::format("... and {} more", left_out_));
   return all;
 }
 

@@ -31,17 +31,27 @@ class Defects {
  public:
   static constexpr std::size_t most_shown = 20;
 
-  void add(std::string_view file, TextPosition place, std::string_view what);
+  /// Adds a defect. The same words about the same file again are counted in the line of the first.
+  void add(std::string_view file, TextPosition place, std::string_view what) { add(file, place, what, file); }
+  /// Adds the defect of a row whose `file` names the row too. The same words about another row are likewise counted.
+  void add_row(std::string_view file, std::string_view what) { add(file, {}, what, ""); }
   std::size_t count() const { return count_; }
   bool empty() const { return count_ == 0; }
-  /// Returns the first `most_shown` in the order they were added; what was left out is counted in a last line.
+  /// Returns the first `most_shown` different ones in the order they were added; what was left out is counted in a last
+  /// line.
   std::vector<std::string> lines() const;
   /// @throws InputError if there is any
   void check() const;
 
  private:
-  std::vector<std::string> lines_;
-  std::size_t count_ = 0;
+  struct Defect {
+    std::string group, line, what;
+    std::size_t rows = 1;
+  };
+  void add(std::string_view file, TextPosition place, std::string_view what, std::string_view group);
+
+  std::vector<Defect> shown_;
+  std::size_t count_ = 0, left_out_ = 0;
 };
 
 /// Shows text from a file in a message: in single quotes, at most 40 bytes, everything but printable ASCII as \xNN.

@@ -4,8 +4,22 @@
 
 #include <algorithm>
 #include <limits>
+#include <ranges>
+#include <string>
+#include <vector>
 
 namespace metastable::analysis {
+namespace {
+
+constexpr std::size_t most_ids_shown = 12;  // in a message
+
+std::vector<std::string> ids_of(const std::vector<Condition>& conditions) {
+  std::vector<std::string> ids;
+  for (const Condition& condition : conditions) ids.push_back(condition.id);
+  return ids;
+}
+
+}  // namespace
 
 TrialIndex::TrialIndex(Experiment& experiment, Rows rows, bool described)
     : experiment_(experiment),
@@ -34,8 +48,13 @@ std::optional<std::size_t> TrialIndex::condition(CsvReader& csv, std::size_t col
     known.emplace_back().id = id;
     return last_condition_;
   }
-  csv.refuse(column, id.empty() ? "is empty; the id of a condition is expected"
-                                : fmt::format("unknown condition {}", shown_text(id)));
+  const std::vector<std::string> ids = ids_of(known);
+  csv.refuse(column,
+             fmt::format("{}; experiment.toml has: {}{}",
+                         id.empty() ? "is empty where the id of a condition is expected"
+                                    : fmt::format("unknown condition {}", shown_text(id)),
+                         fmt::join(ids | std::views::take(most_ids_shown), ", "),
+                         ids.size() > most_ids_shown ? fmt::format(" and {} more", ids.size() - most_ids_shown) : ""));
   return std::nullopt;
 }
 

@@ -40,7 +40,7 @@ std::vector<long> trial_numbers(const std::vector<ImportedRow>& rows, bool renum
   std::map<long, std::string> condition_of;
   for (const ImportedRow& row : rows) {
     if (!row.trial) {
-      defects.add(row.place, {}, "trial: is not told");
+      defects.add_row(row.place, "trial: is not told");
       if (std::ranges::none_of(rows, [](const ImportedRow& one) { return one.trial.has_value(); })) return {};
       numbers.push_back(0);
       continue;
@@ -52,12 +52,12 @@ std::vector<long> trial_numbers(const std::vector<ImportedRow>& rows, bool renum
     constexpr const char* remedy = "; --number-trials numbers them in the order of their first rows";
     const std::optional<long> number = whole_number(*row.trial);
     if (!number)
-      defects.add(row.place, {}, fmt::format("trial: {} is no whole number from 0{}", shown_text(*row.trial), remedy));
+      defects.add_row(row.place, fmt::format("trial: {} is no whole number from 0{}", shown_text(*row.trial), remedy));
     const std::string& condition = condition_of.emplace(number.value_or(0), row.condition.value_or("")).first->second;
     if (number && condition != row.condition.value_or(""))
-      defects.add(row.place, {},
-                  fmt::format("trial: {} is of condition {} too, where numbers are of the whole experiment{}", *number,
-                              shown_text(condition), remedy));
+      defects.add_row(row.place,
+                      fmt::format("trial: {} is of condition {} too, where numbers are of the whole experiment{}",
+                                  *number, shown_text(condition), remedy));
     numbers.push_back(number.value_or(0));
   }
   return numbers;
@@ -91,13 +91,13 @@ Outcomes outcomes_of(const std::vector<ImportedRow>& rows, const std::vector<lon
     const auto word = options.outcomes.find(*rows[i].outcome);
     const std::string outcome = word == options.outcomes.end() ? *rows[i].outcome : word->second;
     if (outcome != "rest" && outcome != "end_of_ramp" && outcome != "max_collisions")
-      defects.add(
-          rows[i].place, {},
+      defects.add_row(
+          rows[i].place,
           fmt::format("outcome: {0} is none of rest, end_of_ramp, max_collisions; --outcomes rest={1} would say "
                       "that it is the first",
                       shown_text(outcome), outcome));
     else if (!told.outcome.empty() && told.outcome != outcome)
-      defects.add(rows[i].place, {}, fmt::format("outcome: {} after {} of the same trial", outcome, told.outcome));
+      defects.add_row(rows[i].place, fmt::format("outcome: {} after {} of the same trial", outcome, told.outcome));
     else
       told.outcome = outcome;
   }
@@ -105,7 +105,7 @@ Outcomes outcomes_of(const std::vector<ImportedRow>& rows, const std::vector<lon
   Outcomes outcomes{.csv = condition ? "condition,trial,outcome\n" : "trial,outcome\n", .places = {}};
   for (const auto& [number, told] : of_trial) {
     if (told.outcome.empty() && defects.empty())
-      defects.add(told.place, {}, fmt::format("outcome: is not told of trial {}, but of others", number));
+      defects.add_row(told.place, fmt::format("outcome: is not told of trial {}, but of others", number));
     outcomes.csv += fmt::format("{}{},{}\n", condition ? csv_field(told.condition) + "," : "", number, told.outcome);
     outcomes.places.push_back(told.place);
   }

@@ -79,10 +79,9 @@ TEST(CsvReader, NamesPlaceAndReasonOfEachDefect) {
   EXPECT_EQ(
       read("count,speed\n,1\nx,2\n0,nan\n1,-2\n1,1e999\n1,0x1\n").defects,
       (Strings{"f.csv:2:1: count: is empty; a whole number is expected",
-               "f.csv:3:1: count: 'x' is not a whole number in 1..99",
-               "f.csv:4:1: count: '0' is not a whole number in 1..99", "f.csv:4:3: speed: 'nan' is not a finite number",
-               "f.csv:5:3: speed: -2 is outside [0, 1000]", "f.csv:6:3: speed: '1e999' is not a finite number",
-               "f.csv:7:3: speed: '0x1' is not a finite number"}));
+               "f.csv:3:1: count: 'x' is not a whole number in 1..99", "f.csv:4:1: count: 0 is outside 1..99",
+               "f.csv:4:3: speed: 'nan' is not a finite number", "f.csv:5:3: speed: -2 is outside [0, 1000]",
+               "f.csv:6:3: speed: '1e999' is not a finite number", "f.csv:7:3: speed: '0x1' is not a finite number"}));
 }
 
 // A spreadsheet runs a cell that begins with = + - @ or a tab; what our own files hold comes back as it was.
@@ -103,15 +102,21 @@ TEST(CsvReader, GoesOnAfterADefect) {
   const Reading reading = read("count,name\n1,a\"\n2,\"x\"y\n3,ok\n\n4,\"multi\nline\"z,\nx,last\n");
   EXPECT_EQ(reading.names, (Strings{"ok", "last"}));
   EXPECT_EQ(reading.defects.back(), "f.csv:8:1: count: 'x' is not a whole number in 1..99");
-  EXPECT_EQ(reading.defects[3], "f.csv:7:6: text after a closing quote");
+  EXPECT_EQ(reading.defects[1], "f.csv:3:6: text after a closing quote (in 2 rows)");
 }
 
 TEST(CsvReader, ShowsTwentyDefectsAndCountsTheRest) {
   std::string text = "count\n";
-  for (int i = 0; i < 30; ++i) text += "x\n";
+  for (int i = 0; i < 30; ++i) text += "x" + std::to_string(i) + "\n";
   const Strings lines = read(text).defects;
   ASSERT_EQ(lines.size(), Defects::most_shown + 1);
   EXPECT_EQ(lines.back(), "... and 10 more");
+}
+
+TEST(CsvReader, CountsTheRowsOfOneDefect) {
+  EXPECT_EQ(read("count\nx\n1\nx\n0\nx\n0\n").defects,
+            (Strings{"f.csv:2:1: count: 'x' is not a whole number in 1..99 (in 3 rows)",
+                     "f.csv:5:1: count: 0 is outside 1..99 (in 2 rows)"}));
 }
 
 }  // namespace

@@ -139,6 +139,8 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
   EXPECT_EQ(of("1.39", "\"1.39\""), "experiment.toml:2:15: wheel.hub_mass_kg: a number is expected");
   EXPECT_EQ(of("0.151", "nan"), "experiment.toml:3:24: wheel.leg_lengths_m[1]: nan is outside [0.001, 100]");
   EXPECT_EQ(of("[0.15, 0.151, 0.15, 0.15]", "[0.15]"),
+            "experiment.toml:3:17: wheel.leg_lengths_m: 1 legs are outside 3..1000");
+  EXPECT_EQ(of("[0.15, 0.151, 0.15, 0.15]", "0.15"),
             "experiment.toml:3:17: wheel.leg_lengths_m: a list of 3 to 1000 numbers [m] is expected");
   EXPECT_EQ(of("coulomb", "sticky"),
             "experiment.toml:5:7: contact.law: one of published, coulomb, plastic, settled is expected");
@@ -147,7 +149,8 @@ TEST(Experiment, NamesWhatIsWrongWithTheDescription) {
             "experiment.toml:6:15: contact.restitution: { mean = ..., sd = ... } is expected");
   EXPECT_EQ(of("slope_deg = 12", "slope_deg = 45"),
             "experiment.toml:14:13: condition[1].slope_deg: 45 is outside [0.001, 45)");
-  EXPECT_EQ(of("leg = 1", "leg = 4"),
+  EXPECT_EQ(of("leg = 1", "leg = 4"), "experiment.toml:17:21: condition[1].first_landing_leg: 4 is outside 0..3");
+  EXPECT_EQ(of("leg = 1", "leg = 1.5"),
             "experiment.toml:17:21: condition[1].first_landing_leg: a whole number in 0..3 is expected");
   EXPECT_EQ(of("id = \"b\"", "id = \"a\""), "experiment.toml:13:6: id: a condition 'a' was there before");
   EXPECT_EQ(of("[wheel]\n", "[wheel]\nhub_mas_kg = 1\n"),
@@ -186,6 +189,21 @@ TEST(Experiment, RefusesWhatNoWheelCanHave) {
             "collisions.csv:2:9: omega_minus_rad_s: 1e+308 is outside [0, 1000]");
 }
 
+// A spelling that runs through the data is one mistake, not thousands.
+TEST(Experiment, SaysOnceWhatIsWrongWithManyRows) {
+  std::string rows = header, outcomes = "condition,trial,outcome\n";
+  for (int trial = 1; trial <= 1000; ++trial) {
+    rows += fmt::format("{},{},1,0,{}\n", trial % 2 == 0 ? "a" : "C", trial, trial == 2 ? 5 : 5000);
+    outcomes += fmt::format("{},{},stopped\n", trial % 2 == 0 ? "a" : "C", trial);
+  }
+  const std::string unknown = ":2:1: condition: unknown condition 'C'; experiment.toml has: a, b (in 500 rows)";
+  EXPECT_EQ(
+      defects(source(description, rows, outcomes)),
+      (Strings{"collisions.csv" + unknown,
+               "collisions.csv:2:9: omega_minus_rad_s: 5000 is outside [0, 1000] (in 999 rows)", "trials.csv" + unknown,
+               "trials.csv:2:5: outcome: 'stopped' is none of rest, end_of_ramp, max_collisions (in 1000 rows)"}));
+}
+
 TEST(Experiment, NamesWhatIsWrongWithTheRows) {
   const auto of = [&](const std::string& rows) { return defects(source(description, header + rows)); };
   EXPECT_EQ(of(""), (Strings{"collisions.csv: holds no collision"}));
@@ -195,13 +213,16 @@ TEST(Experiment, NamesWhatIsWrongWithTheRows) {
   EXPECT_EQ(of("a,1,1,0,5\na,1,3,1,5\n"),
             (Strings{"collisions.csv:3:5: collision: 3 skips: collision 2 of trial 1 is due"}));
   EXPECT_EQ(of("a,1,1,0,5\na,1,2,2,5\n"), (Strings{"collisions.csv:3:7: leg: leg 2 does not land after leg 0"}));
-  EXPECT_EQ(of("c,1,1,0,5\n"), (Strings{"collisions.csv:2:1: condition: unknown condition 'c'"}));
+  const std::string ids = "; experiment.toml has: a, b";
+  EXPECT_EQ(of("c,1,1,0,5\n"), (Strings{"collisions.csv:2:1: condition: unknown condition 'c'" + ids}));
+  EXPECT_EQ(of(",1,1,0,5\n"),
+            (Strings{"collisions.csv:2:1: condition: is empty where the id of a condition is expected" + ids}));
   EXPECT_EQ(
       of("a,1,1,0,5\nb,1,2,1,5\n"),
       (Strings{"collisions.csv:3:1: condition: trial 1 is of condition 'a' in line 2; numbers count over the whole "
                "experiment"}));
   EXPECT_EQ(of("a,1,1,4,-5\na,x,1,0,NaN\n"),
-            (Strings{"collisions.csv:2:7: leg: '4' is not a whole number in 0..3",
+            (Strings{"collisions.csv:2:7: leg: 4 is outside 0..3",
                      "collisions.csv:2:9: omega_minus_rad_s: -5 is outside [0, 1000]",
                      "collisions.csv:3:3: trial: 'x' is not a whole number in 0..2147483647",
                      "collisions.csv:3:9: omega_minus_rad_s: 'NaN' is not a finite number"}));

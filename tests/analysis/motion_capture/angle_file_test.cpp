@@ -83,7 +83,7 @@ TEST(AngleFile, NamesWhatIsWrong) {
           "angle.csv:5:1: time_s: 0.02 s after the frame before where trial 1 has 0.01 s; frames must follow evenly"}));
   EXPECT_EQ(defects(header + "a,1,0,x\nb,1,0.01,0.1\n"),
             (Strings{"angle.csv:2:7: angle_rad: 'x' is not a finite number",
-                     "angle.csv:3:1: condition: unknown condition 'b'"}));
+                     "angle.csv:3:1: condition: unknown condition 'b'; experiment.toml has: a"}));
   EXPECT_EQ(defects(header + "a,1,0,0\na,1,0.01,0.1\n", "trial,outcome\n2,rest\n"),
             (Strings{"angle.csv:2:1: trial 1 is not in trials.csv", "trials.csv:2:1: trial 2 is not in angle.csv"}));
 }

@@ -209,18 +209,12 @@ TEST_F(Import, NumbersNamesOfTrialsAndStatesTheWheelByOptions) {
   expect_refused(import(stated({"--slope", "9.59"})),
                  csv +
                      ":2: trial: 'monday' is no whole number from 0; --number-trials numbers them in the order of "
-                     "their first rows\nmetastable: " +
-                     csv +
-                     ":3: trial: 'monday' is no whole number from 0; --number-trials numbers them in the order "
-                     "of their first rows\nmetastable: " +
-                     csv +
-                     ":4: trial: 'monday' is no whole number from 0; --number-trials numbers them in the order "
-                     "of their first rows\nmetastable: " +
+                     "their first rows (in 3 rows)\nmetastable: " +
                      csv +
                      ":5: trial: 'tuesday' is no whole number from 0; --number-trials numbers them in the order "
                      "of their first rows");
   expect_refused(import(stated({"--conditions", "fast=9.59", "--number-trials"})),
-                 csv + ":4: condition: unknown condition 'slow'");
+                 csv + ":4: condition: unknown condition 'slow'; experiment.toml has: fast");
   expect_refused(import(with({"--slope", "9.59", "--law", "coulomb"})),
                  "import: data do not tell wheel, contact and ramp: --description FILE states them (an "
                  "experiment.toml), or these, of which some are missing: --legs, --mass, --ramp-length, --restitution, "
