@@ -271,7 +271,11 @@ int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, in
     command.declare(options.back());
     sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")
         ->type_name("FILE")
-        ->check([](const std::string& file) { return file.empty() ? std::string("what is given is empty") : ""; }, "");
+        ->check(
+            [](const std::string& file) {
+              return file.empty() ? std::string("what is given is empty") : value_objection(file, "FILE");
+            },
+            "");
     subcommands.push_back(sub);
   }
   manual = manual_of(subcommands);

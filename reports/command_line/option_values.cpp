@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
@@ -25,11 +26,21 @@ std::string dashed(std::string_view name) { return fmt::format("--{}", name); }
   throw std::invalid_argument(fmt::format("--{}: '{}' is not {}", name, text, wanted));
 }
 
-// Reads the whole text as a finite number.
+// Reads the whole text as a number. One beyond all doubles, or `inf`, is infinite: no range holds it.
 bool parse(std::string_view text, double& value) {
   if (text.starts_with('+')) text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+  if (end != text.data() + text.size() || error == std::errc::invalid_argument) return false;
+  if (error == std::errc::result_out_of_range) value = std::strtod(std::string(text).c_str(), nullptr);
+  return !std::isnan(value);
+}
+
+// Reads one value of a list of contacts.
+double contact_value(std::string_view place, std::string_view text, const dynamics::Range& range) {
+  double value = 0;
+  if (!parse(text, value)) throw std::invalid_argument(fmt::format("{}: '{}' is not a number", place, text));
+  check_in_range(place, value, range);
+  return value;
 }
 
 std::vector<std::string_view> split(std::string_view text, char mark) {
@@ -73,16 +84,25 @@ void check_legs(std::string_view called, const std::vector<double>& lengths) {
 double number_value(std::string_view name, std::string_view text, const dynamics::Range& range) {
   double value = 0;
   if (!parse(trimmed(text), value)) refuse(name, text, "a number");
+  if (std::isinf(value) && std::isinf(range.low) && std::isinf(range.high)) refuse(name, text, "a finite number");
   check_in_range(dashed(name), value, range);
   return value;
 }
 
 std::uint64_t whole_value(std::string_view name, std::string_view text, std::uint64_t least, std::uint64_t most) {
-  std::uint64_t value = 0;
   const std::string_view digits = trimmed(text);
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc() || end != digits.data() + digits.size() || value < least || value > most)
+  double number = 0;  // "1e6" is a whole number too, and "-3" is one that no range holds
+  if (!parse(digits, number) || number != std::floor(number))
     refuse(name, text, fmt::format("a whole number in {}..{}", least, most));
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  bool held = error == std::errc() && end == digits.data() + digits.size();
+  if (!held && number >= 0 && number < 0x1p64) {
+    value = static_cast<std::uint64_t>(number);
+    held = true;
+  }
+  if (!held || value < least || value > most)
+    throw std::invalid_argument(fmt::format("--{}: {} is outside {}..{}", name, digits, least, most));
   return value;
 }
 
@@ -170,12 +190,10 @@ std::vector<dynamics::Contact> contact_list(const std::string& file) {
     if (parts.size() != 2)
       throw std::invalid_argument(fmt::format("{}:{}: {} columns where 2 are expected", file, number, parts.size()));
     dynamics::Contact pair;
-    if (!parse(trimmed(parts[0]), pair.restitution) || !dynamics::range::restitution.holds(pair.restitution))
-      throw std::invalid_argument(fmt::format("{}:{}: column restitution: '{}' is not a number in {}", file, number,
-                                              parts[0], dynamics::range::restitution.text()));
-    if (!parse(trimmed(parts[1]), pair.friction) || !dynamics::range::friction.holds(pair.friction))
-      throw std::invalid_argument(fmt::format("{}:{}: column friction: '{}' is not a number in {}", file, number,
-                                              parts[1], dynamics::range::friction.text()));
+    pair.restitution = contact_value(fmt::format("{}:{}: column restitution", file, number), trimmed(parts[0]),
+                                     dynamics::range::restitution);
+    pair.friction = contact_value(fmt::format("{}:{}: column friction", file, number), trimmed(parts[1]),
+                                  dynamics::range::friction);
     pairs.push_back(pair);
   }
   if (pairs.empty()) throw std::invalid_argument(fmt::format("{}: holds no pair", file));

@@ -18,11 +18,12 @@ void check_in_range(std::string_view called, const analysis::Spread& value, cons
 /// Likewise refuses any but 3 to 1000 legs whose lengths [m] are in their range.
 void check_legs(std::string_view called, const std::vector<double>& lengths);
 
-/// All throw std::invalid_argument: "--NAME: 'TEXT' is not ...", or "--NAME: NUMBER is outside RANGE".
+/// All throw std::invalid_argument: "--NAME: 'TEXT' is not ..." of what is no such thing at all, and "--NAME: NUMBER is
+/// outside RANGE" of what is one.
 double number_value(std::string_view name, std::string_view text, const dynamics::Range& range = {});
 /// Reads a whole number in [least, most].
 std::uint64_t whole_value(std::string_view name, std::string_view text, std::uint64_t least, std::uint64_t most);
-/// Reads "a,b,c" as numbers, at least one.
+/// Reads "a,b,c" as numbers, at least one; they may be infinite.
 std::vector<double> list_value(std::string_view name, std::string_view text);
 /// Reads "mean,sd", or "mean" alone for a constant; sd >= 0. "0,4" for a coefficient, which is hardly ever meant so, is
 /// refused with a word on decimal points.

@@ -33,6 +33,13 @@ std::vector<std::string> words_of(const std::string& value) {
 
 }  // namespace
 
+std::string value_objection(const std::string& text, const std::string& value) {
+  const std::size_t dashes = text.find_first_not_of('-');
+  const bool option = dashes != std::string::npos && (dashes == 2 || (dashes == 1 && text.size() == 2)) &&
+                      std::isalpha(static_cast<unsigned char>(text[dashes])) != 0;
+  return option ? fmt::format("{} is missing: '{}' is an option", value, text) : "";
+}
+
 LooseOptions::LooseOptions(const std::function<void(Options&)>& declare)
     : holder_(std::make_unique<CLI::App>()), options_(*holder_) {
   declare(options_);
@@ -47,6 +54,7 @@ void Options::add(const std::string& name, const std::string& value, const std::
   std::vector<std::string>& texts = texts_[name];
   CLI::Option* option = command_.add_option("--" + name, texts, help);
   option->expected(1)->allow_extra_args(false)->type_name(value)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  option->check([value](const std::string& text) { return value_objection(text, value); }, "");
   if (!fallback.empty()) {
     option->default_str(fallback);
     fallback_[name] = fallback;

@@ -19,6 +19,10 @@ class App;
 
 namespace metastable::reports {
 
+/// Says why a text cannot be an option's value: it is an option itself ("--how-it-fails", "-h"), so that the value was
+/// left out. "" for all others, such as negative numbers. @param value  what stands for it in the help
+std::string value_objection(const std::string& text, const std::string& value);
+
 /// Holds what was given on the command line or in a --config file, or is left at its default. What a text means is
 /// checked when it is read; messages name the option (std::invalid_argument).
 class Options {

@@ -95,6 +95,40 @@ TEST_F(Refusals, OfOptionsThatDoNothing) {
   EXPECT_EQ(metastable({"steps", "--config", ""}).code, 2);
 }
 
+TEST_F(Refusals, OfNumbersTellTheRangeWhereverTheyStand) {
+  const std::string pairs = file("low.csv", "restitution,friction\n0.4,0.4\n0.4,30\n"),
+                    words = file("words.csv", "restitution,friction\nhigh,0.4\n");
+  expect_refused({
+      {{"steps", "--samples", "3"}, "--samples: 3 is outside 16..16777216"},
+      {{"steps", "--samples", "3.5"}, "--samples: '3.5' is not a whole number in 16..16777216"},
+      {{"steps", "--threads=-1"}, "--threads: -1 is outside 0..1024"},
+      {{"steps", "--config", file("s.toml", "slope = 5\nsamples = 3\n")},
+       path("s.toml") + ":2: --samples: 3 is outside 16..16777216"},
+      {{"steps", "--config", file("t.toml", "samples = \"many\"\n")},
+       path("t.toml") + ":1: --samples: 'many' is not a whole number in 16..16777216"},
+      {{"steps", "--contact-list", pairs}, pairs + ":3: column friction: 30 is outside [0, 10]"},
+      {{"steps", "--contact-list", words}, words + ":2: column restitution: 'high' is not a number"},
+      {{"steps", "--slope", "inf"}, "--slope: 'inf' is not a finite number"},
+  });
+}
+
+// The name of an option that follows one without its value is no file, no number and no word.
+TEST_F(Refusals, OfAnOptionWhereAValueIsMissing) {
+  const auto missing = [](const std::string& option, const std::string& value, const std::string& taken,
+                          const std::string& command = "steps") {
+    return option + ": " + value + " is missing: '" + taken + "' is an option; see 'metastable " + command + " --help'";
+  };
+  expect_refused({
+      {{"steps", "--json", "--how-it-fails"}, missing("--json", "FILE|-", "--how-it-fails")},
+      {{"steps", "--json", "--seed=3"}, missing("--json", "FILE|-", "--seed=3")},
+      {{"steps", "--json", "-h"}, missing("--json", "FILE|-", "-h")},
+      {{"steps", "--friction", "--law", "settled"}, missing("--friction", "MEAN,SD", "--law")},
+      {{"steps", "--config", "--json"}, missing("--config", "FILE", "--json")},
+      {{"describe", "--out", "--json", path("x"), path("y")}, missing("--out", "DIR", "--json", "describe")},
+  });
+  EXPECT_EQ(metastable({"steps", "--correlation", "-2"}).err, "metastable: --correlation: -2 is outside (-1, 1)\n");
+}
+
 TEST_F(Refusals, OfWhatNoWheelCanHave) {
   expect_refused({
       {{"steps", "--mass", "1e250"}, "--mass: 1e+250 is outside [1e-06, 1e+06]"},

@@ -45,7 +45,7 @@ class Settings(unittest.TestCase):
                                  (dict(friction=(1, 2, 3)), "friction: '1,2,3' is not 'mean,sd'"),
                                  (dict(contact_list=[1, 2]), "contact_list: an array of n rows and two columns"),
                                  (dict(legs=[0.15]), "legs: 1 legs are fewer than 3"),
-                                 (dict(first_leg=8), r"first_leg: '8' is not a whole number in 0\.\.7"),
+                                 (dict(first_leg=8), r"first_leg: 8 is outside 0\.\.7"),
                                  (dict(mass=True), "mass: a number expected, not bool"),
                                  (dict(mass=[1, 2]), "mass: a number expected, not list"),
                                  (dict(law=3), "law: a text expected, not int"),

@@ -88,8 +88,8 @@ class Steps(unittest.TestCase):
                 line(step).study(progress=False)
         with self.assertRaises(KeyboardInterrupt):
             line(self.interrupting).study()
-        for fields, sentence in ((dict(dimension=5), r"dimension: '5' is not a whole number in 1\.\.4"),
-                                 (dict(noise=0), r"noise: '0' is not a whole number in 1\.\.16"),
+        for fields, sentence in ((dict(dimension=5), r"dimension: 5 is outside 1\.\.4"),
+                                 (dict(noise=0), r"noise: 0 is outside 1\.\.16"),
                                  (dict(start=[0, 0]), "a start of 1 numbers expected"),
                                  (dict(names=["a", "b"]), "one name for each dimension"),
                                  (dict(noise_names=["a", "b"]), "noise_names: 2 given")):
