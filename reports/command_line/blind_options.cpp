@@ -52,8 +52,10 @@ BlindRequest blind_request(const Options& o, const std::string& line) {
 }
 
 std::vector<Command> blind_commands() {
-  return {{"blind", "The diagnosis tested on cases whose truth is sealed until it has answered: make, answer, open",
-           declare_blind, [](const Options& o, const std::string& line) {
+  return {{"blind",
+           "The diagnosis tested on cases whose truth is sealed until it has answered: make, answer, open",
+           declare_blind,
+           [](const Options& o, const std::string& line) {
              const BlindRequest request = blind_request(o, line);
              const std::string action = o.text("ACTION");
              if (action == "make")
@@ -62,7 +64,10 @@ std::vector<Command> blind_commands() {
                run_blind_answer(request);
              else
                run_blind_open(request, o.flag("partial") ? Unanswered::left_out : Unanswered::refused);
-           }}};
+           },
+           "",
+           {"metastable blind make run --per-effect 1 --none 5 --pairs 2 --outside 2", "metastable blind answer run",
+            "metastable blind open run"}}};
 }
 
 }  // namespace metastable::reports

@@ -18,6 +18,7 @@
 #include "analysis/experiment/input_error.h"
 #include "analysis/experiment/suggestion.h"
 #include "reports/command_line/command.h"
+#include "reports/command_line/help.h"
 #include "reports/command_line/manual.h"
 #include "reports/command_line/requests.h"
 #include "reports/command_line/setting_options.h"
@@ -48,7 +49,11 @@ Command steps() {
               return run_walker_steps(walker);
             }
             run_steps(steps_request(o, one_setting(o), line));
-          }};
+          },
+          "",
+          {"metastable steps --slope 9.59 --friction 0.3,0.05",
+           "metastable steps --law settled --slope 9.59 --how-it-fails",
+           "metastable steps --slope 9.59 --method integrated --sensitivities"}};
 }
 
 Command compare() {
@@ -65,7 +70,9 @@ Command compare() {
           "Every option of wheel, contact, course and launch takes several values: with commas between them (--law "
           "published,settled, --mass 1,2), or, where commas have a meaning of their own, given again (--legs 0.15 "
           "--legs 0.16; likewise --restitution, --friction, --contact-list, --initial-speed). All combinations are "
-          "studied; the first values together are the setting that every other one is compared with."};
+          "studied; the first values together are the setting that every other one is compared with.",
+          {"metastable compare --slopes 7.02,9.59", "metastable compare --slope 9.59 --friction-mean 0.3,0.4,0.5",
+           "metastable compare --slope 9.59 --law published,settled"}};
 }
 
 }  // namespace
@@ -105,7 +112,10 @@ Command sweep_command(const Sharing* sharing) {
             request.json = o.text("json");
             request.command = line;
             run_sweep(request);
-          }};
+          },
+          "",
+          {"metastable sweep --slope 6:10:0.5", "metastable sweep --slope 9.59 --friction-mean 0.2:0.5:0.05 --out mu.csv",
+           "metastable sweep --slope 8:10:1 --friction-sd 0.05,0.1 --out map.csv"}};
 }
 
 namespace {
@@ -121,13 +131,18 @@ Command solve() {
             // One rule for all slopes: the paper's launch is that of one of them.
             if (solved == "slope" && !o.given("initial-speed")) setting.steady_launch = true;
             run_solve(solve_request(o, setting, line));
-          }};
+          },
+          "",
+          {"metastable solve friction-mean --slope 9.59 --steps 100",
+           "metastable solve slope --friction 0.3,0.05 --steps 1000",
+           "metastable solve friction-sd --slope 9.59 --friction 0.3 --survive 1000:0.9"}};
 }
 
 Command report() {
   return {
       "report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
       [](Options& o) {
+        o.group("Question");
         o.add("slopes", "DEG,DEG,...", "7.02,9.59",
               "Ramp slopes [deg], each from 0.001 to below half the angle between legs");
         add_launch(o, "Once per slope, in order");
@@ -135,6 +150,7 @@ Command report() {
         o.add("energy-trials", "N", "1000", "Trials behind the energy-loss table, 2..1000000");
         o.add("landings", "N", "40000",
               "Landings rolled under settled for each cell of a map, 1000..1000000000: their cost and their intervals");
+        o.group("Files and help");
         o.add("out", "DIR", "report", "Folder for the files");
         o.add_json();
         add_walker(o, "DEG,DEG,...");
@@ -143,7 +159,10 @@ Command report() {
         if (asks_for_walker(o)) return run_walker_report(walker_request(o, line));
         run_report({several_settings(o, 1), study_options(o), o.count("energy-trials", 2, 1000000),
                     o.count("landings", 1000, 1000000000), o.text("out"), line, o.text("json")});
-      }};
+      },
+      "",
+      {"metastable report", "metastable report --slopes 6,8,10 --friction 0.3,0.05 --out steeper",
+       "metastable report --walker compass --slope-sd 0.458 --out compass"}};
 }
 
 Command verify() {
@@ -160,20 +179,24 @@ Command verify() {
           [](const Options& o, const std::string& line) {
             run_verify({o.count("seeds", 0, 1000), o.whole("nodes", 128, 4096), o.threads(), o.text("out"),
                         o.text("export"), o.text("json"), line});
-          }};
+          },
+          "",
+          {"metastable verify", "metastable verify --out evidence", "metastable verify --export chain"}};
 }
 
-// Returns what CLI11 knows of the commands' options, for manual pages and completion.
-std::vector<ManualCommand> manual_of(const std::vector<CLI::App*>& subcommands) {
+// Returns what CLI11 knows of the commands' options, for help, manual pages and completion.
+// @param subcommands  as many as commands, in that order
+std::vector<ManualCommand> manual_of(const std::vector<Command>& commands, const std::vector<CLI::App*>& subcommands) {
   std::vector<ManualCommand> manual;
-  for (const CLI::App* sub : subcommands) {
-    ManualCommand& command =
-        manual.emplace_back(ManualCommand{sub->get_name(), sub->get_description(), {}, sub->get_footer()});
-    for (const CLI::Option* option : sub->get_options()) {
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    const Command& of = commands[i];
+    ManualCommand& command = manual.emplace_back(ManualCommand{of.name, of.summary, {}, of.details, of.examples});
+    for (const CLI::Option* option : subcommands[i]->get_options()) {
       const bool place = option->get_positional();
       command.options.push_back({place ? option->get_single_name() : "--" + option->get_lnames().front(),
                                  option->get_expected_max() == 0 ? "" : option->get_type_name(),
-                                 option->get_default_str(), option->get_description(), place});
+                                 option->get_default_str(), option->get_description(), place,
+                                 option->get_group()});
     }
   }
   return manual;
@@ -203,7 +226,9 @@ std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
              if (o.text("json") != "-") fmt::print("{}", page);
              answer.table(options_table(manual, o));
              answer.finish({line, {}, 0, version()});
-           }},
+           },
+           "",
+           {"metastable man steps | man -l -"}},
           {"completion", "A script that completes commands and options: source <(metastable completion bash)",
            [](Options& o) {
              o.add_place("SHELL", "Whose completion it is", "bash|zsh|fish");
@@ -216,7 +241,9 @@ std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
              answer.fact("shell", o.text("SHELL"));
              answer.fact("script", script);
              answer.finish({line, {}, 0, version()});
-           }},
+           },
+           "",
+           {"source <(metastable completion bash)", "metastable completion fish | source"}},
           {"doctor", "What is installed, and what each missing piece would add", [](Options& o) { o.add_json(); },
            [](const Options& o, const std::string&) { run_doctor(o.text("json")); }}};
 }
@@ -257,20 +284,25 @@ int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, in
   CLI::App app(program.summary, program.name);
   app.require_subcommand(1);
   app.set_version_flag("--version", version_text());
-  app.footer(
-      "Exit codes: 0 done, 2 wrong option or file (one that cannot be written too), 3 a computation failed, 130 "
-      "interrupted, 143 terminated.");
+  app.formatter_fn([&](const CLI::App*, const std::string&, CLI::AppFormatMode) {
+    return program_help(manual, program.name, program.summary, help_width());
+  });
   const std::vector<Command>& all = program.commands;
   std::deque<Options> options;
   std::vector<CLI::App*> subcommands;
   std::deque<std::string> config_files;
   for (const Command& command : all) {
     CLI::App* sub = app.add_subcommand(command.name, command.summary);
-    sub->footer(command.details);
+    const std::size_t index = subcommands.size();
+    sub->formatter_fn([&manual, &program, index](const CLI::App*, const std::string&, CLI::AppFormatMode) {
+      return command_help(manual[index], program.name, help_width());
+    });
+    sub->set_help_flag("-h,--help", "Prints this text")->group("Files and help");
     options.emplace_back(*sub);
     command.declare(options.back());
     sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")
         ->type_name("FILE")
+        ->group("Files and help")
         ->check(
             [](const std::string& file) {
               return file.empty() ? std::string("what is given is empty") : value_objection(file, "FILE");
@@ -278,7 +310,7 @@ int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, in
             "");
     subcommands.push_back(sub);
   }
-  manual = manual_of(subcommands);
+  manual = manual_of(all, subcommands);
   if (argc < 2 || (argv[1][0] != '-' &&
                    std::none_of(all.begin(), all.end(), [&](const Command& c) { return c.name == argv[1]; }))) {
     std::vector<std::string> names;

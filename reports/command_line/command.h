@@ -13,7 +13,8 @@ struct Command {
   std::string name, summary;
   std::function<void(Options&)> declare;
   std::function<void(const Options&, const std::string& command_line)> run;
-  std::string details = {};  ///< below the options in --help and on the manual page
+  std::string details = {};                ///< below the options in --help and on the manual page
+  std::vector<std::string> examples = {};  ///< before them: lines for the shell, to be pasted as they stand
 };
 
 /// Makes import.

@@ -37,6 +37,7 @@ analysis::Setting stand_in_base(const Options& o, const Pairs& pairs) {
 }
 
 void add_reality(Options& o) {
+  o.group("The virtual laboratory (--reality)");
   o.add_flag("reality", "In the virtual laboratory: motion in continuous time, sharing no formula with the model");
   o.add("effect", "ID:NAME=VALUE,...", "",
         "With --reality, repeatable: an effect the model lacks, e.g. leg_contact:leg=3,friction_ratio=1.4");
@@ -63,16 +64,23 @@ std::vector<std::string> split(const std::string& text, char separator) {
 }
 
 Command simulate() {
-  return {"simulate", "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)", declare_simulate,
-          [](const Options& o, const std::string& line) {
-            if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
-            if (asks_for_walker(o)) return run_walker_simulate(walker_simulate_request(o, line));
-            const SimulateRequest request = simulate_request(o, line);
-            if (o.flag("reality"))
-              run_reality(reality_request(o, request));
-            else
-              run_simulate(request);
-          }};
+  return {
+      "simulate",
+      "Trials as an experiment folder (experiment.toml, collisions.csv, trials.csv)",
+      declare_simulate,
+      [](const Options& o, const std::string& line) {
+        if (o.text("out").empty()) throw std::invalid_argument("--out: a folder must be given");
+        if (asks_for_walker(o)) return run_walker_simulate(walker_simulate_request(o, line));
+        const SimulateRequest request = simulate_request(o, line);
+        if (o.flag("reality"))
+          run_reality(reality_request(o, request));
+        else
+          run_simulate(request);
+      },
+      "",
+      {"metastable simulate --slope 9.59 --law settled --trials 40 --out trials",
+       "metastable simulate --stand-in --out stand-in",
+       "metastable simulate --reality --slope 9.59 --out wheel \\\n    --effect leg_contact:leg=3,friction_ratio=1.4"}};
 }
 
 Command coast_down() {
@@ -119,7 +127,8 @@ Command coast_down() {
 
 Command collisions() {
   return {
-      "collisions", "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
+      "collisions",
+      "Collisions from the wheel's angle over time: angle.csv of an experiment folder to collisions.csv",
       [](Options& o) {
         o.add_place("DIR", "Experiment folder with experiment.toml and angle.csv");
         o.add("window", "N", "",
@@ -148,16 +157,25 @@ Command collisions() {
         request.threads = o.threads();
         request.out = o.text("out");
         run_collisions(request);
-      }};
+      },
+      "",
+      {"metastable simulate --stand-in --out filmed   # an experiment folder to try", "metastable collisions filmed",
+       "metastable collisions filmed --omega-minus peak --out -"}};
 }
 
 Command describe() {
-  return {"describe", "What the trials of an experiment folder show: speeds, tests, survival, restitution and friction",
-          declare_describe, [](const Options& o, const std::string& line) { run_describe(describe_request(o, line)); }};
+  return {"describe",
+          "What the trials of an experiment folder show: speeds, tests, survival, restitution and friction",
+          declare_describe,
+          [](const Options& o, const std::string& line) { run_describe(describe_request(o, line)); },
+          "",
+          {"metastable simulate --stand-in --out stand-in   # an experiment folder to try",
+           "metastable describe stand-in", "metastable describe stand-in --out described"}};
 }
 
 Command study() {
-  return {"study", "The paper's study: its simulated figures, its claims one by one and its hypotheses, under each law",
+  return {"study",
+          "The paper's study: its simulated figures, its claims one by one and its hypotheses, under each law",
           [](Options& o) {
             o.add("data", "DIR", "", "Experiment folder of its three experiments (default: a simulated stand-in)");
             o.add("trials", "N", "1000", "Trials of each simulated profile, 20..1000000");
@@ -178,13 +196,20 @@ Command study() {
             request.options.threads = o.threads();
             request.command = line;
             run_study(request);
-          }};
+          },
+          "",
+          {"metastable study", "metastable study --data stand-in --out measured"}};
 }
 
 Command diagnose() {
-  return {"diagnose",
-          "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
-          declare_diagnose, [](const Options& o, const std::string& line) { run_diagnose(diagnose_request(o, line)); }};
+  return {
+      "diagnose",
+      "The gap between an experiment and its nominal model: where it lies, which effect closes it, how far",
+      declare_diagnose,
+      [](const Options& o, const std::string& line) { run_diagnose(diagnose_request(o, line)); },
+      "",
+      {"metastable simulate --reality --slope 9.59 --out wheel \\\n    --effect leg_contact:leg=3,friction_ratio=1.4",
+       "metastable diagnose wheel", "metastable diagnose wheel --out diagnosis"}};
 }
 
 Command lessons() {
@@ -207,7 +232,9 @@ Command lessons() {
             request.options.threads = o.threads();
             request.command = line;
             run_lessons(request);
-          }};
+          },
+          "",
+          {"metastable lessons", "metastable lessons --data stand-in"}};
 }
 
 Command effects() {
@@ -222,6 +249,7 @@ void declare_simulate(Options& o) {
   add_slope(o);
   add_launch(o, "Just before collision 1 [rad/s]");
   add_wheel(o), add_contact(o), add_course(o);
+  o.group("Trials");
   o.add_flag("stand-in",
              "The paper's three experiments instead of one setting: 51 fast and 48 slow trials at 9.59 deg, 50 "
              "at 7.02 deg, angle.csv at 120 Hz; eta ~ N(0.54, 0.045^2) and mu ~ N(0.352, 0.043^2) unless given");
@@ -231,8 +259,10 @@ void declare_simulate(Options& o) {
   o.add("angle-noise", "RAD", "", "White noise of the angle, >= 0 (default 0.0002; needs --angle-rate)");
   add_reality(o);
   add_walker(o, "DEG", false);
+  o.group("Trials");
   o.add_seed();
   o.add_threads();
+  o.group("Files and help");
   o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
   o.add_json();
 }

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <iterator>
 #include <sstream>
 #include <stdexcept>
 
@@ -34,17 +35,22 @@ constexpr const char* details = R"(What it needs
   MAT: struct arrays (omega_minus=trials.w[deg/s], or lab.trials.w of a struct in a struct), cell arrays,
   matrices padded with NaN (with --trials-in), or vectors with one that tells the trials.
   What data cannot tell: --description with an experiment.toml, or --slope (or --conditions), --legs, --mass,
-  --ramp-length, --law and, unless the law is plastic, --restitution and --friction.
-Examples
-  metastable import runs.csv --columns 'trial=run,omega_minus=w before[deg/s]' --description wheel.toml --out wheel
-  metastable import wide.csv --columns 'omega_minus=w_*[rad/s]' --slope 9.59 --legs paper --mass 1.39 \
-    --ramp-length 3.66 --law coulomb --restitution 0.5,0.05 --friction 0.4,0.05 --out wheel
-  metastable import lab.mat --columns 'omega_minus=trials.w[deg/s]' --description wheel.toml --out wheel)";
+  --ramp-length, --law and, unless the law is plastic, --restitution and --friction.)";
+
+constexpr const char* examples[] = {
+    R"(metastable import runs.csv --description wheel.toml --out wheel \
+    --columns 'trial=run,omega_minus=w before[deg/s]')",
+    R"(metastable import wide.csv --columns 'omega_minus=w_*[rad/s]' --slope 9.59 \
+    --legs paper --mass 1.39 --ramp-length 3.66 --law coulomb \
+    --restitution 0.5,0.05 --friction 0.4,0.05 --out wheel)",
+    R"(metastable import lab.mat --columns 'omega_minus=trials.w[deg/s]' \
+    --description wheel.toml --out wheel)"};
 
 constexpr const char* stated[] = {"legs", "mass", "ramp-length", "law", "restitution", "friction"};
 
 void declare_import(Options& o) {
   o.add_place("FILE", "CSV or MAT file");
+  o.group("The file");
   o.add("columns", "WHAT=NAME,...", "", "Which column or variable tells what, see below");
   o.add("separator", "','|';'|tab", "", "Between the fields of a CSV (default: found)");
   o.add("decimal", "point|comma", "", "Before the decimals of a CSV's numbers (default: found)");
@@ -56,13 +62,16 @@ void declare_import(Options& o) {
   o.add("outcomes", "rest=WORD,...", "",
         "The file's words for rest, end_of_ramp and max_collisions; a word may be a number");
   o.add_flag("number-trials", "Number the trials in the order of their first rows, whatever the file calls them");
+  o.group("What the file does not tell");
   o.add("description", "FILE", "", "experiment.toml to take; otherwise all of the following state it");
   o.add("slope", "DEG", "", "Ramp slope [deg] of all trials, from 0.001 to below half the angle between legs");
   o.add("conditions", "ID=DEG,...", "", "Instead: the slope of each condition");
   add_stated_wheel(o), add_stated_contact(o), add_course(o);
   for (const char* name : stated) o.drop_default(name);
+  o.group("What the file does not tell");
   o.add("sensor-noise", "SD", "", "Believed noise of the speeds [rad/s]", dynamics::range::speed);
   o.add("title", "TEXT", "", "Of the experiment (default: the file's name)");
+  o.group("Files and help");
   o.add("out", "DIR", "", "Folder to create (must not hold an experiment yet)");
   o.add_json();
 }
@@ -157,8 +166,9 @@ void import_as_asked(const Options& o, const std::string& line) {
 }  // namespace
 
 Command import_command() {
-  return {"import", "A CSV (long or wide) or MAT file of trials to an experiment folder", declare_import,
-          import_as_asked, details};
+  return {"import",       "A CSV (long or wide) or MAT file of trials to an experiment folder",
+          declare_import, import_as_asked,
+          details,        {std::begin(examples), std::end(examples)}};
 }
 
 }  // namespace metastable::reports

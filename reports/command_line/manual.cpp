@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "analysis/experiment/suggestion.h"
+#include "reports/command_line/options.h"
 
 namespace metastable::reports {
 namespace {
@@ -158,6 +159,19 @@ constexpr std::string_view exit_codes =
 
 }  // namespace
 
+std::vector<std::pair<std::string, std::vector<ManualOption>>> option_groups_of(const ManualCommand& command) {
+  constexpr std::size_t few = 12;
+  const bool together = std::ranges::count(command.options, false, &ManualOption::place) <= static_cast<long>(few);
+  std::vector<std::pair<std::string, std::vector<ManualOption>>> groups{{"What it takes", {}}};
+  for (const std::string_view group : option_groups) groups.emplace_back(group, std::vector<ManualOption>());
+  for (const ManualOption& o : command.options) {
+    const std::string group = o.place ? groups.front().first : together ? std::string(option_groups[0]) : o.group;
+    std::ranges::find(groups, group, [](const auto& one) { return one.first; })->second.push_back(o);
+  }
+  std::erase_if(groups, [](const auto& group) { return group.second.empty(); });
+  return groups;
+}
+
 std::string completion_script(const std::vector<ManualCommand>& commands, std::string_view shell) {
   if (shell == "bash") return bash(commands);
   if (shell == "zsh") return zsh(commands);
@@ -186,20 +200,26 @@ std::string manual_page(const std::vector<ManualCommand>& commands, std::string_
                      troff(found->name) + "\n[\\fIOPTIONS\\fR]";
   for (const ManualOption& o : found->options)
     if (o.place) page += " \\fI" + troff(o.name) + "\\fR";
-  page += "\n.SH OPTIONS\n";
-  for (const ManualOption& o : found->options) {
-    page += fmt::format(".TP\n\\fB{}\\fR", troff(o.name));
-    if (!o.value.empty()) page += fmt::format(" \\fI{}\\fR", troff(o.value));
-    page += "\n" + troff(o.help);
-    if (!o.fallback.empty()) page += troff(fmt::format(" (default: {})", o.fallback));
-    page += ".\n";
-  }
-  if (!found->details.empty()) {
-    page += ".SH DETAILS\n.nf\n";
-    std::istringstream lines(found->details);
+  page += "\n";
+  const auto as_it_stands = [&page](const char* heading, const std::string& text) {
+    page += fmt::format(".SH {}\n.nf\n", heading);
+    std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) page += troff(line) + "\n";
     page += ".fi\n";
+  };
+  if (!found->examples.empty()) as_it_stands("EXAMPLES", fmt::format("{}", fmt::join(found->examples, "\n")));
+  page += ".SH OPTIONS\n";
+  for (const auto& [group, options] : option_groups_of(*found)) {
+    page += fmt::format(".SS {}\n", troff(group));
+    for (const ManualOption& o : options) {
+      page += fmt::format(".TP\n\\fB{}\\fR", troff(o.name));
+      if (!o.value.empty()) page += fmt::format(" \\fI{}\\fR", troff(o.value));
+      page += "\n" + troff(o.help);
+      if (!o.fallback.empty()) page += troff(fmt::format(" (default: {})", o.fallback));
+      page += ".\n";
+    }
   }
+  if (!found->details.empty()) as_it_stands("DETAILS", found->details);
   return page + std::string(exit_codes) + ".SH SEE ALSO\n\\fBmetastable\\fR(1)\n";
 }
 

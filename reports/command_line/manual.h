@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace metastable::reports {
@@ -13,14 +14,19 @@ struct ManualOption {
   std::string value;     ///< "DEG"; "" of a flag
   std::string fallback;  ///< "" where there is none
   std::string help;
-  bool place = false;  ///< given by its place on the command line
+  bool place = false;             ///< given by its place on the command line
+  std::string group = "Options";  ///< one of option_groups
 };
 
 struct ManualCommand {
   std::string name, summary;
   std::vector<ManualOption> options;
   std::string details = {};
+  std::vector<std::string> examples = {};
 };
+
+/// Returns the options under the names of their groups, places first. Where there are few, all others are one group.
+std::vector<std::pair<std::string, std::vector<ManualOption>>> option_groups_of(const ManualCommand& command);
 
 inline constexpr std::string_view shells[] = {"bash", "zsh", "fish"};
 

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <sstream>
 #include <stdexcept>
 
@@ -49,11 +50,18 @@ LooseOptions::LooseOptions(LooseOptions&&) noexcept = default;
 
 LooseOptions::~LooseOptions() = default;
 
+void Options::group(std::string_view name) {
+  if (std::ranges::find(option_groups, name) == std::end(option_groups))
+    throw std::logic_error(fmt::format("options: '{}' is no group", name));
+  group_ = name;
+}
+
 void Options::add(const std::string& name, const std::string& value, const std::string& fallback,
                   const std::string& help) {
   std::vector<std::string>& texts = texts_[name];
   CLI::Option* option = command_.add_option("--" + name, texts, help);
   option->expected(1)->allow_extra_args(false)->type_name(value)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  option->group(group_);
   option->check([value](const std::string& text) { return value_objection(text, value); }, "");
   if (!fallback.empty()) {
     option->default_str(fallback);
@@ -68,7 +76,10 @@ void Options::add(const std::string& name, const std::string& value, const std::
 }
 
 void Options::add_json() {
+  const std::string before = group_;
+  group("Files and help");
   add("json", "FILE|-", "", "Write what comes out as JSON; on standard output (-) nothing else is printed");
+  group_ = before;
 }
 
 void Options::drop_default(const std::string& name) {
@@ -78,8 +89,10 @@ void Options::drop_default(const std::string& name) {
 
 void Options::add_flag(const std::string& name, const std::string& help) {
   std::vector<std::string>& texts = texts_[name];
-  command_.add_flag_callback(
-      "--" + name, [&texts] { texts = {"true"}; }, help);
+  command_
+      .add_flag_callback(
+          "--" + name, [&texts] { texts = {"true"}; }, help)
+      ->group(group_);
   fallback_[name] = "false";
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,21 @@ class App;
 
 namespace metastable::reports {
 
+/// Lists what options are grouped under in --help and on manual pages, in that order; the first is of those without.
+inline constexpr std::string_view option_groups[] = {"Options",
+                                                     "Question",
+                                                     "Trials",
+                                                     "The file",
+                                                     "What the file does not tell",
+                                                     "The virtual laboratory (--reality)",
+                                                     "Ramp and launch",
+                                                     "Wheel",
+                                                     "Contacts and their law",
+                                                     "Method and accuracy",
+                                                     "Standard errors of what was measured",
+                                                     "Walkers on two legs (--walker)",
+                                                     "Files and help"};
+
 /// Says why a text cannot be an option's value: it is an option itself ("--how-it-fails", "-h"), so that the value was
 /// left out. "" for all others, such as negative numbers. @param value  what stands for it in the help
 std::string value_objection(const std::string& text, const std::string& value);
@@ -29,6 +45,8 @@ class Options {
  public:
   explicit Options(CLI::App& command) : command_(command) {}
 
+  /// Puts the options that are added from now on into one of option_groups.
+  void group(std::string_view name);
   void add(const std::string& name, const std::string& value, const std::string& fallback, const std::string& help);
   /// Its number, its mean and sd, or each number of its list must lie in the range, which the help states.
   void add(const std::string& name, const std::string& value, const std::string& fallback, const std::string& help,
@@ -90,6 +108,7 @@ class Options {
   std::map<std::string, std::string> places_;  ///< "file:line: " of what a file gave
   std::map<std::string, dynamics::Range> ranges_;
   std::set<std::string> several_;
+  std::string group_{option_groups[0]};
 };
 
 /// Options that give() gives, and no command line.

@@ -21,11 +21,12 @@ void declare_steps(Options& o) {
   add_wheel(o), add_contact(o), add_course(o), add_study(o);
   o.add_flag("direct", "Follow every landing instead of reading a table, hundreds of times slower (settled)");
   o.add_flag("certify", "Guaranteed bounds as well, refined to the width --tolerance (law published)");
+  o.group("Question");
+  o.add_flag("how-it-fails", "The last steps before failure: which leg, which noise, from where");
   o.add_flag("sensitivities", "How ln(expected steps) responds to each parameter, ranked");
+  o.add_flag("explain", "What stands behind the words of the answer");
   add_standard_errors(o);
   o.add_json();
-  o.add_flag("explain", "What stands behind the words of the answer");
-  o.add_flag("how-it-fails", "The last steps before failure: which leg, which noise, from where");
   add_walker(o, "DEG");
 }
 
@@ -43,14 +44,16 @@ StepsRequest steps_request(const Options& o, const analysis::Setting& setting, c
 }
 
 void declare_compare(Options& o) {
+  o.group("Question");
   o.add("slopes", "DEG,DEG,...", "7.02,9.59",
         "Ramp slopes [deg], each from 0.001 to below half the angle between legs; later ones are compared "
         "with the first (default: 7.02 alone where something else is compared)");
   add_slope(o);
   add_launch(o, "Once per slope, in order");
   add_wheel(o), add_contact(o), add_course(o), add_study(o);
-  add_compared(o);
   o.add_flag("direct", "Follow every landing instead of reading a table, hundreds of times slower (settled)");
+  add_compared(o);
+  o.group("Question");
   o.add("collisions", "N", "16", "Collisions of a measured trial, 1..63");
   add_standard_errors(o);
   o.add_json();
@@ -70,6 +73,7 @@ CompareRequest compare_request(const Options& o, const std::vector<analysis::Set
 }
 
 void declare_sweep(Options& o) {
+  o.group("Question");
   o.add("slope", "RANGE", "7.02",
         "[deg] first:last:step, a comma list or one value, each from 0.001 to below half the angle between legs; "
         "likewise the other axes");
@@ -79,15 +83,17 @@ void declare_sweep(Options& o) {
   o.add("friction-sd", "RANGE", "", "Sd of mu", dynamics::range::friction);
   add_launch(o, "Of all points");
   add_wheel(o), add_contact(o), add_course(o), add_study(o);
+  o.group("Files and help");
   o.add("out", "FILE", "sweep.csv", "CSV; the figure goes beside it as .svg. A sweep cut short is taken up again");
   o.add_json();
   add_walker(o, "RANGE");
 }
 
 void declare_solve(Options& o) {
-  o.add_place("PARAMETER", "What is solved for; slope-sd with --walker",
+  o.add_place("PARAMETER", "What is solved for (of a walker, slope or slope-sd)",
               "slope|restitution-mean|restitution-sd|friction-mean|friction-sd|leg-length|inertia|ramp-stiffness|"
               "radius-of-gyration|contact-mass|tip-radius|slope-sd");
+  o.group("Question");
   o.add("steps", "N", "", "Wanted: so many expected steps before failure, above 1");
   o.add("survive", "N:P", "", "Wanted: a share P of all, above 0 and below 1, that takes more than N steps");
   o.add("reach", "P", "", "Wanted: a share P of all that reaches the end of the ramp", wanted_shares);

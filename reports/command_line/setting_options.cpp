@@ -90,10 +90,12 @@ analysis::Setting checked(analysis::Setting setting) {
 }  // namespace
 
 void add_slope(Options& options) {
+  options.group("Ramp and launch");
   options.add("slope", "DEG", "7.02", "Ramp slope [deg], from 0.001 to below half the angle between legs");
 }
 
 void add_launch(Options& options, const std::string& whose) {
+  options.group("Ramp and launch");
   options.add("initial-speed", "MEAN,SD|steady", "",
               whose +
                   "; steady: of wheels that still roll long after any launch (default: the paper's at 7.02 and 9.59, "
@@ -102,6 +104,7 @@ void add_launch(Options& options, const std::string& whose) {
 }
 
 void add_stated_wheel(Options& options) {
+  options.group("Wheel");
   options.add("legs", "paper|L|L1,L2,...", "paper",
               "Leg lengths [m]: the paper's, one for all, or a list in landing order", range::leg_length);
   options.add("leg-count", "N", "8", "Number of legs when --legs is one length, 3..1000");
@@ -120,13 +123,14 @@ void add_stated_wheel(Options& options) {
 
 void add_wheel(Options& options) {
   add_stated_wheel(options);
-  options.add("ramp-stiffness", "N/M", "9000", "K_r [N/m] (published)", range::ramp_stiffness);
+  options.add("ramp-stiffness", "N/M", "9000", "Stiffness of the ramp K_r [N/m] (published)", range::ramp_stiffness);
   options.add("contact-mass", "KG", "", "Mass in the Kelvin-Voigt contact (25) [kg] (published; default: the hub mass)",
               range::mass);
-  options.add("gravity", "M/S2", "9.81", "g [m/s^2]", range::gravity);
+  options.add("gravity", "M/S2", "9.81", "Gravity g [m/s^2]", range::gravity);
 }
 
 void add_stated_contact(Options& options) {
+  options.group("Contacts and their law");
   options.add("law", "published|coulomb|plastic|settled", "published", "Contact law");
   options.add("restitution", "MEAN,SD", "0.4,0.1", "eta, normal truncated to [0, 1]; SD 0 or MEAN alone: constant",
               range::restitution);
@@ -141,11 +145,13 @@ void add_contact(Options& options) {
 }
 
 void add_course(Options& options) {
+  options.group("Ramp and launch");
   options.add("ramp-length", "M", "3.66", "Ramp length [m], inf: without end", range::ramp_length);
   options.add("first-leg", "I", "0", "Leg that lands at collision 1, from 0 to the number of legs less one");
 }
 
 void add_study(Options& options) {
+  options.group("Method and accuracy");
   options.add("method", "sampled|integrated", "sampled",
               "How rows are made: by sampling eta and mu per cell, or by quadrature over them (independent eta, mu)");
   options.add("cells", "N", "", "Cells per landing leg, 8..4096 (default: refined until the tolerance is met)");
@@ -295,6 +301,7 @@ std::vector<std::string> compared_slopes(const Options& options, bool alone) {
 }  // namespace
 
 void add_compared(Options& options) {
+  options.group("Contacts and their law");
   options.add("restitution-mean", "MEAN", "", "Mean of eta, in the place of that of --restitution", range::restitution);
   options.add("restitution-sd", "SD", "", "Sd of eta, likewise", range::restitution);
   options.add("friction-mean", "MEAN", "", "Mean of mu, in the place of that of --friction", range::friction);
@@ -360,15 +367,16 @@ analysis::StudyOptions study_options(const Options& options) {
 }
 
 void add_standard_errors(Options& options) {
+  options.group("Standard errors of what was measured");
   options.add("slope-se", "DEG", "",
               "Standard error of each slope, 0 or more: an interval from it is given apart; likewise below");
   options.add("restitution-se", "MEAN,SD", "", "Of the mean of eta, and of its sd");
   options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd");
   options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]");
-  options.add("inertia-se", "KGM2", "", "[kg m^2]");
-  options.add("radius-of-gyration-se", "M", "", "[m] (coulomb, plastic, settled)");
-  options.add("ramp-stiffness-se", "N/M", "", "[N/m] (published)");
-  options.add("contact-mass-se", "KG", "", "[kg] (published)");
+  options.add("inertia-se", "KGM2", "", "Of the inertia about the stance foot [kg m^2]");
+  options.add("radius-of-gyration-se", "M", "", "Of the radius of gyration [m] (coulomb, plastic, settled)");
+  options.add("ramp-stiffness-se", "N/M", "", "Of the ramp's stiffness [N/m] (published)");
+  options.add("contact-mass-se", "KG", "", "Of the contact mass [kg] (published)");
 }
 
 std::vector<analysis::StandardError> standard_errors(const Options& options, const analysis::Setting& setting) {

@@ -54,6 +54,7 @@ std::vector<double> slopes_in(const Options& o, const std::string& name) {
 }  // namespace
 
 void add_walker(Options& o, const std::string& sd, bool meshes) {
+  o.group("Walkers on two legs (--walker)");
   o.add("walker", "simplest|compass", "",
         "A walker on two legs instead of the wheel (simplest: lengths in legs, times in sqrt(l/g)); slopes then "
         "default to 0.009 rad and 3 deg, in " +
