@@ -41,7 +41,9 @@ namespace metastable::reports {
 namespace {
 
 Command steps() {
-  return {"steps", "Expected steps before failure of one setting, with their interval", declare_steps,
+  return {"steps",
+          "Expected steps before failure of one setting, with their interval",
+          declare_steps,
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) {
               WalkerRequest walker = walker_request(o, line, {"how-it-fails"});
@@ -57,7 +59,9 @@ Command steps() {
 }
 
 Command compare() {
-  return {"compare", "Expected steps of two or more settings on common random numbers", declare_compare,
+  return {"compare",
+          "Expected steps of two or more settings on common random numbers",
+          declare_compare,
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) {
               const WalkerRequest walker = walker_request(o, line);
@@ -78,55 +82,59 @@ Command compare() {
 }  // namespace
 
 Command sweep_command(const Sharing* sharing) {
-  return {"sweep", "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable", declare_sweep,
-          [sharing](const Options& o, const std::string& line) {
-            if (asks_for_walker(o)) {
-              WalkerRequest walker = walker_sweep_request(o, line);
-              walker.sharing = sharing;
-              if (sharing) walker.study.threads = 1;
-              return run_walker_sweep(walker);
-            }
-            SweepRequest request;
-            request.sharing = sharing;
-            request.setting = common_setting(o);
-            for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
-              if (o.text(name).empty()) continue;
-              analysis::SweepAxis axis = sweep_axis(o, name, request.setting);
-              if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
-                request.setting.slope_deg = axis.values.front();
-              else
-                request.axes.push_back(std::move(axis));
-            }
-            if (request.axes.empty())
-              throw std::invalid_argument(
-                  "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
-                  "--friction-mean or --friction-sd as first:last:step)");
-            const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
-            std::optional<std::string> launch;
-            if (o.given("initial-speed")) launch = o.text("initial-speed");
-            if (!launch && !one_slope) launch = "steady";  // one rule for all slopes
-            set_launch(request.setting, launch);
-            request.rigid_bodies = !o.given("law");
-            request.study = study_options(o);
-            request.out = o.text("out");
-            request.json = o.text("json");
-            request.command = line;
-            run_sweep(request);
-          },
-          "",
-          {"metastable sweep --slope 6:10:0.5", "metastable sweep --slope 9.59 --friction-mean 0.2:0.5:0.05 --out mu.csv",
-           "metastable sweep --slope 8:10:1 --friction-sd 0.05,0.1 --out map.csv"}};
+  return {
+      "sweep",
+      "Expected steps over ranges of slope, means and spreads; CSV and figure, resumable",
+      declare_sweep,
+      [sharing](const Options& o, const std::string& line) {
+        if (asks_for_walker(o)) {
+          WalkerRequest walker = walker_sweep_request(o, line);
+          walker.sharing = sharing;
+          if (sharing) walker.study.threads = 1;
+          return run_walker_sweep(walker);
+        }
+        SweepRequest request;
+        request.sharing = sharing;
+        request.setting = common_setting(o);
+        for (const char* name : {"slope", "restitution-mean", "restitution-sd", "friction-mean", "friction-sd"}) {
+          if (o.text(name).empty()) continue;
+          analysis::SweepAxis axis = sweep_axis(o, name, request.setting);
+          if (axis.parameter == analysis::Parameter::slope && axis.values.size() == 1)
+            request.setting.slope_deg = axis.values.front();
+          else
+            request.axes.push_back(std::move(axis));
+        }
+        if (request.axes.empty())
+          throw std::invalid_argument(
+              "sweep: no range given (--slope, --restitution-mean, --restitution-sd, "
+              "--friction-mean or --friction-sd as first:last:step)");
+        const bool one_slope = request.axes.front().parameter != analysis::Parameter::slope;
+        std::optional<std::string> launch;
+        if (o.given("initial-speed")) launch = o.text("initial-speed");
+        if (!launch && !one_slope) launch = "steady";  // one rule for all slopes
+        set_launch(request.setting, launch);
+        request.rigid_bodies = !o.given("law");
+        request.study = study_options(o);
+        request.out = o.text("out");
+        request.json = o.text("json");
+        request.command = line;
+        run_sweep(request);
+      },
+      "",
+      {"metastable sweep --slope 6:10:0.5", "metastable sweep --slope 9.59 --friction-mean 0.2:0.5:0.05 --out mu.csv",
+       "metastable sweep --slope 8:10:1 --friction-sd 0.05,0.1 --out map.csv"}};
 }
 
 namespace {
 
 Command solve() {
-  return {"solve", "Which value of a parameter gives the steps, or the survival, that are asked for", declare_solve,
+  return {"solve",
+          "Which value of a parameter gives the steps, or the survival, that are asked for",
+          declare_solve,
           [](const Options& o, const std::string& line) {
             const std::string solved = o.text("PARAMETER");
             if (asks_for_walker(o)) return run_solve(walker_solve_request(o, walker_solved_setting(o, solved), line));
-            if (solved == "slope" && o.given("slope"))
-              throw std::invalid_argument("--slope: is what is solved for");
+            if (solved == "slope" && o.given("slope")) throw std::invalid_argument("--slope: is what is solved for");
             analysis::Setting setting = one_setting(o);
             // One rule for all slopes: the paper's launch is that of one of them.
             if (solved == "slope" && !o.given("initial-speed")) setting.steady_launch = true;
@@ -140,7 +148,8 @@ Command solve() {
 
 Command report() {
   return {
-      "report", "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
+      "report",
+      "The ramps side by side: tables (CSV, Markdown, LaTeX), figures (SVG) and a page that shows them",
       [](Options& o) {
         o.group("Question");
         o.add("slopes", "DEG,DEG,...", "7.02,9.59",
@@ -166,7 +175,8 @@ Command report() {
 }
 
 Command verify() {
-  return {"verify", "How accurate the program is: known values, doubling of nodes, three solvers side by side",
+  return {"verify",
+          "How accurate the program is: known values, doubling of nodes, three solvers side by side",
           [](Options& o) {
             o.add("seeds", "N", "0",
                   "Sampled studies a benchmark, 0..1000, to count how often their interval is right; 0: none");
@@ -195,8 +205,7 @@ std::vector<ManualCommand> manual_of(const std::vector<Command>& commands, const
       const bool place = option->get_positional();
       command.options.push_back({place ? option->get_single_name() : "--" + option->get_lnames().front(),
                                  option->get_expected_max() == 0 ? "" : option->get_type_name(),
-                                 option->get_default_str(), option->get_description(), place,
-                                 option->get_group()});
+                                 option->get_default_str(), option->get_description(), place, option->get_group()});
     }
   }
   return manual;
@@ -215,7 +224,8 @@ Table options_table(const std::vector<ManualCommand>& manual, const Options& o) 
 
 // @param manual  of all commands, known once they are declared
 std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
-  return {{"man", "The manual page of the program or of a command, for `man -l -`",
+  return {{"man",
+           "The manual page of the program or of a command, for `man -l -`",
            [](Options& o) {
              o.add_optional_place("COMMAND", "One of the commands");
              o.add_json();
@@ -229,7 +239,8 @@ std::vector<Command> help_commands(const std::vector<ManualCommand>& manual) {
            },
            "",
            {"metastable man steps | man -l -"}},
-          {"completion", "A script that completes commands and options: source <(metastable completion bash)",
+          {"completion",
+           "A script that completes commands and options: source <(metastable completion bash)",
            [](Options& o) {
              o.add_place("SHELL", "Whose completion it is", "bash|zsh|fish");
              o.add_json();

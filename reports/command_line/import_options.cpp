@@ -38,8 +38,10 @@ constexpr const char* details = R"(What it needs
   --ramp-length, --law and, unless the law is plastic, --restitution and --friction.)";
 
 constexpr const char* examples[] = {
-    R"(metastable import runs.csv --description wheel.toml --out wheel \
-    --columns 'trial=run,omega_minus=w before[deg/s]')",
+    R"(printf '%s\n' run,omega_deg_s 1,333 1,327 1,321 2,339 2,283 > runs.csv)",
+    R"(metastable import runs.csv --columns trial=run,omega_minus=omega_deg_s \
+    --slope 9.59 --legs paper --mass 1.39 --ramp-length 3.66 \
+    --law settled --restitution 0.4,0.1 --friction 0.4,0.1 --out runs)",
     R"(metastable import wide.csv --columns 'omega_minus=w_*[rad/s]' --slope 9.59 \
     --legs paper --mass 1.39 --ramp-length 3.66 --law coulomb \
     --restitution 0.5,0.05 --friction 0.4,0.05 --out wheel)",

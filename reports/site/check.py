@@ -4,7 +4,7 @@
     check.py --bin FOLDER... [--python FOLDER] PAGE...
 
 A PAGE is a page of Markdown or a notebook, whose code is run (exit code 77 without Matplotlib). Blocks fenced as `console` hold commands behind "$ " (continued lines end with a backslash) and what they print, on
-either stream. Blocks fenced as `pycon` hold a Python session. The blocks of a page run in order, in one empty folder
+either stream. Blocks fenced as `pycon` hold a Python session, blocks fenced as `python` a program that is to end well. The blocks of a page run in order, in one empty folder
 of their own, with the files of samples/ that the page offers; a line "..." stands for lines that are left out. A
 session that begins with the import of what is not there (SciPy) is not run, nor are other blocks.
 
@@ -30,7 +30,7 @@ import sys
 import tempfile
 import traceback
 
-FENCE = re.compile(r"^```(console|pycon)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```(console|pycon|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def steps_of(kind, body):
@@ -101,6 +101,12 @@ class Session:
             self.environment["PYTHONPATH"] = python_folder
         self.interpreter = Interpreter({"__name__": "__page__"})
 
+    def run_program(self, text):
+        """What a program in Python says of its failure; "" where it ends well."""
+        done = subprocess.run([sys.executable, "-c", text], cwd=self.folder, env=self.environment,
+                              stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL)
+        return done.stderr.decode() or f"exit code {done.returncode}" if done.returncode else ""
+
     def run(self, kind, given):
         if kind == "console":
             command = "\n".join([given[0][2:]] + given[1:])
@@ -136,6 +142,10 @@ def check(page, programs, python_folder, write):
 
         def run_block(match):
             kind, body = match.group(1), []
+            if kind == "python":
+                if python_folder and (said := session.run_program(match.group(2))):
+                    wrong.append(f"{page.name}: the program in Python: {said}")
+                return match.group(0)
             if not there(match.group(2)):
                 return match.group(0)
             for given, shown in steps_of(kind, match.group(2)):

@@ -21,7 +21,9 @@ const std::vector<ManualCommand> manual{
       {"--slope", "DEG", "7.02", "Ramp's slope [deg]: any", false},
       {"--json", "FILE|-", "", "Write JSON", false},
       {"--separator", "','|';'|tab", ",", "Between fields", false},
-      {"--direct", "", "", "-follow every landing", false}}},
+      {"--direct", "", "", "-follow every landing", false}},
+     "",
+     {"metastable steps --slope 9 \\\n    --direct"}},
     {"describe", "What the trials say", {{"DIR", "", "", "Folder", true}, {"--out", "DIR", "", "Folder", false}}},
     {"blind", "The check", {{"ACTION", "make|open", "", "What to do", true}, {"DIR", "", "", "Folder", true}}},
     {"man", "The manual", {{"COMMAND", "", "", "One of them", true}}}};
@@ -81,6 +83,11 @@ TEST(Manual, OtherShellsAndPagesEscapeWhatTheyWouldTakeForSyntax) {
   EXPECT_NE(page.find("\\fB\\-\\-slope\\fR \\fIDEG\\fR\nRamp's slope [deg]: any (default: 7.02).\n"), std::string::npos)
       << page;
   EXPECT_NE(page.find("\n\\-follow every landing.\n"), std::string::npos) << page;
+  EXPECT_NE(
+      page.find(
+          "\n.SH EXAMPLES\n.nf\nmetastable steps \\-\\-slope 9 \\e\n    \\-\\-direct\n.fi\n.SH OPTIONS\n.SS Options\n"),
+      std::string::npos)
+      << page;
   EXPECT_NE(manual_page(manual, "", "1.0").find("\\fBmetastable\\-describe\\fR(1)\nWhat the trials say.\n"),
             std::string::npos);
 }
