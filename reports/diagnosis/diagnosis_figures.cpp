@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "analysis/statistics/interval_95.h"
@@ -20,8 +21,11 @@ using analysis::GapMap;
 
 constexpr double full_colour = 6;  // score beyond which colours do not change
 constexpr std::size_t bars_at_most = 12;
-constexpr std::size_t furthest_rows = 10, most_rows = 14;  // of one figure
-constexpr int map_width = 720, row_height = 26;            // [px]
+constexpr std::size_t furthest_rows = 8, least_rows = 3, most_rows = 14;  // of one figure
+// A place is shown alone where its score is beyond this: of some hundred that are chance, one in three maps has such
+// one.
+constexpr double telling = 3;
+constexpr int shrinkage_height = 250, furthest_width = 520, map_width = 640, row_height = 30;  // [px]
 constexpr int given_colour = 1, recalibrated_colour = 4, effect_colour = 0, floor_colour = 6;
 
 constexpr std::string_view stance_mark = ", stance", collision_mark = ", collision",
@@ -56,8 +60,15 @@ bool two_phases(const Diagnosis& d) {
 struct Row {
   std::string facet, name, phase;  // phase: "" where there is one
   std::vector<double> scores;      // a column each; NaN: no such cell
-  double furthest = 0;             // of the recalibrated model
 };
+
+// Finds how far a row's scores of one aspect are from 0 at most. @param columns  of the aspect, from the first
+double furthest(const Row& row, std::size_t first, std::size_t columns) {
+  double most = 0;
+  for (std::size_t i = first; i < first + columns; ++i)
+    if (!std::isnan(row.scores[i])) most = std::max(most, std::abs(row.scores[i]));
+  return most;
+}
 
 // Lists rows as the map orders them; columns are aspects by models.
 std::vector<Row> rows_of(const Diagnosis& d, std::vector<std::string>& columns) {
@@ -72,21 +83,20 @@ std::vector<Row> rows_of(const Diagnosis& d, std::vector<std::string>& columns) 
       const std::string name = row_name(cell), phase = !phases ? "" : cell.stance ? "stance" : "collision";
       auto row = std::ranges::find_if(rows, [&](const Row& r) { return r.name == name && r.phase == phase; });
       if (row == rows.end())
-        row =
-            rows.insert(rows.end(), {cell.facet, name, phase,
-                                     std::vector<double>(columns.size(), std::numeric_limits<double>::quiet_NaN()), 0});
+        row = rows.insert(rows.end(), {cell.facet, name, phase,
+                                       std::vector<double>(columns.size(), std::numeric_limits<double>::quiet_NaN())});
       double& score = row->scores[m + (cell.aspect == "spread" ? models.size() : 0)];
       if (std::isnan(score) || !cell.swing || std::abs(cell.statistic) > std::abs(score)) score = cell.statistic;
-      if (models[m].map == &d.gap.recalibrated) row->furthest = std::max(row->furthest, std::abs(cell.statistic));
     }
   return rows;
 }
 
-// Draws the rows, the first on top, in letters one can read.
+// Draws the rows, the first on top, in letters one can read. @param digits  behind the points of the scores in the
+// cells; 0: colours alone
 Figure map_figure(const std::vector<Row>& rows, const std::vector<std::string>& columns, const std::string& id,
-                  const std::string& title, bool with_phase) {
+                  const std::string& title, bool with_phase, int digits) {
   Figure figure{.id = id, .title = title, .x = {""}, .y = {""}};
-  HeatMap map{.x = {}, .y = {}, .value = {}, .label = "score", .digits = 1, .format = NumberFormat::fixed};
+  HeatMap map{.x = {}, .y = {}, .value = {}, .label = "score", .digits = digits, .format = NumberFormat::fixed};
   map.limit = full_colour;
   map.x_names = columns;
   for (std::size_t i = 0; i < columns.size(); ++i) map.x.push_back(static_cast<double>(i));
@@ -101,17 +111,39 @@ Figure map_figure(const std::vector<Row>& rows, const std::vector<std::string>& 
   return figure;
 }
 
+// Draws the places where one aspect tells most. @param first  its first column of the rows
+std::optional<Figure> furthest_figure(std::vector<Row> rows, const std::vector<ModelMap>& models, std::size_t first,
+                                      const std::string& id, std::string title, std::size_t least) {
+  const auto far = [&](const Row& row) { return furthest(row, first, models.size()); };
+  std::ranges::stable_sort(rows, [&](const Row& a, const Row& b) { return far(a) > far(b); });
+  const auto beyond =
+      static_cast<std::size_t>(std::ranges::count_if(rows, [&](const Row& r) { return far(r) > telling; }));
+  rows.resize(std::min({rows.size(), furthest_rows, std::max(beyond, least)}));
+  if (rows.empty()) return std::nullopt;
+  std::vector<std::string> columns;
+  for (const ModelMap& model : models) columns.push_back(model.name);
+  for (Row& row : rows)
+    row.scores = {row.scores.begin() + static_cast<std::ptrdiff_t>(first),
+                  row.scores.begin() + static_cast<std::ptrdiff_t>(first + models.size())};
+  const bool mixed = std::ranges::any_of(rows, [&](const Row& row) { return row.phase != rows.front().phase; });
+  if (!mixed && !rows.front().phase.empty()) title += fmt::format(", {}s", rows.front().phase);
+  Figure figure = map_figure(rows, columns, id, title, mixed, 1);
+  figure.width = furthest_width;
+  return figure;
+}
+
 }  // namespace
 
-std::vector<Figure> furthest_figure(const Diagnosis& d) {
+std::vector<Figure> furthest_figures(const Diagnosis& d) {
   std::vector<std::string> columns;
-  std::vector<Row> rows = rows_of(d, columns);
-  if (rows.empty()) return {};
-  std::ranges::stable_sort(rows, [](const Row& a, const Row& b) { return a.furthest > b.furthest; });
-  rows.resize(std::min(rows.size(), furthest_rows));
-  const bool mixed = std::ranges::any_of(rows, [&](const Row& row) { return row.phase != rows.front().phase; });
-  const std::string of = mixed || rows.front().phase.empty() ? "" : fmt::format(", {}s", rows.front().phase);
-  return {map_figure(rows, columns, "map-furthest", "Furthest from the model" + of, mixed)};
+  const std::vector<Row> rows = rows_of(d, columns);
+  const std::vector<ModelMap> models = models_of(d);
+  std::vector<Figure> figures;
+  if (auto mean = furthest_figure(rows, models, 0, "map-furthest", "Mean speed", least_rows))
+    figures.push_back(std::move(*mean));
+  if (auto spread = furthest_figure(rows, models, models.size(), "map-furthest-spread", "Spread of the speed", 0))
+    figures.push_back(std::move(*spread));
+  return figures;
 }
 
 std::vector<Figure> map_figures(const Diagnosis& d) {
@@ -129,7 +161,7 @@ std::vector<Figure> map_figures(const Diagnosis& d) {
       if (rows.empty()) return;
       const std::string id = "map-" + name;  // of the first part; then map-stances-2, ...
       figures.push_back(map_figure(rows, columns, ++part == 1 ? id : fmt::format("{}-{}", id, part),
-                                   fmt::format("The map of {}: {}", name, fmt::join(facets, ", ")), false));
+                                   fmt::format("The map of {}: {}", name, fmt::join(facets, ", ")), false, 0));
       rows.clear(), facets.clear();
     };
     // A facet's rows stay together.
@@ -198,8 +230,11 @@ std::vector<Figure> ranking_figures(const Diagnosis& d) {
     bars.value.push_back(probability);
     bars.colour.push_back(colour);
   }
-  Figure figure{.id = "ranking", .title = "", .x = {.label = "probability", .low = 0, .high = 1.15}, .y = {""}};
-  figure.height = 110 + 30 * static_cast<int>(bars.name.size());
+  Figure figure{.id = "ranking",
+                .title = "Causes, and how probable they are",
+                .x = {.label = "probability", .low = 0, .high = 1.15},
+                .y = {""}};
+  figure.height = std::max(130 + 30 * static_cast<int>(bars.name.size()), shrinkage_height);
   figure.bars = std::move(bars);
   return {figure};
 }
@@ -216,7 +251,7 @@ std::vector<Figure> shrinkage_figures(const Diagnosis& d) {
                            .upper = {s.baseline_upper, none, none, none},
                            .colour = {given_colour, recalibrated_colour, effect_colour, floor_colour}};
     figure.reference_lines = {{.vertical = true, .at = s.floor, .label = ""}};
-    figure.height = 250;
+    figure.height = shrinkage_height;
     figures.push_back(std::move(figure));
   }
   return figures;

@@ -8,9 +8,11 @@
 
 namespace metastable::reports {
 
-/// Draws the ten places of the map whose scores under the recalibrated model are largest, under all models.
-std::vector<Figure> furthest_figure(const analysis::Diagnosis& diagnosis);
-/// Draws scores of all the map's cells under the three models, some facets a figure, collisions and stances apart.
+/// Draws the places of the map whose scores under any of the three models are beyond chance, eight at most: of the mean
+/// speed, and of its spread where there are such. Where there are none, the three furthest of the mean.
+std::vector<Figure> furthest_figures(const analysis::Diagnosis& diagnosis);
+/// Draws all the map's cells under the three models, coloured by their scores, some facets a figure, collisions and
+/// stances apart.
 std::vector<Figure> map_figures(const analysis::Diagnosis& diagnosis);
 /// Draws the mean speed by collision, measured and simulated, a figure a condition.
 std::vector<Figure> profile_figures(const analysis::Diagnosis& diagnosis);

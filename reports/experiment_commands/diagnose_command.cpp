@@ -68,23 +68,30 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
   page.intro.push_back("Next: " + analysis::next_step(d));
   page.provenance = provenance;
   Sections sections(pages, provenance, law);
-  sections.add("where", "Where the gap lies",
-               "The places where the recalibrated model is furthest from the measured speeds. A cell holds its score, "
-               "standard normal without a gap, under each model: red, the measured speeds are higher or more spread "
-               "than the model’s; blue, lower or less. Scores beyond 4 are rarely chance.",
-               furthest_figure(d), {},
-               {{"Cells beyond chance, after recalibration", {}, {}, {where_table(d)}},
-                {"The whole map", {}, map_figures(d), {map_table(d)}}});
+  std::vector<Figure> answer = ranking_figures(d), shrinking = shrinkage_figures(d);
+  if (!shrinking.empty()) {  // of the likelihood, which all effects show in
+    answer.push_back(std::move(shrinking.front()));
+    shrinking.erase(shrinking.begin());
+  }
   sections.add(
-      "which", "Which effect",
-      "Probabilities over the effects of the catalogue, pairs, and their alternatives; the 95 % set is what "
-      "these data leave open.",
-      ranking_figures(d), {},
-      {{"All causes and their parameters", {}, {}, {causes_table(d), parameters_table(d), undecided_table(d)}}});
-  sections.add("how-far", "How far it shrinks",
-               "Measured on trials that the fit did not see; the line is the floor, what remains where the model is "
-               "right.",
-               shrinkage_figures(d), {steps_table(d)}, {{"The measures in numbers", {}, {}, {shrinkage_table(d)}}});
+      "which", "Which effect, and how much of the gap it closes",
+      "How probable each cause is, given these data, and what is left of the gap on trials that the fit did not "
+      "see, under each model: the line is the floor, what remains where the model is right.",
+      std::move(answer), {},
+      {{"All causes and their parameters",
+        {"The 95 % set is what these data leave open."},
+        {},
+        {causes_table(d), parameters_table(d), undecided_table(d)}},
+       {"Every measure of the gap", {}, std::move(shrinking), {shrinkage_table(d)}}});
+  sections.add("where", "Where the gap lies",
+               "The places where the models are furthest from the measured speeds. Red, the measured speeds are higher "
+               "or more spread than the model’s; blue, lower or less; pale, as chance has it. The score is standard "
+               "normal without a gap: beyond 4 it is rarely chance.",
+               furthest_figures(d), {},
+               {{"Cells beyond chance, after recalibration", {}, {}, {where_table(d)}},
+                {"The whole map, in colours and in numbers", {}, map_figures(d), {map_table(d)}}});
+  sections.add("how-far", "Steps before failure", "What the models say of the steps that were observed.", {},
+               {steps_table(d)});
   sections.add("profiles", "Speeds, measured and simulated",
                "Bars are 95 % intervals of the measured means; the band holds the mean of as many simulated trials.",
                profile_figures(d), {}, {{"The speeds in numbers", {}, {}, {profile_table(d)}}});

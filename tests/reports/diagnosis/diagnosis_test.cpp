@@ -1,5 +1,6 @@
 // Shows a diagnosis as text, JSON and page, from one filled by hand.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -272,6 +273,38 @@ TEST(DiagnosisFigures, MapHasAPhaseAFigureAndRowsFromTheTop) {
   EXPECT_EQ(map.value[0][1], -8);
   EXPECT_EQ(map.value[0][4], 3.9);
   EXPECT_TRUE(std::isnan(map.value[1][4]));
+}
+
+// What a reader sees first holds only what says something, in letters of the size of a caption.
+TEST(DiagnosisFigures, FirstMapHoldsThePlacesThatTellAlone) {
+  analysis::Diagnosis d = sample();
+  std::vector<Figure> figures = furthest_figures(d);
+  ASSERT_EQ(figures.size(), 2U);
+  EXPECT_EQ(figures[0].heat_map->y_names,
+            (std::vector<std::string>{"leg 3, stance", "leg 1, collision", "leg 3, collision"}));
+  EXPECT_EQ(figures[0].heat_map->x_names, (std::vector<std::string>{"as given", "recalibrated", "with effect"}));
+  EXPECT_EQ(figures[0].heat_map->value.back(), (std::vector<double>{-8, -8, -8}));
+  EXPECT_EQ(figures[1].title, "Spread of the speed, collisions");
+  EXPECT_EQ(figures[1].heat_map->y_names, std::vector<std::string>{"leg 3"});
+
+  for (analysis::GapMap* map : {&d.gap.as_given, &d.gap.recalibrated, &d.gap.left}) {
+    const analysis::GapCell pattern = map->cells.front();
+    map->cells.clear();
+    for (int leg = 0; leg < 40; ++leg) {
+      analysis::GapCell one = pattern;
+      one.at = fmt::format("leg {}, collision", leg);
+      one.statistic = leg < 20 ? 5 : 1;
+      map->cells.push_back(one);
+    }
+  }
+  figures = furthest_figures(d);
+  ASSERT_EQ(figures.size(), 1U);
+  EXPECT_EQ(figures[0].heat_map->y.size(), 8U);
+  for (analysis::GapMap* map : {&d.gap.as_given, &d.gap.recalibrated, &d.gap.left})
+    for (analysis::GapCell& one : map->cells) one.statistic = 1;
+  EXPECT_EQ(furthest_figures(d).at(0).heat_map->y.size(), 3U);
+  // The whole map is a picture, its numbers are a table.
+  EXPECT_EQ(map_figures(d).at(0).heat_map->digits, 0);
 }
 
 TEST(DiagnosisPage, HoldsFiguresAndTablesAndLoadsNothing) {
