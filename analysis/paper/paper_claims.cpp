@@ -283,55 +283,59 @@ Finding failures_seen(const PaperExperiments& experiments) {
 
 // Pairs a claim of the paper with the way trials are held against it.
 struct Check {
-  const char *where, *claim, *paper, *reading;
+  const char *where, *brief, *claim, *paper, *reading;
   Finding (*simulated)(const VariantStudy&);
   Finding (*measured)(const PaperExperiments&) = nullptr;
 };
 
 const Check checks[] = {
-    {"Fig. 4", "fast and slow start at 9.59 deg meet beyond the 12th collision", "P > 0.07",
+    {"Fig. 4", "starts meet at 9.59°", "fast and slow start at 9.59 deg meet beyond the 12th collision", "P > 0.07",
      "Welch's test of trial means from collision 13 on, P > 0.05; no collision from the 13th on told apart",
      [](const VariantStudy& s) { return convergence(s.fig4.comparison); },
      [](const PaperExperiments& e) { return convergence(compare_conditions(e.fast_959, e.slow_959)); }},
-    {"Fig. 4", "error bars shrink along the profiles, yet do not vanish", "figure only",
+    {"Fig. 4", "error bars shrink", "error bars shrink along the profiles, yet do not vanish", "figure only",
      "mean standard error at collisions 13 to 16 below that at the first, for both starts",
      [](const VariantStudy& s) { return error_bars(s.fig4.fast.profile, s.fig4.slow.profile); },
      [](const PaperExperiments& e) { return error_bars(speed_profile(e.fast_959), speed_profile(e.slow_959)); }},
-    {"Fig. 6", "μ < 0.5: launch speed leaves no trace in the steady state", "P > 0.9, all pairs",
+    {"Fig. 6", "μ < 0.5 forgets the launch", "μ < 0.5: launch speed leaves no trace in the steady state",
+     "P > 0.9, all pairs",
      "pooled t-test of all collisions from the 13th on at μ = 0.40 and 0.45; “partly”: none significant at 0.05 over "
      "the family. P > 0.9 for each of several pairs is itself improbable where nothing differs (P is then uniform)",
      low_friction},
-    {"Fig. 6", "μ > 0.5: the fastest launch (k = 3) ends in another steady state", "P < 0.001 against both",
-     "pooled t-test of all collisions from the 13th on at μ = 0.55", high_friction},
-    {"Fig. 6", "steady variability grows with μ and with launch speed", "figure only",
+    {"Fig. 6", "μ > 0.5 remembers it (k = 3)", "μ > 0.5: the fastest launch (k = 3) ends in another steady state",
+     "P < 0.001 against both", "pooled t-test of all collisions from the 13th on at μ = 0.55", high_friction},
+    {"Fig. 6", "spread grows with μ", "steady variability grows with μ and with launch speed", "figure only",
      "mean sd at collisions 13 to 16, by more than 5 %; the text's “variability of μ” is read as its value, μ being "
      "constant here",
      variability_grows},
-    {"Sec. IV-A", "uneven legs do not matter (H2)", "P > 0.1, all launches and μ",
+    {"Sec. IV-A", "uneven legs do not matter", "uneven legs do not matter (H2)", "P > 0.1, all launches and μ",
      "the measured legs against eight of mean length, pooled t-test of all collisions, P > 0.1 for all 12; “partly”: "
      "one value a trial, none significant at 0.05 over the family. Collisions 13 to 16 land on legs 4 to 7 only, whose "
      "mean is not that of all",
      leg_lengths},
-    {"Fig. 7", "agreement with the experiment depends on the spread of μ, not on that of η", "figure only",
+    {"Fig. 7", "spread of μ decides, not of η",
+     "agreement with the experiment depends on the spread of μ, not on that of η", "figure only",
      "range of |t| (simulated against measured steady speeds at 7.02 deg) over the sds of μ more than twice that over "
      "those of η",
      spread_of_friction},
-    {"Fig. 8", "more spread of μ raises mean and variance of the tangential net loss",
+    {"Fig. 8", "spread of μ raises the loss", "more spread of μ raises mean and variance of the tangential net loss",
      "N(0.05, 0.03²) to N(0.11, 0.19²) J", "both rise, all four within a factor of 1.5; “partly”: both rise",
      tangential_loss},
-    {"Fig. 8", "more spread of η widens the normal loss, whose mean stays", "sd 0.06 to 0.1 J, mean about 0.17 J",
-     "sd rises, means within 25 % of 0.17 J; “partly”: sd rises", normal_loss},
-    {"Fig. 9", "low μ (< 0.3): mean η acts on the transient variability, less on the steady one", "figure only",
+    {"Fig. 8", "spread of η widens the loss", "more spread of η widens the normal loss, whose mean stays",
+     "sd 0.06 to 0.1 J, mean about 0.17 J", "sd rises, means within 25 % of 0.17 J; “partly”: sd rises", normal_loss},
+    {"Fig. 9", "low μ: η acts on transients",
+     "low μ (< 0.3): mean η acts on the transient variability, less on the steady one", "figure only",
      "range over mean η of the sd at collisions 2 to 6 exceeds that at 13 to 16, at μ mean 0.2", transient_influence},
-    {"Fig. 9", "the influence of mean η on the steady variability grows with μ", "figure only",
+    {"Fig. 9", "mean η acts more with μ", "the influence of mean η on the steady variability grows with μ",
+     "figure only",
      "range over mean η of the sd at collisions 13 to 16, μ mean 0.5 against 0.2; the text says the opposite three "
      "sentences later (next but one row)",
      influence_grows},
-    {"Fig. 9", "mean η raises the steady variability in general", "figure only",
+    {"Fig. 9", "mean η raises the spread", "mean η raises the steady variability in general", "figure only",
      "sd at collisions 13 to 16 at η mean 0.7 above that at 0.3, for all μ", restitution_raises},
-    {"Fig. 9", "this effect shrinks with μ", "figure only", "as two rows above, the other way round",
-     influence_shrinks},
-    {"Sec. III", "intermittent failures on the 7.02 deg ramp", "observed, not counted",
+    {"Fig. 9", "mean η acts less with μ", "this effect shrinks with μ", "figure only",
+     "as two rows above, the other way round", influence_shrinks},
+    {"Sec. III", "some fail at 7.02°", "intermittent failures on the 7.02 deg ramp", "observed, not counted",
      "between 2 and 90 % of the trials rest within 16 collisions, at η, μ ~ N(0.4, 0.1²)", failures, failures_seen},
 };
 
@@ -354,7 +358,8 @@ std::string verdict_text(ClaimVerdict verdict) {
 std::vector<Claim> paper_claims(const std::vector<VariantStudy>& studies, const PaperExperiments& experiments) {
   std::vector<Claim> claims;
   for (const Check& check : checks) {
-    Claim& claim = claims.emplace_back(Claim{check.where, check.claim, check.paper, check.reading, {}, {}});
+    Claim& claim = claims.emplace_back(Claim{
+        check.where, check.claim, check.paper, check.reading, {}, {}, fmt::format("{}: {}", check.where, check.brief)});
     for (const VariantStudy& study : studies) claim.findings.push_back(check.simulated(study));
     if (check.measured != nullptr) claim.experiment = check.measured(experiments);
   }
@@ -381,7 +386,11 @@ std::vector<Hypothesis> paper_hypotheses(const std::vector<VariantStudy>& studie
   std::vector<Hypothesis> all;
   for (const auto& [name, text, sources] : stated) {
     Hypothesis& hypothesis = all.emplace_back(Hypothesis{name, text, {}});
-    for (const VariantStudy& s : studies) hypothesis.findings.push_back(judge(largest(s, sources)));
+    for (const VariantStudy& s : studies) {
+      const Influence share = largest(s, sources);
+      hypothesis.findings.push_back(judge(share));
+      hypothesis.shares.push_back(share.steady.value);
+    }
   }
   return all;
 }

@@ -24,6 +24,7 @@ struct Claim {
   std::string reading;            ///< what counts as reproduced
   std::vector<Finding> findings;  ///< one a variant, in order
   Finding experiment;             ///< the measured trials or their stand-in, where the claim is about them
+  std::string brief = {};         ///< the claim in some thirty letters, with its figure, for a picture
 };
 
 /// @param studies  of paper_variants(), in order
@@ -32,7 +33,8 @@ std::vector<Claim> paper_claims(const std::vector<VariantStudy>& studies, const 
 struct Hypothesis {
   std::string name;  ///< "H1", ...
   std::string text;
-  std::vector<Finding> findings;  ///< one a variant; reproduced: the hypothesis holds
+  std::vector<Finding> findings;    ///< one a variant; reproduced: the hypothesis holds
+  std::vector<double> shares = {};  ///< one a variant: the largest total index of the steady speed
 };
 /// Judges H1 to H3 by variance shares of the steady speed and of the steps (total indices over mean friction 0.3 to
 /// 0.55), with the tests of Figs. 6 and 7. A source matters where its total index exceeds 0.1.

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
+#include <map>
+#include <utility>
 
 #include "reports/description/describe_figures.h"
 
@@ -30,6 +33,30 @@ void add_experiment(Figure& figure, const analysis::PaperExperiments& experiment
   figure.x.high = 16.5;
 }
 
+// Begins a map with a column a variant.
+Figure variants_map(const std::string& id, const std::string& title, const std::vector<VariantStudy>& studies,
+                    const Provenance& provenance) {
+  Figure figure{.id = id, .title = title, .x = {""}, .y = {""}, .provenance = provenance};
+  figure.heat_map = HeatMap{.x = {}, .y = {}, .value = {}, .label = ""};
+  for (const VariantStudy& study : studies) {
+    figure.heat_map->x.push_back(static_cast<double>(figure.heat_map->x.size()));
+    figure.heat_map->x_names.push_back(study.variant.name);
+  }
+  figure.width = 640;
+  figure.height = 130;
+  return figure;
+}
+
+// Adds a row above those that are there.
+void add_row(Figure& figure, const std::string& name, std::vector<double> values) {
+  constexpr int row_height = 30;  // [px]
+  HeatMap& map = *figure.heat_map;
+  map.y.push_back(static_cast<double>(map.y.size()));
+  map.y_names.push_back(name);
+  map.value.push_back(std::move(values));
+  figure.height += row_height;
+}
+
 Figure panel(const std::string& id, const std::string& title,
              const std::vector<const analysis::StudiedProfile*>& profiles, const Provenance& provenance) {
   Figure figure = profile_figure(id, title, provenance);
@@ -37,6 +64,8 @@ Figure panel(const std::string& id, const std::string& title,
   for (const analysis::StudiedProfile* profile : profiles)
     add_profile(figure, profile->profile, profile->label, colour++);
   figure.reference_lines = {{true, 9, "first leg again"}};
+  constexpr int lines_above = 2, legend_line = 24;  // whose legend a figure of the usual height has room for; [px]
+  figure.height += legend_line * std::max(static_cast<int>(profiles.size()) + 1 - lines_above, 0);
   return figure;
 }
 
@@ -52,22 +81,41 @@ std::vector<const analysis::StudiedProfile*> lines(const Runs& runs, analysis::S
 
 Figure claims_figure(const std::vector<analysis::Claim>& claims, const std::vector<VariantStudy>& studies,
                      const Provenance& provenance) {
-  Figure figure{.id = "claims-reproduced",
-                .title = "Claims reproduced, by law and reading",
-                .x = {.label = fmt::format("claims, of {}", claims.size()),
-                      .low = 0,
-                      .high = 1.05 * static_cast<double>(claims.size())},
-                .y = {""},
-                .provenance = provenance};
-  BarChart bars{.name = {}, .value = {}, .digits = 3, .format = NumberFormat::general};
-  for (std::size_t v = 0; v < studies.size(); ++v) {
-    bars.name.push_back(studies[v].variant.name);
-    bars.value.push_back(static_cast<double>(std::ranges::count_if(claims, [&](const analysis::Claim& claim) {
-      return claim.findings.at(v).verdict == analysis::ClaimVerdict::reproduced;
-    })));
+  constexpr double right = -1, wrong = 1;  // blue and red
+  Figure figure =
+      variants_map("claims-reproduced", "The paper's claims, under each law and reading", studies, provenance);
+  HeatMap& map = *figure.heat_map;
+  map.digits = 0;
+  map.limit = wrong;
+  map.scale_names = {{right, "reproduced"}, {0, "partly"}, {wrong, "not reproduced"}};
+  for (auto claim = claims.rbegin(); claim != claims.rend(); ++claim) {
+    std::vector<double> row;
+    for (std::size_t v = 0; v < studies.size(); ++v) {
+      const analysis::ClaimVerdict verdict = claim->findings.at(v).verdict;
+      row.push_back(verdict == analysis::ClaimVerdict::reproduced       ? right
+                    : verdict == analysis::ClaimVerdict::partly         ? 0
+                    : verdict == analysis::ClaimVerdict::not_reproduced ? wrong
+                                                                        : std::numeric_limits<double>::quiet_NaN());
+    }
+    add_row(figure, claim->brief.empty() ? claim->where : claim->brief, std::move(row));
   }
-  figure.height = 120 + 40 * static_cast<int>(bars.name.size());
-  figure.bars = std::move(bars);
+  return figure;
+}
+
+Figure hypotheses_figure(const std::vector<analysis::Hypothesis>& hypotheses, const std::vector<VariantStudy>& studies,
+                         const Provenance& provenance) {
+  Figure figure = variants_map("hypotheses-shares", "Share of the steady speed's variance", studies, provenance);
+  HeatMap& map = *figure.heat_map;
+  map.digits = 2;
+  map.format = NumberFormat::fixed;
+  map.label = "total index";
+  map.low = 0, map.high = 1;
+  const std::map<std::string, std::string> sources{
+      {"H1", "H1: launch speed"}, {"H2", "H2: leg lengths"}, {"H3", "H3: restitution, friction"}};
+  for (auto h = hypotheses.rbegin(); h != hypotheses.rend(); ++h) {
+    const auto source = sources.find(h->name);
+    add_row(figure, source == sources.end() ? h->name : source->second, h->shares);
+  }
   return figure;
 }
 

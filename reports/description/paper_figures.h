@@ -9,9 +9,12 @@
 
 namespace metastable::reports {
 
-/// Draws how many of the claims come out under each variant, as bars.
+/// Draws which of the claims come out under each variant, as a map of verdicts.
 Figure claims_figure(const std::vector<analysis::Claim>& claims, const std::vector<analysis::VariantStudy>& studies,
                      const Provenance& provenance);
+/// Draws how much of the steady speed's variance each hypothesis's source takes, under each variant.
+Figure hypotheses_figure(const std::vector<analysis::Hypothesis>& hypotheses,
+                         const std::vector<analysis::VariantStudy>& studies, const Provenance& provenance);
 /// Draws one figure a panel of the paper's, for one variant.
 std::vector<Figure> fig4_figures(const analysis::VariantStudy& study, const Provenance& provenance);
 std::vector<Figure> fig6_figures(const analysis::VariantStudy& study, const analysis::PaperExperiments& experiments,

@@ -64,8 +64,7 @@ void run_describe(const DescribeRequest& request) {
          {tests_table(description, provenance)}});
   pages->section("conditions", "How fast they roll",
                  "Mean speeds collision by collision; they meet where a steady state is reached.",
-                 {profiles_figure(description, provenance)}, {short_table(description, provenance)}, std::move(folds),
-                 Arrangement::beside);
+                 {profiles_figure(description, provenance)}, {short_table(description, provenance)}, std::move(folds));
   std::vector<Figure> maps;
   for (const analysis::ConditionDescription& c : description.conditions)
     if (auto figure = measured_map_figure(c, provenance)) maps.push_back(std::move(*figure));

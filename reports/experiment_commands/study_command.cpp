@@ -92,19 +92,25 @@ void run_study(const StudyRequest& request) {
   page.lead = claims_sentences(claims, studies);
   pages.section(
       "claims", "Claim by claim",
-      "How many of the paper’s claims come out under each law and reading; what counts is below.",
-      {claims_figure(claims, studies, provenance)}, {claims_count_table(claims, studies, provenance)},
-      {{"Each claim, its verdicts and the numbers behind them",
+      "Which of the paper’s claims come out under each law and reading. Empty: the simulation says nothing of it, "
+      "mostly "
+      "because hardly a trial gets so far.",
+      {claims_figure(claims, studies, provenance)}, {},
+      {{"How many, by verdict", {}, {}, {claims_count_table(claims, studies, provenance)}},
+       {"Each claim, its verdicts and the numbers behind them",
         {"Each cell gives the verdict first and then the numbers behind it."},
         {},
         {claims_table(claims, studies, experiments, provenance)}},
        {"What the law and the reading change", {}, {}, {changes_table(claims, studies, experiments, provenance)}},
-       {"What counts as reproduced", {}, {}, {readings_table(claims, provenance)}}},
-      Arrangement::beside);
-  pages.section("hypotheses", "The three hypotheses",
-                "A source that matters takes a large share of the variance with it.", {},
-                {hypotheses_table(analysis::paper_hypotheses(studies), studies, provenance)},
-                {{"All shares of the variance", {}, {}, {variance_table(studies, provenance)}}});
+       {"What counts as reproduced", {}, {}, {readings_table(claims, provenance)}}});
+  const std::vector<analysis::Hypothesis> hypotheses = analysis::paper_hypotheses(studies);
+  pages.section(
+      "hypotheses", "The three hypotheses",
+      "A source that matters takes a large share of the variance with it: the total Sobol’ index of the "
+      "steady speed, at the mean friction where it is largest.",
+      {hypotheses_figure(hypotheses, studies, provenance)}, {},
+      {{"The verdicts, with intervals and for the steps", {}, {}, {hypotheses_table(hypotheses, studies, provenance)}},
+       {"All shares of the variance", {}, {}, {variance_table(studies, provenance)}}});
   pages.section("stopping", "Why a wheel that rolls steadily stops: the law settled", stopping_story(stopping),
                 {sticking_figure(stopping, provenance), resting_figure(stopping, provenance)},
                 {design_table(designs, provenance)},

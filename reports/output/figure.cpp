@@ -205,9 +205,12 @@ Margins margins(const HeatMap& map, const Figure& figure) {
   std::size_t longest_y = 4, longest_x = 0;
   for (const std::string& name : map.y_names) longest_y = std::max(longest_y, length(name));
   for (const std::string& name : map.x_names) longest_x = std::max(longest_x, length(name));
+  std::size_t longest_on_scale = 0;
+  for (const auto& [at, name] : map.scale_names) longest_on_scale = std::max(longest_on_scale, length(name));
   const bool y_label = !figure.y.label.empty(), x_label = !figure.x.label.empty();
   // Names of columns are turned by 25 deg: 0.42 of their length downwards.
-  return {22 + letter * static_cast<double>(longest_y) + (y_label ? 26 : 0), 104, figure.title.empty() ? 16.0 : 44.0,
+  return {22 + letter * static_cast<double>(longest_y) + (y_label ? 26 : 0),
+          std::max(104.0, 50 + letter * static_cast<double>(longest_on_scale)), figure.title.empty() ? 16.0 : 44.0,
           30 + 0.42 * letter * static_cast<double>(longest_x) + (x_label ? 24 : 0)};
 }
 
@@ -293,6 +296,11 @@ void append_colours(std::string& script, const HeatMap& map, const ColourScale& 
   if (map.limit > 0) low = -map.limit, high = map.limit;
   script += fmt::format("set cblabel {} noenhanced textcolor rgb '#222222'\nset cbrange [{}:{}]\n", quote(map.label),
                         low, high);
+  if (!map.scale_names.empty()) {
+    std::vector<std::string> names;
+    for (const auto& [at, name] : map.scale_names) names.push_back(fmt::format("{} {}", quote(name), at));
+    script += fmt::format("set cbtics ({}) noenhanced\n", fmt::join(names, ", "));
+  }
   if (!map.logarithmic) return;
   script += "set logscale cb\n";
   if (high / low >= 100) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "reports/output/table.h"
@@ -67,7 +68,8 @@ struct HeatMap {
   double limit = 0;
   /// Ends of the colour scale, e.g. of maps side by side; not given: the least and the largest value.
   std::optional<double> low = {}, high = {};
-  std::vector<std::vector<bool>> at_least = {};  ///< cells whose value is a lower bound; empty: none
+  std::vector<std::pair<double, std::string>> scale_names = {};  ///< words in the place of the scale's numbers
+  std::vector<std::vector<bool>> at_least = {};                  ///< cells whose value is a lower bound; empty: none
 };
 
 /// Holds named horizontal bars from zero, the first on top, each with its value at the end.

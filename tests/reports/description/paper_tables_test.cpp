@@ -7,6 +7,7 @@
 
 #include "analysis/description/description.h"
 #include "reports/description/describe_tables.h"
+#include "reports/description/paper_figures.h"
 #include "tests/reports/cells.h"
 
 namespace metastable::reports {
@@ -159,6 +160,17 @@ TEST(PaperTables, ChangesSayWhatALawOrAReadingChanges) {
   expect_cell(at(table, law, "settled"), "not reproduced");
   expect_cell(at(table, test::row_of(table, "Fig. 4: four"), "changes with"), "reading and law");
   EXPECT_NE(table.notes[0].find("the other 1 of 4"), std::string::npos);
+}
+
+TEST(PaperFigures, ClaimsAreAMapOfVerdictsFromTheTop) {
+  std::vector<analysis::Claim> all = claims();
+  all[0].brief = "Fig. 1: in brief";
+  const HeatMap map = *claims_figure(all, studies(), {}).heat_map;
+  EXPECT_EQ(map.y_names, (std::vector<std::string>{"Fig. 4", "Fig. 3", "Fig. 2", "Fig. 1: in brief"}));
+  ASSERT_EQ(map.x_names.size(), 4u);
+  EXPECT_EQ(map.value[3], (std::vector<double>{-1, -1, -1, -1}));
+  EXPECT_EQ(map.value[1], (std::vector<double>{0, 0, 0, 1}));
+  EXPECT_TRUE(std::isnan(map.value[0][2]));
 }
 
 TEST(PaperTables, HypothesesAndTheirShares) {

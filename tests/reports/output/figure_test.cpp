@@ -123,6 +123,18 @@ TEST(Figure, ValuesThatAreNotFiniteLeaveAGap) {
   EXPECT_FALSE(render_svg(figure).empty());
 }
 
+TEST(Figure, HeatMapMayHaveWordsOnItsScaleAndNoNumbers) {
+  Figure figure{.id = "verdicts", .title = "", .x = {""}, .y = {""}, .heat_map = HeatMap{}};
+  HeatMap& map = *figure.heat_map;
+  map.x = {0}, map.y = {0, 1}, map.value = {{1}, {-1}};
+  map.digits = 0, map.limit = 1;
+  map.scale_names = {{-1, "reproduced"}, {1, "it's not"}};
+  const std::string svg = render_svg(figure);
+  EXPECT_EQ(count(svg, ">reproduced<"), 1u) << svg;
+  EXPECT_EQ(count(svg, ">it's not<") + count(svg, ">it&#39;s not<") + count(svg, ">it&apos;s not<"), 1u) << svg;
+  EXPECT_EQ(count(svg, ">1<") + count(svg, ">-1<") + count(svg, ">1.0<"), 0u) << svg;
+}
+
 TEST(Figure, HeatMapLabelsCells) {
   Figure figure{.id = "grid", .title = "", .x = {"sd of μ", ""}, .y = {"sd of η", ""}, .heat_map = sample_map()};
   const std::string svg = render_svg(figure);
