@@ -35,12 +35,11 @@ std::string option_entry(const ManualOption& o, std::size_t width) {
   return entry(label, text, column, width);
 }
 
-// Returns paragraphs broken at spaces; a text with lines of its own keeps them where they fit.
-std::string paragraphs(const std::string& text, std::size_t width) {
-  return text.find('\n') == std::string::npos ? wrapped(text, "", width) : fitted(text + "\n", width);
-}
-
 }  // namespace
+
+std::string details_lines(const std::string& details, std::size_t width) {
+  return details.find('\n') == std::string::npos ? wrapped(details, "", width) : fitted(details + "\n", width);
+}
 
 std::size_t help_width() { return ::isatty(STDOUT_FILENO) == 1 ? std::min(terminal_width(), widest) : piped_width; }
 
@@ -55,7 +54,7 @@ std::string command_help(const ManualCommand& command, const std::string& progra
     text += "\n" + group + "\n";
     for (const ManualOption& o : options) text += option_entry(o, width);
   }
-  if (!command.details.empty()) text += "\n" + paragraphs(command.details, width);
+  if (!command.details.empty()) text += "\n" + details_lines(command.details, width);
   return text;
 }
 

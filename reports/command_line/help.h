@@ -20,4 +20,7 @@ std::string command_help(const ManualCommand& command, const std::string& progra
 std::string program_help(const std::vector<ManualCommand>& commands, const std::string& program,
                          const std::string& summary, std::size_t width);
 
+/// Returns a command's details in lines of at most `width` characters: a paragraph, or lines that keep their indent.
+std::string details_lines(const std::string& details, std::size_t width);
+
 }  // namespace metastable::reports

@@ -27,25 +27,21 @@ constexpr const char* details = R"(What it needs
     leg          the leg that lands            time      in s, ms, us or min
     position     of the foot, in m, cm or mm   condition, outcome
     angle        instead of speeds: the wheel's angle over time, in rad, deg or rev ('metastable collisions' goes on)
-  A unit may end the name (omega_deg_s, 'omega [deg/s]') or stand in a row of its own behind the header; where it is
-  told nowhere the column is refused. A time may be counted in frames: time=frame[1/120 s].
+  A unit may end the name (omega_deg_s, 'omega [deg/s]') or stand in a row of its own behind the header; where it is told nowhere the column is refused. A time may be counted in frames: time=frame[1/120 s].
   Columns named as in an experiment folder (trial, omega_minus_rad_s, ...) need no entry.
   Separator, decimal commas, lines before the header and a row of units are found where they are plain, and said.
   Wide: a * stands for the collision's number: omega_minus=w_*[deg/s]. A trial ends at the row's last value.
-  MAT: struct arrays (omega_minus=trials.w[deg/s], or lab.trials.w of a struct in a struct), cell arrays,
-  matrices padded with NaN (with --trials-in), or vectors with one that tells the trials.
-  What data cannot tell: --description with an experiment.toml, or --slope (or --conditions), --legs, --mass,
-  --ramp-length, --law and, unless the law is plastic, --restitution and --friction.)";
+  MAT: struct arrays (omega_minus=trials.w[deg/s], or lab.trials.w of a struct in a struct), cell arrays, matrices padded with NaN (with --trials-in), or vectors with one that tells the trials.
+  What data cannot tell: --description with an experiment.toml, or --slope (or --conditions), --legs, --mass, --ramp-length, --law and, unless the law is plastic, --restitution and --friction.)";
 
-constexpr const char* examples[] = {
-    R"(printf '%s\n' run,omega_deg_s 1,333 1,327 1,321 2,339 2,283 > runs.csv)",
-    R"(metastable import runs.csv --columns trial=run,omega_minus=omega_deg_s \
+constexpr const char* examples[] = {R"(printf '%s\n' run,omega_deg_s 1,333 1,327 1,321 2,339 2,283 > runs.csv)",
+                                    R"(metastable import runs.csv --columns trial=run,omega_minus=omega_deg_s \
     --slope 9.59 --legs paper --mass 1.39 --ramp-length 3.66 \
     --law settled --restitution 0.4,0.1 --friction 0.4,0.1 --out runs)",
-    R"(metastable import wide.csv --columns 'omega_minus=w_*[rad/s]' --slope 9.59 \
+                                    R"(metastable import wide.csv --columns 'omega_minus=w_*[rad/s]' --slope 9.59 \
     --legs paper --mass 1.39 --ramp-length 3.66 --law coulomb \
     --restitution 0.5,0.05 --friction 0.4,0.05 --out wheel)",
-    R"(metastable import lab.mat --columns 'omega_minus=trials.w[deg/s]' \
+                                    R"(metastable import lab.mat --columns 'omega_minus=trials.w[deg/s]' \
     --description wheel.toml --out wheel)"};
 
 constexpr const char* stated[] = {"legs", "mass", "ramp-length", "law", "restitution", "friction"};

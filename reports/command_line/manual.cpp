@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "analysis/experiment/suggestion.h"
+#include "reports/command_line/help.h"
 #include "reports/command_line/options.h"
 
 namespace metastable::reports {
@@ -219,7 +220,7 @@ std::string manual_page(const std::vector<ManualCommand>& commands, std::string_
       page += ".\n";
     }
   }
-  if (!found->details.empty()) as_it_stands("DETAILS", found->details);
+  if (!found->details.empty()) as_it_stands("DETAILS", details_lines(found->details, 72));
   return page + std::string(exit_codes) + ".SH SEE ALSO\n\\fBmetastable\\fR(1)\n";
 }
 
