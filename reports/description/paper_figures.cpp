@@ -81,19 +81,19 @@ std::vector<const analysis::StudiedProfile*> lines(const Runs& runs, analysis::S
 
 Figure claims_figure(const std::vector<analysis::Claim>& claims, const std::vector<VariantStudy>& studies,
                      const Provenance& provenance) {
-  constexpr double right = -1, wrong = 1;  // blue and red
+  constexpr double right = -1, half = -0.5, wrong = 1;  // blue, pale blue and red; white is an empty cell's
   Figure figure =
       variants_map("claims-reproduced", "The paper's claims, under each law and reading", studies, provenance);
   HeatMap& map = *figure.heat_map;
   map.digits = 0;
   map.limit = wrong;
-  map.scale_names = {{right, "reproduced"}, {0, "partly"}, {wrong, "not reproduced"}};
+  map.scale_names = {{right, "reproduced"}, {half, "partly"}, {wrong, "not reproduced"}};
   for (auto claim = claims.rbegin(); claim != claims.rend(); ++claim) {
     std::vector<double> row;
     for (std::size_t v = 0; v < studies.size(); ++v) {
       const analysis::ClaimVerdict verdict = claim->findings.at(v).verdict;
       row.push_back(verdict == analysis::ClaimVerdict::reproduced       ? right
-                    : verdict == analysis::ClaimVerdict::partly         ? 0
+                    : verdict == analysis::ClaimVerdict::partly         ? half
                     : verdict == analysis::ClaimVerdict::not_reproduced ? wrong
                                                                         : std::numeric_limits<double>::quiet_NaN());
     }

@@ -169,7 +169,7 @@ TEST(PaperFigures, ClaimsAreAMapOfVerdictsFromTheTop) {
   EXPECT_EQ(map.y_names, (std::vector<std::string>{"Fig. 4", "Fig. 3", "Fig. 2", "Fig. 1: in brief"}));
   ASSERT_EQ(map.x_names.size(), 4u);
   EXPECT_EQ(map.value[3], (std::vector<double>{-1, -1, -1, -1}));
-  EXPECT_EQ(map.value[1], (std::vector<double>{0, 0, 0, 1}));
+  EXPECT_EQ(map.value[1], (std::vector<double>{-0.5, -0.5, -0.5, 1}));
   EXPECT_TRUE(std::isnan(map.value[0][2]));
 }
 

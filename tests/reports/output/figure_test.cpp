@@ -127,6 +127,7 @@ TEST(Figure, HeatMapMayHaveWordsOnItsScaleAndNoNumbers) {
   Figure figure{.id = "verdicts", .title = "", .x = {""}, .y = {""}, .heat_map = HeatMap{}};
   HeatMap& map = *figure.heat_map;
   map.x = {0}, map.y = {0, 1}, map.value = {{1}, {-1}};
+  map.x_names = {"law"}, map.y_names = {"this", "that"};
   map.digits = 0, map.limit = 1;
   map.scale_names = {{-1, "reproduced"}, {1, "it's not"}};
   const std::string svg = render_svg(figure);
