@@ -20,7 +20,7 @@ using analysis::GapCell;
 using analysis::GapMap;
 
 constexpr double full_colour = 6;  // score beyond which colours do not change
-constexpr std::size_t bars_at_most = 12;
+constexpr std::size_t bars_at_most = 8;
 constexpr std::size_t furthest_rows = 8, least_rows = 3, most_rows = 14;  // of one figure
 // A place is shown alone where its score is beyond this: of some hundred that are chance, one in three maps has such
 // one.
@@ -230,10 +230,7 @@ std::vector<Figure> ranking_figures(const Diagnosis& d) {
     bars.value.push_back(probability);
     bars.colour.push_back(colour);
   }
-  Figure figure{.id = "ranking",
-                .title = "Causes, and how probable they are",
-                .x = {.label = "probability", .low = 0, .high = 1.15},
-                .y = {""}};
+  Figure figure{.id = "ranking", .title = "Causes", .x = {.label = "probability", .low = 0, .high = 1.15}, .y = {""}};
   figure.height = std::max(130 + 30 * static_cast<int>(bars.name.size()), shrinkage_height);
   figure.bars = std::move(bars);
   return {figure};

@@ -85,8 +85,8 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
        {"Every measure of the gap", {}, std::move(shrinking), {shrinkage_table(d)}}});
   sections.add("where", "Where the gap lies",
                "The places where the models are furthest from the measured speeds. Red, the measured speeds are higher "
-               "or more spread than the model’s; blue, lower or less; pale, as chance has it. The score is standard "
-               "normal without a gap: beyond 4 it is rarely chance.",
+               "or more spread than the model’s; blue, lower or less. The score is standard normal without a gap: the "
+               "largest of so many places is about 3 by chance, and beyond 4 it is rarely chance.",
                furthest_figures(d), {},
                {{"Cells beyond chance, after recalibration", {}, {}, {where_table(d)}},
                 {"The whole map, in colours and in numbers", {}, map_figures(d), {map_table(d)}}});
