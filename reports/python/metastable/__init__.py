@@ -23,16 +23,16 @@ from typing import Optional, Sequence, Tuple, Union
 
 import numpy
 
-from metastable import _metastable, _progress, blind
+from metastable import _frames, _metastable, _progress, blind
 from metastable._errors import ComputationError, Contradiction, InputError, MapError
-from metastable._results import (Columns, Comparison, Description, Diagnosis, Record, Regime, Result, Solution,
+from metastable._results import (Columns, Comparison, Description, Diagnosis, HowItFails, Record, Regime, Result, Solution,
                                  Study, Sweep, Table, WalkerComparison, WalkerStudy, Walks)
 
 __version__ = _metastable.version
 
 __all__ = [
     "Chain", "Columns", "Comparison", "ComputationError", "Contradiction", "Description", "Diagnosis", "Experiment",
-    "FirstPassage", "InputError", "MapError", "Passage", "QuasiStationary", "Record", "Regime", "Result", "Setting",
+    "FirstPassage", "HowItFails", "InputError", "MapError", "Passage", "QuasiStationary", "Record", "Regime", "Result", "Setting",
     "SimulatedSteps", "Solution", "Study", "Sweep", "Table", "Walker", "WalkerComparison", "WalkerSetting", "WalkerStudy", "Walks",
     "blind", "chain", "compare", "describe", "diagnose", "effects", "experiment", "read_experiment", "simulate",
     "solve", "study", "sweep", "version_text", "walker",
@@ -372,6 +372,10 @@ def solve(setting, parameter, *, steps=None, survive=None, reach=None, start=Non
                                           command, tell))
 
 
+class _Collisions(Columns):
+    _drawn = "collision", "omega_minus_rad_s"
+
+
 class Experiment:
     """Trials of one wheel: measured (read_experiment), simulated (simulate), or from arrays (experiment).
 
@@ -400,7 +404,7 @@ class Experiment:
     def collisions(self):
         """A row a collision: condition, trial, collision, leg (-1: not known), time_s, position_m, omega_minus_rad_s,
         omega_plus_rad_s (NaN: not known)."""
-        return Columns(self._held.collisions(), "collisions")
+        return _Collisions(self._held.collisions(), "collisions")
 
     @property
     def trials(self):
@@ -417,6 +421,27 @@ class Experiment:
         return {"title": self.title, "conditions": list(self.conditions), "notes": list(self.notes),
                 "collisions": self.collisions.to_dict(), "trials": self.trials.to_dict()}
 
+    def to_dataframe(self):
+        """The collisions, a row each, as a pandas.DataFrame, conditions by their ids; `trials.to_dataframe()` has the
+        trials. Raises ImportError where pandas is not installed."""
+        columns = dict(self.collisions)
+        columns["condition"] = [self.conditions[i] for i in columns["condition"]]
+        return _frames.dataframe(columns)
+
+    def plot(self, ax=None):
+        """Draws the speeds before each collision, by condition, with their means, on Matplotlib's axes and returns
+        them. Raises ImportError where Matplotlib is not installed."""
+        ax, columns = _frames.axes(ax), self.collisions
+        for i, name in enumerate(self.conditions):
+            own = columns.condition == i
+            number, speed = columns.collision[own], columns.omega_minus_rad_s[own]
+            dots, = ax.plot(number, speed, ".", alpha=0.3)
+            at = numpy.unique(number)
+            ax.plot(at, [speed[number == n].mean() for n in at], color=dots.get_color(), label=name)
+        ax.set(xlabel="collision", ylabel="speed before the collision [rad/s]")
+        ax.legend(title="condition")
+        return ax
+
     def _repr_html_(self):
         return f"<p>{html.escape(self.title)}</p>{self.trials._repr_html_()}"
 
@@ -432,12 +457,20 @@ def read_experiment(folder):
     return Experiment(_metastable.read_experiment(os.fspath(folder)))
 
 
+def _condition_id(given):
+    """An id as a file holds it: 1, 1.0 and "1" are one."""
+    if isinstance(given, bool) or not isinstance(given, (str, numbers.Real)):
+        raise TypeError(f"settings: ids of conditions are texts or numbers, not {type(given).__name__}")
+    return str(int(given)) if isinstance(given, numbers.Real) and given == given // 1 else str(given)
+
+
 def experiment(settings, collisions, trials=None, *, title="From arrays", rate_hz=None, noise_sd=None):
     """Arrays as an Experiment, checked as files are: rows are then lines of arrays/collisions.csv.
 
-    settings    a Setting, or {id: Setting}: wheel and contact of the first, slope, ramp and launch of each
+    settings    a Setting, or {id: Setting}, ids being texts or numbers: wheel and contact of the first, slope, ramp and
+                launch of each
     collisions  columns by name (a dict, a pandas.DataFrame): trial, collision (from 1) and omega_minus_rad_s; also
-                condition (the id), leg, time_s, position_m, omega_plus_rad_s, as far as they were measured
+                condition (an id), leg, time_s, position_m, omega_plus_rad_s, as far as they were measured
     trials      trial, outcome ("rest", "end_of_ramp", "max_collisions"), and condition; None: outcomes are not known
     rate_hz     of the sensor [Hz]; noise_sd: believed noise of the speeds [rad/s]
     """
@@ -448,7 +481,7 @@ def experiment(settings, collisions, trials=None, *, title="From arrays", rate_h
         return {str(name): table[name] for name in table.keys()}
 
     return Experiment(_metastable.experiment_from_arrays(
-        list(settings), [_fields(each) for each in settings.values()], columns(collisions),
+        [_condition_id(each) for each in settings], [_fields(each) for each in settings.values()], columns(collisions),
         None if trials is None else columns(trials), dict(title=title, rate_hz=rate_hz, noise_sd=noise_sd)))
 
 
@@ -599,13 +632,34 @@ class SimulatedSteps(Record):
         half = statistics.NormalDist().inv_cdf(0.975) * self.standard_error
         return self.mean - half, self.mean + half
 
+    def _rows(self):
+        return {"trial": numpy.arange(1, len(self.steps) + 1), "steps": self.steps}
+
+    def _draw(self, ax):
+        return _frames.plot_walked(ax, self.steps, numpy.ones(len(self.steps), bool))
+
     def __repr__(self):
         low, high = self.interval_95
         return (f"<metastable.SimulatedSteps: {self.mean:.4g} steps (95 %: {low:.4g} to {high:.4g}), "
                 f"{len(self.steps)} trials>")
 
 
-class FirstPassage(Record):
+class _ByState(Record):
+    """Numbers by state of a chain, of which the first is drawn."""
+
+    def _rows(self):
+        by_state = {name: self[name] for name in self.keys() if numpy.ndim(self[name]) == 1}
+        return {"state": numpy.arange(len(next(iter(by_state.values())))), **by_state}
+
+    def _draw(self, ax):
+        rows, ax = self._rows(), _frames.axes(ax)
+        name = list(rows)[1]
+        ax.plot(rows["state"], rows[name], ".-")
+        ax.set(xlabel="state", ylabel=name)
+        return ax
+
+
+class FirstPassage(_ByState):
     """Steps before failure from each state: `mean` and `sd`, and guaranteed bounds `lower` <= mean <= `upper`."""
 
     def __init__(self, mean, sd, lower, upper):
@@ -616,7 +670,7 @@ class FirstPassage(Record):
                 f"{len(self.mean)} states>")
 
 
-class QuasiStationary(Record):
+class QuasiStationary(_ByState):
     """What survivors look like once the start is forgotten: their `distribution`, the `survival_weight` of each state
     (largest 1), and the `failure_rate` per step. `residual` is the largest of |y Q - lambda y| and |Q x - lambda x|,
     entry by entry, relative to the entry times the probability of leaving its state, and of the error that may be left
@@ -630,7 +684,7 @@ class QuasiStationary(Record):
         return f"<metastable.QuasiStationary: failure rate {self.failure_rate:.6g} per step>"
 
 
-class Passage(Record):
+class Passage(_ByState):
     """First passage to a set of states: the committor `reach` (probability of being there before failing), `fail`
     (neither is one minus the other), and the expected `steps` until either, infinite where neither need come."""
 

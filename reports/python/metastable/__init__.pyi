@@ -38,6 +38,8 @@ class Record:
     def __len__(self) -> int: ...
     def keys(self) -> List[str]: ...
     def to_dict(self) -> Dict[str, Any]: ...
+    def to_dataframe(self) -> Any: ...
+    def plot(self, ax: Any = None) -> Any: ...
 
 
 class Result(Record):
@@ -72,6 +74,13 @@ class Regime(Record):
     def speed_edges(self) -> Floats: ...
 
 
+class HowItFails(Record):
+    last_steps: Tuple[Record, ...]
+    regime: Record
+    by_phase: Tuple[float, ...]
+    most_likely_path: Tuple[Record, ...]
+
+
 class Study(Result):
     schema: int
     slope_deg: float
@@ -98,7 +107,7 @@ class Study(Result):
     solver_disagreement: float
     certificate: Optional[Record]
     sensitivities: Optional[Any]
-    how_it_fails: Optional[Record]
+    how_it_fails: Optional[HowItFails]
     from_standard_errors: Optional[Record]
     launch: Record
     rigid_bodies: Optional[Record]
@@ -149,7 +158,7 @@ class WalkerStudy(Result):
     meshes: Tuple[Record, ...]
     memory_bytes: float
     gait: Optional[Record]
-    how_it_fails: Optional[Record]
+    how_it_fails: Optional[HowItFails]
     provenance: Provenance
 
 
@@ -196,12 +205,16 @@ class Table:
     def __len__(self) -> int: ...
     def __getitem__(self, column: str) -> List[Any]: ...
     def to_dict(self) -> Dict[str, Any]: ...
+    def to_dataframe(self) -> Any: ...
+    def plot(self, column: Optional[str] = None, ax: Any = None) -> Any: ...
 
 
 class Description(Result):
     schema: int
     tables: Dict[str, Table]
     provenance: Provenance
+    def to_dataframe(self, table: Optional[str] = None) -> Any: ...
+    def plot(self, table: Optional[str] = None, column: Optional[str] = None, ax: Any = None) -> Any: ...
 
 
 class Columns:
@@ -212,6 +225,8 @@ class Columns:
     def __len__(self) -> int: ...
     def __getattr__(self, name: str) -> Any: ...
     def to_dict(self) -> Dict[str, List[Any]]: ...
+    def to_dataframe(self) -> Any: ...
+    def plot(self, x: Optional[str] = None, y: Optional[str] = None, ax: Any = None) -> Any: ...
 
 
 class Sweep(Columns):
@@ -230,12 +245,14 @@ class Sweep(Columns):
     rigid_bodies_steps_high95: Floats
     rigid_bodies: Optional[str]
     def __init__(self, columns: Mapping[str, Any], title: str, rigid_bodies: Optional[str] = None) -> None: ...
+    def plot(self, x: Optional[str] = None, y: str = "expected_steps", ax: Any = None) -> Any: ...
 
 
 class Walks(Columns):
     steps: Integers
     fell: NDArray[np.bool_]
     def __init__(self, columns: Mapping[str, Any], steps: Integers, fell: NDArray[np.bool_]) -> None: ...
+    def plot(self, ax: Any = None) -> Any: ...
 
 
 class Setting:
@@ -320,6 +337,8 @@ class Experiment:
     def trials(self) -> Columns: ...
     def write(self, folder: Path) -> None: ...
     def to_dict(self) -> Dict[str, Any]: ...
+    def to_dataframe(self) -> Any: ...
+    def plot(self, ax: Any = None) -> Any: ...
 
 
 class FirstPassage(Record):
@@ -431,7 +450,7 @@ def simulate(setting: Walker, *, trials: int = 50, most_steps: Optional[int] = N
 def read_experiment(folder: Path) -> Experiment: ...
 
 
-def experiment(settings: Union[Setting, Mapping[str, Setting]], collisions: Any, trials: Any = None, *,
+def experiment(settings: Union[Setting, Mapping[Union[str, float], Setting]], collisions: Any, trials: Any = None, *,
                title: str = "From arrays", rate_hz: Optional[float] = None,
                noise_sd: Optional[float] = None) -> Experiment: ...
 
