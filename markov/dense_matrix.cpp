@@ -1,6 +1,7 @@
 #include "markov/dense_matrix.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 namespace metastable::markov {
@@ -34,6 +35,15 @@ Eigen::MatrixXd floored_inverse(const Eigen::MatrixXd& matrix, double least_shar
   const SymmetricEigen split = symmetric_eigen(unit.asDiagonal() * matrix * unit.asDiagonal());
   const Eigen::MatrixXd root = unit.asDiagonal() * split.vectors;
   return root * split.values.cwiseMax(least_share).cwiseInverse().asDiagonal() * root.transpose();
+}
+
+std::vector<std::complex<double>> eigenvalues_of(const Eigen::MatrixXd& matrix) {
+  const Eigen::VectorXcd values = matrix.eigenvalues();
+  std::vector<std::complex<double>> sorted(values.begin(), values.end());
+  std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
+    return std::abs(a) != std::abs(b) ? std::abs(a) > std::abs(b) : a.imag() > b.imag();
+  });
+  return sorted;
 }
 
 double spectral_radius(Eigen::MatrixXd matrix) {

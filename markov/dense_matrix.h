@@ -3,6 +3,8 @@
 // costs whoever else instantiates it up to ten seconds of compiling.
 
 #include <Eigen/Core>
+#include <complex>
+#include <vector>
 
 namespace metastable::markov {
 
@@ -37,6 +39,9 @@ Eigen::MatrixXd floored_inverse(const Eigen::MatrixXd& matrix, double least_shar
 /// Returns the modulus of the largest eigenvalue, real or complex, of a matrix [n x n], n >= 1, to nine digits: by
 /// repeated squaring (Gelfand's formula).
 double spectral_radius(Eigen::MatrixXd matrix);
+
+/// Returns the eigenvalues of a matrix [n x n], n >= 1, by falling modulus; of a conjugate pair the upper one first.
+std::vector<std::complex<double>> eigenvalues_of(const Eigen::MatrixXd& matrix);
 
 /// Returns the inverse of an invertible matrix [n x n].
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix);

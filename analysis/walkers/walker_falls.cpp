@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "markov/mesh/batch_map.h"
 #include "markov/mesh/coupled_passage.h"
@@ -34,18 +35,18 @@ struct Tried {
 class Falls {
  public:
   Falls(const markov::BatchMap& map, std::span<const double> start, const std::vector<NamedNoise>& noises,
-        const markov::MeshOptions& options, const markov::OtherGaits& gaits, int threads)
+        const markov::MeshOptions& options, const markov::MeshStudy& study, int threads)
       : map_(map),
         noises_(noises),
         threads_(threads),
         spacing_(options.spacing),
         lattice_(map.scores, map.scores == 1 ? score_spacing : score_spacing_of_several, score_reach),
-        frames_(markov::noise_frames(map, start)),
-        mesh_(map, frames_, start, markov::with_gaits(options, gaits)),
-        passage_(gaits.states.size() < 2
+        frames_(study.orbit.frames),
+        mesh_(map, frames_, start, markov::with_gaits(options, study.gaits)),
+        passage_(study.gaits.states.size() < 2
                      ? markov::mesh_passage(mesh_, start)
-                     : markov::coupled_passage(mesh_, start, markov::gait_classes(mesh_, gaits.states, frames_),
-                                               gaits.states.size())
+                     : markov::coupled_passage(mesh_, start, markov::gait_classes(mesh_, study.gaits.states, frames_),
+                                               study.gaits.states.size())
                            .passage) {
     const markov::Chain chain = mesh_.chain();
     last_ = markov::last_steps(chain, passage_.visits, steps_of_a_fall);
@@ -68,9 +69,8 @@ class Falls {
     for (const NamedNoise& noise : noises_) falls.moments.noise_names.push_back(noise.name);
     falls.moments.by_phase.assign(static_cast<std::size_t>(map_.phases), 0.0);
     tried_.resize(mesh_.size());
-    markov::parallel_for(mesh_.size(), threads_, [&](std::size_t i) {
-      if (matters(i)) tried_[i] = noise_from(i);
-    });
+    const std::vector<std::vector<std::size_t>> shares = nodes_by_call();
+    markov::parallel_for(shares.size(), threads_, [&](std::size_t share) { try_noise_from(shares[share]); });
     for (std::size_t k = 0; k < last_.share.size(); ++k) falls.moments.last.push_back(profile(last_.share[k], k));
     falls.moments.regime = profile(passage_.distribution, {});
     for (std::size_t k = last_.likeliest.size(); k-- > 0;) falls.moments.likeliest.push_back(path_step(k));
@@ -108,21 +108,67 @@ class Falls {
                        [&](const auto& share) { return share[i] > node_of_no_weight; });
   }
 
-  Tried noise_from(std::size_t i) const {
-    const std::size_t m = lattice_.size(), d = state_[i].size(), scores = noises_.size();
-    Tried tried{std::vector<double>(m * scores), std::vector<double>(m * d), std::vector<std::uint8_t>(m, 0), {}};
-    std::vector<double> weight(m), states, offset;
-    for (std::size_t k = 0; k < scores; k += 4) {
+  /// Returns the nodes that matter, those of one phase that are stepped in one call together.
+  std::vector<std::vector<std::size_t>> nodes_by_call() const {
+    const std::size_t most = map_.dear ? std::max<std::size_t>(1, markov::rows_of_a_dear_call / lattice_.size()) : 1;
+    std::vector<std::vector<std::size_t>> calls;
+    for (int phase = 0; phase < map_.phases; ++phase) {
+      std::vector<std::size_t> nodes;
+      for (std::size_t i = 0; i < mesh_.size(); ++i) {
+        if (phase_[i] != phase || !matters(i)) continue;
+        nodes.push_back(i);
+        if (nodes.size() == most) calls.push_back(std::exchange(nodes, {}));
+      }
+      if (!nodes.empty()) calls.push_back(std::move(nodes));
+    }
+    return calls;
+  }
+
+  /// Steps the scores tried from nodes of one phase.
+  void try_noise_from(const std::vector<std::size_t>& nodes) {
+    const std::size_t m = lattice_.size(), d = state_.front().size(), s = noises_.size();
+    std::vector<double> scores(nodes.size() * m * s), weight(nodes.size() * m), states;
+    std::vector<std::size_t> stepped;  // those inside the section
+    for (const std::size_t i : nodes)
+      if (!map_.inside || map_.inside(phase_[i], state_[i])) stepped.push_back(i);
+    for (std::size_t k = 0; k < nodes.size(); ++k) place_scores(nodes[k], std::span(scores).subspan(k * m * s, m * s),
+                                                                std::span(weight).subspan(k * m, m));
+    std::vector<double> asked;
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      if (!std::binary_search(stepped.begin(), stepped.end(), nodes[k])) continue;
+      for (std::size_t n = 0; n < m; ++n)
+        states.insert(states.end(), state_[nodes[k]].begin(), state_[nodes[k]].end());
+      asked.insert(asked.end(), &scores[k * m * s], &scores[k * m * s] + m * s);
+    }
+    std::vector<double> next(stepped.size() * m * d);
+    std::vector<std::uint8_t> falls(stepped.size() * m, 0);
+    if (!stepped.empty()) markov::checked_step(map_, phase_[nodes.front()], states, asked, next, falls);
+    for (std::size_t k = 0, at = 0; k < nodes.size(); ++k) {
+      Tried tried{{&scores[k * m * s], &scores[k * m * s] + m * s}, std::vector<double>(m * d),
+                  std::vector<std::uint8_t>(m, 1), {}};
+      if (std::binary_search(stepped.begin(), stepped.end(), nodes[k])) {
+        tried.next.assign(&next[at * m * d], &next[at * m * d] + m * d);
+        tried.falls.assign(&falls[at * m], &falls[at * m] + m);
+        ++at;
+      }
+      weigh(nodes[k], std::span(weight).subspan(k * m, m), tried);
+      tried_[nodes[k]] = std::move(tried);
+    }
+  }
+
+  void place_scores(std::size_t i, std::span<double> scores, std::span<double> weight) const {
+    std::vector<double> offset;
+    for (std::size_t k = 0; k < noises_.size(); k += 4) {
       const auto u = markov::uniforms(1, offsets_of_scores + k / 4, i, 0);
       offset.insert(offset.end(), u.begin(),
-                    u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, scores - k)));
+                    u.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, noises_.size() - k)));
     }
-    lattice_.place(offset, tried.score, weight);
-    for (std::size_t n = 0; n < m; ++n) states.insert(states.end(), state_[i].begin(), state_[i].end());
-    if (!map_.inside || map_.inside(phase_[i], state_[i]))
-      markov::checked_step(map_, phase_[i], states, tried.score, tried.next, tried.falls);
-    else
-      std::fill(tried.falls.begin(), tried.falls.end(), 1);
+    lattice_.place(offset, scores, weight);
+  }
+
+  /// Says what each score is worth as the noise of each of the last steps.
+  void weigh(std::size_t i, std::span<const double> weight, Tried& tried) const {
+    const std::size_t m = lattice_.size(), d = state_[i].size();
     tried.weight.assign(last_.share.size(), std::vector<double>(m, 0.0));
     const int landing_phase = (phase_[i] + 1) % map_.phases;
     for (std::size_t n = 0; n < m; ++n) {
@@ -136,7 +182,6 @@ class Falls {
         for (std::size_t k = 1; k < last_.share.size(); ++k)
           tried.weight[k][n] += met * corners.weight[c] * last_.fails_in[k - 1][corners.node[c]];
     }
-    return tried;
   }
 
   double noise(std::size_t which, double score) const { return noises_[which].mean + noises_[which].sd * score; }
@@ -224,8 +269,8 @@ WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> st
     throw std::invalid_argument("how it falls: one noise for each score expected");
   const double spacing = study.sizes.at(1).spacing;
   WalkerFalls falls =
-      Falls(map, start, noises, {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes},
-            study.gaits, options.threads)
+      Falls(map, start, noises, {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes,
+             .row_states = study.row_states}, study, options.threads)
           .tell();
   falls.spacing = spacing;
   return falls;

@@ -35,33 +35,40 @@ std::string describe_state(const BatchMap& map, std::span<const double> state) {
 
 namespace {
 
-void check(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> next,
-           std::span<const std::uint8_t> failed) {
+bool all_finite(std::span<const double> landing) {
+  return std::all_of(landing.begin(), landing.end(), [](double x) { return std::isfinite(x); });
+}
+
+}  // namespace
+
+bool is_landing(const BatchMap& map, int phase, std::span<const double> state) {
+  return all_finite(state) && (!map.inside || map.inside(phase, state));
+}
+
+void require_landings(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> next,
+                      std::span<const std::uint8_t> failed) {
   const auto dimension = static_cast<std::size_t>(map.dimension);
   const int landing_phase = (phase + 1) % map.phases;
   for (std::size_t i = 0; i < failed.size(); ++i) {
     if (failed[i]) continue;
     const auto landing = next.subspan(i * dimension, dimension);
-    const bool finite = std::all_of(landing.begin(), landing.end(), [](double x) { return std::isfinite(x); });
-    if (finite && (!map.inside || map.inside(landing_phase, landing))) continue;
+    if (is_landing(map, landing_phase, landing)) continue;
     throw MapError(fmt::format("return map: from the state {} (phase {}) it leads to {}, which is {}",
                                describe_state(map, states.subspan(i * dimension, dimension)), phase,
-                               describe_state(map, landing), finite ? "outside its own section" : "not finite"));
+                               describe_state(map, landing), all_finite(landing) ? "outside its own section" : "not finite"));
   }
 }
-
-}  // namespace
 
 void checked_step(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> scores,
                   std::span<double> next, std::span<std::uint8_t> failed) {
   map.step(phase, states, scores, next, failed);
-  check(map, phase, states, next, failed);
+  require_landings(map, phase, states, next, failed);
 }
 
 void checked_draw(const BatchMap& map, int phase, std::span<const double> states, std::span<const std::uint64_t> words,
                   std::span<double> next, std::span<std::uint8_t> failed) {
   map.draw(phase, states, words, next, failed);
-  check(map, phase, states, next, failed);
+  require_landings(map, phase, states, next, failed);
 }
 
 }  // namespace metastable::markov

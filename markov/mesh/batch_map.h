@@ -36,13 +36,27 @@ struct BatchMap {
   /// Says whether a state lies in the section, where the map is defined; empty: everywhere. A mesh counts its nodes
   /// outside as failed; a landing outside is an error.
   std::function<bool(int phase, std::span<const double> state)> inside;
+  /// Says that a call costs much more than a row, as where an interpreter runs it: work is then laid out for few calls
+  /// of many rows, of which some may turn out not to be needed. Answers are those of a map that is not dear.
+  bool dear = false;
 };
+
+/// Counts the rows at most that a dear map is asked for in one call: enough that the call itself costs nothing.
+inline constexpr std::size_t rows_of_a_dear_call = 16384;
 
 /// @throws std::invalid_argument naming what is missing or out of range
 void require_map(const BatchMap& map);
 
 /// Does the same, and wants a state as long as it has dimensions to start from.
 void require_start(const BatchMap& map, std::span<const double> start);
+
+/// Returns whether a state is finite and inside the map's section at its phase.
+bool is_landing(const BatchMap& map, int phase, std::span<const double> state);
+
+/// Looks at what a step from states at `phase` gave.
+/// @throws MapError naming the state from which a landing is not finite or outside the map's section
+void require_landings(const BatchMap& map, int phase, std::span<const double> states, std::span<const double> next,
+                      std::span<const std::uint8_t> failed);
 
 /// Calls map.step and looks at what comes back.
 /// @throws MapError naming the state from which a landing is not finite or outside the map's section

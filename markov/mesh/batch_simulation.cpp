@@ -73,8 +73,9 @@ bool follow_all(const BatchMap& map, std::span<const double> start, std::uint64_
     throw std::invalid_argument(fmt::format("simulation: {} trials, 2 or more expected", options.trials));
   steps.assign(options.trials, 0);
   std::atomic<std::uint64_t> spent = 0;
-  parallel_for((options.trials + kTogether - 1) / kTogether, options.threads, [&](std::size_t share) {
-    const std::size_t first = share * kTogether, count = std::min(kTogether, options.trials - first);
+  const std::size_t together = map.dear ? rows_of_a_dear_call : kTogether;
+  parallel_for((options.trials + together - 1) / together, options.threads, [&](std::size_t share) {
+    const std::size_t first = share * together, count = std::min(together, options.trials - first);
     if (spent <= options.most_steps)
       follow(map, start, options, longest, first, std::span(steps).subspan(first, count), spent);
   });

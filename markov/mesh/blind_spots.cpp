@@ -22,6 +22,11 @@ constexpr double kAboveNodes = 2;                // of one score: a line fails s
 constexpr double kLineFails = 0.3, kNodesFail = 0.03;  // of several: more than the first where no node does the second,
                                                        // nor the first under the line's other scores
 constexpr double kErrors = 2;                          // standard errors
+constexpr double kJumpWorth = 0.01;     // of the rate: a difference of failing between neighbours that is looked into,
+constexpr std::size_t kJumpEdges = 32;  // so many of them,
+constexpr int kJumpHalvings = 7;        // so often
+constexpr double kJumpsMatter = 0.05;   // of the rate, as a root of squares: jumps worth less show in the shifts alone
+constexpr double kJumpLeft = 0.3;       // of a difference: what is left of a jump, and 1/128 of what is smooth
 
 /// Sums contributions of lines, each with its probability.
 struct Sum {
@@ -64,7 +69,7 @@ class Probing {
       if (map_.inside && !map_.inside(line.phase, line.state)) continue;
       auto& waiting = of_phase[static_cast<std::size_t>(line.phase)];
       waiting.push_back(std::move(line));
-      if (waiting.size() == kProbedTogether) probe(waiting);
+      if (waiting.size() == (map_.dear ? kLinesProbed : kProbedTogether)) probe(waiting);
     }
     for (auto& waiting : of_phase)
       if (!waiting.empty()) probe(waiting);
@@ -208,6 +213,111 @@ class Probing {
 BlindSpots find_blind_spots(const BatchMap& map, const std::vector<NoiseFrame>& frames, const Mesh& mesh,
                             std::span<const double> visits, const MeshOptions& options) {
   return Probing(map, frames, mesh, visits, options).find();
+}
+
+namespace {
+
+/// An edge between two nodes, with the chance of failing at both of its ends.
+struct Edge {
+  int phase = 0;
+  std::vector<double> from, to;
+  double fails_from = 0, fails_to = 0, worth = 0;
+  double difference() const { return std::abs(fails_to - fails_from); }
+};
+
+/// Returns the edges whose difference is worth something, the largest ones.
+std::vector<Edge> edges_worth_it(const Mesh& mesh, std::span<const double> visits, std::size_t dimension) {
+  double failing = 0;
+  for (std::size_t i = 0; i < mesh.size(); ++i) failing += visits[i] * mesh.kill()[i];
+  std::vector<Edge> edges;
+  for (std::size_t i = 0; i < mesh.size(); ++i)
+    for (std::size_t axis = 0; axis < dimension; ++axis) {
+      const std::uint32_t j = mesh.neighbour(i, axis);
+      if (j == NodeTable::none) continue;
+      const double difference = std::abs(mesh.kill()[i] - mesh.kill()[j]);
+      const double worth = difference * std::max(visits[i], visits[j]) / failing;
+      if (worth < kJumpWorth) continue;
+      edges.push_back({mesh.phase(i), mesh.state(i), mesh.state(j), mesh.kill()[i], mesh.kill()[j], worth});
+    }
+  std::stable_sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return a.worth > b.worth; });
+  if (edges.size() > kJumpEdges) edges.resize(kJumpEdges);
+  return edges;
+}
+
+/// Finds the chance of failing from states of one phase, all under the same lines of scores.
+std::vector<double> fails_from(const BatchMap& map, const NodeLattice& lattice, int phase,
+                               const std::vector<std::vector<double>>& states, const MeshOptions& options) {
+  const std::size_t fixed = static_cast<std::size_t>(map.scores) - 1;
+  std::vector<double> score, weight{1};
+  if (fixed > 0) {
+    const ScoreLattice others(map.scores - 1, options.score_spacing, options.score_reach);
+    score.resize(others.size() * fixed);
+    weight.resize(others.size());
+    others.place(std::vector<double>(fixed, 0.5), score, weight);
+  }
+  ScoreLines lines;
+  for (const std::vector<double>& state : states)
+    for (std::size_t n = 0; n < weight.size(); ++n) {
+      lines.states.insert(lines.states.end(), state.begin(), state.end());
+      const auto at = std::span(score).subspan(n * fixed, fixed);
+      lines.others.insert(lines.others.end(), at.begin(), at.end());
+      lines.reach.push_back(options.score_reach);
+    }
+  const std::vector<ScoreCurve> curves =
+      follow_curves(map, lattice, phase, lines, options.score_spacing, options.spacing);
+  const double all = std::accumulate(weight.begin(), weight.end(), 0.0);
+  std::vector<std::pair<std::uint64_t, double>> parts;
+  std::vector<double> fails(states.size(), 0.0);
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    parts.clear();
+    fails[i / weight.size()] +=
+        weight[i % weight.size()] / all * curves[i].share(lattice, (phase + 1) % map.phases, 1, parts).fails;
+  }
+  return fails;
+}
+
+/// Halves edges of one phase, and keeps the half whose ends differ more. Middles outside the section fail.
+void halve(const BatchMap& map, const NodeLattice& lattice, std::vector<Edge*>& edges, const MeshOptions& options) {
+  std::vector<std::vector<double>> middles, inside;
+  for (const Edge* edge : edges) {
+    middles.push_back(edge->from);
+    for (std::size_t k = 0; k < edge->from.size(); ++k) middles.back()[k] = 0.5 * (edge->from[k] + edge->to[k]);
+    if (!map.inside || map.inside(edge->phase, middles.back())) inside.push_back(middles.back());
+  }
+  const std::vector<double> found =
+      inside.empty() ? std::vector<double>{} : fails_from(map, lattice, edges.front()->phase, inside, options);
+  std::size_t next = 0;
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    Edge& edge = *edges[e];
+    const double fails = map.inside && !map.inside(edge.phase, middles[e]) ? 1 : found[next++];
+    if (std::abs(fails - edge.fails_from) > std::abs(edge.fails_to - fails)) {
+      edge.to = std::move(middles[e]);
+      edge.fails_to = fails;
+    } else {
+      edge.from = std::move(middles[e]);
+      edge.fails_from = fails;
+    }
+  }
+}
+
+}  // namespace
+
+bool failing_jumps(const BatchMap& map, const std::vector<NoiseFrame>& frames, const Mesh& mesh,
+                   std::span<const double> visits, const MeshOptions& options) {
+  std::vector<Edge> edges = edges_worth_it(mesh, visits, static_cast<std::size_t>(map.dimension));
+  const NodeLattice lattice = mesh_lattice(map, frames, options);
+  std::vector<std::vector<Edge*>> of_phase(static_cast<std::size_t>(map.phases));
+  std::vector<double> before;
+  for (Edge& edge : edges) {
+    before.push_back(edge.difference());
+    of_phase[static_cast<std::size_t>(edge.phase)].push_back(&edge);
+  }
+  for (std::vector<Edge*>& some : of_phase)
+    for (int halving = 0; halving < kJumpHalvings && !some.empty(); ++halving) halve(map, lattice, some, options);
+  double squares = 0;  // of what jumps are worth, each of them half a spacing off at random
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (edges[e].difference() > kJumpLeft * before[e]) squares += edges[e].worth * edges[e].worth;
+  return std::sqrt(squares) > kJumpsMatter;
 }
 
 }  // namespace metastable::markov

@@ -32,12 +32,16 @@ class Guided {
   }
 
   /// Says how many samples go side by side: few steps of many states take a simulator less time than many of one.
-  std::size_t together() const { return std::clamp<std::size_t>(4096 / lattice_.size(), 1, 64); }
+  std::size_t together() const {
+    return map_.dear ? std::max<std::size_t>(1, rows_of_a_dear_call / lattice_.size())
+                     : std::clamp<std::size_t>(4096 / lattice_.size(), 1, 64);
+  }
 
   /// Writes the weights of the samples `first`, `first` + phases, ..., which meet the same phase in each step.
-  void sample(std::uint64_t first, std::span<double> weight) const {
+  /// @param state  of each after its burn-in
+  void sample(std::uint64_t first, std::vector<double> state, std::span<double> weight) const {
     const std::size_t d = start_.size(), m = lattice_.size(), s = static_cast<std::size_t>(map_.scores);
-    std::vector<double> state = settled(first, weight.size()), states, scores, weights, next;
+    std::vector<double> states, scores, weights, next;
     std::vector<std::uint8_t> failed;
     std::vector<std::size_t> led(weight.size());  // those that the mesh can lead to failure
     std::iota(led.begin(), led.end(), std::size_t{0});
@@ -63,6 +67,42 @@ class Guided {
       if (left == 0) return;
       led.resize(kept);
     }
+  }
+
+  /// Returns the states of these samples after their burn-in; a sample that failed begins again.
+  std::vector<double> settled(std::uint64_t first, std::size_t count) const {
+    const std::size_t d = start_.size(), s = static_cast<std::size_t>(map_.scores);
+    std::vector<double> state, states, scores, next;
+    for (std::size_t k = 0; k < count; ++k) state.insert(state.end(), start_.begin(), start_.end());
+    std::vector<int> step(count, 0);
+    std::vector<std::uint64_t> attempt(count, 0);
+    std::vector<std::uint8_t> failed;
+    std::vector<std::size_t> walking;
+    const int last = burn_in(first);
+    for (int phase = 0; std::any_of(step.begin(), step.end(), [&](int n) { return n < last; });
+         phase = (phase + 1) % map_.phases) {
+      walking.clear(), states.clear(), scores.clear();
+      for (std::size_t k = 0; k < count; ++k) {
+        if (step[k] == last || step[k] % map_.phases != phase) continue;
+        walking.push_back(k);
+        states.insert(states.end(), &state[k * d], &state[k * d] + d);
+        for (std::size_t j = 0; j < s; ++j)
+          scores.push_back(normal_score(uniforms(options_.seed, kBurnIn + j, number(first, k),
+                                                 attempt[k] * 0x10000 + static_cast<std::uint64_t>(step[k]))[0]));
+      }
+      if (walking.empty()) continue;
+      next.resize(states.size());
+      failed.assign(walking.size(), 0);
+      checked_step(map_, phase, states, scores, next, failed);
+      for (std::size_t i = 0; i < walking.size(); ++i) {
+        const std::size_t k = walking[i];
+        const double* const to = failed[i] ? start_.data() : &next[i * d];
+        std::copy_n(to, d, &state[k * d]);
+        step[k] = failed[i] ? 0 : step[k] + 1;
+        if (failed[i] && ++attempt[k] > 100000) throw MapError("guided sampling: no walker survives the burn-in");
+      }
+    }
+    return state;
   }
 
  private:
@@ -129,42 +169,6 @@ class Guided {
     return total / worth[chosen];
   }
 
-  /// Returns the states of these samples after their burn-in; a sample that failed begins again.
-  std::vector<double> settled(std::uint64_t first, std::size_t count) const {
-    const std::size_t d = start_.size(), s = static_cast<std::size_t>(map_.scores);
-    std::vector<double> state, states, scores, next;
-    for (std::size_t k = 0; k < count; ++k) state.insert(state.end(), start_.begin(), start_.end());
-    std::vector<int> step(count, 0);
-    std::vector<std::uint64_t> attempt(count, 0);
-    std::vector<std::uint8_t> failed;
-    std::vector<std::size_t> walking;
-    const int last = burn_in(first);
-    for (int phase = 0; std::any_of(step.begin(), step.end(), [&](int n) { return n < last; });
-         phase = (phase + 1) % map_.phases) {
-      walking.clear(), states.clear(), scores.clear();
-      for (std::size_t k = 0; k < count; ++k) {
-        if (step[k] == last || step[k] % map_.phases != phase) continue;
-        walking.push_back(k);
-        states.insert(states.end(), &state[k * d], &state[k * d] + d);
-        for (std::size_t j = 0; j < s; ++j)
-          scores.push_back(normal_score(uniforms(options_.seed, kBurnIn + j, number(first, k),
-                                                 attempt[k] * 0x10000 + static_cast<std::uint64_t>(step[k]))[0]));
-      }
-      if (walking.empty()) continue;
-      next.resize(states.size());
-      failed.assign(walking.size(), 0);
-      checked_step(map_, phase, states, scores, next, failed);
-      for (std::size_t i = 0; i < walking.size(); ++i) {
-        const std::size_t k = walking[i];
-        const double* const to = failed[i] ? start_.data() : &next[i * d];
-        std::copy_n(to, d, &state[k * d]);
-        step[k] = failed[i] ? 0 : step[k] + 1;
-        if (failed[i] && ++attempt[k] > 100000) throw MapError("guided sampling: no walker survives the burn-in");
-      }
-    }
-    return state;
-  }
-
   const BatchMap& map_;
   const Mesh& mesh_;
   std::vector<double> start_;
@@ -184,17 +188,24 @@ GuidedRate guided_failure_rate(const BatchMap& map, const Mesh& mesh, std::span<
         "guided sampling: {} samples (16 or more), a window of {} steps (1 or more), a burn-in of {} (0 to 65535)",
         options.samples, options.window, options.burn_in));
   const Guided guided(map, mesh, start, options);
-  // Samples that meet the same phases stand side by side.
+  // Samples that meet the same phases stand side by side; of a dear map all of them while they walk in.
   const auto phases = static_cast<std::size_t>(map.phases), share = guided.together();
-  const std::size_t shares = (options.samples + share * phases - 1) / (share * phases);
+  const std::size_t walking = map.dear ? std::max(share, rows_of_a_dear_call / share * share) : share;
   std::vector<double> weight(options.samples);
-  parallel_for(shares * phases, options.threads, [&](std::size_t part) {
-    const std::size_t first = part / phases * share * phases + part % phases;
-    if (first >= options.samples) return;
-    std::vector<double> some(std::min(share, (options.samples - first + phases - 1) / phases));
-    guided.sample(first, some);
-    for (std::size_t k = 0; k < some.size(); ++k) weight[first + k * phases] = some[k];
-  });
+  parallel_for((options.samples + walking * phases - 1) / (walking * phases) * phases, options.threads,
+               [&](std::size_t part) {
+                 const std::size_t begin = part / phases * walking * phases + part % phases;
+                 if (begin >= options.samples) return;
+                 const std::size_t all = std::min(walking, (options.samples - begin + phases - 1) / phases);
+                 const std::vector<double> state = guided.settled(begin, all);
+                 for (std::size_t from = 0; from < all; from += share) {
+                   std::vector<double> some(std::min(share, all - from));
+                   const auto at = state.begin() + static_cast<std::ptrdiff_t>(from * start.size());
+                   guided.sample(begin + from * phases,
+                                 {at, at + static_cast<std::ptrdiff_t>(some.size() * start.size())}, some);
+                   for (std::size_t k = 0; k < some.size(); ++k) weight[begin + (from + k) * phases] = some[k];
+                 }
+               });
   GuidedRate rate;
   rate.samples = options.samples;
   const auto n = static_cast<double>(options.samples);

@@ -39,6 +39,10 @@ struct MeshOptions {
   std::vector<MeshSource> sources = {};           ///< other gaits (OtherGaits)
   double start_action = 0;                        ///< of the start and its orbit
   double limit = 0;                               ///< > 0: nodes as far as this action, wherever failures are
+  /// Reads the row of a node off so many states around it instead of its own (of several scores, one for each line of
+  /// theirs), spread as far as the landings that it stands for: where failing jumps between neighbours, a node that
+  /// stood for one side alone would put the jump half a spacing off, by chance. >= 1
+  int row_states = 1;
   /// States of phase 0 whose actions are asked for: if there are any, it grows until they and a failure are met.
   std::vector<std::vector<double>> targets = {};
 };
@@ -77,6 +81,10 @@ class Mesh {
   /// Return phase and state of a node.
   int phase(std::size_t node) const { return NodeLattice::phase(key_[node]); }
   std::vector<double> state(std::size_t node) const { return lattice_.state(key_[node]); }
+  /// Returns the node one further on an axis; NodeTable::none where that is not part of the mesh.
+  std::uint32_t neighbour(std::size_t node, std::size_t axis) const {
+    return table_.find(key_[node] + NodeLattice::axis_key(axis));
+  }
 
   /// Holds the nodes around a state with their weights; nodes that are not part of the mesh are left out.
   struct Corners {

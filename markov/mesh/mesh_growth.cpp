@@ -14,8 +14,12 @@ constexpr double kBucket = 1;                             // of actions, expande
 constexpr double kWorthAgain = 0.05;                      // a row speaks again if its node's action falls by this
 constexpr double kFarther = 0.5;                          // scores looked at, beyond what the action allows
 constexpr std::size_t kBatch = 32;                        // nodes whose landings are asked for at once,
-constexpr std::size_t kLines = 1024;                      // fewer where that makes more curves
+constexpr std::size_t kLines = 1024;                      // fewer where that makes more curves;
+constexpr std::size_t kDearLines = 1024;                  // and curves at once where calls are dear: some 20 rows each
 constexpr std::uint32_t kTaken = MeshGrowth::no_row - 1;  // not a row yet
+constexpr std::uint64_t kStatesOfRows = 0xd000;
+constexpr double kIrrational[] = {0.7548776662466927, 0.5698402909980532, 0.4301597090019468};  // of a row's states
+constexpr std::size_t kApart = 31;  // a prime: lines of scores whose states follow one another
 constexpr std::size_t kFewestInChunk = std::size_t{1} << 16, kMostInChunk = std::size_t{1} << 23;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -196,36 +200,60 @@ void MeshGrowth::store(std::uint32_t node, Parts& parts, double failed, double a
   row_.push_back(row);
 }
 
-void MeshGrowth::expand(std::span<const std::uint32_t> nodes) {
-  std::vector<double> states;
-  std::vector<std::uint32_t> inside;
-  const int phase = NodeLattice::phase(key_[nodes.front()]);
-  Parts none;
-  for (const std::uint32_t node : nodes) {
-    const std::vector<double> state = lattice_.state(key_[node]);
-    if (map_.inside && !map_.inside(phase, state)) {
-      none.clear();
-      store(node, none, 1, 0);
-      continue;
-    }
-    states.insert(states.end(), state.begin(), state.end());
-    inside.push_back(node);
+/// Returns states in rows that stand for a node: its own, or so many spread as the sum of two numbers even over half a
+/// spacing to either side, which is how far landings are shared. They lie on a lattice of rank one, moved by an offset of
+/// the node's own.
+std::vector<double> MeshGrowth::row_states(std::uint32_t node, std::size_t count) const {
+  std::vector<double> states = lattice_.state(key_[node]);
+  if (options_.row_states == 1) {
+    const std::vector<double> own = states;
+    for (std::size_t q = 1; q < count; ++q) states.insert(states.end(), own.begin(), own.end());
+    return states;
   }
-  if (!inside.empty()) land(inside, states);
+  const std::vector<double> centre = std::move(states);
+  states.clear();
+  const std::size_t d = centre.size();
+  const NoiseFrame& frame = lattice_.frame(NodeLattice::phase(key_[node]));
+  const auto offset = uniforms(options_.seed, kStatesOfRows, key_[node], options_.shift);
+  for (std::size_t q = 0; q < count; ++q) {
+    states.insert(states.end(), centre.begin(), centre.end());
+    for (std::size_t k = 0; k < d; ++k) {
+      const double step = k == 0 ? 1 / static_cast<double>(count) : kIrrational[k - 1];
+      double u = offset[k] + static_cast<double>(q) * step;
+      u -= std::floor(u);
+      const double by = options_.spacing * (u < 0.5 ? std::sqrt(2 * u) - 1 : 1 - std::sqrt(2 * (1 - u)));
+      for (std::size_t i = 0; i < d; ++i) states[q * d + i] += frame.axes[i * d + k] * by;
+    }
+  }
+  return states;
 }
 
-/// Puts lines through the scores that a node is landed from, along the first: of one score there is one, of several a
-/// lattice of the others, moved by an offset of the node's own. As far as the action allows.
-void MeshGrowth::add_lines(std::uint32_t node, std::span<const double> state, Lines& lines) const {
+/// Puts lines through the scores that a node is landed from, along the first: of one score there is one from each of its
+/// states, of several a lattice of the others, moved by an offset of the node's own. As far as the action allows.
+/// Returns the weight of the lines from states outside the section, which are left out: they count as failed.
+double MeshGrowth::add_lines(std::uint32_t node, Lines& lines) const {
   const double far = std::min(options_.score_reach, kFarther + std::sqrt(2 * std::max(0.0, limit() - action_[node])));
-  const auto add = [&](std::span<const double> others, double weight, double reach) {
+  const auto d = static_cast<std::size_t>(map_.dimension);
+  const int phase = NodeLattice::phase(key_[node]);
+  double outside = 0;
+  const auto add = [&](std::span<const double> state, std::span<const double> others, double weight, double reach) {
+    if (map_.inside && !map_.inside(phase, state)) {
+      outside += weight;
+      return;
+    }
     lines.along.states.insert(lines.along.states.end(), state.begin(), state.end());
     lines.along.others.insert(lines.along.others.end(), others.begin(), others.end());
     lines.along.reach.push_back(reach);
     lines.weight.push_back(weight);
   };
   lines.first.push_back(lines.weight.size());
-  if (!others_) return add({}, 1, far);
+  if (!others_) {
+    const auto count = static_cast<std::size_t>(options_.row_states);
+    const std::vector<double> states = row_states(node, count);
+    for (std::size_t q = 0; q < count; ++q)
+      add(std::span(states).subspan(q * d, d), {}, 1 / static_cast<double>(count), far);
+    return outside;
+  }
   const std::size_t fixed = static_cast<std::size_t>(map_.scores) - 1, m = others_->size();
   std::vector<double> offset, score(m * fixed), weight(m);
   for (std::size_t k = 0; k < fixed; k += 4) {
@@ -234,25 +262,30 @@ void MeshGrowth::add_lines(std::uint32_t node, std::span<const double> state, Li
   }
   others_->place(offset, score, weight);
   const double sum = std::accumulate(weight.begin(), weight.end(), 0.0);
+  const std::vector<double> states = row_states(node, m);
+  // Neighbours on the lattice of scores come one after another, and so would their states.
+  const std::size_t apart = kApart % m == 0 ? 1 : kApart;
   for (std::size_t i = 0; i < m; ++i) {
     const auto others = std::span(score).subspan(i * fixed, fixed);
     const double left = far * far - std::inner_product(others.begin(), others.end(), others.begin(), 0.0);
-    if (left > 0) add(others, weight[i] / sum, std::max(kFarther, std::sqrt(left)));
+    if (left > 0)
+      add(std::span(states).subspan(i * apart % m * d, d), others, weight[i] / sum, std::max(kFarther, std::sqrt(left)));
   }
+  return outside;
 }
 
-void MeshGrowth::land(const std::vector<std::uint32_t>& inside, const std::vector<double>& states) {
-  const auto d = static_cast<std::size_t>(map_.dimension);
-  const int phase = NodeLattice::phase(key_[inside.front()]), to_phase = (phase + 1) % map_.phases;
+void MeshGrowth::land(std::span<const std::uint32_t> nodes) {
+  const int phase = NodeLattice::phase(key_[nodes.front()]), to_phase = (phase + 1) % map_.phases;
   Lines lines;
-  for (std::size_t n = 0; n < inside.size(); ++n) add_lines(inside[n], std::span(states).subspan(n * d, d), lines);
+  std::vector<double> outside;
+  for (const std::uint32_t node : nodes) outside.push_back(add_lines(node, lines));
   lines.first.push_back(lines.weight.size());
   const std::vector<ScoreCurve> curves =
       follow_curves(map_, lattice_, phase, lines.along, options_.score_spacing, options_.spacing);
   Parts parts;
-  for (std::size_t n = 0; n < inside.size(); ++n) {
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
     parts.clear();
-    double fails = 0, looked_at = 0, away = 0;
+    double fails = outside[n], looked_at = outside[n], away = 0;
     for (std::size_t line = lines.first[n]; line < lines.first[n + 1]; ++line) {
       const double weight = lines.weight[line];
       const ScoreCurve::Shares shares = curves[line].share(lattice_, to_phase, weight, parts);
@@ -260,7 +293,7 @@ void MeshGrowth::land(const std::vector<std::uint32_t>& inside, const std::vecto
       away += weight * shares.leaves;
       looked_at += weight;
     }
-    store(inside[n], parts, fails, away + std::max(0.0, 1 - looked_at));
+    store(nodes[n], parts, fails, away + std::max(0.0, 1 - looked_at));
   }
 }
 
@@ -293,14 +326,16 @@ void MeshGrowth::expand_wave(std::vector<std::uint32_t>& wave) {
   std::stable_sort(wave.begin(), wave.end(), [&](std::uint32_t a, std::uint32_t b) {
     return NodeLattice::phase(key_[a]) < NodeLattice::phase(key_[b]);
   });
-  const std::size_t together = others_ ? std::clamp<std::size_t>(kLines / others_->size(), 1, kBatch) : kBatch;
+  const std::size_t lines = map_.dear ? kDearLines : kLines, batch = map_.dear ? kDearLines : kBatch;
+  const std::size_t each = others_ ? others_->size() : static_cast<std::size_t>(options_.row_states);
+  const std::size_t together = each > 1 ? std::clamp<std::size_t>(lines / each, 1, batch) : batch;
   std::string broken;
   try {
     for (std::size_t first = 0; first < wave.size();) {
       std::size_t last = first + 1;
       const int phase = NodeLattice::phase(key_[wave[first]]);
       while (last < wave.size() && last - first < together && NodeLattice::phase(key_[wave[last]]) == phase) ++last;
-      expand(std::span(wave).subspan(first, last - first));
+      land(std::span(wave).subspan(first, last - first));
       if (options_.on_batch) options_.on_batch();
       first = last;
     }

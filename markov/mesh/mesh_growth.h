@@ -100,10 +100,10 @@ class MeshGrowth {
   void grow();
   double limit() const;
   std::uint32_t node_at(std::uint64_t key);
-  void expand(std::span<const std::uint32_t> nodes);
   void expand_wave(std::vector<std::uint32_t>& wave);
-  void add_lines(std::uint32_t node, std::span<const double> state, Lines& lines) const;
-  void land(const std::vector<std::uint32_t>& inside, const std::vector<double>& states);
+  std::vector<double> row_states(std::uint32_t node, std::size_t count) const;
+  double add_lines(std::uint32_t node, Lines& lines) const;
+  void land(std::span<const std::uint32_t> nodes);
   void store(std::uint32_t node, Parts& parts, double failed, double away);
   void follow(std::vector<std::uint32_t> rows);
   void relax(const Row& row);

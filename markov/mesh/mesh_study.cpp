@@ -5,17 +5,21 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 
 #include "markov/mesh/batch_simulation.h"
 #include "markov/mesh/coupled_passage.h"
 #include "markov/mesh/guided_sampling.h"
+#include "markov/mesh/joined_steps.h"
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/noise_frame.h"
 #include "markov/mesh/other_gaits.h"
+#include "markov/mesh/score_lattice.h"
 #include "markov/normal_95.h"
 #include "markov/parallel.h"
+#include "markov/work_left.h"
 
 namespace metastable::markov {
 namespace {
@@ -35,6 +39,9 @@ constexpr double kCounted = 0.5;         // with so much of the steps: an eighth
 constexpr std::size_t kPilotShare = 16;  // trials for one of the pilot, which sees whether trials end,
 constexpr std::size_t kPilotLeast = 8, kPilotMost = 128;
 constexpr double kPilotSteps = 4;     // within so many times the expected steps: of 8, 8 or 7 do.
+// States of a row where the chance of failing jumps, by dimension: of 32 in one dimension shifts differ by 4 per cent.
+constexpr std::array<int, 4> kRowStates{256, 32, 16, 16};
+constexpr double kMemorySideBySide = 0.5;  // of all: for the meshes of a dear map that grow side by side
 constexpr double kLongestTrial = 30;  // times the expected steps: one trial of 1e13 takes longer
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
@@ -122,37 +129,55 @@ std::pair<std::string, bool> walked_alone(const BatchMap& map, std::span<const d
 /// Makes one study.
 class Run {
  public:
-  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options,
-      std::vector<NoiseFrame> frames)
+  Run(const BatchMap& map, std::span<const double> start, const MeshStudyOptions& options, NoiseFreeOrbit orbit)
       : map_(map),
         start_(start),
         options_(options),
-        frames_(std::move(frames)),
+        frames_(orbit.frames),
         sizes_(options.sizes > 0    ? static_cast<std::size_t>(options.sizes)
                : map.dimension == 4 ? 4
                                     : 3),
         shifts_(static_cast<std::size_t>(options.shifts)),
-        threads_(std::min(thread_count(options.threads), options.shifts)),
+        at_once_(map.dear ? 1 : std::min(thread_count(options.threads), options.shifts)),
         steps_(shifts_, std::vector<double>(sizes_)),
         rates_(steps_),
         brackets_(steps_) {
     study_.sizes.resize(sizes_);
+    study_.orbit = std::move(orbit);
+    map_.step = [this, step = map.step](int phase, auto states, auto scores, auto next, auto failed) {
+      step(phase, states, scores, next, failed);
+      const std::lock_guard lock(mutex_);
+      work_.advance(static_cast<double>(failed.size()));
+      tell();
+    };
   }
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
 
   MeshStudy run() {
     foresee_memory();
-    parallel_for(sizes_ * shifts_ - 1, threads_, [&](std::size_t task) {
-      // The long ones come first; the very last, the first shift of the coarsest size, has been made.
+    // The long ones come first; the very last, the first shift of the coarsest size, has been made.
+    const std::size_t tasks = sizes_ * shifts_ - 1;
+    const auto make = [&](std::size_t task, const BatchMap& map) {
       const std::size_t size = sizes_ - 1 - task / shifts_, shift = shifts_ - 1 - task % shifts_;
-      solve(Mesh(map_, frames_, start_, mesh_options(size, shift)), size, shift);
-    });
+      auto mesh = std::make_unique<Mesh>(map, frames_, start_, mesh_options(size, shift));
+      solve(*mesh, size, shift);
+      if (map_.dear && size == 1 && shift == 0) guide_ = std::move(mesh);
+    };
+    if (map_.dear)
+      joined_for(map_, tasks, static_cast<std::size_t>(at_once_), options_.threads, make);
+    else
+      parallel_for(tasks, at_once_, [&](std::size_t task) { make(task, map_); });
     join();
+    over(kMeshes);
+    foresee_other_ways(study_.steps.value, study_.mixing_steps);
     if (study_.steps.upper > kWidest * study_.steps.lower)
       study_.disagreement =
           fmt::format("the meshes do not converge ({:.4g} steps, {:.4g} to {:.4g}){}: no number is given",
                       study_.steps.value, study_.steps.lower, study_.steps.upper,
                       options_.simulated_steps > 0 ? "; " + walked_alone(map_, start_, options_).first : std::string());
     if (study_.disagreement.empty()) simulate();
+    over(kSimulation);
     if (study_.disagreement.empty()) see_blind_spots();
     if (!study_.disagreement.empty()) return std::move(study_);
     sample();
@@ -171,12 +196,8 @@ class Run {
                               : map_.scores == 1  ? 12.0
                                                   : 16.0,
                     .score_spacing = study_score_spacing(map_),
-                    .most_bytes = options_.most_bytes / static_cast<std::size_t>(threads_)};
-    if (options_.progress)
-      one.on_batch = [this] {
-        const std::lock_guard lock(mutex_);
-        options_.progress(done_ / all_work());
-      };
+                    .most_bytes = options_.most_bytes / static_cast<std::size_t>(at_once_)};
+    one.row_states = study_.row_states;
     if (!several_gaits()) return one;
     return with_gaits(one, study_.gaits);
   }
@@ -187,11 +208,85 @@ class Run {
   /// bytes.
   std::size_t begin() {
     const MeshOptions alone = mesh_options(0, 0);
+    auto spent = [this, rows = work_.done(), at = work_.seconds()]() mutable {
+      const Spent now{work_.done() - rows, work_.seconds() - at};
+      rows += now.rows;
+      at += now.seconds;
+      return now;
+    };
     const Mesh mesh(map_, frames_, start_, alone);
+    coarsest_ = spent();
     study_.gaits = find_other_gaits(map_, frames_, start_, mesh, alone);
+    searched_ = spent();
     if (!study_.gaits.trap.empty()) throw Disagreement("mesh study: " + study_.gaits.trap + ": no number is given");
-    if (!several_gaits()) return solve(mesh, 0, 0);
-    return solve(Mesh(map_, frames_, start_, mesh_options(0, 0)), 0, 0);
+    if (!several_gaits() && !failing_jumps(map_, frames_, mesh, mesh_passage(mesh, start_).visits, alone))
+      return solve(mesh, 0, 0);
+    if (several_gaits()) {
+      const Mesh with_all(map_, frames_, start_, mesh_options(0, 0));
+      if (!failing_jumps(map_, frames_, with_all, visits(with_all), mesh_options(0, 0))) {
+        coarsest_ = spent();
+        return solve(with_all, 0, 0);
+      }
+    }
+    study_.row_states = kRowStates[static_cast<std::size_t>(map_.dimension - 1)];
+    spent();
+    const Mesh averaged(map_, frames_, start_, mesh_options(0, 0));
+    coarsest_ = spent();
+    return solve(averaged, 0, 0);
+  }
+
+  std::vector<double> visits(const Mesh& mesh) const {
+    return coupled_passage(mesh, start_, gait_classes(mesh, study_.gaits.states, frames_), study_.gaits.states.size())
+        .passage.visits;
+  }
+
+  /// Plans what is left once the coarsest mesh has told how long it takes.
+  void foresee_work() {
+    const double rows = std::max(1.0, coarsest_.rows), mesh_rate = coarsest_.seconds / rows;
+    const double row_rate = searched_.seconds / std::max(1.0, searched_.rows);
+    const int threads = map_.dear ? 1 : thread_count(options_.threads);
+    double all = -1;
+    for (std::size_t size = 0; size < sizes_; ++size) all += static_cast<double>(shifts_) * mesh_work(size);
+    const std::lock_guard lock(mutex_);
+    work_.plan(rows * all, mesh_rate / (map_.dear ? 1 : at_once_));
+    for (int other = 0; other < 2; ++other) work_.plan(0, row_rate / threads);
+    tell();
+  }
+
+  /// Foresees the rows of both other ways. @param steps, mixing  as far as they are known
+  void foresee_other_ways(double steps, double mixing) {
+    const auto allowed = static_cast<double>(options_.simulated_steps), expected = std::max(1.0, steps);
+    const bool to_failure = allowed / expected >= static_cast<double>(kFewestTrials) && !several_gaits();
+    const double longest = kCounted * allowed / static_cast<double>(kWalks);
+    const double simulated =
+        to_failure ? allowed : static_cast<double>(kWalks) * expected * -std::expm1(-longest / expected);
+    const std::lock_guard lock(mutex_);
+    work_.replan(kSimulation, simulated);
+    const int forgets = forgetting_steps(mixing);
+    const bool guided = options_.guided_samples > 0 && !several_gaits() && steps > kSampledFrom &&
+                        steps > kSampledWindows * std::min(forgets, kLongestWindow);
+    const double grown = map_.dear ? 0 : coarsest_.rows * mesh_work(1);
+    work_.replan(kGuided, guided ? grown + guided_rows(forgets, std::min(forgets, kLongestWindow)) : 0);
+    tell();
+  }
+
+  double guided_rows(int forgets, int window) const {
+    const double lattice = static_cast<double>(ScoreLattice(map_.scores, GuidedOptions().score_spacing,
+                                                            GuidedOptions().score_reach).size());
+    return static_cast<double>(options_.guided_samples) * (2 * forgets + window * lattice);
+  }
+
+  static int forgetting_steps(double mixing) { return 8 + static_cast<int>(std::ceil(8 * mixing)); }
+
+  /// Says how far the work is; called with the lock.
+  void tell() {
+    if (options_.progress) options_.progress(work_.share());
+  }
+
+  void over(std::size_t stage) {
+    const std::lock_guard lock(mutex_);
+    work_.finish(stage);
+    tell();
   }
 
   void foresee_memory() {
@@ -199,18 +294,24 @@ class Run {
     const double coarse = static_cast<double>(begin());
     const double growth = std::pow(std::sqrt(2.0), static_cast<double>(sizes_ - 1));
     const double finest = coarse * std::pow(growth, map_.dimension + std::min(map_.scores, map_.dimension));
-    study_.expected_bytes = finest * threads_;
+    if (map_.dear)
+      at_once_ = static_cast<int>(std::clamp(kMemorySideBySide * static_cast<double>(options_.most_bytes) / finest, 1.0,
+                                             static_cast<double>(sizes_ * shifts_ - 1)));
+    study_.expected_bytes = finest * at_once_;
     if (study_.expected_bytes > static_cast<double>(options_.most_bytes))
       throw std::length_error(fmt::format(
           "mesh study: its finest meshes, of spacing {:.3g}, would take about {:.2g} GB, {} at a time; {:.2g} GB are "
           "allowed",
-          mesh_options(sizes_ - 1, 0).spacing, study_.expected_bytes / 0x1p30, threads_,
+          mesh_options(sizes_ - 1, 0).spacing, study_.expected_bytes / 0x1p30, at_once_,
           static_cast<double>(options_.most_bytes) / 0x1p30));
+    foresee_work();
+    foresee_other_ways(std::exp(steps_[0][0]), coarse_mixing_);
   }
 
   /// Returns the mesh's bytes.
   std::size_t solve(const Mesh& mesh, std::size_t size, std::size_t shift) {
     CoupledPassage coupled;
+    const double before = work_.seconds();
     if (several_gaits())
       coupled =
           coupled_passage(mesh, start_, gait_classes(mesh, study_.gaits.states, frames_), study_.gaits.states.size());
@@ -220,11 +321,11 @@ class Run {
     steps_[shift][size] = std::log(passage.steps);
     rates_[shift][size] = std::log(passage.failure_rate);
     brackets_[shift][size] = 0.5 * std::log(passage.steps_upper / passage.steps_lower);
+    if (size == 0 && shift == 0) coarsest_.seconds += work_.seconds() - before;
     if (size == 0 && shift == 0)
       study_.blind_spots = find_blind_spots(map_, frames_, mesh, passage.visits, mesh_options(0, 0));
     const std::lock_guard lock(mutex_);
-    done_ += mesh_work(size);
-    if (options_.progress) options_.progress(done_ / all_work());
+    if (size == 0 && shift == 0) coarse_mixing_ = passage.mixing_steps;
     if (shift > 0) return mesh.bytes();
     study_.sizes[size] = {mesh_options(size, 0).spacing, mesh.size(), mesh.entries(), {}};
     if (size + 1 < sizes_) return mesh.bytes();
@@ -238,11 +339,6 @@ class Run {
 
   double mesh_work(std::size_t size) const {
     return std::pow(std::sqrt(2.0), static_cast<double>(size) * map_.dimension);
-  }
-  double all_work() const {
-    double all = 0;
-    for (std::size_t size = 0; size < sizes_; ++size) all += static_cast<double>(shifts_) * mesh_work(size);
-    return 1.25 * all;  // a fifth for the other ways
   }
 
   void join() {
@@ -286,17 +382,42 @@ class Run {
             half_width(study_.steps)};
   }
 
-  /// Follows walks, which may refute the mesh. Returns the steps of each.
-  std::vector<std::uint64_t> count(std::size_t walks, double longest) {
-    const auto steps = static_cast<std::uint64_t>(std::max(1.0, std::ceil(longest)));
-    std::vector<std::uint64_t> walked =
-        follow_walks(map_, start_, steps, {.trials = walks, .seed = options_.seed, .threads = options_.threads});
-    study_.walks = count_failures(walked, steps, hazard());
+  std::vector<std::uint64_t> follow(std::size_t walks, std::uint64_t longest) const {
+    return follow_walks(map_, start_, longest, {.trials = walks, .seed = options_.seed, .threads = options_.threads});
+  }
+
+  /// Holds walks against the mesh, which they may refute.
+  void see_failures(const std::vector<std::uint64_t>& walked, std::uint64_t longest) {
+    study_.walks = count_failures(walked, longest, hazard());
     if (study_.walks->refutes(hazard()))
       study_.disagreement = fmt::format(
           "the mesh ({:.4g} steps, {:.4g} to {:.4g}) and direct simulation ({}) disagree: no number is given",
           study_.steps.value, study_.steps.lower, study_.steps.upper, count_text(*study_.walks));
-    return walked;
+  }
+
+  void count(std::size_t walks, double longest) {
+    const auto steps = static_cast<std::uint64_t>(std::max(1.0, std::ceil(longest)));
+    see_failures(follow(walks, steps), steps);
+  }
+
+  static std::uint64_t longest_trial(double expected) {
+    return static_cast<std::uint64_t>(std::max(1.0, std::ceil(kLongestTrial * expected)));
+  }
+
+  /// Follows all trials of a dear map side by side without a pilot, whose calls would hold few rows; returns false if
+  /// they take more steps than a pilot would allow.
+  bool follow_in_time(std::size_t trials, double expected, std::vector<std::uint64_t>& steps) const {
+    const double most = kPilotSteps * expected * static_cast<double>(trials);
+    const auto found = simulate_steps(map_, start_,
+                                      {.trials = trials,
+                                       .seed = options_.seed,
+                                       .threads = options_.threads,
+                                       .most_steps = static_cast<std::uint64_t>(std::min(most, 0x1p62))});
+    if (!found) return false;
+    steps = found->steps;
+    for (std::uint64_t& n : steps)
+      if (n > longest_trial(expected)) n = 0;
+    return true;
   }
 
   void simulate() {
@@ -313,9 +434,14 @@ class Run {
           (several_gaits() ? "it would know one gait; " : "too few trials would fail; ") + count_text(*study_.walks);
       return;
     }
-    count(std::clamp(trials / kPilotShare, kPilotLeast, kPilotMost), kPilotSteps * expected);
-    if (!study_.disagreement.empty()) return;
-    std::vector<std::uint64_t> steps = count(trials, kLongestTrial * expected);
+    std::vector<std::uint64_t> steps;
+    const bool piloted = !map_.dear || !follow_in_time(trials, expected, steps);
+    if (piloted) {
+      count(std::clamp(trials / kPilotShare, kPilotLeast, kPilotMost), kPilotSteps * expected);
+      if (!study_.disagreement.empty()) return;
+      steps = follow(trials, longest_trial(expected));
+    }
+    see_failures(steps, longest_trial(expected));
     if (!study_.disagreement.empty()) return;
     study_.walks.reset();
     const SimulatedSteps all = summarize_steps(std::move(steps));
@@ -331,16 +457,20 @@ class Run {
       study_.no_guided = "not asked: failures are too frequent";
     if (several_gaits()) study_.no_guided = "its samples would know one gait";
     if (!study_.no_guided.empty()) return;
-    const Mesh mesh(map_, frames_, start_, mesh_options(1, 0));
+    if (!guide_) guide_ = std::make_unique<Mesh>(map_, frames_, start_, mesh_options(1, 0));
     // It goes from the start to where failures keep their share: the time to forget the start, some times over. A
     // window too short to reach the failures from an ordinary state leaves the weight to a few rare ones, which few
     // samples meet: the rate comes out too low. So it is lengthened until the weights are even.
-    const int forgets = 8 + static_cast<int>(std::ceil(8 * study_.mixing_steps));
+    const int forgets = forgetting_steps(study_.mixing_steps);
     GuidedRate guided;
     double even = 0;
     for (int window = std::min(forgets, kLongestWindow); even < kEven; window = std::min(2 * window, kLongestWindow)) {
       if (study_.steps.value <= kSampledWindows * window) break;
-      guided = guided_failure_rate(map_, mesh, start_,
+      if (guided.samples > 0) {
+        const std::lock_guard lock(mutex_);
+        work_.add(kGuided, guided_rows(forgets, window));
+      }
+      guided = guided_failure_rate(map_, *guide_, start_,
                                    {.samples = options_.guided_samples,
                                     .burn_in = std::min(2 * forgets, 60000),
                                     .window = window,
@@ -361,20 +491,33 @@ class Run {
     study_.no_guided.clear();
   }
 
-  const BatchMap& map_;
+  static constexpr std::size_t kMeshes = 0, kSimulation = 1, kGuided = 2;  // stages of the work
+  struct Spent {
+    double rows = 0, seconds = 0;
+  };
+
+  BatchMap map_;  ///< which counts the rows that are stepped
   std::span<const double> start_;
   const MeshStudyOptions& options_;
   std::vector<NoiseFrame> frames_;
   std::size_t sizes_, shifts_;
-  int threads_;
+  int at_once_;  ///< meshes
   std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]
   MeshStudy study_;
   double tail_rate_ = 0;  ///< a step, beyond the survival of the study
+  double coarse_mixing_ = 0;
+  Spent coarsest_, searched_;  ///< on the coarsest mesh, on the search for other gaits
+  std::unique_ptr<Mesh> guide_;  ///< of guided sampling
   std::mutex mutex_;
-  double done_ = 0;
+  WorkLeft work_;
 };
 
 }  // namespace
+
+MeshEstimate steps_from_quasi_stationary(const MeshStudy& study) {
+  const MeshEstimate& rate = study.failure_rate;
+  return {1 / rate.value, 1 / rate.upper, 1 / rate.lower};
+}
 
 double study_score_spacing(const BatchMap& map) {
   // Of one score the landing is read as a curve, which takes further places where it needs them.
@@ -386,9 +529,9 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     throw std::invalid_argument(fmt::format("mesh study: {} sizes, 3 or 4 expected", options.sizes));
   if (options.shifts < 6)
     throw std::invalid_argument(fmt::format("mesh study: {} shifts, 6 or more expected", options.shifts));
-  std::vector<NoiseFrame> frames;
+  NoiseFreeOrbit orbit;
   try {
-    frames = noise_frames(map, start);
+    orbit = noise_free_orbit(map, start);
   } catch (const NoOrbit& error) {
     if (options.simulated_steps == 0) throw;
     std::string walked;
@@ -400,7 +543,7 @@ MeshStudy mesh_study(const BatchMap& map, std::span<const double> start, const M
     throw NoOrbit(fmt::format("{}; {}", error.what(), walked));
   }
   try {
-    return Run(map, start, options, std::move(frames)).run();
+    return Run(map, start, options, std::move(orbit)).run();
   } catch (const NoFailureFound& error) {
     if (options.simulated_steps == 0) throw;
     const auto [found, fails] = walked_alone(map, start, options);

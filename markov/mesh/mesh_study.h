@@ -14,6 +14,7 @@
 #include "markov/mesh/blind_spots.h"
 #include "markov/mesh/failure_count.h"
 #include "markov/mesh/mesh.h"
+#include "markov/mesh/noise_frame.h"
 #include "markov/mesh/other_gaits.h"
 
 namespace metastable::markov {
@@ -28,7 +29,8 @@ struct MeshStudyOptions {
   std::size_t guided_samples = 4000;              ///< 0: none
   std::uint64_t simulated_steps = 2000000;        ///< direct simulation takes about so many steps; 0: none at all
   std::size_t most_bytes = std::size_t{3} << 30;  ///< of all meshes held at once
-  /// It is called with the share of the work done, from any thread but one at a time, and may throw to stop.
+  /// It is called with the share of the time that all takes, 0 until that can be foretold (from the coarsest mesh on),
+  /// from any thread but one at a time, and may throw to stop. The share falls back where more work turns up.
   std::function<void(double)> progress = {};
 };
 
@@ -49,14 +51,17 @@ struct MeshStudy {
   double mixing_steps = 0;
   std::vector<double> survival;  ///< as MeshPassage's, of the finest mesh's first shift
   double cheapest_failure = 0;
+  NoiseFreeOrbit orbit;
   OtherGaits gaits;
   std::vector<double> gait_share;  ///< of the expected steps, by gait, the start's own first; empty: there is no other
   /// Holds the relative parts of the interval of `steps`: the shifts' t-interval, what is left of the discretization,
   /// and what leaves the mesh.
   double shift_error = 0, discretization_error = 0, bracket = 0;
   BlindSpots blind_spots;  ///< of the coarsest mesh
+  int row_states = 1;      ///< MeshOptions::row_states of all meshes: above 1 where the chance of failing jumps
   std::vector<MeshSize> sizes;
   double expected_bytes = 0;                             ///< of all meshes held at once, as foreseen from the coarsest
+                                                         ///< (of a dear map it does not depend on the threads)
   std::optional<MeshEstimate> guided, simulated;         ///< expected steps in the two other ways, where they reach
   std::size_t guided_samples = 0, simulated_trials = 0;  ///< 0: not asked
   /// Say, where there is no such estimate, why: a clause.
@@ -66,6 +71,9 @@ struct MeshStudy {
   /// Empty, or a sentence that says which ways disagree and that `steps` must not be used.
   std::string disagreement;
 };
+
+/// Returns the expected steps of survivors who have forgotten the start: one over the failure rate.
+MeshEstimate steps_from_quasi_stationary(const MeshStudy& study);
 
 /// Returns the spacing of the scores that a study's meshes take.
 double study_score_spacing(const BatchMap& map);
@@ -93,6 +101,9 @@ class Disagreement : public std::runtime_error {
 /// failures are then counted only, and no samples are guided: both would start in one gait and know nothing of the
 /// others. No number is given either where a gait is a trap, where blind spots may hold more than a tenth of the
 /// failures, or where the interval is wider than a factor of four.
+/// Where the chance of failing jumps from one state to the next (failing_jumps), rows are read off states around their
+/// nodes.
+/// A dear map's meshes grow side by side, as many as half the memory holds, in joined steps.
 /// The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries
 /// with them, is foreseen from it.
 /// @param start  a state at phase 0

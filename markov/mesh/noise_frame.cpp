@@ -36,17 +36,6 @@ class Probe {
                                 describe_state(map_, {state.data(), static_cast<std::size_t>(state.size())})));
     return next;
   }
-  /// Does the same; nothing where it fails or leads nowhere.
-  std::optional<VectorXd> surviving(int phase, const VectorXd& state, const VectorXd& scores) const {
-    VectorXd next(state.size());
-    std::uint8_t failed = 0;
-    map_.step(phase, {state.data(), static_cast<std::size_t>(state.size())},
-              {scores.data(), static_cast<std::size_t>(scores.size())},
-              {next.data(), static_cast<std::size_t>(next.size())}, {&failed, 1});
-    if (failed || !next.allFinite()) return std::nullopt;
-    return next;
-  }
-
  private:
   const BatchMap& map_;
 };
@@ -69,37 +58,84 @@ std::vector<VectorXd> settled_orbit(const BatchMap& map, const Probe& probe, std
                             describe_state(map, {state.data(), static_cast<std::size_t>(state.size())})));
 }
 
-MatrixXd by_state(const BatchMap& map, const Probe& probe, int phase, const VectorXd& state) {
-  const VectorXd quiet = VectorXd::Zero(map.scores);
-  const char* const fails = "without noise it fails right beside its orbit";
-  MatrixXd a(map.dimension, map.dimension);
-  for (Index k = 0; k < map.dimension; ++k) {
-    const double h = 1e-5 * std::max(std::abs(state[k]), 1e-2);
-    VectorXd low = state, high = state;
-    low[k] -= h;
-    high[k] += h;
-    a.col(k) = (probe(phase, high, quiet, fails) - probe(phase, low, quiet, fails)) / (2 * h);
-  }
-  return a;
-}
+/// Holds the derivatives of a step by the state and by the scores.
+struct Derivatives {
+  MatrixXd by_state, by_scores;
+};
 
-MatrixXd by_scores(const BatchMap& map, const Probe& probe, int phase, const VectorXd& state) {
-  constexpr double h = 1e-2;
-  const char* const fails = "on its noise-free orbit a noise of 0.01 sd makes it fail";
-  MatrixXd b(map.dimension, map.scores);
-  for (Index k = 0; k < map.scores; ++k) {
-    VectorXd low = VectorXd::Zero(map.scores), high = low;
-    low[k] = -h;
-    high[k] = h;
-    b.col(k) = (probe(phase, state, high, fails) - probe(phase, state, low, fails)) / (2 * h);
-    const auto up = probe.surviving(phase, state, high / h), down = probe.surviving(phase, state, low / h);
-    if (!up || !down) continue;
-    for (Index i = 0; i < map.dimension; ++i) {
-      const double wide = ((*up)[i] - (*down)[i]) / 2;
-      if (wide != 0 && std::abs(b(i, k)) > kJumps * std::abs(wide)) b(i, k) = wide;
+/// Steps rows of one phase in one call, and says of a failure in those that must not fail where it is.
+class Rows {
+ public:
+  Rows(const BatchMap& map, int phase) : map_(map), phase_(phase) {}
+  void add(const VectorXd& state, const VectorXd& scores) {
+    states_.insert(states_.end(), state.begin(), state.end());
+    scores_.insert(scores_.end(), scores.begin(), scores.end());
+  }
+  void step() {
+    next_.resize(states_.size());
+    failed_.assign(states_.size() / static_cast<std::size_t>(map_.dimension), 0);
+    map_.step(phase_, states_, scores_, next_, failed_);
+  }
+  VectorXd landing(Index row, const char* when) const {
+    const auto d = static_cast<std::size_t>(map_.dimension), r = static_cast<std::size_t>(row);
+    const auto state = std::span(states_).subspan(r * d, d), next = std::span(next_).subspan(r * d, d);
+    require_landings(map_, phase_, state, next, std::span(failed_).subspan(r, 1));
+    if (failed_[r])
+      throw NoOrbit(fmt::format("return map: {}, from the state {}", when, describe_state(map_, state)));
+    return Eigen::Map<const VectorXd>(next.data(), map_.dimension);
+  }
+  /// Returns nothing where it fails or leads nowhere.
+  std::optional<VectorXd> surviving(Index row) const {
+    const VectorXd next = Eigen::Map<const VectorXd>(next_.data() + row * map_.dimension, map_.dimension);
+    if (failed_[static_cast<std::size_t>(row)] || !next.allFinite()) return std::nullopt;
+    return next;
+  }
+
+ private:
+  const BatchMap& map_;
+  int phase_;
+  std::vector<double> states_, scores_, next_;
+  std::vector<std::uint8_t> failed_;
+};
+
+Derivatives derivatives(const BatchMap& map, int phase, const VectorXd& state) {
+  constexpr double score_step = 1e-2;
+  const Index d = map.dimension, s = map.scores;
+  const VectorXd quiet = VectorXd::Zero(s);
+  Rows rows(map, phase);  // for each number of the state a row above and one below, for each score two of each
+  std::vector<double> steps;
+  for (Index k = 0; k < d; ++k) {
+    steps.push_back(1e-5 * std::max(std::abs(state[k]), 1e-2));
+    for (const double to : {steps.back(), -steps.back()}) {
+      VectorXd moved = state;
+      moved[k] += to;
+      rows.add(moved, quiet);
     }
   }
-  return b;
+  for (Index k = 0; k < s; ++k)
+    for (const double to : {score_step, -score_step, 1.0, -1.0}) {
+      VectorXd moved = quiet;
+      moved[k] = to;
+      rows.add(state, moved);
+    }
+  rows.step();
+  Derivatives found{MatrixXd(d, d), MatrixXd(d, s)};
+  const char* const beside = "without noise it fails right beside its orbit";
+  for (Index k = 0; k < d; ++k)
+    found.by_state.col(k) =
+        (rows.landing(2 * k, beside) - rows.landing(2 * k + 1, beside)) / (2 * steps[static_cast<std::size_t>(k)]);
+  const char* const noisy = "on its noise-free orbit a noise of 0.01 sd makes it fail";
+  for (Index k = 0; k < s; ++k) {
+    const Index row = 2 * d + 4 * k;
+    found.by_scores.col(k) = (rows.landing(row, noisy) - rows.landing(row + 1, noisy)) / (2 * score_step);
+    const auto up = rows.surviving(row + 2), down = rows.surviving(row + 3);
+    if (!up || !down) continue;
+    for (Index i = 0; i < d; ++i) {
+      const double wide = ((*up)[i] - (*down)[i]) / 2;
+      if (wide != 0 && std::abs(found.by_scores(i, k)) > kJumps * std::abs(wide)) found.by_scores(i, k) = wide;
+    }
+  }
+  return found;
 }
 
 std::vector<double> row_major(const MatrixXd& m) {
@@ -112,6 +148,10 @@ std::vector<double> row_major(const MatrixXd& m) {
 }  // namespace
 
 std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double> start) {
+  return noise_free_orbit(map, start).frames;
+}
+
+NoiseFreeOrbit noise_free_orbit(const BatchMap& map, std::span<const double> start) {
   require_start(map, start);
   if (map.scores == 0)
     throw MapError(
@@ -122,9 +162,9 @@ std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double
   MatrixXd revolution = MatrixXd::Identity(map.dimension, map.dimension);
   for (int phase = 0; phase < map.phases; ++phase) {
     const VectorXd& state = orbit[static_cast<std::size_t>(phase)];
-    a.push_back(by_state(map, probe, phase, state));
-    const MatrixXd b = by_scores(map, probe, phase, state);
-    q.push_back(b * b.transpose());
+    const auto [by_state, by_scores] = derivatives(map, phase, state);
+    a.push_back(by_state);
+    q.push_back(by_scores * by_scores.transpose());
     revolution = a.back() * revolution;
   }
   const double growth = spectral_radius(revolution);
@@ -153,7 +193,7 @@ std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double
       covariance = a[p] * covariance * a[p].transpose() + q[p];
     }
   }
-  return frames;
+  return {std::move(frames), eigenvalues_of(revolution)};
 }
 
 }  // namespace metastable::markov

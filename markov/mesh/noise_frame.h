@@ -2,6 +2,7 @@
 // Finds the principal axes of a map's noise, in which the linear response to it has unit variance in every direction.
 
 #include <array>
+#include <complex>
 #include <span>
 #include <vector>
 
@@ -31,5 +32,13 @@ class NoOrbit : public MapError {
 /// @throws NoOrbit when the map fails without noise or right beside that, does not settle, or is unstable, naming the
 /// state; MapError as checked_step does, and when the noise does not move every number of the state
 std::vector<NoiseFrame> noise_frames(const BatchMap& map, std::span<const double> start);
+
+/// Holds the noise-free orbit, by the frames around it, and how what is beside it comes back.
+struct NoiseFreeOrbit {
+  std::vector<NoiseFrame> frames;                 ///< phase by phase
+  std::vector<std::complex<double>> eigenvalues;  ///< of the derivative over all phases, by falling modulus
+};
+/// Does the same as noise_frames(), and keeps the eigenvalues. @throws as it
+NoiseFreeOrbit noise_free_orbit(const BatchMap& map, std::span<const double> start);
 
 }  // namespace metastable::markov

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "markov/mesh/mesh_growth.h"
@@ -43,7 +44,7 @@ class Search {
       State state = mesh.state(i);
       if (!map_.inside || map_.inside(0, state)) found.push_back(std::move(state));
     }
-    for (std::size_t heat = 0; heat < std::size(kHeats); ++heat) walk_hot(start, kHeats[heat], seed, heat, found);
+    walk_hot(start, seed, found);
     return found;
   }
 
@@ -124,25 +125,28 @@ class Search {
     }
   }
 
-  void walk_hot(std::span<const double> start, double heat, std::uint64_t seed, std::size_t stream,
-                std::vector<State>& found) const {
+  /// Adds what the walks come through, those of the least heat first; all walk side by side.
+  void walk_hot(std::span<const double> start, std::uint64_t seed, std::vector<State>& found) const {
     const State first(start.begin(), start.end());
-    std::vector<State> states(kHotWalks, first);
-    std::vector<double> scores(kHotWalks * s_);
+    std::vector<State> states(std::size(kHeats) * kHotWalks, first), met[std::size(kHeats)];
+    std::vector<double> scores(states.size() * s_);
     for (int number = 0; number < kHotSteps;) {
       for (int phase = 0; phase < map_.phases; ++phase, ++number) {
-        for (std::size_t i = 0; i < kHotWalks; ++i)
-          for (std::size_t k = 0; k < s_; ++k)
-            scores[i * s_ + k] = std::clamp(heat * normal_score(uniforms(seed, kHotStream + stream, i * s_ + k,
-                                                                         static_cast<std::uint64_t>(number))[0]),
-                                            -kHottest, kHottest);
+        for (std::size_t i = 0; i < states.size(); ++i)
+          for (std::size_t k = 0; k < s_; ++k) {
+            const std::size_t heat = i / kHotWalks, walk = i % kHotWalks;
+            const double u =
+                uniforms(seed, kHotStream + heat, walk * s_ + k, static_cast<std::uint64_t>(number))[0];
+            scores[i * s_ + k] = std::clamp(kHeats[heat] * normal_score(u), -kHottest, kHottest);
+          }
         step(phase, states, scores);
       }
-      for (State& state : states) {
-        if (!state.empty() && number / map_.phases % kKeptEvery == 0) found.push_back(state);
-        if (state.empty()) state = first;  // it begins again, as it would at phase 0
+      for (std::size_t i = 0; i < states.size(); ++i) {
+        if (!states[i].empty() && number / map_.phases % kKeptEvery == 0) met[i / kHotWalks].push_back(states[i]);
+        if (states[i].empty()) states[i] = first;  // it begins again, as it would at phase 0
       }
     }
+    for (std::vector<State>& some : met) std::move(some.begin(), some.end(), std::back_inserter(found));
   }
 
   const BatchMap& map_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 
 namespace metastable::markov {
@@ -13,6 +14,7 @@ constexpr double kNarrowestGap = 1.0 / 512;   // of the spacing: gaps are halved
 constexpr double kForetold = 1e-3;            // stationary sds: what a gap's middle may lie off before it was stepped;
                                               // afterwards a sixteenth is left
 constexpr double kExtrapolated = 40;          // times that, where a cubic had to look beyond its places
+constexpr int kForeseen = 2;                  // further halvings of a gap that a dear map is asked for ahead
 constexpr double kPerCell = 2, kMost = 1024;  // pairs of Gauss's points a cell of the lattice, and between two places
 
 using Point = NodeLattice::Point;
@@ -228,40 +230,145 @@ ScoreCurve::Shares ScoreCurve::share(const NodeLattice& lattice, int phase, doub
   return shares;
 }
 
-std::vector<ScoreCurve> follow_curves(const BatchMap& map, const NodeLattice& lattice, int phase,
-                                      const ScoreLines& lines, double spacing, double unit) {
-  const auto d = static_cast<std::size_t>(map.dimension), fixed = static_cast<std::size_t>(map.scores) - 1;
-  const int to_phase = (phase + 1) % map.phases;
-  std::vector<ScoreCurve> curves;
-  for (const double far : lines.reach) curves.emplace_back(spacing, far);
-  std::vector<double> from, scores, next;
-  std::vector<std::uint8_t> failed;
-  for (;;) {
-    from.clear(), scores.clear();
-    for (std::size_t n = 0; n < curves.size(); ++n)
-      for (const double score : curves[n].asked()) {
-        from.insert(from.end(), lines.states.data() + n * d, lines.states.data() + (n + 1) * d);
-        scores.push_back(score);
-        scores.insert(scores.end(), lines.others.data() + n * fixed, lines.others.data() + (n + 1) * fixed);
-      }
-    if (scores.empty()) return curves;
-    next.resize(from.size());
-    failed.assign(from.size() / d, 0);
-    checked_step(map, phase, from, scores, next, failed);
-    std::vector<ScoreCurve::Landing> landings(failed.size());
-    for (std::size_t i = 0; i < landings.size(); ++i) {
-      if (failed[i])
-        landings[i].fate = ScoreCurve::Fate::fails;
-      else if (!lattice.locate(to_phase, &next[i * d], landings[i].at))
-        landings[i].fate = ScoreCurve::Fate::leaves;
+std::vector<double> ScoreCurve::may_ask(int halvings) const {
+  std::vector<double> scores;
+  const auto halves = [&](const auto& again, double low, double high, int left) -> void {
+    if (left == 0) return;
+    const double middle = 0.5 * (low + high);
+    for (const auto& [from, to] : {std::pair(low, middle), std::pair(middle, high)}) {
+      scores.push_back(0.5 * (from + to));
+      again(again, from, to, left - 1);
     }
-    std::size_t first = 0;
-    for (ScoreCurve& curve : curves) {
-      const std::size_t count = curve.asked().size();
-      if (count > 0) curve.answer(std::span(landings).subspan(first, count), unit);
-      first += count;
+  };
+  if (place_.empty())
+    for (std::size_t i = 0; i + 1 < asked_.size(); ++i) scores.push_back(0.5 * (asked_[i] + asked_[i + 1]));
+  for (std::size_t i = 0; i < place_.size(); ++i)
+    if (place_[i].open) halves(halves, place_[i].score, place_[i + 1].score, halvings);
+  return scores;
+}
+
+namespace {
+
+/// Follows curves of one phase round by round.
+class Following {
+ public:
+  Following(const BatchMap& map, const NodeLattice& lattice, int phase, const ScoreLines& lines, double unit)
+      : map_(map),
+        lattice_(lattice),
+        phase_(phase),
+        lines_(lines),
+        unit_(unit),
+        d_(static_cast<std::size_t>(map.dimension)),
+        fixed_(static_cast<std::size_t>(map.scores) - 1) {}
+
+  void follow(std::vector<ScoreCurve>& curves) {
+    for (;;) {
+      clear();
+      for (std::size_t n = 0; n < curves.size(); ++n)
+        for (const double score : curves[n].asked()) add(n, score);
+      if (scores_.empty()) return;
+      checked_step(map_, phase_, from_, scores_, next_, failed_);
+      std::size_t first = 0;
+      for (ScoreCurve& curve : curves) {
+        std::vector<ScoreCurve::Landing> landings(curve.asked().size());
+        for (ScoreCurve::Landing& landing : landings) landing = landing_of(first++);
+        if (!landings.empty()) curve.answer(landings, unit_);
+      }
     }
   }
+
+  /// Does the same in fewer calls: landings of scores that a curve may ask for are known beforehand.
+  void follow_ahead(std::vector<ScoreCurve>& curves) {
+    std::vector<std::map<double, ScoreCurve::Landing>> known(curves.size());
+    for (;;) {
+      clear();
+      std::vector<std::pair<std::size_t, double>> asked;  // curve and score of each row
+      const auto ask = [&](std::size_t n, double score) {
+        if (known[n].contains(score)) return;
+        asked.emplace_back(n, score);
+        add(n, score);
+      };
+      for (std::size_t n = 0; n < curves.size(); ++n) {
+        answer_what_is_known(curves[n], known[n]);
+        for (const double score : curves[n].asked()) ask(n, score);
+      }
+      if (asked.empty()) return;
+      const std::size_t sure = asked.size();
+      for (std::size_t n = 0; n < curves.size(); ++n)
+        for (const double score : curves[n].may_ask(kForeseen)) ask(n, score);
+      for (std::size_t first = 0; first < asked.size();) {
+        const std::size_t last = std::min(asked.size(), first + rows_of_a_dear_call);
+        step(first, last);
+        first = last;
+      }
+      require_landings(map_, phase_, std::span(from_).first(sure * d_), std::span(next_).first(sure * d_),
+                       std::span(failed_).first(sure));
+      // What was not asked for yet and leads to no number is asked for again, if ever, and then named.
+      for (std::size_t i = 0; i < asked.size(); ++i)
+        if (i < sure || failed_[i] || is_landing(map_, (phase_ + 1) % map_.phases, std::span(next_).subspan(i * d_, d_)))
+          known[asked[i].first].emplace(asked[i].second, landing_of(i));
+    }
+  }
+
+ private:
+  void clear() {
+    from_.clear(), scores_.clear(), next_.clear(), failed_.clear();
+  }
+
+  void add(std::size_t n, double score) {
+    from_.insert(from_.end(), lines_.states.data() + n * d_, lines_.states.data() + (n + 1) * d_);
+    scores_.push_back(score);
+    scores_.insert(scores_.end(), lines_.others.data() + n * fixed_, lines_.others.data() + (n + 1) * fixed_);
+    next_.resize(from_.size());
+    failed_.push_back(0);
+  }
+
+  void step(std::size_t first, std::size_t last) {
+    const std::size_t some = last - first, s = fixed_ + 1;
+    map_.step(phase_, std::span(from_).subspan(first * d_, some * d_), std::span(scores_).subspan(first * s, some * s),
+              std::span(next_).subspan(first * d_, some * d_), std::span(failed_).subspan(first, some));
+  }
+
+  ScoreCurve::Landing landing_of(std::size_t row) const {
+    ScoreCurve::Landing landing;
+    if (failed_[row])
+      landing.fate = ScoreCurve::Fate::fails;
+    else if (!lattice_.locate((phase_ + 1) % map_.phases, &next_[row * d_], landing.at))
+      landing.fate = ScoreCurve::Fate::leaves;
+    return landing;
+  }
+
+  void answer_what_is_known(ScoreCurve& curve, std::map<double, ScoreCurve::Landing>& known) const {
+    while (!curve.asked().empty()) {
+      std::vector<ScoreCurve::Landing> landings;
+      for (const double score : curve.asked()) {
+        const auto found = known.find(score);
+        if (found == known.end()) return;
+        landings.push_back(found->second);
+      }
+      curve.answer(landings, unit_);
+    }
+  }
+
+  const BatchMap& map_;
+  const NodeLattice& lattice_;
+  int phase_;
+  const ScoreLines& lines_;
+  double unit_;
+  std::size_t d_, fixed_;
+  std::vector<double> from_, scores_, next_;
+  std::vector<std::uint8_t> failed_;
+};
+
+}  // namespace
+
+std::vector<ScoreCurve> follow_curves(const BatchMap& map, const NodeLattice& lattice, int phase,
+                                      const ScoreLines& lines, double spacing, double unit) {
+  std::vector<ScoreCurve> curves;
+  for (const double far : lines.reach) curves.emplace_back(spacing, far);
+  Following following(map, lattice, phase, lines, unit);
+  map.dear ? following.follow_ahead(curves) : following.follow(curves);
+  return curves;
 }
 
 }  // namespace metastable::markov

@@ -34,6 +34,9 @@ class ScoreCurve {
 
   /// Returns the scores to be stepped next, ascending; none when the curve is known.
   const std::vector<double>& asked() const { return asked_; }
+  /// Returns scores that may be asked for after these: at first the middles of all gaps, which are sure to be, and
+  /// later those of gaps that would be halved `halvings` times more.
+  std::vector<double> may_ask(int halvings) const;
   /// Takes the landings of the scores asked for.
   /// @param unit  of the lattice's coordinates, in stationary sds
   void answer(std::span<const Landing> landings, double unit);
@@ -70,7 +73,8 @@ struct ScoreLines {
   std::vector<double> reach;   ///< of the first score
 };
 
-/// Follows the curves along lines of one phase together: the map is asked for many steps at once.
+/// Follows the curves along lines of one phase together: the map is asked for many steps at once, and a dear one for
+/// those that the next rounds may need as well.
 /// @param unit  as ScoreCurve::answer's
 /// @throws as checked_step does
 std::vector<ScoreCurve> follow_curves(const BatchMap& map, const NodeLattice& lattice, int phase,

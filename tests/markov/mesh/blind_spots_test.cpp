@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "markov/mesh/mesh_passage.h"
+#include "markov/mesh/mesh_study.h"
 #include "tests/markov/mesh/maps.h"
 
 namespace metastable::markov {
@@ -55,6 +58,33 @@ TEST(BlindSpots, DoNotTakeOneScoresFailuresForAnothers) {
     const BlindSpots spots = find_blind_spots(map, frames, mesh, mesh_passage(mesh, start).visits, options);
     EXPECT_LT(spots.missed, 0.01) << which;
   }
+}
+
+bool jumps(const BatchMap& map) {
+  const std::vector<double> start{0};
+  const auto frames = noise_frames(map, start);
+  const MeshOptions options{.spacing = 0.4, .score_spacing = 0.8};
+  const Mesh mesh(map, frames, start, options);
+  return failing_jumps(map, frames, mesh, mesh_passage(mesh, start).visits, options);
+}
+
+TEST(FailingJumps, AreThoseOfTheStateBeforeTheStep) {
+  EXPECT_TRUE(jumps(damped_batch([](double before, double, double) { return before > 2.5; })));
+  EXPECT_TRUE(jumps(damped_batch([](double before, double z, double) { return before > 2.5 && z > 0.5; })));
+  EXPECT_FALSE(jumps(damped_batch([](double, double, double after) { return after > 2.5; })));
+  EXPECT_FALSE(jumps(damped_batch([](double, double z, double) { return z > 2.5; })));
+  EXPECT_FALSE(jumps(damped_batch([](double, double, double) { return false; })));
+}
+
+// The reference is elimination on even cells of 0.01 over (-7, 7), of which half the width changes no digit.
+TEST(FailingJumps, DoNotWidenTheInterval) {
+  const BatchMap map = damped_batch([](double before, double, double) { return std::abs(before) > 2.5; });
+  const std::vector<double> start{0};
+  const MeshStudy study = mesh_study(map, start, {.guided_samples = 0, .simulated_steps = 0});
+  EXPECT_GT(study.row_states, 1);
+  EXPECT_LT(study.steps.lower, 39.858);
+  EXPECT_GT(study.steps.upper, 39.858);
+  EXPECT_LT(study.steps.upper, 1.05 * study.steps.lower);
 }
 
 }  // namespace
