@@ -42,8 +42,11 @@ Provenance walker_provenance(const WalkerRequest& request) {
 WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& begin) {
   const WalkerSetting& setting = request.settings.front();
   WalkerAnswer answer{{agreed_walker(setting, request.study, begin("steps"))}, {}};
-  if (request.how_it_fails)
+  if (request.how_it_fails) {
+    const Tell tell = begin("how it fails");
+    tell(0, "");
     answer.moments = analysis::how_it_falls(setting, answer.studies.front(), request.study).moments;
+  }
   return answer;
 }
 

@@ -39,6 +39,7 @@ void Progress::advance(std::size_t units) {
   const std::lock_guard lock(mutex_);
   done_ = std::min(done_ + units, total_);
   const auto now = Clock::now();
+  if (units > 0) moved_ = now;
   if (now - last_draw_ >= std::chrono::milliseconds(100)) draw(now);
 }
 
@@ -56,7 +57,8 @@ void Progress::draw(Clock::time_point now) {
   const double share = static_cast<double>(done_) / static_cast<double>(total_);
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   out_ << wipe_line << fmt::format("{}  {:.0f} % ({} of {})", label_, 100 * share, done_, total_);
-  if (elapsed > 2 && done_ > skipped_)
+  const double still = std::chrono::duration<double>(now - moved_).count();
+  if (elapsed > 2 && done_ > skipped_ && done_ < total_ && still <= std::max(2.0, elapsed / 10))
     out_ << ", about "
          << remaining(elapsed * static_cast<double>(total_ - done_) / static_cast<double>(done_ - skipped_)) << " left";
   out_ << std::flush;

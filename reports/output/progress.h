@@ -13,7 +13,9 @@ namespace metastable::reports {
 bool stderr_is_terminal();
 
 /// Shows "label  37 % (37 of 100), about 12 s left" on one line of a terminal, redrawn at most ten times a second and
-/// wiped at the end. Writes nothing where there is no terminal. advance() may be called from any thread.
+/// wiped at the end. Of the time left it says nothing while the work has stood still for a tenth of the time: what takes
+/// longer than was foreseen takes no one knows how long. Writes nothing where there is no terminal. advance() may be
+/// called from any thread.
 class Progress {
  public:
   /// Writes on standard error. @param total units of work, >= 1
@@ -24,7 +26,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `units` more are done. @throws Interrupted (see interrupt.h)
+  /// `units` more are done; 0 draws the line anew. @throws Interrupted (see interrupt.h)
   void advance(std::size_t units = 1);
   /// `units` were done before this work began: they count as done, but not for how long the rest takes. Draws the line
   /// at once. @throws Interrupted
@@ -43,6 +45,7 @@ class Progress {
   bool visible_;
   Clock::time_point start_ = Clock::now();
   Clock::time_point last_draw_{};
+  Clock::time_point moved_ = start_;
 };
 
 }  // namespace metastable::reports

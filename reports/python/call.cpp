@@ -6,7 +6,8 @@
 namespace metastable::reports::python {
 namespace {
 
-constexpr auto glance = std::chrono::milliseconds(50);  // between two looks at Ctrl-C
+constexpr auto glance = std::chrono::milliseconds(50);      // between two looks at Ctrl-C
+constexpr auto stands_still = std::chrono::milliseconds(500);  // before the same is shown again
 
 }  // namespace
 
@@ -58,8 +59,17 @@ void Call::serve(const Asked* asked) {
       share = share_;
       doing = doing_;
     }
-    if (progress_.is_none() || share == shown_) return;
+    if (progress_.is_none()) return;
+    const auto now = std::chrono::steady_clock::now();
+    if (share == shown_ && doing == shown_doing_) {
+      if (now - shown_at_ < stands_still || !py::hasattr(progress_, "again")) return;
+      shown_at_ = now;
+      progress_.attr("again")();
+      return;
+    }
     shown_ = share;
+    shown_doing_ = doing;
+    shown_at_ = now;
     progress_(share, doing);
   } catch (...) {
     raised_ = std::current_exception();

@@ -4,6 +4,7 @@
 #include <pybind11/pybind11.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -20,7 +21,8 @@ namespace py = pybind11;
 /// thread, one piece at a time.
 class Call {
  public:
-  /// @param progress  None, or called as progress(share of the work done in [0, 1], what is being done)
+  /// @param progress  None, or called as progress(share of the work done in [0, 1], what is being done) when these
+  ///                  change; where it has a method `again`, that is called every now and then while they do not
   explicit Call(py::object progress) : progress_(std::move(progress)) {}
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
@@ -52,7 +54,8 @@ class Call {
   bool ended_ = false;
   std::atomic<bool> stopped_{false};
   double share_ = 0, shown_ = -1;
-  std::string doing_;
+  std::string doing_, shown_doing_;
+  std::chrono::steady_clock::time_point shown_at_{};
   std::exception_ptr raised_;  ///< by Python, in the caller's thread
 };
 

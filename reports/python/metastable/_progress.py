@@ -12,22 +12,36 @@ def _remaining(seconds):
 
 
 class _Shown:
-    """Words that are shown from the first half second on, at most five times a second, and wiped at the end."""
+    """Words that are shown from the first half second on, at most five times a second, and wiped at the end.
+
+    How far a part is is said once its share is above 0, and how long it takes while the share moves: where it has stood
+    still for a tenth of the time, the next stage takes longer than was foreseen, and no one knows how long.
+    """
 
     def __init__(self, label):
-        self._label, self._start, self._last, self._drawn = label, time.monotonic(), 0.0, False
+        self._label, self._began, self._last, self._drawn = label, time.monotonic(), 0.0, False
+        self._part, self._share, self._start, self._moved = "", 0.0, self._began, self._began
 
     def __call__(self, share, doing=""):
         now = time.monotonic()
-        if now - self._start < 0.5 or now - self._last < 0.2:
+        if doing != self._part:
+            self._part, self._start = doing, now if self._part else self._began
+        if share != self._share:
+            self._share, self._moved = share, now
+        if now - self._began < 0.5 or now - self._last < 0.2:
             return
         self._last, self._drawn = now, True
         elapsed = now - self._start
         words = f"{self._label}: {doing}" if doing and doing != self._label else self._label
-        words += f"  {100 * share:.0f} %"
-        if elapsed > 2 and share > 0.01:
+        if share > 0:
+            words += f"  {100 * share:.0f} %"
+        if elapsed > 2 and 0.01 < share < 1 and now - self._moved <= max(2, elapsed / 10):
             words += f", about {_remaining(elapsed * (1 - share) / share)} left"
         self.draw(share, words)
+
+    def again(self):
+        """Shows the same once more: time has passed."""
+        self(self._share, self._part)
 
     def close(self):
         if self._drawn:
