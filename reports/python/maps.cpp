@@ -145,6 +145,7 @@ markov::BatchMap batch_of(const PythonMap& python, Call& call) {
   map.scores = python.scores;
   map.phases = python.phases;
   map.names = python.names;
+  map.dear = true;
   map.step = [&python, &call](int phase, auto states, auto scores, auto next, auto failed) {
     call.ask([&] {
       const std::size_t rows = failed.size();
@@ -168,7 +169,9 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
   const Arguments given(options);
   markov::MeshStudyOptions study = mesh_options_of(given);
   const bool how_it_fails = given.flag("how_it_fails");
-  MapStudy found{python.name, {}};
+  MapStudy found{python.name, python.names, {}};
+  for (int k = static_cast<int>(found.names.size()); k < python.dimension; ++k)
+    found.names.push_back(fmt::format("x{}", k + 1));
   std::optional<analysis::LastMoments> moments;
   Call call(progress);
   const markov::BatchMap map = batch_of(python, call);
@@ -177,6 +180,7 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
     found.passage = markov::mesh_study(map, python.start, study);
     markov::require_agreement(found.passage, python.name);
     if (!how_it_fails) return;
+    call.tell(0, "how it fails");
     std::vector<analysis::NamedNoise> noises;
     for (const std::string& name : python.noise_names) noises.push_back({name});
     moments = analysis::how_it_falls(map, python.start, noises, found.passage, study).moments;

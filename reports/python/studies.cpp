@@ -101,7 +101,10 @@ py::dict compare(const py::list& settings, const py::dict& options, const Comman
     columns.push_back({found.comparison.studies[i], found.thresholds[i]});
     described += request.settings[i].describe() + "\n";
   }
-  std::string html = to_html(ramps_table(columns, {command, described, request.study.seed, version()}));
+  Table table = ramps_table(columns, {command, described, request.study.seed, version()});
+  table.title = "The settings side by side";
+  for (std::size_t i = 0; i < columns.size(); ++i) table.columns[2 + i].name = found.comparison.labels[i];
+  std::string html = to_html(table);
   for (const analysis::Contrast& contrast : found.comparison.contrasts)
     html += "<p>" + escape_html(contrast.sentence) + "</p>";
   if (request.rigid_bodies)

@@ -34,7 +34,7 @@ Cell known(double value) { return std::isnan(value) ? Cell("") : Cell(value); }
 Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance) {
   Table table;
   table.id = "ramps";
-  table.title = "The ramps side by side under each contact law";
+  table.title = columns.size() == 1 ? "How long the wheel rolls" : "The ramps side by side under each contact law";
   table.provenance = provenance;
   table.columns = {{"quantity"}, {"unit"}};
   for (const Studied& one : columns)

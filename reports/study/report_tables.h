@@ -19,7 +19,7 @@ struct Studied {
   analysis::RestThresholds thresholds;
 };
 
-/// Puts all ramps under all laws side by side: quantities down, settings across.
+/// Puts all ramps under all laws side by side: quantities down, settings across. Of one alone the title says so.
 Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance);
 
 /// Returns "the law of rigid bodies (settled)", "the paper's law (published)", ...

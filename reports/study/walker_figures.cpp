@@ -46,10 +46,10 @@ std::string walker_sentence(const StudiedWalker& walker) {
       plain_text(e.value), plain_text(e.lower), plain_text(e.upper));
 }
 
-std::string eigenvalues_text(const dynamics::Gait& gait) {
+std::string eigenvalues_text(const std::vector<std::complex<double>>& eigenvalues) {
   std::string all;
-  for (std::size_t i = 0; i < gait.eigenvalues.size(); ++i) {
-    const auto& value = gait.eigenvalues[i];
+  for (std::size_t i = 0; i < eigenvalues.size(); ++i) {
+    const auto& value = eigenvalues[i];
     if (!all.empty()) all += ", ";
     if (value.imag() == 0) {
       all += fmt::format("{:.4f}", value.real());
@@ -80,7 +80,7 @@ Table walkers_table(const std::vector<StudiedWalker>& columns, const Provenance&
   row("failure rate a step", [](const auto& w) { return estimate_cell(w.study.passage.failure_rate); });
   row("mixing [steps]", [](const auto& w) { return Cell(w.study.passage.mixing_steps); });
   row("gait: half angle [rad]", [](const auto& w) { return Cell(fmt::format("{:.9f}", w.study.gait.state[0])); });
-  row("gait: eigenvalues", [](const auto& w) { return Cell(eigenvalues_text(w.study.gait)); });
+  row("gait: eigenvalues", [](const auto& w) { return Cell(eigenvalues_text(w.study.gait.eigenvalues)); });
   return table;
 }
 

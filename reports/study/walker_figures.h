@@ -1,6 +1,7 @@
 #pragma once
 // Draws what `report --walker` shows, from finished studies.
 
+#include <complex>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,6 @@ Figure walker_survival_figure(const std::vector<StudiedWalker>& walkers, const P
 std::vector<Figure> section_figures(const StudiedWalker& walker, const std::string& id, const Provenance& provenance);
 
 /// Returns "-0.1990 ± 0.5445 i, 0.1314".
-std::string eigenvalues_text(const dynamics::Gait& gait);
+std::string eigenvalues_text(const std::vector<std::complex<double>>& eigenvalues);
 
 }  // namespace metastable::reports

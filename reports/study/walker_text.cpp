@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -22,6 +23,12 @@ using WalkerJson = nlohmann::ordered_json;
 using Lines = std::vector<std::pair<std::string, std::string>>;
 
 Estimate estimate_of(const MeshEstimate& e) { return {e.value, e.lower, e.upper}; }
+
+WalkerJson eigenvalues_json(const std::vector<std::complex<double>>& values) {
+  WalkerJson json = WalkerJson::array();
+  for (const auto& value : values) json.push_back({value.real(), value.imag()});
+  return json;
+}
 
 WalkerJson mesh_estimate_json(const MeshEstimate& e) {
   return {{"value", e.value}, {"interval_95", {e.lower, e.upper}}};
@@ -42,9 +49,13 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
   WalkerJson gaits = WalkerJson::array();
   for (std::size_t g = 1; g < s.gait_share.size(); ++g)
     gaits.push_back({{"state", s.gaits.states[g]}, {"share_of_steps", s.gait_share[g]}});
+  const MeshEstimate regime = markov::steps_from_quasi_stationary(s);
+  WalkerJson steps = mesh_estimate_json(s.steps);
+  steps["from_quasi_stationary"] = regime.value;
+  steps["from_quasi_stationary_interval_95"] = {regime.lower, regime.upper};
   return {{"setting", name},
           {"status", walker_status(s)},
-          {"expected_steps", mesh_estimate_json(s.steps)},
+          {"expected_steps", steps},
           {"failure_rate_per_step", mesh_estimate_json(s.failure_rate)},
           {"survival", survival_json(s)},
           {"mixing_steps", s.mixing_steps},
@@ -65,9 +76,21 @@ WalkerJson mesh_study_json(const std::string& name, const markov::MeshStudy& s) 
 
 WalkerJson walker_study_json(const WalkerSetting& setting, const WalkerStudy& study) {
   WalkerJson json = mesh_study_json(setting.describe(), study.passage);
-  WalkerJson eigenvalues = WalkerJson::array();
-  for (const auto& value : study.gait.eigenvalues) eigenvalues.push_back({value.real(), value.imag()});
-  json["gait"] = {{"names", setting.map().names()}, {"state", study.gait.state}, {"eigenvalues", eigenvalues}};
+  json["gait"] = {{"names", setting.map().names()},
+                  {"state", study.gait.state},
+                  {"eigenvalues", eigenvalues_json(study.gait.eigenvalues)}};
+  return json;
+}
+
+// Tells of the orbit of a map of one's own; where it has several phases, of each.
+WalkerJson orbit_json(const MapStudy& study) {
+  const std::vector<markov::NoiseFrame>& frames = study.passage.orbit.frames;
+  WalkerJson json = {{"names", study.names},
+                     {"state", frames.front().centre},
+                     {"eigenvalues", eigenvalues_json(study.passage.orbit.eigenvalues)}};
+  if (frames.size() == 1) return json;
+  json["state_by_phase"] = WalkerJson::array();
+  for (const markov::NoiseFrame& frame : frames) json["state_by_phase"].push_back(frame.centre);
   return json;
 }
 
@@ -97,6 +120,7 @@ constexpr double negligible_blind = 1e-4;  // of the failures: less is not told
 
 Lines head_lines(const markov::MeshStudy& s) {
   return {{"expected steps before failure", with_interval(s.steps)},
+          {"  from the metastable regime", with_interval(markov::steps_from_quasi_stationary(s))},
           {"  by guided sampling", s.guided ? with_interval(*s.guided) : s.no_guided},
           {"  by direct simulation", s.simulated ? with_interval(*s.simulated) : s.no_simulated},
           {"status", s.guided || s.simulated ? "agreed: the independent ways lie within their joint intervals"
@@ -132,7 +156,7 @@ std::string study_lines(const WalkerSetting& setting, const WalkerStudy& study) 
   const std::vector<std::string> names = setting.map().names();
   for (std::size_t k = 0; k < study.gait.state.size(); ++k)
     lines.emplace_back("gait: " + names[k], fmt::format("{:.9f}", study.gait.state[k]));
-  lines.emplace_back("gait: eigenvalues", eigenvalues_text(study.gait));
+  lines.emplace_back("gait: eigenvalues", eigenvalues_text(study.gait.eigenvalues));
   for (auto& line : mesh_lines(study.passage)) lines.push_back(std::move(line));
   return lines_text(setting.describe(), lines);
 }
@@ -163,7 +187,9 @@ std::string walker_json(const WalkerSetting& setting, const WalkerStudy& study,
 }
 
 std::string map_json(const MapStudy& study, const std::optional<LastMoments>& moments, const Provenance& provenance) {
-  return finished(mesh_study_json(study.name, study.passage), moments, provenance);
+  WalkerJson json = mesh_study_json(study.name, study.passage);
+  json["gait"] = orbit_json(study);
+  return finished(std::move(json), moments, provenance);
 }
 
 std::string walkers_json(const std::vector<WalkerSetting>& settings, const std::vector<WalkerStudy>& studies,
@@ -187,6 +213,13 @@ std::string walker_text(const WalkerSetting& setting, const WalkerStudy& study,
 
 std::string map_text(const MapStudy& study, const std::optional<LastMoments>& moments, std::size_t width) {
   Lines lines = head_lines(study.passage);
+  const markov::NoiseFreeOrbit& orbit = study.passage.orbit;
+  for (std::size_t phase = 0; phase < orbit.frames.size(); ++phase)
+    for (std::size_t k = 0; k < study.names.size(); ++k)
+      lines.emplace_back(fmt::format("gait{}: {}", orbit.frames.size() > 1 ? fmt::format(", phase {}", phase) : "",
+                                     study.names[k]),
+                         fmt::format("{:.9g}", orbit.frames[phase].centre[k]));
+  lines.emplace_back("gait: eigenvalues", eigenvalues_text(orbit.eigenvalues));
   for (auto& line : mesh_lines(study.passage)) lines.push_back(std::move(line));
   return with_moments(lines_text(study.name, lines), moments, width);
 }

@@ -18,16 +18,17 @@ namespace metastable::reports {
 analysis::WalkerStudy agreed_walker(const analysis::WalkerSetting& setting, const markov::MeshStudyOptions& options,
                                     const Tell& tell);
 
-/// Holds a study of a map that has no gait to tell of.
+/// Holds a study of a map of one's own.
 struct MapStudy {
   std::string name;
+  std::vector<std::string> names;  ///< of the numbers of a state
   markov::MeshStudy passage;
 };
 
 /// Writes keys as in the README ("steps --json", with --walker), with a final line end.
 std::string walker_json(const analysis::WalkerSetting& setting, const analysis::WalkerStudy& study,
                         const std::optional<analysis::LastMoments>& moments, const Provenance& provenance);
-/// Does the same without "gait".
+/// Does the same; "gait" is the noise-free orbit, with "state_by_phase" where it has several phases.
 std::string map_json(const MapStudy& study, const std::optional<analysis::LastMoments>& moments,
                      const Provenance& provenance);
 /// Writes "settings" and "contrasts", each with the ratio of its expected steps to those of the first.

@@ -197,13 +197,15 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     simulated_steps  how many steps, about, direct simulation takes beside it, however rare failures are; None: 2
                      million, 0: none, and failures that the meshes step over may go unseen
     guided_samples   of the importance sampling beside it, asked above 100 steps; None: 4000, 0: none. It takes some
-                     hundred calls of a Walker's step for each
+                     hundred rows of a Walker's step for each
     memory_gb        most memory of the meshes; None: 3
 
     Of all:
     how_it_fails     the last steps before failure as well
     seed             the same seed gives the same numbers, on any number of threads (0: all cores)
-    progress         None: shown on a terminal and in a notebook; True, False, or a function of the share done (0 to 1)
+    progress         None: shown on a terminal and in a notebook; True, False, or a function of the share of the time
+                     that has passed (0 to 1), 0 until it is known how long the rest takes; each part, as the steps and
+                     then how it fails, begins at 0
     """
     options = dict(method=method, cells=cells, samples=samples, tolerance=tolerance, sequence=sequence, draws=draws,
                    tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
@@ -372,10 +374,6 @@ def solve(setting, parameter, *, steps=None, survive=None, reach=None, start=Non
                                           command, tell))
 
 
-class _Collisions(Columns):
-    _drawn = "collision", "omega_minus_rad_s"
-
-
 class Experiment:
     """Trials of one wheel: measured (read_experiment), simulated (simulate), or from arrays (experiment).
 
@@ -404,7 +402,9 @@ class Experiment:
     def collisions(self):
         """A row a collision: condition, trial, collision, leg (-1: not known), time_s, position_m, omega_minus_rad_s,
         omega_plus_rad_s (NaN: not known)."""
-        return _Collisions(self._held.collisions(), "collisions")
+        columns = Columns(self._held.collisions(), "collisions")
+        columns._drawn = "collision", "omega_minus_rad_s"
+        return columns
 
     @property
     def trials(self):
@@ -608,10 +608,14 @@ def walker(step, dimension, noise, *, start, names=(), noise_names=(), phases=1,
                  after one event (a touchdown, a period), `noise` an (n, noise) array of independent standard normal
                  numbers, `next` the (n, dimension) states just after the next event, `failed` n booleans. It must be a
                  function of its arguments alone; states that make no sense have failed. With phases > 1 it is called
-                 as step(state, noise, phase). It runs in the thread that called, one call at a time.
+                 as step(state, noise, phase). It runs in the thread that called, one call at a time, on as many
+                 rows as there are at once, some of which may turn out not to be needed.
     dimension    numbers of a state, 1 to 4
     noise        numbers of noise a step, 1 or more
-    start        a state from which the noise-free map settles into its orbit
+    start        the state that walks begin from, at phase 0: expected steps are counted from it. Without noise the map
+                 has to settle from it into an orbit, the gait, which meshes are centred on and the answer tells
+                 (`gait`); expected steps from the metastable regime, `expected_steps.from_quasi_stationary`, do not
+                 hang on it
     names        of the numbers of a state, with units; noise_names likewise
     phases       events after which the map repeats itself
 

@@ -142,10 +142,15 @@ class Solution(Result):
     provenance: Provenance
 
 
+class WalkerSteps(MeshEstimate):
+    from_quasi_stationary: float
+    from_quasi_stationary_interval_95: Interval
+
+
 class WalkerStudy(Result):
     setting: str
     status: str
-    expected_steps: MeshEstimate
+    expected_steps: WalkerSteps
     failure_rate_per_step: MeshEstimate
     survival: Floats
     mixing_steps: float

@@ -40,7 +40,7 @@ def flat(values, prefix=""):
         pair = isinstance(value, (tuple, list)) and len(value) == 2 and all(isinstance(v, numbers.Real) for v in value)
         if hasattr(value, "keys") and hasattr(value, "__getitem__"):
             row.update(flat(value, name + "."))
-        elif pair and key.startswith(("interval", "middle", "band")) or pair and "_interval_" in key:
+        elif pair and any(word in name for word in ("interval_", "middle_", "band_")):
             row.update(zip(interval_names(name), value))
         else:
             row[name] = value
