@@ -184,6 +184,32 @@ class Waiting(unittest.TestCase):
             self.assertTrue(written[-1] == "" if written else words.endswith("\r\033[K"))
 
 
+    def test_the_time_left_is_told_only_while_the_share_moves(self):
+        from metastable import _progress
+
+        class Words(_progress._Shown):
+            def draw(self, share, words):
+                self.shown = words
+
+        now = [0.0]
+        with unittest.mock.patch("time.monotonic", lambda: now[0]):
+            words = Words("study")
+            for at, share, doing, shown in (
+                    (30, 0, "steps", "study: steps"),  # nothing is known yet
+                    (40, 0.4, "steps", "study: steps  40 %, about 60 s left"),
+                    (43, 0.4, "steps", "study: steps  40 %, about 64 s left"),
+                    (60, 0.4, "steps", "study: steps  40 %"),  # it stands still
+                    (70, 0.35, "steps", "study: steps  35 %, about 2 min left"),  # more has turned up
+                    (100, 0, "how it fails", "study: how it fails"),  # another part, with a time of its own
+                    (110, 0.5, "how it fails", "study: how it fails  50 %, about 10 s left")):
+                now[0] = at
+                words(share, doing)
+                self.assertEqual(words.shown, shown)
+            now[0] = 130
+            words.again()
+            self.assertEqual(words.shown, "study: how it fails  50 %")
+
+
 class Experiments(unittest.TestCase):
     def test_simulated_read_and_from_arrays_are_one(self):
         setting = metastable.Setting(slope_deg=9.59, restitution=(0.54, 0.045), friction=(0.352, 0.043))
@@ -202,6 +228,21 @@ class Experiments(unittest.TestCase):
         self.assertFalse(columns.omega_minus_rad_s.flags.owndata)
         self.assertEqual(read.to_dict()["collisions"], columns.to_dict())
         self.assertEqual(read._repr_html_().count("<tr>"), 21)  # a head and the trials
+
+    def test_ids_of_conditions_may_be_numbers(self):
+        settings = {1: metastable.Setting(), 2: metastable.Setting(slope_deg=9.59)}
+        speeds = dict(trial=[1, 1, 2, 2], collision=[1, 2, 1, 2], omega_minus_rad_s=[5.0, 5.1, 5.2, 5.3])
+        for ids, conditions in ((settings, [1, 1, 2, 2]), (settings, np.array([1, 1, 2, 2])),
+                                ({np.int64(1): settings[1], 2.0: settings[2]}, np.array([1.0, 1, 2, 2])),
+                                ({"1": settings[1], 2: settings[2]}, ["1", "1", "2", "2"])):
+            read = metastable.experiment(ids, {**speeds, "condition": conditions},
+                                         dict(trial=[1, 2], condition=conditions[1:3], outcome=["rest", "rest"]))
+            self.assertEqual(read.conditions, ("1", "2"))
+            self.assertEqual(read.collisions.condition.tolist(), [0, 0, 1, 1])
+        with self.assertRaisesRegex(metastable.InputError, "1"):
+            metastable.experiment({1: settings[1], "1": settings[2]}, {**speeds, "condition": [1, 1, 1, 1]})
+        with self.assertRaisesRegex(TypeError, "settings: ids of conditions are texts or numbers, not tuple"):
+            metastable.experiment({(1, 2): settings[1]}, speeds)
 
     def test_defects_have_their_places(self):
         wrong = dict(trial=[1, 1, 1], collision=[1, 2, 4], omega_minus_rad_s=[5.0, -1, 5])

@@ -122,6 +122,79 @@ class Steps(unittest.TestCase):
         self.assertEqual(study.no_direct_simulation, "not asked for")
         self.assertIn("not asked for", str(study))
 
+    def test_answers_tell_the_orbit_its_eigenvalues_and_the_regime(self):
+        def spiral(state, noise):  # about (2, 1) at phase 0, eigenvalues 0.6 e^(+-i pi / 3) a step
+            turn = 0.6 * np.array([[0.5, -np.sqrt(0.75)], [np.sqrt(0.75), 0.5]])
+            following = (state - [2, 1]) @ turn.T + [2, 1] + noise
+            return following, following[:, 0] > 4.5
+
+        study = metastable.walker(spiral, 2, 2, start=[2, 1], names=["x", "y"]).study(spacing=1, simulated_steps=0)
+        self.assertEqual(study.gait.names, ("x", "y"))
+        np.testing.assert_allclose(study.gait.state, [2, 1], atol=1e-9)
+        values = [complex(*value) for value in study.gait.eigenvalues]
+        np.testing.assert_allclose(values, 0.6 * np.exp([1j * np.pi / 3, -1j * np.pi / 3]), atol=1e-7)
+        regime = study.expected_steps
+        self.assertAlmostEqual(regime.from_quasi_stationary * study.failure_rate_per_step.value, 1, 12)
+        low, high = regime.from_quasi_stationary_interval_95
+        self.assertLess(low, regime.from_quasi_stationary)
+        self.assertLess(regime.from_quasi_stationary, high)
+        for words in ("from the metastable regime", "gait: x", "gait: eigenvalues", "0.3000 ± 0.5196 i"):
+            self.assertIn(words, str(study))
+
+        def alternate(state, noise, phase):
+            following = (0.3 if phase else 0.9) * state + 1 + noise
+            return following, following[:, 0] > 6
+
+        study = metastable.walker(alternate, 1, 1, start=[0], phases=2).study(spacing=0.4, simulated_steps=0)
+        first = 1.3 / 0.73
+        np.testing.assert_allclose([s[0] for s in study.gait.state_by_phase], [first, 0.9 * first + 1], atol=1e-9)
+        self.assertAlmostEqual(study.gait.eigenvalues[0][0], 0.27, 7)
+
+    def test_are_asked_for_in_few_calls_of_many_rows(self):
+        # In calls of a thousand rows at least, but for stragglers and searches whose next row hangs on the last one.
+        def calls(threads, **options):
+            rows = []
+
+            def step(state, noise):
+                rows.append(len(state))
+                following = state / 2 + noise
+                return following, following[:, 0] > 3
+
+            study = line(step).study(threads=threads, progress=False, **options)
+            return rows, study.to_dict()
+
+        options = dict(simulated_steps=0, how_it_fails=True)
+        (one, told), (two, again) = calls(1, **options), calls(2, **options)
+        self.assertEqual(one, two)  # call by call: a step's last bits may hang on how many rows it gets
+        self.assertEqual(told, again)
+        self.assertGreater(sum(one) / len(one), 1000)
+        self.assertGreater(sum(n for n in one if n >= 1000) / sum(one), 0.9)
+        simulated, _ = calls(2, simulated_steps=400000, guided_samples=0)
+        self.assertLess(len(simulated), len(one) + 4000)
+
+    def test_that_fail_by_the_state_before_them_are_resolved(self):
+        # Against elimination on fine cells: x' = x / 2 + z, and the step from x > 2.5 fails.
+        h, half = 0.01, 6.0
+        x = np.arange(-half + h / 2, half, h)
+        rows = np.exp(-0.5 * (x[None, :] - x[:, None] / 2) ** 2)
+        rows /= rows.sum(axis=1, keepdims=True)
+        for fails, of_new in ((x > 2.5, False), (np.abs(x) > 2.2, False), (x > 2.5, True)):
+            kept = rows * (~fails)[None, :] if of_new else rows * (~fails)[:, None]
+            expected = np.linalg.solve(np.eye(len(x)) - kept, np.ones(len(x)))
+            start = np.interp(0.0, x, expected)
+            two_sided = fails[0]
+
+            def step(state, noise):
+                following = state / 2 + noise
+                told = following if of_new else state
+                return following, np.abs(told[:, 0]) > 2.2 if two_sided else told[:, 0] > 2.5
+
+            study = line(step).study(simulated_steps=0, guided_samples=0)
+            low, high = study.expected_steps.interval_95
+            with self.subTest(of_new=of_new, two_sided=two_sided):
+                self.assertLess(high / low, 1.1)
+                self.assertLess(abs(np.log(study.expected_steps.value / start)), 1.7 * np.log(high / low) / 2 + 0.005)
+
     @staticmethod
     def interrupting(state, noise):
         raise KeyboardInterrupt
