@@ -77,7 +77,7 @@ void write_diagnosis(const analysis::Diagnosis& d, const std::string& title, con
       "which", "Which effect, and how much of the gap it closes",
       "How probable each cause is, given these data, and what is left of the gap on trials that the fit did not "
       "see, under each model: the line is the floor, what remains where the model is right.",
-      std::move(answer), {},
+      std::move(answer), {at_work_table(d)},
       {{"All causes and their parameters",
         {"The 95 % set is what these data leave open."},
         {},
