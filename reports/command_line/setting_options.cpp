@@ -79,6 +79,7 @@ void check_slope(const char* option, const analysis::Setting& setting) {
 constexpr dynamics::Range between_zero_and_one{.low = 0, .high = 1, .low_open = true, .high_open = true};
 constexpr dynamics::Range shares{.low = 0, .high = 1};
 constexpr dynamics::Range correlations{.low = -1, .high = 1, .low_open = true, .high_open = true};
+constexpr dynamics::Range not_negative{.low = 0};
 constexpr dynamics::Range tails{.low = 1e-300, .high = 1e-3};
 
 // Checks what can be checked before any work: ranges live with the quantities they belong to.
@@ -368,15 +369,16 @@ analysis::StudyOptions study_options(const Options& options) {
 
 void add_standard_errors(Options& options) {
   options.group("Standard errors of what was measured");
-  options.add("slope-se", "DEG", "",
-              "Standard error of each slope, 0 or more: an interval from it is given apart; likewise below");
-  options.add("restitution-se", "MEAN,SD", "", "Of the mean of eta, and of its sd");
-  options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd");
-  options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]");
-  options.add("inertia-se", "KGM2", "", "Of the inertia about the stance foot [kg m^2]");
-  options.add("radius-of-gyration-se", "M", "", "Of the radius of gyration [m] (coulomb, plastic, settled)");
-  options.add("ramp-stiffness-se", "N/M", "", "Of the ramp's stiffness [N/m] (published)");
-  options.add("contact-mass-se", "KG", "", "Of the contact mass [kg] (published)");
+  options.add("slope-se", "DEG", "", "Standard error of each slope: an interval from it is given apart; likewise below",
+              not_negative);
+  options.add("restitution-se", "MEAN,SD", "", "Of the mean of eta, and of its sd", not_negative);
+  options.add("friction-se", "MEAN,SD", "", "Of the mean of mu, and of its sd", not_negative);
+  options.add("legs-se", "M", "", "Of the leg length, common to all legs [m]", not_negative);
+  options.add("inertia-se", "KGM2", "", "Of the inertia about the stance foot [kg m^2]", not_negative);
+  options.add("radius-of-gyration-se", "M", "", "Of the radius of gyration [m] (coulomb, plastic, settled)",
+              not_negative);
+  options.add("ramp-stiffness-se", "N/M", "", "Of the ramp's stiffness [N/m] (published)", not_negative);
+  options.add("contact-mass-se", "KG", "", "Of the contact mass [kg] (published)", not_negative);
 }
 
 std::vector<analysis::StandardError> standard_errors(const Options& options, const analysis::Setting& setting) {

@@ -108,6 +108,8 @@ TEST_F(Refusals, OfNumbersTellTheRangeWhereverTheyStand) {
        path("t.toml") + ":1: --samples: 'many' is not a whole number in 16..16777216"},
       {{"steps", "--contact-list", pairs}, pairs + ":3: column friction: 30 is outside [0, 10]"},
       {{"steps", "--contact-list", words}, words + ":2: column restitution: 'high' is not a number"},
+      {{"steps", "--slope-se", "-1"}, "--slope-se: -1 is outside [0, inf)"},
+      {{"steps", "--friction-se", "-0.1,0"}, "--friction-se: mean -0.1 is outside [0, inf)"},
       {{"steps", "--slope", "inf"}, "--slope: 'inf' is not a finite number"},
   });
 }
