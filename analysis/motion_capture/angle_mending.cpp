@@ -25,6 +25,9 @@ constexpr std::size_t most_in_row = 3;  // frames lost, repeated or stray one af
 // motion by 1.5 rad/s of 5, which moves the frame beside it by less.
 constexpr double stray_noise = 10, stray_share = 0.3;
 constexpr double moving_noise = 6;  // sds of the noise that a wheel turns in a frame, or repeats tell nothing
+// A step in which frames are missing exceeds those around it by this share of one, and by eight of its own sds: a share
+// of 1e-15 of the steps does so by chance.
+constexpr double lost_share = 0.15, lost_noise = 8 * std::numbers::sqrt2;
 
 struct Unmended : std::invalid_argument {
   using std::invalid_argument::invalid_argument;
@@ -245,16 +248,39 @@ class Mending {
     }
   }
 
+  // Returns the usual step before (or behind) the step between frames i - 1 and i, of up to four [rad].
+  std::optional<double> step_on_side(std::size_t i, bool before) const {
+    constexpr std::size_t most = 4, least = 2;
+    std::vector<double> steps;
+    for (std::size_t k = 1; k <= most; ++k) {
+      if (before && i > k) steps.push_back(angle_[i - k] - angle_[i - k - 1]);
+      if (!before && i + k < angle_.size()) steps.push_back(angle_[i + k] - angle_[i + k - 1]);
+    }
+    if (steps.size() < least) return std::nullopt;
+    return median(steps);
+  }
+
+  // Returns how many frames are missing between i - 1 and i. A step in which none is missing lies between those of both
+  // sides, for a wheel speeds up or slows down from one to the other; beside a collision the nearest says it best.
+  std::size_t missing_before(std::size_t i) const {
+    const std::optional<double> before = step_on_side(i, true), behind = step_on_side(i, false);
+    if (!before || !behind || std::min(*before, *behind) <= 0) return 0;
+    const double step = angle_[i] - angle_[i - 1], last = angle_[i - 1] - angle_[i - 2],
+                 next = angle_[i + 1] - angle_[i];
+    const auto [low, high] = std::minmax(*before, *behind);
+    const double largest = std::max({high, last, next});
+    if (step - largest < std::max(lost_share * largest, lost_noise * noise_)) return 0;
+    const double frames = std::max(2.0, std::round(2 * step / (low + high)));
+    if (frames - 1 > most_in_row || step < (frames - 0.3) * low || step > (frames + 0.3) * high) return 0;
+    // A frame that is itself off would look like it, but comes back.
+    if (std::abs(next / *behind - 1) > 0.5 || std::abs(last / *before - 1) > 0.5) return 0;
+    return static_cast<std::size_t>(frames) - 1;
+  }
+
   void lost_frames() {
     for (std::size_t i = 1; i < angle_.size(); ++i) {
-      const std::optional<double> step = usual_step(i, i);
-      if (!step || std::abs(*step) < moving_noise * noise_) continue;
-      const double frames = (angle_[i] - angle_[i - 1]) / *step;
-      const auto lost = static_cast<std::size_t>(std::max(0.0, std::round(frames) - 1));
-      if (lost < 1 || lost > most_in_row || std::abs(frames - std::round(frames)) > 0.3) continue;
-      // A frame that is itself off would look like it, but comes back.
-      if (i + 1 < angle_.size() && std::abs((angle_[i + 1] - angle_[i]) / *step - 1) > 0.5) continue;
-      if (i > 1 && std::abs((angle_[i - 1] - angle_[i - 2]) / *step - 1) > 0.5) continue;
+      const std::size_t lost = missing_before(i);
+      if (lost == 0) continue;
       if (mended_.lost == 0) mended_.first_lost = time_[i];
       mended_.lost += lost;
       const double frame = frame_of(time_);

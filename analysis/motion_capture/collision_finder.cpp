@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <span>
 #include <stdexcept>
 
@@ -33,8 +34,10 @@ constexpr double near_raster = 0.01, noise_off_raster = 2.5;
 constexpr double known_angle_sd = 0.003;  // of a raster that many fits have made [rad]
 constexpr double flight_span = 0.04;      // behind a collision in which a foot flies [s]
 constexpr std::size_t most_tries = 12;    // of where it began to stand
-constexpr double noise_error = 1.7;       // ratio by which the noise's square is known
-constexpr double noise_level = 0.99;      // share of fits to noise alone that pass for it
+constexpr double stray_by = 5;            // sds of the noise by which a frame is off that a fit may leave out
+constexpr std::size_t fewest_less_one = 8, most_left_out = 6;  // frames of such a fit, and how many of them are tried
+constexpr double noise_error = 1.7;                            // ratio by which the noise's square is known
+constexpr double noise_level = 0.99;                           // share of fits to noise alone that pass for it
 
 struct Peak {
   std::size_t at = 0;      // sample of the largest speed
@@ -92,32 +95,27 @@ class Search {
       return noise_ * rate * std::sqrt(squares);
     };
     // Noise makes peaks of its own: the window grows until they stay below the rise that is asked for.
+    noisy_ = noise_rise * speed_noise() > options.rise;
     while (options.window == 0 && noise_rise * speed_noise() > options.rise &&
            slope.window() + 2 <= widest_share * slowest_step * rate)
       slope = SavitzkyGolay(slope.window() + 2, 3, 1);
     half_window_ = static_cast<std::size_t>(slope.window() / 2);
-    rise_ = std::max(options.rise, noise_rise * speed_noise());
+    rate_ = rate, rise_ = std::max(options.rise, noise_rise * speed_noise());
     angle_ = SavitzkyGolay(slope.window(), 3, 0).apply(even_.angle_rad, 1 / rate);
     speed_ = slope.apply(even_.angle_rad, 1 / rate);
   }
 
   FoundTrial run() {
     std::vector<Peak> all = peaks(speed_, rise_);
-    FoundTrial found;
-    if (all.empty()) {
-      found.stopped = fmt::format("no peak rises {:.3g} rad/s above both sides", rise_);
-      return found;
-    }
+    if (all.empty()) return none(fmt::format("no peak rises {:.3g} rad/s above both sides", rise_));
     for (Peak& peak : all) {
       peak.fall = peak.at;
       for (std::size_t i = peak.at; i < peak.trough; ++i)
         if (speed_[i] - speed_[i + 1] > speed_[peak.fall] - speed_[peak.fall + 1]) peak.fall = i;
     }
     std::erase_if(all, [this](const Peak& peak) { return !slows(peak.fall); });
-    if (all.empty()) {
-      found.stopped = "the wheel slows down at none of its peaks";
-      return found;
-    }
+    if (all.empty()) return none("the wheel slows down at none of its peaks");
+    FoundTrial found;
     std::vector<std::size_t> chosen = on_raster(all);
     for (std::size_t dropped = 1; dropped > 0;) {
       found.collisions.clear();
@@ -127,12 +125,21 @@ class Search {
       chosen.erase(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(dropped));  // legs count from the first
     }
     check_steps(found.collisions);
+    check_end(found.collisions);
     if (found.collisions.size() < static_cast<std::size_t>(options_.collisions))
       found.stopped = fmt::format("no peak near the leg angle behind collision {}", found.collisions.size());
     return found;
   }
 
  private:
+  // Returns a trial without a collision, or refuses one that turns where noise may hide some.
+  FoundTrial none(const std::string& why) const {
+    const auto [least, most] = std::ranges::minmax(angle_);
+    if (noisy_ && most - least > map_.wheel().leg_angle() / 2)
+      throw std::invalid_argument(fmt::format("the wheel turns by {:.3g} rad; {}", most - least, hidden()));
+    return {{}, why};
+  }
+
   double turned(const Peak& peak) const { return angle_[peak.fall] / map_.wheel().leg_angle(); }  // [leg angles]
 
   // Says whether the wheel is slower behind a fall than before it: smoothing also rings where a wheel is let go at
@@ -201,6 +208,17 @@ class Search {
     }
   }
 
+  // Sorts peaks and ends each before the next begins: what the speed does not show may reach over its neighbours.
+  static void put_in_order(std::vector<Peak>& all) {
+    std::ranges::sort(all, {}, [](const Peak& peak) { return std::pair(peak.fall, peak.shown); });
+    const auto same = std::ranges::unique(all, {}, &Peak::fall);
+    all.erase(same.begin(), same.end());
+    for (std::size_t k = 1; k < all.size(); ++k) {
+      all[k].at = std::max(all[k].at, all[k - 1].fall + 1);
+      all[k - 1].trough = std::min(all[k - 1].trough, all[k].at);
+    }
+  }
+
   // Chooses the collisions, as indices of `all`, which gets those that the speed does not show: a wheel collides once a
   // leg angle, always at the same angle of its legs. Of several peaks at one of these angles the fastest is the
   // collision, for what follows it (bounces, rocking) is slower.
@@ -222,7 +240,7 @@ class Search {
       if (!peak.shown) all.push_back(peak);
       falls.push_back(peak.fall);
     }
-    std::ranges::sort(all, {}, &Peak::fall);
+    put_in_order(all);
     for (const std::size_t fall : falls)
       chosen.push_back(static_cast<std::size_t>(std::ranges::lower_bound(all, fall, {}, &Peak::fall) - all.begin()));
     return chosen;
@@ -249,7 +267,7 @@ class Search {
     if (origins.size() < 3) return;
     const double origin = median(origins);
     for (std::size_t n = 0; n < collisions.size(); ++n) {
-      std::optional<StanceFit>& fit_now = collisions[n].fit;
+      const std::optional<StanceFit>& fit_now = collisions[n].fit;
       const double angle = origin + due(n);
       if (fit_now && near(*fit_now, angle)) continue;
       Peak peak = all[chosen[n]];
@@ -259,14 +277,21 @@ class Search {
       if (peak.fall + 1 >= end) continue;
       const double from = begin > 0 ? even_.time[(begin + peak.fall) / 2] : even_.time.front(),
                    to = even_.time[end - 1];
-      const std::optional<StanceFit> again =
-          fit(peak, from, to, n, KnownAngle{angle, std::min(1.0, noise_ / known_angle_sd)});
-      if (again && near(*again, angle)) fit_now = again;
+      const Fitted again = fit(peak, from, to, n, KnownAngle{angle, std::min(1.0, noise_ / known_angle_sd)});
+      if (again.fit && near(*again.fit, angle)) take(collisions[n], again);
     }
   }
 
-  // Drops at both ends what only the angle says and no fall of the speed bears out; in between that is refused. Returns
-  // how many are dropped before the first.
+  // Says what the noise of the angle hides, where it is so large that the smoothing or the rise had to give way to it.
+  std::string hidden() const {
+    return fmt::format(
+        "the noise of the angle is about {:.2g} rad: at {:.4g} Hz, smoothed over {:.2g} s, it hides collisions whose "
+        "speed falls by less than {:.2g} rad/s",
+        noise_, rate_, static_cast<double>(2 * half_window_ + 1) / rate_, rise_);
+  }
+
+  // Drops at both ends what only the angle says and no fall of the speed bears out; in between that is refused, and at
+  // the ends where noise may hide the fall. Returns how many are dropped before the first.
   std::size_t keep_shown(const std::vector<Peak>& all, const std::vector<std::size_t>& chosen,
                          std::vector<FoundCollision>& collisions) const {
     std::vector<double> residuals;
@@ -278,6 +303,11 @@ class Search {
              (c.fit && c.fit->omega_minus - c.fit->omega_plus >= options_.rise &&
               c.fit->residual_sd_rad <= 2 * std::max(usual, noise_));
     };
+    if (noisy_)
+      for (const FoundCollision* c : {&collisions.front(), &collisions.back()})
+        if (!borne_out(*c))
+          throw std::invalid_argument(fmt::format("at {:.6g} s the wheel turns on past the angle of a collision; {}",
+                                                  reported_time(*c), hidden()));
     while (!collisions.empty() && !borne_out(collisions.back())) collisions.pop_back();
     const auto dropped = std::ranges::find_if(collisions, borne_out) - collisions.begin();
     if (dropped > 0) return static_cast<std::size_t>(dropped);
@@ -290,6 +320,16 @@ class Search {
     if (const auto most = static_cast<std::size_t>(options_.collisions); collisions.size() > most)
       collisions.resize(most);
     return 0;
+  }
+
+  // Refuses a wheel that turns on past further landings which noise hides.
+  void check_end(const std::vector<FoundCollision>& collisions) const {
+    if (!noisy_ || collisions.empty() || collisions.size() >= static_cast<std::size_t>(options_.collisions)) return;
+    const FoundCollision& last = collisions.back();
+    const double beyond = std::ranges::max(angle_) - (last.fit ? last.fit->angle_rad : last.peak_angle_rad);
+    if (beyond > (1 + 1.0 / 3) * map_.wheel().leg_angle())
+      throw std::invalid_argument(fmt::format("behind the collision at {:.6g} s the wheel turns on by {:.3g} rad; {}",
+                                              reported_time(last), beyond, hidden()));
   }
 
   // Holds what was found against what a wheel can do: from landing to landing it turns by the angle between its legs.
@@ -337,11 +377,24 @@ class Search {
                       speed_.begin();
     c.apex_time = even_.time[static_cast<std::size_t>(apex)];
     c.apex = speed_[static_cast<std::size_t>(apex)];
-    c.fit = fit(all, chosen[n], n);
+    take(c, fit(all, chosen[n], n));
     return c;
   }
 
-  std::optional<StanceFit> fit(const std::vector<Peak>& all, std::size_t k, std::size_t n) const {
+  // A fit, whether it leaves no more than noise, and how far the frame that it leaves out is off.
+  struct Fitted {
+    std::optional<StanceFit> fit;
+    bool noise_alone = false;
+    double stray = 0;
+  };
+
+  static void take(FoundCollision& collision, const Fitted& fitted) {
+    collision.fit = fitted.fit;
+    collision.stray_rad = fitted.stray;
+    collision.rough_rad = fitted.fit && !fitted.noise_alone ? fitted.fit->residual_sd_rad : 0;
+  }
+
+  Fitted fit(const std::vector<Peak>& all, std::size_t k, std::size_t n) const {
     // It keeps away from the neighbouring peaks: half way to the fall behind the last one, and up to the next one.
     const std::vector<double>& time = even_.time;
     return fit(all[k], k > 0 ? (time[all[k - 1].trough] + time[all[k - 1].at]) / 2 : time.front(),
@@ -349,8 +402,7 @@ class Search {
   }
 
   // Fits the collision at a fall to the frames at times [from, to] at most.
-  std::optional<StanceFit> fit(const Peak& peak, double from, double to, std::size_t n,
-                               std::optional<KnownAngle> known) const {
+  Fitted fit(const Peak& peak, double from, double to, std::size_t n, std::optional<KnownAngle> known) const {
     const std::vector<double>& time = recording_.time;
     const std::size_t fall = peak.fall;
     const double at = (even_.time[fall] + even_.time[fall + 1]) / 2;
@@ -359,7 +411,8 @@ class Search {
                           .angle_rad = (even_.angle_rad[fall] + even_.angle_rad[fall + 1]) / 2,
                           .omega_minus = speed_[peak.at],
                           .omega_plus = speed_[std::min(peak.trough, fall + (fall - std::min(fall, peak.at)) + 1)],
-                          .residual_sd_rad = 0};
+                          .residual_sd_rad = 0,
+                          .omega_minus_se = 0};
     const auto first = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), from) - time.begin());
     const auto end_at = [&](double last) {
       return static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), last) - time.begin());
@@ -369,16 +422,46 @@ class Search {
                            std::span(recording_.angle_rad).subspan(begin, end - begin), stance(n), stance(n + 1), guess,
                            then, known);
     };
-    const std::optional<StanceFit> whole = fitted(first, end_at(to), AfterCollision::stands);
-    if (whole && noise_alone(*whole, end_at(to) - first)) return whole;
+    const std::size_t last = end_at(to);
+    const std::optional<StanceFit> whole = fitted(first, last, AfterCollision::stands);
+    if (whole && noise_alone(*whole, last - first)) return {whole, true};
+    if (const Fitted less = whole ? without_one(*whole, first, last, n, known) : Fitted{}; less.fit) return less;
     // Feet hop: the wheel stands for the last part of a step only, and flies at first.
-    const std::size_t end = end_at(std::min(to, at + flight_span)), before = end_at(even_.time[fall]),
-                      stride = std::max<std::size_t>(1, (before - first) / most_tries);
+    const std::size_t end = end_at(std::min(to, at + flight_span)), before = end_at(even_.time[fall]);
+    if (before < first + 3) return {whole};
+    const std::size_t stride = std::max<std::size_t>(1, (before - first) / most_tries);
     for (std::size_t begin = first; begin + 3 <= before; begin += stride)
       if (const std::optional<StanceFit> fit = fitted(begin, end, AfterCollision::flies);
           fit && noise_alone(*fit, end - begin))
-        return fit;
-    return whole;
+        return {fit, true};
+    return {whole};
+  }
+
+  // Fits the frames [first, end) less one of them, if that leaves no more than noise: a tracker loses a marker for a
+  // frame by less than what shows beside the steps between frames.
+  Fitted without_one(const StanceFit& whole, std::size_t first, std::size_t end, std::size_t n,
+                     std::optional<KnownAngle> known) const {
+    const std::span<const double> all_times = std::span(recording_.time).subspan(first, end - first),
+                                  all_angles = std::span(recording_.angle_rad).subspan(first, end - first);
+    if (all_times.size() < fewest_less_one) return {};
+    const std::vector<double> off = fit_residuals(all_times, all_angles, stance(n), stance(n + 1), whole);
+    std::vector<std::size_t> order(off.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::sort(order, [&](std::size_t i, std::size_t k) { return std::abs(off[i]) > std::abs(off[k]); });
+    order.resize(std::min(order.size(), most_left_out));
+    Fitted best;
+    for (const std::size_t left_out : order) {
+      std::vector<double> time(all_times.begin(), all_times.end()), angle(all_angles.begin(), all_angles.end());
+      time.erase(time.begin() + static_cast<std::ptrdiff_t>(left_out));
+      angle.erase(angle.begin() + static_cast<std::ptrdiff_t>(left_out));
+      const std::optional<StanceFit> less =
+          fit_collision(time, angle, stance(n), stance(n + 1), whole, AfterCollision::stands, known);
+      if (!less || !noise_alone(*less, time.size()) || (best.fit && best.fit->residual_sd_rad <= less->residual_sd_rad))
+        continue;
+      const double stray = fit_residuals(all_times, all_angles, stance(n), stance(n + 1), *less)[left_out];
+      if (std::abs(stray) >= stray_by * noise_) best = {less, true, std::abs(stray)};
+    }
+    return best;
   }
 
   // Says whether what a fit leaves is no more than the samples' noise.
@@ -395,6 +478,8 @@ class Search {
   int first_leg_;
   const FinderOptions& options_;
   std::vector<double> angle_, speed_;  // smoothed
+  double rate_ = 0;                    // of the frames [Hz]
+  bool noisy_ = false;                 // more than the filter alone leaves room for
   double noise_ = 0;                   // of the samples, about [rad]
   double rise_ = 0;                    // of a peak [rad/s]
   std::size_t half_window_ = 0;        // of the smoothing [samples]

@@ -33,6 +33,10 @@ struct FoundCollision {
   double apex_time = 0;  ///< of the smallest smoothed speed before the next collision, mid-stance [s]
   double apex = 0;       ///< that speed [rad/s]
   int bounces = 0;       ///< peaks between this collision and the next (or the end)
+  /// How far the one frame that the fit leaves out lies off the motion of the others [rad]; 0 where it takes all.
+  double stray_rad = 0;
+  /// The fit's residual sd where it is more than the noise of the angle [rad]: the speeds are less exact; 0 elsewhere.
+  double rough_rad = 0;
 };
 
 /// Returns what a collisions.csv says of it: the fit, or the peak where there is no fit or `peak` is wanted.

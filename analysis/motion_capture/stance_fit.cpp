@@ -88,13 +88,25 @@ std::optional<std::pair<StanceFit, double>> descend(const Residuals& residuals, 
     if (better && !settled) continue;
     if (!better && !(gradient.norm() <= 1e-6 * (1 + normal.diagonal().norm()))) return std::nullopt;
     const double freedom = std::max<double>(1, static_cast<double>(r.size()) - 4);
-    return std::pair(StanceFit{p(0), p(1), p(2), std::max(0.0, p(3)), std::sqrt(r.squaredNorm() / freedom)},
+    const double sd = std::sqrt(r.squaredNorm() / freedom);
+    const double variance = normal.ldlt().solve(Eigen::Vector4d::Unit(2))(2);  // of omega_minus, for samples of sd 1
+    return std::pair(StanceFit{p(0), p(1), p(2), std::max(0.0, p(3)), sd, sd * std::sqrt(std::max(0.0, variance))},
                      r.squaredNorm());
   }
   return std::nullopt;
 }
 
 }  // namespace
+
+std::vector<double> fit_residuals(std::span<const double> time, std::span<const double> angle,
+                                  const dynamics::Stance& before, const dynamics::Stance& after, const StanceFit& fit,
+                                  AfterCollision then) {
+  const Eigen::VectorXd model_less_samples = Residuals(time, angle, before, after, then, std::nullopt)(
+      Parameters(fit.time, fit.angle_rad, fit.omega_minus, fit.omega_plus));
+  std::vector<double> residuals;
+  for (const double one : model_less_samples) residuals.push_back(-one);
+  return residuals;
+}
 
 std::optional<StanceFit> fit_collision(std::span<const double> time, std::span<const double> angle,
                                        const dynamics::Stance& before, const dynamics::Stance& after, StanceFit guess,

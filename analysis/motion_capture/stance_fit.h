@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "dynamics/return_map/wheel_map.h"
 
@@ -14,6 +15,7 @@ struct StanceFit {
   double omega_minus = 0;      ///< [rad/s]
   double omega_plus = 0;       ///< [rad/s]
   double residual_sd_rad = 0;  ///< of the samples
+  double omega_minus_se = 0;   ///< standard error of omega_minus, from what the fit leaves [rad/s]
 };
 
 /// Says what the wheel does behind a collision, as far as its samples are taken.
@@ -27,6 +29,11 @@ struct KnownAngle {
   double angle_rad = 0;
   double weight = 0;  ///< of its residual beside those of the samples
 };
+
+/// Returns the samples less the motion that a fit describes [rad], one each.
+std::vector<double> fit_residuals(std::span<const double> time, std::span<const double> angle,
+                                  const dynamics::Stance& before, const dynamics::Stance& after, const StanceFit& fit,
+                                  AfterCollision then = AfterCollision::stands);
 
 /// Fits by least squares time, angle, omega_minus and omega_plus: before the collision the stance motion of `before`
 /// backwards from its end, after it that of `after` onwards from its start, or a flight; a wheel that falls back lies

@@ -30,6 +30,9 @@ namespace fs = std::filesystem;
 using analysis::FoundCollision;
 using analysis::FoundTrial;
 
+// From this standard error on [rad/s] a fitted speed tells little: the speeds of one wheel spread by about as much.
+constexpr double vague_from = 0.2;
+
 std::string text(const analysis::SpeedDifferences& d) {
   if (d.count < 2) return "too few to say";
   return fmt::format("bias {:+.4f} +- {:.4f} rad/s, spread (sd) {:.4f} rad/s, n = {}", d.bias, d.bias_half_width, d.sd,
@@ -97,6 +100,37 @@ void check_speeds(const analysis::Experiment& experiment, const std::vector<anal
         file, experiment.conditions[condition].id, middle < bounds.slowest ? "below" : "above", middle,
         bounds.slowest / analysis::RollingSpeeds::room, bounds.lifting));
   }
+}
+
+// Says which fitted speeds are less exact than the others, and why.
+void say_fits(Answer& answer, const std::vector<FoundTrial>& found) {
+  std::size_t less_one = 0, rough = 0, vague = 0;
+  double most_stray = 0, roughest = 0, vaguest = 0;
+  for (const FoundTrial& trial : found)
+    for (const FoundCollision& c : trial.collisions) {
+      less_one += c.stray_rad > 0;
+      most_stray = std::max(most_stray, c.stray_rad);
+      rough += c.rough_rad > 0;
+      if (c.fit && c.fit->omega_minus_se > vague_from) {
+        ++vague;
+        vaguest = std::max(vaguest, c.fit->omega_minus_se);
+      }
+      roughest = std::max(roughest, c.rough_rad);
+    }
+  if (less_one > 0)
+    answer.say(
+        "{} collisions are fitted without one frame, which lies off the motion of the others by up to {:.2g} rad",
+        less_one, most_stray);
+  if (vague > 0)
+    answer.say(
+        "the noise of the angle leaves omega_minus of {} collisions open by more than {} rad/s (standard error, up to "
+        "{:.2g}): film at a higher rate, or leave them out",
+        vague, vague_from, vaguest);
+  if (rough > 0)
+    answer.say(
+        "{} collisions leave more than the noise of the angle beside their fit (sd up to {:.2g} rad), as where frames "
+        "are lost or off, or a foot hops: their speeds are less exact (column fit_residual_rad of the details)",
+        rough, roughest);
 }
 
 // Names trials that trials.csv lists as rest but that roll on after the last collision written: read together, the two
@@ -225,6 +259,7 @@ void run_collisions(const CollisionsRequest& request) {
         "{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
         "empty",
         unfitted);
+  say_fits(answer, found);
   for (const auto& [why, trials] : stopped) answer.say("{} trials without a collision: {}", trials, why);
   if (const auto trials = std::count(cut.begin(), cut.end(), 1); trials > 0)
     answer.say("{} trials roll on after collision {}, where --collisions stops them", trials, limit);
