@@ -17,9 +17,10 @@ namespace {
 
 constexpr std::size_t replicates = 8;
 constexpr std::size_t fine_draws = 128, rough_draws = 32;  // of a replicate
-constexpr double rough_tolerance = 0.05;         // from it on rough draws do: their scatter is in the interval
-constexpr std::uint32_t of_landings = 1u << 20;  // the first of their randomisations
-constexpr double spread = 2;                     // [sd] of the scores by which memory is looked for
+constexpr double rough_tolerance = 0.05;             // from it on rough draws do: their scatter is in the interval
+constexpr std::uint32_t of_landings = 1u << 20;      // the first of their randomisations
+constexpr double begins_at = 0.96, ends_at = 0.999;  // share of a study that is done
+constexpr double spread = 2;                         // [sd] of the scores by which memory is looked for
 
 // Interpolates expected steps between the states of a phase: straight lines.
 class Between {
@@ -81,11 +82,12 @@ class Events {
 
   // Returns the defect of every randomisation, relative to the expected steps from the launch; every draw is written to
   // its place, so that threads change no bit.
-  std::vector<double> sum(const std::vector<markov::Draws>& draws, int threads, const Defect& defect) const {
+  std::vector<double> sum(const std::vector<markov::Draws>& draws, const StudyOptions& options,
+                          const Defect& defect) const {
     const auto dimension = static_cast<std::size_t>(draws.front().dimension);
     std::vector<double> part(draws.size() * draws_a_replicate_);
     const double all_visits = visits_.back();
-    markov::parallel_for(part.size(), threads, [&](std::size_t task) {
+    const auto follow = [&](std::size_t task) {
       const std::size_t k = task % draws_a_replicate_, r = task / draws_a_replicate_;
       const markov::Draws& of = draws[r];
       const auto score = std::span(of.score).subspan(k * dimension, dimension);
@@ -97,7 +99,8 @@ class Events {
         const double state = problem_.launch.state(markov::normal_score(of.offset[k]));
         part[task] = of.weight[k] * defect(state, problem_.launch.phase, score);
       }
-    });
+    };
+    markov::parallel_for(part.size(), options.threads, follow, progress_of(options));
     std::vector<double> change(replicates);
     for (std::size_t task = 0; task < part.size(); ++task)
       change[task / draws_a_replicate_ % replicates] += part[task] / solved_.from_start;
@@ -105,6 +108,14 @@ class Events {
   }
 
  private:
+  // Landings that are followed may take long: whoever listens may stop them.
+  static markov::Share progress_of(const StudyOptions& options) {
+    if (!options.progress) return {};
+    return [&options](double share) {
+      options.progress(begins_at + (ends_at - begins_at) * share, "landings followed beside the table");
+    };
+  }
+
   const Problem& problem_;
   std::span<const double> states_;
   const SolvedChain& solved_;
@@ -135,20 +146,18 @@ LandingError landing_error(const Problem& problem, int phases, std::span<const d
   const Events events(problem, phases, states, sampled, solved, draws_a_replicate);
   LandingError error;
   if (map.landing_defect(states[0], 0, std::span(no_noise).first(static_cast<std::size_t>(dimension)), nothing)) {
-    const TInterval change =
-        t_interval(events.sum(draws(markov::make_draws, dimension), options.threads,
-                              [&](double state, int phase, std::span<const double> score) {
-                                return *map.landing_defect(state, phase, score, events.worth(phase + 1));
-                              }));
+    const TInterval change = t_interval(events.sum(
+        draws(markov::make_draws, dimension), options, [&](double state, int phase, std::span<const double> score) {
+          return *map.landing_defect(state, phase, score, events.worth(phase + 1));
+        }));
     const double first_order = std::abs(change.mean) + change.half_width;
     error.table = first_order + 2 * first_order * first_order;
   }
   if (map.memory_defect(states[0], 0, no_noise, nothing)) {
-    const TInterval change =
-        t_interval(events.sum(draws(spread_draws, 2 * dimension), options.threads,
-                              [&](double state, int phase, std::span<const double> score) {
-                                return *map.memory_defect(state, phase, score, events.worth(phase + 2));
-                              }));
+    const TInterval change = t_interval(events.sum(
+        draws(spread_draws, 2 * dimension), options, [&](double state, int phase, std::span<const double> score) {
+          return *map.memory_defect(state, phase, score, events.worth(phase + 2));
+        }));
     const double half = change.half_width + change.mean * change.mean;
     error.memory = {change.mean, change.mean - half, change.mean + half};
   }

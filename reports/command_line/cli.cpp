@@ -46,7 +46,8 @@ Command steps() {
           declare_steps,
           [](const Options& o, const std::string& line) {
             if (asks_for_walker(o)) {
-              WalkerRequest walker = walker_request(o, line, {"how-it-fails"});
+              WalkerRequest walker = walker_request(o, line, {"how-it-fails", "time-limit"});
+              walker.time_limit = o.number("time-limit");
               walker.how_it_fails = o.flag("how-it-fails");
               return run_walker_steps(walker);
             }
@@ -273,7 +274,7 @@ std::string command_line(int argc, const char* const* argv) {
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     const auto is = [&](const std::string& name) { return word == name || word.starts_with(name + "="); };
-    if (is("--out") || is("--json") || is("--threads")) {
+    if (is("--out") || is("--json") || is("--threads") || is("--time-limit")) {
       if (word.find('=') == std::string::npos) ++i;
       continue;
     }

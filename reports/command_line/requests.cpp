@@ -12,6 +12,7 @@ namespace metastable::reports {
 namespace {
 
 constexpr dynamics::Range wanted_shares{.low = 0, .high = 1, .low_open = true, .high_open = true};
+constexpr dynamics::Range time_limits{.low = 0, .high = 1e9, .low_open = true};  // [s]
 
 }  // namespace
 
@@ -27,6 +28,9 @@ void declare_steps(Options& o) {
   o.add_flag("explain", "What stands behind the words of the answer");
   add_standard_errors(o);
   o.add_json();
+  o.add("time-limit", "S", fmt::format("{}", usual_time_limit),
+        "Wall clock after which there is a sentence instead of a number (exit code 3). Results do not depend on it",
+        time_limits);
   add_walker(o, "DEG");
 }
 
@@ -40,6 +44,7 @@ StepsRequest steps_request(const Options& o, const analysis::Setting& setting, c
     throw std::invalid_argument("--direct: has a meaning under --law settled only");
   request.standard_errors = standard_errors(o, request.setting);
   request.rigid_bodies = !o.given("law");
+  request.time_limit = o.number("time-limit");
   return request;
 }
 

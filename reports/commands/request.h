@@ -17,6 +17,7 @@
 #include "analysis/sensitivity/sweep.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/setting.h"
+#include "reports/study/study_progress.h"
 
 namespace metastable::reports {
 
@@ -31,7 +32,8 @@ struct StepsRequest {
   bool sensitivities = false;
   bool how_it_fails = false;
   std::vector<analysis::StandardError> standard_errors = {};  ///< propagated to the expected steps
-  bool rigid_bodies = false;  ///< what the law `settled` gives as well: no law was named
+  bool rigid_bodies = false;             ///< what the law `settled` gives as well: no law was named
+  double time_limit = usual_time_limit;  ///< [s]
 };
 
 /// Asks for `metastable compare`.

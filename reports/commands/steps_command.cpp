@@ -17,7 +17,8 @@
 
 namespace metastable::reports {
 
-StepsAnswer answer_steps(const StepsRequest& request, const BeginPart& begin) {
+StepsAnswer answer_steps(const StepsRequest& request, const BeginPart& begin_part) {
+  const BeginPart begin = within(request.time_limit, begin_part);
   analysis::StudyOptions options = request.study;
   options.progress = begin("steps");
   StepsAnswer answer{analysis::study(request.setting, options), {}, {}};

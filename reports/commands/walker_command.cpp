@@ -39,7 +39,8 @@ Provenance walker_provenance(const WalkerRequest& request) {
 
 }  // namespace
 
-WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& begin) {
+WalkerAnswer answer_walker_steps(const WalkerRequest& request, const BeginPart& begin_part) {
+  const BeginPart begin = within(request.time_limit, begin_part);
   const WalkerSetting& setting = request.settings.front();
   WalkerAnswer answer{{agreed_walker(setting, request.study, begin("steps"))}, {}};
   if (request.how_it_fails) {

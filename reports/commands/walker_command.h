@@ -21,6 +21,7 @@ struct WalkerRequest {
   std::string out;                          ///< file of a sweep, folder of trials or of a report
   std::string command;                      ///< the command line, for provenance
   bool how_it_fails = false;                ///< of steps
+  double time_limit = usual_time_limit;     ///< of steps [s]
   std::vector<double> slopes, slope_sds;    ///< [deg], the axes of a sweep: settings slope by slope
   analysis::WalkOptions walks = {};         ///< of simulate
   const struct Sharing* sharing = nullptr;  ///< of a sweep, with other processes

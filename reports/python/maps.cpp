@@ -34,9 +34,13 @@ markov::MeshStudyOptions mesh_options_of(const Arguments& given, void (*declare)
   LooseOptions options(declare);
   given.give(*options);
   options->check_given();
-  markov::MeshStudyOptions study = mesh_options(*options, {"how-it-fails"});
+  markov::MeshStudyOptions study = mesh_options(*options, {"how-it-fails", "time-limit"});
   read_guided_samples(given, study);
   return study;
+}
+
+double time_limit_of(const Arguments& given) {
+  return given.given("time_limit") ? given.number("time_limit") : usual_time_limit;
 }
 
 WalkerRequest walker_request_of(const py::list& settings, const Arguments& given, const std::string& command) {
@@ -46,6 +50,7 @@ WalkerRequest walker_request_of(const py::list& settings, const Arguments& given
   request.study = mesh_options_of(given, settings.size() > 1 ? declare_compare : declare_steps);
   request.command = command;
   request.how_it_fails = given.flag("how_it_fails");
+  request.time_limit = time_limit_of(given);
   return request;
 }
 
@@ -175,8 +180,9 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
   std::optional<analysis::LastMoments> moments;
   Call call(progress);
   const markov::BatchMap map = batch_of(python, call);
-  study.progress = [&](double share) { call.tell(share, "steps"); };
   call.run([&] {
+    const Tell tell = within(time_limit_of(given), parts_of(call))("steps");
+    study.progress = [&](double share) { tell(share, "steps"); };
     found.passage = markov::mesh_study(map, python.start, study);
     markov::require_agreement(found.passage, python.name);
     if (!how_it_fails) return;

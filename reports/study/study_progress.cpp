@@ -1,6 +1,9 @@
 #include "reports/study/study_progress.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <chrono>
 #include <memory>
 
 namespace metastable::reports {
@@ -11,6 +14,23 @@ std::function<void(double, const std::string&)> study_progress(Progress& progres
     const auto now = static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * static_cast<double>(study_units));
     progress.advance(now > *done ? now - *done : 0);
     *done = std::max(*done, now);
+  };
+}
+
+TimeLimitReached::TimeLimitReached(double seconds, double share, const std::string& what)
+    : std::runtime_error(
+          fmt::format("the time limit of {:.6g} s is reached at {:.0f} % of '{}', and there is no number "
+                      "yet: raise the limit, or ask for less (a larger tolerance)",
+                      seconds, 100 * std::clamp(share, 0.0, 1.0), what)) {}
+
+BeginPart within(double seconds, const BeginPart& begin) {
+  const auto began = std::chrono::steady_clock::now();
+  return [=](const std::string& name) -> Tell {
+    return [=, tell = begin(name)](double share, const std::string& what) {
+      if (tell) tell(share, what);
+      if (std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() > seconds)
+        throw TimeLimitReached(seconds, share, name);
+    };
   };
 }
 

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "reports/output/progress.h"
@@ -21,6 +22,19 @@ std::function<void(double, const std::string&)> study_progress(Progress& progres
 using Tell = std::function<void(double, const std::string&)>;
 /// Begins to show a part of the work under this name, and ends with the part before it.
 using BeginPart = std::function<Tell(const std::string& name)>;
+
+/// The exception of work that takes longer than it may.
+class TimeLimitReached : public std::runtime_error {
+ public:
+  TimeLimitReached(double seconds, double share, const std::string& what);
+};
+
+constexpr double usual_time_limit = 900;  ///< of one question [s]: as long as someone waits at a terminal
+
+/// Lets parts begin that end once this much wall clock has passed from now on, whichever of them runs then. The limit
+/// ends work and changes no number. @param seconds > 0
+/// @throws TimeLimitReached from the listeners of the parts, saying how far the work was
+BeginPart within(double seconds, const BeginPart& begin);
 
 /// Shows the parts of a command on one progress line after another, of study_units each.
 class ProgressParts {

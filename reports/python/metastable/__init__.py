@@ -174,7 +174,7 @@ def _repr(setting):
 def study(setting, *, method=None, cells=None, samples=None, tolerance=None, sequence=None, draws=None, tail=None,
           replicates=None, mixing_distance=None, eigenvalues=None, direct=False, certify=False, sensitivities=False,
           standard_errors=None, spacing=None, simulated_steps=None, guided_samples=None, memory_gb=None,
-          how_it_fails=False, seed=1, threads=0, progress=None):
+          how_it_fails=False, seed=1, threads=0, time_limit=None, progress=None):
     """How many steps before it fails, with its 95 % interval, and what goes with that: `metastable steps`.
 
     setting          a Setting (returns a Study), a WalkerSetting or a Walker (returns a WalkerStudy)
@@ -203,6 +203,7 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
     Of all:
     how_it_fails     the last steps before failure as well
     seed             the same seed gives the same numbers, on any number of threads (0: all cores)
+    time_limit       seconds after which a RuntimeError says how far the work was; None: 900. It changes no number
     progress         None: shown on a terminal and in a notebook; True, False, or a function of the share of the time
                      that has passed (0 to 1), 0 until it is known how long the rest takes; each part, as the steps and
                      then how it fails, begins at 0
@@ -211,8 +212,9 @@ def study(setting, *, method=None, cells=None, samples=None, tolerance=None, seq
                    tail=tail, replicates=replicates, mixing_distance=mixing_distance, eigenvalues=eigenvalues,
                    direct=direct, certify=certify, sensitivities=sensitivities, standard_errors=standard_errors,
                    spacing=spacing, simulated_steps=simulated_steps, guided_samples=guided_samples,
-                   memory_gb=memory_gb, how_it_fails=how_it_fails, seed=seed, threads=threads)
-    command = _called("study", setting, **{key: value for key, value in options.items() if key != "threads"})
+                   memory_gb=memory_gb, how_it_fails=how_it_fails, seed=seed, threads=threads, time_limit=time_limit)
+    command = _called("study", setting,
+                      **{key: value for key, value in options.items() if key not in ("threads", "time_limit")})
     with _progress.telling(progress, "study") as tell:
         if isinstance(setting, Setting):
             return Study(_metastable.study(_fields(setting), options, command, tell))

@@ -80,6 +80,25 @@ TEST_F(ExitCodes, PipesThatNobodyWritesToOrReadsEndAtASignal) {
   EXPECT_EXIT(run_and_signal({"effects", "--json", pipe("d")}, SIGTERM), testing::ExitedWithCode(143), "terminated");
 }
 
+// A limit ends the wait with a sentence, and changes no number where it is not reached.
+TEST_F(ExitCodes, TimeLimitIsThreeAndASentence) {
+  for (const std::vector<std::string>& words : {quick({"steps"}),
+                                                quick({"steps", "--law", "coulomb"}),
+                                                {"steps", "--walker", "simplest", "--slope-sd", "0.1"}}) {
+    std::vector<std::string> limited = words;
+    limited.insert(limited.end(), {"--time-limit", "1e-9", "--json", path("none.json")});
+    const Ran ran = metastable(limited);
+    EXPECT_EQ(ran.code, 3) << ran.out;
+    EXPECT_NE(ran.err.find("the time limit of 1e-09 s is reached at "), std::string::npos) << ran.err;
+    EXPECT_EQ(ran.out, "");
+    EXPECT_FALSE(std::filesystem::exists(path("none.json")));
+  }
+  EXPECT_EQ(metastable({"steps", "--time-limit", "0"}).code, 2);
+  ASSERT_EQ(metastable(quick({"steps", "--time-limit", "1e8", "--json", path("with.json")})).code, 0);
+  ASSERT_EQ(metastable(quick({"steps", "--json", path("without.json")})).code, 0);
+  EXPECT_EQ(test::read(path("with.json")), test::read(path("without.json")));
+}
+
 TEST_F(ExitCodes, PipesAreReadToTheirEnd) {
   std::thread writer([name = pipe("config")] {
     std::ofstream out(name);
