@@ -28,6 +28,7 @@ void declare_steps(Options& o) {
   o.add_flag("explain", "What stands behind the words of the answer");
   add_standard_errors(o);
   o.add_json();
+  o.group("Method and accuracy");
   o.add("time-limit", "S", fmt::format("{}", usual_time_limit),
         "Wall clock after which there is a sentence instead of a number (exit code 3). Results do not depend on it",
         time_limits);

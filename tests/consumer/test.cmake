@@ -22,10 +22,10 @@ foreach(example metastability diagnose return_map)
   endif()
 endforeach()
 
-# The README shows the first of them.
-file(READ ${SOURCE_DIR}/../../README.md readme)
+# The page on C++ shows the first of them.
+file(READ ${SOURCE_DIR}/../../reports/site/cpp.md page)
 file(READ ${WORK_DIR}/build/examples/metastability.cpp program)
-string(FIND "${readme}" "```cpp${program}```" at)
+string(FIND "${page}" "```cpp${program}```" at)
 if(at EQUAL -1)
-  message(FATAL_ERROR "README.md does not show the program at the head of analysis/study/metastability.h")
+  message(FATAL_ERROR "reports/site/cpp.md does not show the program at the head of analysis/study/metastability.h")
 endif()

@@ -183,7 +183,11 @@ class Diagnosis(Result):
     where_left: Tuple[Record, ...]
     causes: Tuple[Record, ...]
     cause_set: Tuple[str, ...]
+    at_work: Tuple[Record, ...]
     unnamed: Tuple[Record, ...]
+    p_unnamed: float
+    left: Record
+    unnamed_supposed: Tuple[Record, ...]
     cause_set_alike: Tuple[str, ...]
     stepwise: Record
     not_decided: Tuple[Record, ...]
@@ -391,12 +395,14 @@ def study(setting: Setting, *, method: Optional[str] = None, cells: Optional[int
           draws: Optional[str] = None, tail: Optional[float] = None, replicates: Optional[int] = None,
           mixing_distance: Optional[float] = None, eigenvalues: Optional[int] = None, direct: bool = False,
           certify: bool = False, sensitivities: bool = False, standard_errors: Optional[Mapping[str, float]] = None,
-          how_it_fails: bool = False, seed: int = 1, threads: int = 0, progress: Progress = None) -> Study: ...
+          how_it_fails: bool = False, seed: int = 1, threads: int = 0, time_limit: Optional[float] = None,
+          progress: Progress = None) -> Study: ...
 @overload
 def study(setting: Union[WalkerSetting, Walker], *, spacing: Optional[float] = None,
           simulated_steps: Optional[int] = None, guided_samples: Optional[int] = None,
           memory_gb: Optional[float] = None, how_it_fails: bool = False,
-          seed: int = 1, threads: int = 0, progress: Progress = None) -> WalkerStudy: ...
+          seed: int = 1, threads: int = 0, time_limit: Optional[float] = None,
+          progress: Progress = None) -> WalkerStudy: ...
 
 
 @overload

@@ -39,19 +39,20 @@ def _run(function, progress, label, folder, **options):
         return function(options, f"metastable.blind.{label}({options['folder']!r})", tell)
 
 
-def make(folder, *, sealed=None, seed=None, per_effect=6, none=300, pairs=50, outside=50, left_out=3, law="published",
-         threads=0, progress=None):
+def make(folder, *, sealed=None, seed=None, per_effect=6, none=300, pairs=50, outside=50, left_out=3, mixed=0, many=0,
+         law="published", threads=0, progress=None):
     """Draws cases in the virtual laboratory and seals their truths; a run cut short goes on. Returns Made.
 
     folder      of the run; sealed: of the truths (None: folder + "-sealed")
     seed        of all cases; None: from the system's entropy
     per_effect  cases of each effect at each of 1x, 2x, 4x; none: without a gap; pairs: with two effects;
-                outside: with an effect that no catalogue holds; left_out: of each effect, with a catalogue without it
+                outside: with an effect that no catalogue holds; left_out: of each effect, with a catalogue without it;
+                mixed: with one or two effects and one that no catalogue holds; many: with three effects
     law         "published" (first laboratory), "settled" (second one, a rigid body) or "both", in turn
     """
     return Made(**_run(_metastable.blind_make, progress, "make", folder, sealed=sealed, seed=seed,
                        per_effect=per_effect, none=none, pairs=pairs, outside=outside, left_out=left_out,
-                       law=law, threads=threads))
+                       mixed=mixed, many=many, law=law, threads=threads))
 
 
 def answer(folder, *, tool=None, threads=0, progress=None):

@@ -110,7 +110,7 @@ TEST(JoinedSteps, AnswerADearMapAsAnyOther) {
     EXPECT_EQ(other->blind_spots.missed, plain.blind_spots.missed);
   }
   EXPECT_EQ(one_rows, three_rows);  // call by call
-  EXPECT_LT(10 * one_rows.size(), plain_rows.size());
+  EXPECT_LT(4 * one_rows.size(), plain_rows.size());
 }
 
 }  // namespace

@@ -163,13 +163,15 @@ class SameSentence(unittest.TestCase):
             (metastable.Setting(**wheel), dict(method="integrated", tail=1e-20), ["--method=integrated", "--tail=1e-20"]),
             (metastable.WalkerSetting(**walker), dict(cells=32), ["--walker=simplest", "--slope-sd=0.5", "--cells=32"]),
             (metastable.WalkerSetting(**walker), dict(certify=True), ["--walker=simplest", "--slope-sd=0.5", "--certify"]),
-            (metastable.Setting(**wheel), dict(standard_errors={"friction_mean": -1}), ["--friction-se=-1"]),
             (metastable.Setting(law="plastic"), dict(standard_errors={"friction_mean": 1}),
              ["--law=plastic", "--friction-se=1"]),
         ):
             with self.subTest(said=said), self.assertRaises(metastable.InputError) as raised:
                 metastable.study(setting, **options)
             self.assertEqual(str(raised.exception), in_python(refusal("steps", *said)))
+        with self.assertRaises(metastable.InputError) as raised:  # one name here, mean and sd in the option
+            metastable.study(metastable.Setting(**wheel), standard_errors={"friction_mean": -1})
+        self.assertEqual(str(raised.exception), "friction_mean: standard error -1 is outside [0, inf)")
         for options, said in (
             (dict(effects="bounce"), ["--effect=bounce"]), (dict(flight=False), ["--no-flight"]),
             (dict(shuffled=True), ["--shuffle"]), (dict(drop=["leg"]), ["--drop=leg"]),
