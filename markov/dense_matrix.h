@@ -24,15 +24,15 @@ struct SymmetricEigen {
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix);
 
 /// Returns the root R [n x r] of the pseudo-inverse R R^T of a symmetric semidefinite matrix, over the r directions of
-/// which more is left than a share: eigenvectors of the matrix in units of `whole` whose eigenvalue is above it. What else
-/// there is, rounding or the errors of differences, counts as nothing.
+/// which more is left than a share: eigenvectors of the matrix in units of `whole` whose eigenvalue is above it. What
+/// else there is, rounding or the errors of differences, counts as nothing.
 /// @param matrix  [n x n], n >= 1, of which the lower triangle is read; where it is not finite neither is R
 /// @param whole  [n] its diagonal before anything was projected out; where that is not positive nothing is resolved
 /// @param least_share  in (0, 1)
 Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& whole, double least_share);
 
-/// Returns the inverse of a symmetric semidefinite matrix, whose eigenvalues in units of its diagonal are taken to be no
-/// less than a share: along what is lost it is large instead of whatever rounding makes of it.
+/// Returns the inverse of a symmetric semidefinite matrix, whose eigenvalues in units of its diagonal are taken to be
+/// no less than a share: along what is lost it is large instead of whatever rounding makes of it.
 /// @param matrix  [n x n], n >= 1, of which the lower triangle is read  @param least_share  in (0, 1)
 Eigen::MatrixXd floored_inverse(const Eigen::MatrixXd& matrix, double least_share);
 

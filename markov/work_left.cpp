@@ -6,7 +6,7 @@
 namespace metastable::markov {
 namespace {
 
-constexpr double kTelling = 0.05;  // of a stage: so much of it tells how fast it goes
+constexpr double kTelling = 0.05;     // of a stage: so much of it tells how fast it goes
 constexpr double kUnfinished = 0.02;  // of a stage: so much is left at least while it is not finished
 
 }  // namespace

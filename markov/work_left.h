@@ -8,9 +8,9 @@
 
 namespace metastable::markov {
 
-/// Holds the stages of a computation, how much work each is and how fast it goes. Until stages are planned the share done
-/// is 0: nothing is known then. A stage's speed is the one it was planned with until a twentieth of it is done, and
-/// afterwards its own.
+/// Holds the stages of a computation, how much work each is and how fast it goes. Until stages are planned the share
+/// done is 0: nothing is known then. A stage's speed is the one it was planned with until a twentieth of it is done,
+/// and afterwards its own.
 class WorkLeft {
  public:
   /// @param seconds  a clock that starts at 0; empty: the time since this was made

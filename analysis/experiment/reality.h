@@ -9,8 +9,8 @@
 #include "analysis/experiment/angle_recording.h"
 #include "analysis/experiment/experiment_folder.h"
 #include "analysis/study/setting.h"
-#include "dynamics/laboratory/laboratory.h"
 #include "dynamics/catalogue/effect_catalogue.h"
+#include "dynamics/laboratory/laboratory.h"
 
 namespace metastable::analysis {
 

@@ -11,8 +11,9 @@ struct RollingSpeeds {
   /// The share of an ideal wheel's least speed that others may have whose feet slide or hop. Of 60,000 landings of
   /// four rigid-body engines and of the virtual laboratory none was below 0.99 of it.
   static constexpr double room = 0.7;
-  /// The `room` of what a wheel reaches before a collision once it has come over a leg: it fell from rest over the foot,
-  /// I omega^2 / 2 = M g L (1 - cos(alpha/2 + gamma)). Units that are too small by 2 pi (rev/s) lie below [rad/s].
+  /// The `room` of what a wheel reaches before a collision once it has come over a leg: it fell from rest over the
+  /// foot, I omega^2 / 2 = M g L (1 - cos(alpha/2 + gamma)). Units that are too small by 2 pi (rev/s) lie below
+  /// [rad/s].
   double slowest = 0;
   /// Above this feet leave the ramp, omega^2 L > g [rad/s].
   double lifting = 0;

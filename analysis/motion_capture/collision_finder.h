@@ -12,8 +12,8 @@
 namespace metastable::analysis {
 
 struct FinderOptions {
-  /// The window of the Savitzky-Golay filter [samples], odd, 5..10001; 0: 50 ms, at least 5 samples, and as many more as
-  /// keep the noise's own peaks below `rise`, up to 1.2 of the time of a leg angle at sqrt(g/L).
+  /// The window of the Savitzky-Golay filter [samples], odd, 5..10001; 0: 50 ms, at least 5 samples, and as many more
+  /// as keep the noise's own peaks below `rise`, up to 1.2 of the time of a leg angle at sqrt(g/L).
   int window = 0;
   double rise = 0.4;       ///< of a peak above both sides [rad/s], > 0
   int collisions = 16;     ///< most collisions of a trial, >= 1

@@ -58,9 +58,8 @@ void take_ratio(const Metastability& a, const Metastability& b, Contrast& result
   result.ratio = Estimate{ratio, ratio * std::exp(-half - open_b.less - open_a.more),
                           ratio * std::exp(half + open_b.more + open_a.less)};
   const double apart = at_b - at_a;
-  const double apart_half =
-      std::hypot(std::hypot(sampling(difference), of_trials(a) * at_a, of_trials(b) * at_b),
-                 a.steps.discretization_error * at_a + b.steps.discretization_error * at_b);
+  const double apart_half = std::hypot(std::hypot(sampling(difference), of_trials(a) * at_a, of_trials(b) * at_b),
+                                       a.steps.discretization_error * at_a + b.steps.discretization_error * at_b);
   const auto less = [](double steps, double log) { return -steps * std::expm1(-log); };
   const auto more = [](double steps, double log) { return steps * std::expm1(log); };
   result.difference = Estimate{apart, apart - apart_half - less(at_b, open_b.less) - more(at_a, open_a.more),
@@ -101,9 +100,9 @@ Contrast contrast(const Comparison& comparison, std::size_t against, std::size_t
   }
   take_ratio(a, b, result);
   const DecimalEstimate times = to_decimal(*result.ratio, NumberFormat::significant, 4);
-  result.sentence = fmt::format("{} takes {} times the steps of {} (95 % interval {} to {}), {}", name_b,
-                                plain_text(times.value), name_a, plain_text(times.lower), plain_text(times.upper),
-                                difference_text(*result.difference));
+  result.sentence =
+      fmt::format("{} takes {} times the steps of {} (95 % interval {} to {}), {}", name_b, plain_text(times.value),
+                  name_a, plain_text(times.lower), plain_text(times.upper), difference_text(*result.difference));
   return result;
 }
 

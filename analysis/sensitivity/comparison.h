@@ -21,7 +21,7 @@ struct Contrast {
   /// not differ within them.
   std::optional<double> trials_needed;
   std::optional<double> power;  ///< of that test with so many trials; nothing where there is no such number
-  std::string sentence;  ///< the contrast in words
+  std::string sentence;         ///< the contrast in words
 };
 
 struct Comparison {
@@ -32,12 +32,13 @@ struct Comparison {
 
 /// Studies all settings with the same seed and the same resolution (the finest any of them needed), so that replicate r
 /// of all sides shares its noise, and forms differences and ratios replicate by replicate. What a table of landings and
-/// moving feet leave open (StepsToRest::landing_error, memory) widens them by both sides: nothing shows that it cancels.
+/// moving feet leave open (StepsToRest::landing_error, memory) widens them by both sides: nothing shows that it
+/// cancels.
 /// @param collisions length of a measured trial, >= 1
 Comparison compare(const std::vector<Setting>& settings, const StudyOptions& options, int collisions = 16);
 
-/// Returns what is behind Contrast::trials_needed, of min(steps, collisions + 1), from the survival curves P(steps > n),
-/// n = 0 .. collisions: trials_for_power().
+/// Returns what is behind Contrast::trials_needed, of min(steps, collisions + 1), from the survival curves P(steps >
+/// n), n = 0 .. collisions: trials_for_power().
 /// @throws std::invalid_argument for curves that are shorter, and collisions below 1
 std::optional<TrialDesign> trials_to_tell_apart(const std::vector<double>& survival_a,
                                                 const std::vector<double>& survival_b, int collisions);

@@ -22,11 +22,11 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t longest_roll = 512;  // collisions of a wheel
-constexpr std::uint64_t early = 32;     // collisions after which the launch is forgotten (by the 12th in all studies)
-constexpr std::size_t wheels_a_batch = 16;       // wheels between two looks at what has been rolled
-constexpr double differing = 2;         // times as many or as few steps
-// The speed at which a wheel spins that hops away down the slope, for ever, times the speed sqrt(g / leg) at which gravity no
-// longer holds a standing foot down: none with feet that settle comes near it.
+constexpr std::uint64_t early = 32;  // collisions after which the launch is forgotten (by the 12th in all studies)
+constexpr std::size_t wheels_a_batch = 16;  // wheels between two looks at what has been rolled
+constexpr double differing = 2;             // times as many or as few steps
+// The speed at which a wheel spins that hops away down the slope, for ever, times the speed sqrt(g / leg) at which
+// gravity no longer holds a standing foot down: none with feet that settle comes near it.
 constexpr double hops_away = 10;
 
 // Holds what a number of wheels did.
@@ -148,7 +148,8 @@ std::string several_text(const std::vector<const BesideRigidBodies*>& known, dyn
   }
   if (!open.empty())
     return fmt::format(
-        "whether rigid bodies (law settled) are within twice of it the wheels rolled do not tell in {} of {}, as at {}: "
+        "whether rigid bodies (law settled) are within twice of it the wheels rolled do not tell in {} of {}, as at "
+        "{}: "
         "{} steps; studies under law settled do",
         open.size(), known.size(), open.front()->name, rigid_body_steps_text(open.front()->check));
   return fmt::format("rigid bodies (law settled) are within twice of it in all {}", known.size());
@@ -191,8 +192,9 @@ RigidBodyCheck rigid_body_check(const Setting& setting, const RigidBodyOptions& 
     check.wheels += wheels.size();
     if (once) break;
     if (options.progress)
-      options.progress(std::min(1.0, std::max(static_cast<double>(check.collisions) / static_cast<double>(options.collisions),
-                                              static_cast<double>(check.rests) / static_cast<double>(options.rests))));
+      options.progress(
+          std::min(1.0, std::max(static_cast<double>(check.collisions) / static_cast<double>(options.collisions),
+                                 static_cast<double>(check.rests) / static_cast<double>(options.rests))));
   }
   if (same_contacts && check.rests < check.wheels)
     check.steps = {never, never, never};  // one that rolls on after so many steps is on its orbit

@@ -17,14 +17,14 @@ struct RigidBodyOptions {
   std::uint64_t collisions = 65536;  ///< after which no more wheels are begun, >= 1
   std::uint64_t rests = 1000;        ///< likewise, >= 1: the interval is then 6 to 10 % to either side
   std::uint64_t seed = 1;
-  int threads = 0;                        ///< 0: all cores; the bits do not depend on it
+  int threads = 0;                            ///< 0: all cores; the bits do not depend on it
   std::function<void(double)> progress = {};  ///< share done, from one thread at a time; may throw to stop
 };
 
 /// Holds the expected steps of a setting under `settled`, by direct simulation.
 struct RigidBodyCheck {
-  std::string reason;     ///< why there is no answer, empty otherwise: `settled` has no such wheel
-  Estimate steps;         ///< from the launch, with the 95 % interval
+  std::string reason;  ///< why there is no answer, empty otherwise: `settled` has no such wheel
+  Estimate steps;      ///< from the launch, with the 95 % interval
   /// Nothing bounds it above, for too few rests or because some wheel hops away for ever: `steps` has the lower 95 %
   /// bound as value and lower end.
   bool at_least = false;
@@ -61,7 +61,8 @@ std::string verdict_text(RigidBodyVerdict verdict);
 std::string rigid_body_steps_text(const RigidBodyCheck& check);
 
 /// Says in one line which law answered, what rigid bodies give, and, where the two differ by more than twice, or of
-/// several settings in which takes more steps, which to trust for what. @param all  none where `settled` knows no such wheel
+/// several settings in which takes more steps, which to trust for what. @param all  none where `settled` knows no such
+/// wheel
 std::string rigid_body_sentence(std::span<const BesideRigidBodies> all, dynamics::Law law);
 
 }  // namespace metastable::analysis

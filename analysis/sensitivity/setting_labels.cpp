@@ -30,7 +30,8 @@ Text spread_text(const Settings& settings, const char* name, Spread Setting::*wh
 
 Text legs_text(const Settings& settings) {
   const bool count = differ(settings, [](const Setting& s) { return fmt::format("{}", s.wheel.legs()); });
-  const bool length = differ(settings, [](const Setting& s) { return fmt::format("{}", fmt::join(s.wheel.leg_length, " ")); });
+  const bool length =
+      differ(settings, [](const Setting& s) { return fmt::format("{}", fmt::join(s.wheel.leg_length, " ")); });
   return [=](const Setting& s) -> std::string {
     const dynamics::Wheel paper;
     if (!length) return "";
@@ -47,28 +48,30 @@ std::vector<Text> texts(const Settings& settings) {
     return paper && paper->mean == s.initial_speed.mean && paper->sd == s.initial_speed.sd;
   });
   const auto given = [&](std::optional<double> dynamics::Wheel::*which) {
-    return std::any_of(settings.begin(), settings.end(), [&](const Setting& s) { return (s.wheel.*which).has_value(); });
+    return std::any_of(settings.begin(), settings.end(),
+                       [&](const Setting& s) { return (s.wheel.*which).has_value(); });
   };
   const bool lists = std::any_of(settings.begin(), settings.end(), [](const Setting& s) { return !s.pairs.empty(); });
-  std::vector<Text> all{
-      [](const Setting& s) { return fmt::format("{} deg", s.slope_deg); },
-      [](const Setting& s) { return fmt::format("law {}", dynamics::law_name(s.law)); },
-      legs_text(settings),
-      [](const Setting& s) { return fmt::format("M {} kg", s.wheel.hub_mass); },
-      [](const Setting& s) { return fmt::format("tips of {} m", s.wheel.tip_radius); },
-      [](const Setting& s) { return fmt::format("K_r {} N/m", s.wheel.ramp_stiffness); },
-      [](const Setting& s) { return fmt::format("g {} m/s^2", s.wheel.gravity); },
-      spread_text(settings, "eta", &Setting::restitution),
-      spread_text(settings, "mu", &Setting::friction),
-      [](const Setting& s) { return fmt::format("correlation {}", s.correlation); },
-      [](const Setting& s) { return fmt::format("rebound lost {}", s.rebound_lost); },
-      [](const Setting& s) { return fmt::format("ramp {} m", s.ramp_length); },
-      [](const Setting& s) { return fmt::format("leg {} first", s.first_landing_leg); }};
+  std::vector<Text> all{[](const Setting& s) { return fmt::format("{} deg", s.slope_deg); },
+                        [](const Setting& s) { return fmt::format("law {}", dynamics::law_name(s.law)); },
+                        legs_text(settings),
+                        [](const Setting& s) { return fmt::format("M {} kg", s.wheel.hub_mass); },
+                        [](const Setting& s) { return fmt::format("tips of {} m", s.wheel.tip_radius); },
+                        [](const Setting& s) { return fmt::format("K_r {} N/m", s.wheel.ramp_stiffness); },
+                        [](const Setting& s) { return fmt::format("g {} m/s^2", s.wheel.gravity); },
+                        spread_text(settings, "eta", &Setting::restitution),
+                        spread_text(settings, "mu", &Setting::friction),
+                        [](const Setting& s) { return fmt::format("correlation {}", s.correlation); },
+                        [](const Setting& s) { return fmt::format("rebound lost {}", s.rebound_lost); },
+                        [](const Setting& s) { return fmt::format("ramp {} m", s.ramp_length); },
+                        [](const Setting& s) { return fmt::format("leg {} first", s.first_landing_leg); }};
   if (given(&dynamics::Wheel::inertia))
-    all.push_back([](const Setting& s) { return fmt::format("I {:.6g} kg m^2", parameter_value(s, Parameter::inertia)); });
-  if (given(&dynamics::Wheel::radius_of_gyration))
     all.push_back(
-        [](const Setting& s) { return fmt::format("r_g {:.6g} m", parameter_value(s, Parameter::radius_of_gyration)); });
+        [](const Setting& s) { return fmt::format("I {:.6g} kg m^2", parameter_value(s, Parameter::inertia)); });
+  if (given(&dynamics::Wheel::radius_of_gyration))
+    all.push_back([](const Setting& s) {
+      return fmt::format("r_g {:.6g} m", parameter_value(s, Parameter::radius_of_gyration));
+    });
   if (given(&dynamics::Wheel::contact_mass))
     all.push_back(
         [](const Setting& s) { return fmt::format("m_c {:.6g} kg", parameter_value(s, Parameter::contact_mass)); });

@@ -211,8 +211,7 @@ Solution solve(const AnswerAt& answer, const Target& target, const SolveRange& r
   bool unknown = false;
   for (const CurvePoint& point : crossings.scanned) {
     const Estimate& h = point.height;
-    solution.scanned.push_back(
-        {point.at, {{quantity(h.value), quantity(h.lower), quantity(h.upper)}, point.unknown}});
+    solution.scanned.push_back({point.at, {{quantity(h.value), quantity(h.lower), quantity(h.upper)}, point.unknown}});
     unknown = unknown || !point.unknown.empty();
   }
   solution.found = crossings.crossings;
@@ -226,7 +225,8 @@ Solution solve(const Setting& setting, Parameter parameter, const Target& target
   const SolveRange range = solve_range(setting, parameter);
   const double from = options.from.value_or(range.from), to = options.to.value_or(range.to);
   if (!matters(with_value(setting, parameter, 0.5 * (from + to)), parameter))
-    throw std::invalid_argument(fmt::format("parameter: {} has no meaning under this setting", parameter_name(parameter)));
+    throw std::invalid_argument(
+        fmt::format("parameter: {} has no meaning under this setting", parameter_name(parameter)));
   for (const double end : {from, to}) check_setting(with_value(setting, parameter, end), study_options.method);
   if (target.of == Target::Of::ramp_end && std::isinf(setting.ramp_length))
     throw std::invalid_argument("reach: the ramp has no end");
@@ -246,8 +246,7 @@ Solution solve(const Setting& setting, Parameter parameter, const Target& target
   solution.unit = parameter_unit(parameter);
   for (const Crossing& one : solution.found) {
     const Metastability* known = kept.at(one.at.value);
-    solution.studies.push_back(known ? *known
-                                     : study_for(with_value(setting, parameter, one.at.value), target, brief));
+    solution.studies.push_back(known ? *known : study_for(with_value(setting, parameter, one.at.value), target, brief));
   }
   return solution;
 }
@@ -257,9 +256,9 @@ std::vector<std::string> Solution::sentences() const {
   for (const Crossing& one : found) {
     const DecimalEstimate e = to_decimal(one.at, NumberFormat::general, 6);
     all.push_back(fmt::format("{}{} (95 % interval {}{} to {}{}), {} above it", plain_text(e.value),
-                              unit == "1" || unit.empty() ? "" : " " + unit,
-                              one.open_below ? "from below " : "", plain_text(e.lower),
-                              one.open_above ? "beyond " : "", plain_text(e.upper), one.rising ? "more" : "less"));
+                              unit == "1" || unit.empty() ? "" : " " + unit, one.open_below ? "from below " : "",
+                              plain_text(e.lower), one.open_above ? "beyond " : "", plain_text(e.upper),
+                              one.rising ? "more" : "less"));
   }
   const LookedAt *least = nullptr, *most = nullptr;
   std::string gaps;

@@ -43,9 +43,9 @@ struct Answered {
 using AnswerAt = std::function<Answered(double value, int threads)>;
 
 struct SolveOptions {
-  std::optional<double> from = {}, to = {};  ///< of the parameter; nothing: solve_range()
-  std::size_t points = 17;         ///< looked at first, ends included, 3 .. 1000
-  int threads = 0;                 ///< 0: all cores
+  std::optional<double> from = {}, to = {};                  ///< of the parameter; nothing: solve_range()
+  std::size_t points = 17;                                   ///< looked at first, ends included, 3 .. 1000
+  int threads = 0;                                           ///< 0: all cores
   std::function<void(std::size_t looked_at)> progress = {};  ///< may throw to stop
 };
 
@@ -80,14 +80,14 @@ SolveRange solve_range(const Setting& setting, Parameter parameter);
 
 /// Looks at values of a parameter over a range, and finds all at which the quantity is the target's, as far as the
 /// points looked at show them (level_crossings()).
-/// @throws std::invalid_argument for a target, range or number of points that is none; std::runtime_error where no value
-/// is found and some points have no answer, or a crossing lies among them
+/// @throws std::invalid_argument for a target, range or number of points that is none; std::runtime_error where no
+/// value is found and some points have no answer, or a crossing lies among them
 Solution solve(const AnswerAt& answer, const Target& target, const SolveRange& range, const SolveOptions& options);
 
 /// Does so for a wheel: studies in brief, of few cells and draws where that leaves no doubt on which side of the target
 /// they are, points side by side on the options' threads. The interval of a value is that
-/// of the study's own: tolerance 0.01 leaves one per cent of the steps. A wheel of which fewer than 1e-12 survive a step
-/// takes one.
+/// of the study's own: tolerance 0.01 leaves one per cent of the steps. A wheel of which fewer than 1e-12 survive a
+/// step takes one.
 /// @throws also std::invalid_argument for a parameter that does not matter() to the setting, naming it, and for ends of
 /// the range that it cannot have
 Solution solve(const Setting& setting, Parameter parameter, const Target& target, const SolveOptions& options,

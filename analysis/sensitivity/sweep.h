@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "analysis/sensitivity/parameter.h"
-#include "analysis/study/metastability.h"
 #include "analysis/sensitivity/rigid_body_check.h"
+#include "analysis/study/metastability.h"
 #include "analysis/study/setting.h"
 
 namespace metastable::analysis {
@@ -25,8 +25,8 @@ std::vector<double> axis_values(double first, double last, double step);
 
 /// Holds what a sweep says of one point.
 struct SweepPoint {
-  std::vector<double> at;           ///< one value per axis
-  Metastability study;              ///< with its setting
+  std::vector<double> at;  ///< one value per axis
+  Metastability study;     ///< with its setting
   /// Set when a solver did not converge here, or there is no regime to launch from (study.status tells which).
   std::exception_ptr failure = {};
   std::optional<RigidBodyCheck> rigid_bodies = {};  ///< where wheels were rolled

@@ -16,10 +16,10 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double steepest = 700;        // height that stands for an infinite one
-constexpr double of_interval = 0.05;    // of an interval's half, left of each of its ends
-constexpr double of_spacing = 1e-6;     // of the points' spacing, below which no place is told apart
-constexpr int most_turns = 3;           // steps towards a turning point
+constexpr double steepest = 700;      // height that stands for an infinite one
+constexpr double of_interval = 0.05;  // of an interval's half, left of each of its ends
+constexpr double of_spacing = 1e-6;   // of the points' spacing, below which no place is told apart
+constexpr int most_turns = 3;         // steps towards a turning point
 constexpr std::uintmax_t most_halvings = 60;
 
 double bounded(double height) { return std::clamp(height, -steepest, steepest); }
@@ -30,8 +30,7 @@ class Search {
       : curve_(curve), from_(from), to_(to), options_(options) {
     if (!(from < to)) throw std::invalid_argument(fmt::format("range: from {} to {} is none", from, to));
     if (options.points < 3) throw std::invalid_argument(fmt::format("points: {} is below 3", options.points));
-    if (options.logarithmic && !(from > 0))
-      throw std::invalid_argument(fmt::format("range: {} is not above 0", from));
+    if (options.logarithmic && !(from > 0)) throw std::invalid_argument(fmt::format("range: {} is not above 0", from));
   }
 
   Crossings run() {
@@ -174,7 +173,8 @@ class Search {
     if (beyond(from)) return {from, false};
     double last = from;
     for (auto next = known_.find(from);;) {
-      if (side < 0 ? next == known_.begin() : std::next(next) == known_.end()) return {scaled(side < 0 ? from_ : to_), true};
+      if (side < 0 ? next == known_.begin() : std::next(next) == known_.end())
+        return {scaled(side < 0 ? from_ : to_), true};
       side < 0 ? --next : ++next;
       if (beyond(next->first)) {
         const double other = next->first;

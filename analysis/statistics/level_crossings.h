@@ -21,7 +21,8 @@ struct CurvePoint {
 struct Crossing {
   Estimate at;         ///< with the places between which the curve's interval holds zero
   bool rising = true;  ///< from below zero to above
-  bool open_below = false, open_above = false;  ///< the interval holds zero as far as the range goes, and perhaps beyond
+  bool open_below = false,
+       open_above = false;  ///< the interval holds zero as far as the range goes, and perhaps beyond
 };
 
 struct CrossingOptions {
@@ -41,11 +42,11 @@ struct Crossings {
 /// Where the point is unknown it says why; it may throw to stop all.
 using Curve = std::function<CurvePoint(double at, int threads)>;
 
-/// Looks at evenly spaced points, and between neighbours of different sign for the crossing by TOMS 748 (Alefeld, Potra,
-/// Shi 1995). Where the curve turns towards zero without a change of sign, up to three steps of parabolic interpolation
-/// look whether it reaches it. Each end of an interval is known to a twentieth of the half of it, the crossing to half of that. A
-/// curve that crosses and comes back between two points, without turning there as seen from them, is missed. Cost:
-/// `points`, and about ten more a crossing.
+/// Looks at evenly spaced points, and between neighbours of different sign for the crossing by TOMS 748 (Alefeld,
+/// Potra, Shi 1995). Where the curve turns towards zero without a change of sign, up to three steps of parabolic
+/// interpolation look whether it reaches it. Each end of an interval is known to a twentieth of the half of it, the
+/// crossing to half of that. A curve that crosses and comes back between two points, without turning there as seen from
+/// them, is missed. Cost: `points`, and about ten more a crossing.
 /// @throws std::invalid_argument for from >= to, fewer than 3 points, or a range that is not above 0 where logarithmic;
 /// std::runtime_error where the curve is unknown at a place between two of different sign
 Crossings level_crossings(const Curve& curve, double from, double to, const CrossingOptions& options);

@@ -33,8 +33,9 @@ class CriticalT {
  public:
   CriticalT() {
     for (std::size_t i = 0; i <= steps; ++i)
-      value_.push_back(i == 0 ? boost::math::quantile(boost::math::normal(), two_sided)
-                              : boost::math::quantile(boost::math::students_t(steps / static_cast<double>(i)), two_sided));
+      value_.push_back(i == 0
+                           ? boost::math::quantile(boost::math::normal(), two_sided)
+                           : boost::math::quantile(boost::math::students_t(steps / static_cast<double>(i)), two_sided));
   }
   double operator()(double degrees) const {
     const double place = std::min(1.0, 1 / degrees) * steps;

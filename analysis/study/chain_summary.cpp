@@ -335,8 +335,8 @@ void summarize_endless(const Problem& problem, const markov::StateSpace& space, 
   const markov::Chain closed = sampled.chain.restricted_to(recurrent);
   const markov::Period period = markov::find_period(closed);
   result.spectrum.period = period.period;
-  result.spectrum.moduli = moduli_per_step(markov::revolution_chain(closed, period), period.period,
-                                           options.eigenvalues, 0.0, result.message);
+  result.spectrum.moduli = moduli_per_step(markov::revolution_chain(closed, period), period.period, options.eigenvalues,
+                                           0.0, result.message);
   result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
   describe_survivors(problem, space, midpoints(space), stationary, result);
 

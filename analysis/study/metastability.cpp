@@ -352,8 +352,8 @@ namespace {
 bool fast_launch_rests(const Setting& setting) {
   constexpr double sticks = 100;  // mu
   const double omega = setting.launch().at_score(2);
-  const double eta = setting.pairs.empty() ? setting.noise().restitution().truncated_mean()
-                                           : setting.pairs.front().restitution;
+  const double eta =
+      setting.pairs.empty() ? setting.noise().restitution().truncated_mean() : setting.pairs.front().restitution;
   const dynamics::LandingEnd end = setting.motion().land(setting.first_landing_leg, omega, {eta, sticks}).end;
   return end == dynamics::LandingEnd::rest || end == dynamics::LandingEnd::given_up;
 }
@@ -365,7 +365,8 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
   // A table of landings takes part of the time.
   const bool tabulates = setting.law == dynamics::Law::settled && !options.direct && !setting.noise_free();
   const bool launch_known = !setting.steady_launch || setting.steady_speed;
-  if (tabulates && launch_known && fast_launch_rests(setting)) {  // a table is not worth its time where no launch passes
+  if (tabulates && launch_known &&
+      fast_launch_rests(setting)) {  // a table is not worth its time where no launch passes
     const Problem direct = setting.problem({.direct = true});
     if (rests_at_once(direct)) {
       Metastability result = followed_study(direct, options);

@@ -122,7 +122,7 @@ struct StepsToRest {
 
 /// Holds the eigenvalues of the chain: they say how fast it fails, and how fast it forgets its start.
 struct Spectrum {
-  Estimate failure_rate;                     ///< 1 - lambda_1 per step
+  Estimate failure_rate;  ///< 1 - lambda_1 per step
   /// Per step, falling: lambda_1, and others that rounding leaves six digits, none for a map without noise.
   std::vector<double> moduli;
   int period = 1;                            ///< steps after which a phase comes again
@@ -182,8 +182,8 @@ Metastability study(const Problem& problem, const StudyOptions& options = {});
 /// friction below 1e-3 that is not 0
 void check_setting(const Setting& setting, Method method);
 
-/// Does the same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer; of a steady launch
-/// the speeds are found first (steadily_launched()), and are in that setting.
+/// Does the same for a wheel on a ramp: setting.problem(), with Metastability::setting in the answer; of a steady
+/// launch the speeds are found first (steadily_launched()), and are in that setting.
 /// @throws std::invalid_argument also as check_setting() and steadily_launched()
 Metastability study(const Setting& setting, const StudyOptions& options = {});
 

@@ -12,8 +12,8 @@ namespace metastable::analysis {
 
 /// One event that was followed.
 struct FollowedEvent {
-  double state = 0;               ///< before the next event
-  double seconds = 0, metres = 0; ///< from the event to the next one; 0 if unknown
+  double state = 0;                ///< before the next event
+  double seconds = 0, metres = 0;  ///< from the event to the next one; 0 if unknown
 };
 /// Goes on by one event at every call; returns nothing once the system has come to rest.
 using Run = std::function<std::optional<FollowedEvent>()>;

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "dynamics/wheel/law_quantities.h"
 #include "dynamics/numerics/truncated_normal.h"
+#include "dynamics/wheel/law_quantities.h"
 
 namespace metastable::analysis {
 namespace {
@@ -44,7 +44,8 @@ bool rolls_on(const Problem& problem) {
   const std::vector<double> no_noise(static_cast<std::size_t>(problem.map.noise_dimension()), 0.0);
   double state = problem.launch.state(0);
   for (int step = 0; step < problem.map.phases(); ++step) {
-    const std::optional<double> next = problem.map.landing(state, (problem.launch.phase + step) % problem.map.phases(), no_noise);
+    const std::optional<double> next =
+        problem.map.landing(state, (problem.launch.phase + step) % problem.map.phases(), no_noise);
     if (!next) return false;
     state = *next;
   }

@@ -131,21 +131,22 @@ class Falls {
     std::vector<std::size_t> stepped;  // those inside the section
     for (const std::size_t i : nodes)
       if (!map_.inside || map_.inside(phase_[i], state_[i])) stepped.push_back(i);
-    for (std::size_t k = 0; k < nodes.size(); ++k) place_scores(nodes[k], std::span(scores).subspan(k * m * s, m * s),
-                                                                std::span(weight).subspan(k * m, m));
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      place_scores(nodes[k], std::span(scores).subspan(k * m * s, m * s), std::span(weight).subspan(k * m, m));
     std::vector<double> asked;
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       if (!std::binary_search(stepped.begin(), stepped.end(), nodes[k])) continue;
-      for (std::size_t n = 0; n < m; ++n)
-        states.insert(states.end(), state_[nodes[k]].begin(), state_[nodes[k]].end());
+      for (std::size_t n = 0; n < m; ++n) states.insert(states.end(), state_[nodes[k]].begin(), state_[nodes[k]].end());
       asked.insert(asked.end(), &scores[k * m * s], &scores[k * m * s] + m * s);
     }
     std::vector<double> next(stepped.size() * m * d);
     std::vector<std::uint8_t> falls(stepped.size() * m, 0);
     if (!stepped.empty()) markov::checked_step(map_, phase_[nodes.front()], states, asked, next, falls);
     for (std::size_t k = 0, at = 0; k < nodes.size(); ++k) {
-      Tried tried{{&scores[k * m * s], &scores[k * m * s] + m * s}, std::vector<double>(m * d),
-                  std::vector<std::uint8_t>(m, 1), {}};
+      Tried tried{{&scores[k * m * s], &scores[k * m * s] + m * s},
+                  std::vector<double>(m * d),
+                  std::vector<std::uint8_t>(m, 1),
+                  {}};
       if (std::binary_search(stepped.begin(), stepped.end(), nodes[k])) {
         tried.next.assign(&next[at * m * d], &next[at * m * d] + m * d);
         tried.falls.assign(&falls[at * m], &falls[at * m] + m);
@@ -269,8 +270,10 @@ WalkerFalls how_it_falls(const markov::BatchMap& map, std::span<const double> st
     throw std::invalid_argument("how it falls: one noise for each score expected");
   const double spacing = study.sizes.at(1).spacing;
   WalkerFalls falls =
-      Falls(map, start, noises, {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes,
-             .row_states = study.row_states}, study, options.threads)
+      Falls(
+          map, start, noises,
+          {.spacing = spacing, .seed = options.seed, .most_bytes = options.most_bytes, .row_states = study.row_states},
+          study, options.threads)
           .tell();
   falls.spacing = spacing;
   return falls;

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "dynamics/step_density/collision_density.h"
 #include "dynamics/settled/settled_density.h"
+#include "dynamics/step_density/collision_density.h"
 #include "dynamics/wheel/wheel.h"
 
 namespace metastable::dynamics {

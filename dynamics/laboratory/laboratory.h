@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/catalogue/effect_catalogue.h"
 #include "dynamics/laboratory/laboratory_changes.h"
 #include "dynamics/laboratory/outside_effect.h"
 #include "dynamics/laboratory/rolling_motion.h"
 #include "dynamics/wheel/contact_law.h"
 #include "dynamics/wheel/contact_noise.h"
-#include "dynamics/catalogue/effect_catalogue.h"
 #include "dynamics/wheel/outcome.h"
 
 namespace metastable::dynamics {

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "dynamics/laboratory/outside_effect.h"
 #include "dynamics/catalogue/effect_catalogue.h"
+#include "dynamics/laboratory/outside_effect.h"
 
 namespace metastable::dynamics {
 

@@ -19,8 +19,8 @@ struct Piece {
   double width, from, to, slope_from, slope_to;
   double value(double t) const {
     const double u = 1 - t;
-    const double cubic = from * (1 + 2 * t) * u * u + to * t * t * (3 - 2 * t) +
-                         width * t * u * (slope_from * u - slope_to * t);
+    const double cubic =
+        from * (1 + 2 * t) * u * u + to * t * t * (3 - 2 * t) + width * t * u * (slope_from * u - slope_to * t);
     return std::clamp(cubic, from, to);  // but for rounding it is within
   }
   double slope(double t) const {

@@ -33,8 +33,7 @@ Contact contact_at(const ContactNoise& noise, std::uint64_t seed, std::uint64_t 
 // Follows one trial as it unfolds. Event 0 of a trial is the launch, event n its collision n.
 class Roll {
  public:
-  Roll(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg, std::uint64_t seed,
-       std::uint64_t index)
+  Roll(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg, std::uint64_t seed, std::uint64_t index)
       : map_(map), first_(first_landing_leg), seed_(seed), index_(index) {
     const double omega = launch.at_score(scores(seed, index, 0)[0]);
     state_ = omega * omega;
@@ -78,8 +77,8 @@ void check_ramp(double ramp_length) {
 // Follows a trial under `settled` as it unfolds.
 class SettledTrial {
  public:
-  SettledTrial(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
-               int first_landing_leg, std::uint64_t seed, std::uint64_t index)
+  SettledTrial(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch, int first_landing_leg,
+               std::uint64_t seed, std::uint64_t index)
       : noise_(noise),
         seed_(seed),
         index_(index),
@@ -128,8 +127,7 @@ int last_collision_on_ramp(std::span<const double> advance, int first_phase, dou
   return number;
 }
 
-Trial simulate_trial(const WheelMap& map, const LaunchSpeed& launch, const TrialOptions& options,
-                     std::uint64_t index) {
+Trial simulate_trial(const WheelMap& map, const LaunchSpeed& launch, const TrialOptions& options, std::uint64_t index) {
   check_collisions(options);
   const int last = last_collision_on_ramp(map, options.first_landing_leg, options.ramp_length);
   Roll roll(map, launch, options.first_landing_leg, options.seed, index);
@@ -216,8 +214,8 @@ RolledOn roll_on(const SettledMotion& motion, const ContactNoise& noise, const L
   }
 }
 
-std::uint64_t steps_to_rest(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg,
-                            std::uint64_t seed, std::uint64_t index, std::uint64_t limit) {
+std::uint64_t steps_to_rest(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg, std::uint64_t seed,
+                            std::uint64_t index, std::uint64_t limit) {
   check_leg(map.wheel().legs(), first_landing_leg);
   for (Roll roll(map, launch, first_landing_leg, seed, index);;) {
     const Stance& stance = map.stance(roll.phase());

@@ -41,8 +41,7 @@ struct TrialOptions {
 /// Simulates trial `index` of a run: launch speed omega_0 ~ launch and (eta, mu) of each collision
 /// come from Philox at counter (index, collision): the same bits whatever ran before and on however many threads.
 /// @throws std::invalid_argument for options out of range
-Trial simulate_trial(const WheelMap& map, const LaunchSpeed& launch, const TrialOptions& options,
-                     std::uint64_t index);
+Trial simulate_trial(const WheelMap& map, const LaunchSpeed& launch, const TrialOptions& options, std::uint64_t index);
 
 /// Does the same under `settled`: the wheel is rolled event by event, with whatever motion its feet still have when the
 /// next leg touches. Before the first collision it stands on a foot with that collision's contact. `loss` is that of
@@ -54,8 +53,8 @@ Trial simulate_trial(const SettledMotion& motion, const ContactNoise& noise, con
                      const TrialOptions& options, std::uint64_t index);
 
 /// Counts the steps before failure of trial `index` without storing it, at most `limit` (returned when reached).
-std::uint64_t steps_to_rest(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg,
-                            std::uint64_t seed, std::uint64_t index, std::uint64_t limit);
+std::uint64_t steps_to_rest(const WheelMap& map, const LaunchSpeed& launch, int first_landing_leg, std::uint64_t seed,
+                            std::uint64_t index, std::uint64_t limit);
 
 std::uint64_t steps_to_rest(const SettledMotion& motion, const ContactNoise& noise, const LaunchSpeed& launch,
                             int first_landing_leg, std::uint64_t seed, std::uint64_t index, std::uint64_t limit);

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "dynamics/numerics/normal_table.h"
-#include "dynamics/settled/touch_sum.h"
 #include "dynamics/numerics/truncated_normal.h"
+#include "dynamics/settled/touch_sum.h"
 
 namespace metastable::dynamics {
 namespace {

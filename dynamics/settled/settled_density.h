@@ -7,8 +7,8 @@
 #include <cmath>
 #include <optional>
 
-#include "dynamics/step_density/collision_density.h"
 #include "dynamics/settled/landing_shares.h"
+#include "dynamics/step_density/collision_density.h"
 
 namespace metastable::dynamics {
 

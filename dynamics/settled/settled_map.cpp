@@ -23,8 +23,8 @@ constexpr std::size_t most_kept = 32;       // maps, of some 8 MB
 // Of a processor: the table of the paper's wheel takes 8 s of its landings of 20 us, those of slopes of 15 deg or of a
 // radius of gyration of 0.4 m a minute; where it is 5 mm, feet slide for milliseconds of computing.
 constexpr double longest_build = 900;  // [s]
-constexpr int foreseen_from = 96;       // landings
-constexpr double landings_a_node = 2;   // beside those kept, mu_r and the kinks are solved for
+constexpr int foreseen_from = 96;      // landings
+constexpr double landings_a_node = 2;  // beside those kept, mu_r and the kinks are solved for
 
 // Says how far a landing gets beyond the barrier: the settled foot's omega_eq^2 less the barrier's; its sign says rest.
 double beyond_barrier(const Landing& landing, double barrier) {
@@ -416,10 +416,10 @@ void SettledMap::foresee() const {
     motion_.land(leg, omega, {eta, sticking_[static_cast<std::size_t>(leg)] * spread(i, 2)});
     const double spent = processor_seconds() - from, each = spent / static_cast<double>(i + 1);
     if (each * landings > longest_build && (spent > enough || i + 1 == foreseen_from))
-      throw TableTooLong(
-          fmt::format("the table of landings would take about {:.2g} min of a processor, more than {:.0f}, as one landing "
-                      "of this wheel takes {:.2g} ms",
-                      each * landings / 60, longest_build / 60, 1e3 * each));
+      throw TableTooLong(fmt::format(
+          "the table of landings would take about {:.2g} min of a processor, more than {:.0f}, as one landing "
+          "of this wheel takes {:.2g} ms",
+          each * landings / 60, longest_build / 60, 1e3 * each));
   }
 }
 

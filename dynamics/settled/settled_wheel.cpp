@@ -123,8 +123,8 @@ double StandingFoot::duration(double next_squared) const {
   const double bend = gravity_ * length_ * std::cos(apex_ + std::atan2(sine_, cosine_)), width = std::sqrt(left / bend);
   const auto smooth = [&](double u) {
     const double angle = apex_ + width * std::sinh(u);
-    const double squared = std::max(spin_squared(angle, energy), left * (1 + std::sinh(u) * std::sinh(u)) / 2 /
-                                                                     inertia(angle));
+    const double squared =
+        std::max(spin_squared(angle, energy), left * (1 + std::sinh(u) * std::sinh(u)) / 2 / inertia(angle));
     return width * std::cosh(u) / std::sqrt(squared);
   };
   const double from = std::asinh((landing_ - apex_) / width), to = std::asinh((next_ - apex_) / width);

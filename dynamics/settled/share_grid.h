@@ -4,9 +4,9 @@
 #include <functional>
 #include <memory>
 
+#include "dynamics/settled/landing_shares.h"
 #include "dynamics/settled/settled_wheel.h"
 #include "dynamics/step_density/collision_density.h"
-#include "dynamics/settled/landing_shares.h"
 
 namespace metastable::dynamics {
 

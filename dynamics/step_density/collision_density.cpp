@@ -11,9 +11,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "dynamics/wheel/coulomb_law.h"
-#include "dynamics/step_density/published_roots.h"
 #include "dynamics/numerics/truncated_normal.h"
+#include "dynamics/step_density/published_roots.h"
+#include "dynamics/wheel/coulomb_law.h"
 
 namespace metastable::dynamics {
 namespace {

@@ -55,7 +55,8 @@ void require_landings(const BatchMap& map, int phase, std::span<const double> st
     if (is_landing(map, landing_phase, landing)) continue;
     throw MapError(fmt::format("return map: from the state {} (phase {}) it leads to {}, which is {}",
                                describe_state(map, states.subspan(i * dimension, dimension)), phase,
-                               describe_state(map, landing), all_finite(landing) ? "outside its own section" : "not finite"));
+                               describe_state(map, landing),
+                               all_finite(landing) ? "outside its own section" : "not finite"));
   }
 }
 

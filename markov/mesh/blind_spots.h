@@ -28,9 +28,10 @@ struct BlindSpots {
 BlindSpots find_blind_spots(const BatchMap& map, const std::vector<NoiseFrame>& frames, const Mesh& mesh,
                             std::span<const double> visits, const MeshOptions& options);
 
-/// Returns whether the chance of failing jumps between nodes that are neighbours by so much that it matters, as where a failure is told by the state
-/// before the step: of the pairs whose difference is worth a share of the rate, the largest first, it halves the edge,
-/// and again the half that differs more, seven times. A smooth chance differs by about 1/128 then.
+/// Returns whether the chance of failing jumps between nodes that are neighbours by so much that it matters, as where a
+/// failure is told by the state before the step: of the pairs whose difference is worth a share of the rate, the
+/// largest first, it halves the edge, and again the half that differs more, seven times. A smooth chance differs by
+/// about 1/128 then.
 /// @param visits, options  as above
 bool failing_jumps(const BatchMap& map, const std::vector<NoiseFrame>& frames, const Mesh& mesh,
                    std::span<const double> visits, const MeshOptions& options);

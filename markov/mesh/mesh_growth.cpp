@@ -201,8 +201,8 @@ void MeshGrowth::store(std::uint32_t node, Parts& parts, double failed, double a
 }
 
 /// Returns states in rows that stand for a node: its own, or so many spread as the sum of two numbers even over half a
-/// spacing to either side, which is how far landings are shared. They lie on a lattice of rank one, moved by an offset of
-/// the node's own.
+/// spacing to either side, which is how far landings are shared. They lie on a lattice of rank one, moved by an offset
+/// of the node's own.
 std::vector<double> MeshGrowth::row_states(std::uint32_t node, std::size_t count) const {
   std::vector<double> states = lattice_.state(key_[node]);
   if (options_.row_states == 1) {
@@ -228,8 +228,8 @@ std::vector<double> MeshGrowth::row_states(std::uint32_t node, std::size_t count
   return states;
 }
 
-/// Puts lines through the scores that a node is landed from, along the first: of one score there is one from each of its
-/// states, of several a lattice of the others, moved by an offset of the node's own. As far as the action allows.
+/// Puts lines through the scores that a node is landed from, along the first: of one score there is one from each of
+/// its states, of several a lattice of the others, moved by an offset of the node's own. As far as the action allows.
 /// Returns the weight of the lines from states outside the section, which are left out: they count as failed.
 double MeshGrowth::add_lines(std::uint32_t node, Lines& lines) const {
   const double far = std::min(options_.score_reach, kFarther + std::sqrt(2 * std::max(0.0, limit() - action_[node])));
@@ -269,7 +269,8 @@ double MeshGrowth::add_lines(std::uint32_t node, Lines& lines) const {
     const auto others = std::span(score).subspan(i * fixed, fixed);
     const double left = far * far - std::inner_product(others.begin(), others.end(), others.begin(), 0.0);
     if (left > 0)
-      add(std::span(states).subspan(i * apart % m * d, d), others, weight[i] / sum, std::max(kFarther, std::sqrt(left)));
+      add(std::span(states).subspan(i * apart % m * d, d), others, weight[i] / sum,
+          std::max(kFarther, std::sqrt(left)));
   }
   return outside;
 }

@@ -38,11 +38,11 @@ constexpr std::size_t kWalks = 512;      // counted where trials would be fewer,
 constexpr double kCounted = 0.5;         // with so much of the steps: an eighth of a quick study's time
 constexpr std::size_t kPilotShare = 16;  // trials for one of the pilot, which sees whether trials end,
 constexpr std::size_t kPilotLeast = 8, kPilotMost = 128;
-constexpr double kPilotSteps = 4;     // within so many times the expected steps: of 8, 8 or 7 do.
+constexpr double kPilotSteps = 4;  // within so many times the expected steps: of 8, 8 or 7 do.
 // States of a row where the chance of failing jumps, by dimension: of 32 in one dimension shifts differ by 4 per cent.
 constexpr std::array<int, 4> kRowStates{256, 32, 16, 16};
 constexpr double kMemorySideBySide = 0.5;  // of all: for the meshes of a dear map that grow side by side
-constexpr double kLongestTrial = 30;  // times the expected steps: one trial of 1e13 takes longer
+constexpr double kLongestTrial = 30;       // times the expected steps: one trial of 1e13 takes longer
 
 /// Returns the coarsest spacings that the extrapolation was found to bear, by dimension.
 double coarsest(int dimension) {
@@ -271,8 +271,8 @@ class Run {
   }
 
   double guided_rows(int forgets, int window) const {
-    const double lattice = static_cast<double>(ScoreLattice(map_.scores, GuidedOptions().score_spacing,
-                                                            GuidedOptions().score_reach).size());
+    const double lattice = static_cast<double>(
+        ScoreLattice(map_.scores, GuidedOptions().score_spacing, GuidedOptions().score_reach).size());
     return static_cast<double>(options_.guided_samples) * (2 * forgets + window * lattice);
   }
 
@@ -501,12 +501,12 @@ class Run {
   const MeshStudyOptions& options_;
   std::vector<NoiseFrame> frames_;
   std::size_t sizes_, shifts_;
-  int at_once_;  ///< meshes
+  int at_once_;                                                ///< meshes
   std::vector<std::vector<double>> steps_, rates_, brackets_;  ///< logs, [shift][size]
   MeshStudy study_;
   double tail_rate_ = 0;  ///< a step, beyond the survival of the study
   double coarse_mixing_ = 0;
-  Spent coarsest_, searched_;  ///< on the coarsest mesh, on the search for other gaits
+  Spent coarsest_, searched_;    ///< on the coarsest mesh, on the search for other gaits
   std::unique_ptr<Mesh> guide_;  ///< of guided sampling
   std::mutex mutex_;
   WorkLeft work_;

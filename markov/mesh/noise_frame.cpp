@@ -36,6 +36,7 @@ class Probe {
                                 describe_state(map_, {state.data(), static_cast<std::size_t>(state.size())})));
     return next;
   }
+
  private:
   const BatchMap& map_;
 };
@@ -80,8 +81,7 @@ class Rows {
     const auto d = static_cast<std::size_t>(map_.dimension), r = static_cast<std::size_t>(row);
     const auto state = std::span(states_).subspan(r * d, d), next = std::span(next_).subspan(r * d, d);
     require_landings(map_, phase_, state, next, std::span(failed_).subspan(r, 1));
-    if (failed_[r])
-      throw NoOrbit(fmt::format("return map: {}, from the state {}", when, describe_state(map_, state)));
+    if (failed_[r]) throw NoOrbit(fmt::format("return map: {}, from the state {}", when, describe_state(map_, state)));
     return Eigen::Map<const VectorXd>(next.data(), map_.dimension);
   }
   /// Returns nothing where it fails or leads nowhere.

@@ -135,8 +135,7 @@ class Search {
         for (std::size_t i = 0; i < states.size(); ++i)
           for (std::size_t k = 0; k < s_; ++k) {
             const std::size_t heat = i / kHotWalks, walk = i % kHotWalks;
-            const double u =
-                uniforms(seed, kHotStream + heat, walk * s_ + k, static_cast<std::uint64_t>(number))[0];
+            const double u = uniforms(seed, kHotStream + heat, walk * s_ + k, static_cast<std::uint64_t>(number))[0];
             scores[i * s_ + k] = std::clamp(kHeats[heat] * normal_score(u), -kHottest, kHottest);
           }
         step(phase, states, scores);

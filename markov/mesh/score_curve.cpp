@@ -305,15 +305,14 @@ class Following {
                        std::span(failed_).first(sure));
       // What was not asked for yet and leads to no number is asked for again, if ever, and then named.
       for (std::size_t i = 0; i < asked.size(); ++i)
-        if (i < sure || failed_[i] || is_landing(map_, (phase_ + 1) % map_.phases, std::span(next_).subspan(i * d_, d_)))
+        if (i < sure || failed_[i] ||
+            is_landing(map_, (phase_ + 1) % map_.phases, std::span(next_).subspan(i * d_, d_)))
           known[asked[i].first].emplace(asked[i].second, landing_of(i));
     }
   }
 
  private:
-  void clear() {
-    from_.clear(), scores_.clear(), next_.clear(), failed_.clear();
-  }
+  void clear() { from_.clear(), scores_.clear(), next_.clear(), failed_.clear(); }
 
   void add(std::size_t n, double score) {
     from_.insert(from_.end(), lines_.states.data() + n * d_, lines_.states.data() + (n + 1) * d_);

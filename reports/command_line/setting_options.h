@@ -38,8 +38,8 @@ void set_launch(analysis::Setting& setting, const std::optional<std::string>& te
 analysis::Setting one_setting(const Options& options, const Pairs& pairs = {}, const char* slope_option = "slope");
 /// Makes one setting a value of --slopes, at least `least` of them, with --initial-speed once a slope; checked.
 std::vector<analysis::Setting> several_settings(const Options& options, std::size_t least);
-/// Adds what several settings are told apart by: the slopes, and means and sds of eta and mu; lets the options of wheel,
-/// contact and course, added before, hold several values.
+/// Adds what several settings are told apart by: the slopes, and means and sds of eta and mu; lets the options of
+/// wheel, contact and course, added before, hold several values.
 void add_compared(Options& options);
 /// Makes all combinations of the values that were given, two settings at least, the first of all in front; checked. Of
 /// several slopes --initial-speed is given once a slope. Where laws differ, an option counts for those that know it.

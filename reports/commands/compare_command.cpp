@@ -72,7 +72,7 @@ std::string compare_answer_text(const CompareRequest& request, const CompareAnsw
   for (std::size_t i = 0; i < comparison.studies.size(); ++i) {
     const std::string& label = comparison.labels[i];
     if (!request.settings[i].describe().starts_with(label)) text += label + ": ";
-        text += study_text(comparison.studies[i], answer.thresholds[i],
+    text += study_text(comparison.studies[i], answer.thresholds[i],
                        extras.rigid_bodies.empty() ? nullptr : &extras.rigid_bodies[i]);
     if (!extras.steps.empty())
       text += fmt::format("  {:<38}{}\n", "95 % interval from standard errors", propagated_text(extras.steps[i]));

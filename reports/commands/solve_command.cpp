@@ -28,7 +28,8 @@ constexpr double looks_a_crossing = 12;  // about, for the progress line
 // Tells of points looked at, from any thread.
 class Looking {
  public:
-  Looking(Tell tell, std::size_t points) : tell_(std::move(tell)), all_(static_cast<double>(points) + looks_a_crossing) {}
+  Looking(Tell tell, std::size_t points)
+      : tell_(std::move(tell)), all_(static_cast<double>(points) + looks_a_crossing) {}
   void looked_at(std::size_t points) {
     const std::scoped_lock lock(mutex_);
     looked_at_ = static_cast<double>(points);
@@ -49,8 +50,8 @@ class Looking {
 double walker_survival(const markov::MeshStudy& passage, int n) {
   const std::vector<double>& head = passage.survival;
   const auto known = std::min(static_cast<std::size_t>(n), head.size() - 1);
-  return head[known] * std::exp(static_cast<double>(static_cast<std::size_t>(n) - known) *
-                                std::log1p(-passage.failure_rate.value));
+  return head[known] *
+         std::exp(static_cast<double>(static_cast<std::size_t>(n) - known) * std::log1p(-passage.failure_rate.value));
 }
 
 Answered walker_answer(const SolveRequest& request, const analysis::WalkerSetting& setting, int threads,
@@ -88,9 +89,9 @@ Solution solve_walker(const SolveRequest& request, const analysis::SolveOptions&
   };
   const analysis::SolveRange range = walker_range(request);
   for (const double end : {options.from.value_or(range.from), options.to.value_or(range.to)}) with(end).map();
-  Solution solution = analysis::solve(
-      [&](double value, int threads) { return walker_answer(request, with(value), threads, looking); }, request.target,
-      range, options);
+  Solution solution =
+      analysis::solve([&](double value, int threads) { return walker_answer(request, with(value), threads, looking); },
+                      request.target, range, options);
   solution.parameter = request.of_slope_sd ? "slope-sd" : "slope";
   solution.unit = "deg";
   return solution;
@@ -107,7 +108,9 @@ SolveJson solve_number(double value) {
   return value;
 }
 
-SolveJson solve_interval(const analysis::Estimate& estimate) { return {solve_number(estimate.lower), solve_number(estimate.upper)}; }
+SolveJson solve_interval(const analysis::Estimate& estimate) {
+  return {solve_number(estimate.lower), solve_number(estimate.upper)};
+}
 
 SolveJson target_json(const Target& target) {
   switch (target.of) {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "analysis/sensitivity/solve.h"
 #include "analysis/sensitivity/rigid_body_check.h"
+#include "analysis/sensitivity/solve.h"
 #include "analysis/walkers/walker_study.h"
 #include "markov/mesh/mesh_study.h"
 #include "reports/study/study_progress.h"

@@ -64,12 +64,13 @@ std::string row(const SweepRequest& request, const analysis::SweepPoint& point) 
   for (const double value : point.at) text += fmt::format("{},", value);
   const std::string last = (request.rigid_bodies ? rigid_bodies_columns(point.rigid_bodies) : "") + "\n";
   if (point.failure) return text + fmt::format(",,,,,,,,{}", analysis::status_text(study.status)) + last;
-  return text + fmt::format("{},{},{},{},{},{},{},{},{}", number(study.steps.from_start.value),
-                            number(study.steps.from_start.lower), number(study.steps.from_start.upper),
-                            number(study.steps.from_quasi_stationary.value), number(study.spectrum.failure_rate.value),
-                            number(study.survivors.mean), number(study.survivors.sd),
-                            study.steps.reach_end ? number(*study.steps.reach_end) : "",
-                            analysis::status_text(study.status)) + last;
+  return text +
+         fmt::format("{},{},{},{},{},{},{},{},{}", number(study.steps.from_start.value),
+                     number(study.steps.from_start.lower), number(study.steps.from_start.upper),
+                     number(study.steps.from_quasi_stationary.value), number(study.spectrum.failure_rate.value),
+                     number(study.survivors.mean), number(study.survivors.sd),
+                     study.steps.reach_end ? number(*study.steps.reach_end) : "", analysis::status_text(study.status)) +
+         last;
 }
 
 // Says what rolled wheels show, from the table's numbers: points taken over from a file count too.

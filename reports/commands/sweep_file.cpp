@@ -158,8 +158,9 @@ std::optional<Figure> figure_of(const SweepFile& sweep, const Table& table) {
     if (std::none_of(line.y.begin(), line.y.end(), [](double value) { return std::isfinite(value); })) continue;
     figure.series.push_back(std::move(band));
     figure.series.push_back(std::move(line));
-    if (auto points = rigid_bodies_of(table, across.values, static_cast<int>(shown == 1 ? 1 : j),
-                                      [&](std::size_t i) { return i * stride + (second == 1 ? k * stride_second : 0); })) {
+    if (auto points = rigid_bodies_of(table, across.values, static_cast<int>(shown == 1 ? 1 : j), [&](std::size_t i) {
+          return i * stride + (second == 1 ? k * stride_second : 0);
+        })) {
       if (rolled) points->label.clear();
       rolled = true;
       figure.series.push_back(std::move(*points));

@@ -39,10 +39,10 @@ analysis::SimulatedCondition one_condition(const SimulateRequest& request, const
   const markov::Share progress = begun(begin, "simulate");
   return {fmt::format("{}", setting.slope_deg), setting,
           analysis::simulate_trials(setting, {.trials = request.trials,
-                                                      .collisions = request.collisions,
-                                                      .seed = request.seed,
-                                                      .threads = request.threads,
-                                                      .progress = progress})};
+                                              .collisions = request.collisions,
+                                              .seed = request.seed,
+                                              .threads = request.threads,
+                                              .progress = progress})};
 }
 
 template <typename Request>
@@ -65,9 +65,8 @@ SimulatedExperiment simulated_experiment(const SimulateRequest& request, const B
   if (std::isinf(request.setting.ramp_length))  // experiment.toml states where the ramp ends
     throw std::invalid_argument("--ramp-length: inf: the ramp of an experiment ends; up to 100000 m do");
   const std::vector<analysis::SimulatedCondition> conditions =
-      request.stand_in
-          ? analysis::stand_in(request.setting, request.seed, request.threads, begun(begin, "simulate"))
-          : std::vector<analysis::SimulatedCondition>{one_condition(request, begin)};
+      request.stand_in ? analysis::stand_in(request.setting, request.seed, request.threads, begun(begin, "simulate"))
+                       : std::vector<analysis::SimulatedCondition>{one_condition(request, begin)};
   Provenance provenance{request.command, {}, request.seed, version()};
   for (const analysis::SimulatedCondition& condition : conditions)
     provenance.settings += (provenance.settings.empty() ? "" : "\n") + condition.setting.describe();

@@ -13,9 +13,9 @@ namespace metastable::reports {
 bool stderr_is_terminal();
 
 /// Shows "label  37 % (37 of 100), about 12 s left" on one line of a terminal, redrawn at most ten times a second and
-/// wiped at the end. Of the time left it says nothing while the work has stood still for a tenth of the time: what takes
-/// longer than was foreseen takes no one knows how long. Writes nothing where there is no terminal. advance() may be
-/// called from any thread.
+/// wiped at the end. Of the time left it says nothing while the work has stood still for a tenth of the time: what
+/// takes longer than was foreseen takes no one knows how long. Writes nothing where there is no terminal. advance() may
+/// be called from any thread.
 class Progress {
  public:
   /// Writes on standard error. @param total units of work, >= 1

@@ -66,8 +66,8 @@ bool is_words(const std::string& value) {
 
 // Names what Python calls otherwise: with its unit, without a negation, in the plural.
 constexpr std::pair<const char*, const char*> other_names[] = {
-    {"slope", "slope_deg"},  {"slopes", "slope_deg"}, {"slope-sd", "slope_sd_deg"}, {"memory", "memory_gb"},
-    {"from", "start"},       {"to", "stop"},
+    {"slope", "slope_deg"},  {"slopes", "slope_deg"}, {"slope-sd", "slope_sd_deg"},
+    {"memory", "memory_gb"}, {"from", "start"},       {"to", "stop"},
     {"no-flight", "flight"}, {"shuffle", "shuffled"}, {"effect", "effects"}};
 
 }  // namespace
@@ -151,8 +151,8 @@ void Arguments::give(Options& options) const {
     } else if (wanted.ends_with("|steady") && py::isinstance<py::str>(value)) {
       options.give(option, {text(name.c_str())});
     } else if (wanted.find(',') != std::string::npos) {
-      options.give(option,
-                   {list_text(name.c_str(), wanted.starts_with("MEAN,SD") ? "(mean, sd) or a number" : "numbers", object)});
+      options.give(option, {list_text(name.c_str(),
+                                      wanted.starts_with("MEAN,SD") ? "(mean, sd) or a number" : "numbers", object)});
     } else {
       options.give(option, {number_text(name.c_str(), "a number", object)});
     }

@@ -6,7 +6,7 @@
 namespace metastable::reports::python {
 namespace {
 
-constexpr auto glance = std::chrono::milliseconds(50);      // between two looks at Ctrl-C
+constexpr auto glance = std::chrono::milliseconds(50);         // between two looks at Ctrl-C
 constexpr auto stands_still = std::chrono::milliseconds(500);  // before the same is shown again
 
 }  // namespace

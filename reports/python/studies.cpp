@@ -109,7 +109,8 @@ py::dict compare(const py::list& settings, const py::dict& options, const Comman
     html += "<p>" + escape_html(contrast.sentence) + "</p>";
   if (request.rigid_bodies)
     html += "<p>" +
-            escape_html(analysis::rigid_body_sentence(found.extras.rigid_bodies, request.settings.front().law)) + "</p>";
+            escape_html(analysis::rigid_body_sentence(found.extras.rigid_bodies, request.settings.front().law)) +
+            "</p>";
   return answer(compare_answer_json(request, found), compare_answer_text(request, found), html);
 }
 
@@ -161,21 +162,26 @@ py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& op
   };
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   call.run([&] {
-    analysis::sweep(base, all, 0, study, [&](std::size_t, const analysis::SweepPoint& point) {
-      const analysis::Metastability& s = point.study;
-      const bool failed = point.failure != nullptr;
-      const auto add = [&](std::vector<double>& column, double value) { column.push_back(failed ? unknown : value); };
-      for (std::size_t a = 0; a < all.size(); ++a) c.at[a].push_back(point.at[a]);
-      add(c.steps, s.steps.from_start.value), add(c.low, s.steps.from_start.lower);
-      add(c.high, s.steps.from_start.upper), add(c.quasi, s.steps.from_quasi_stationary.value);
-      add(c.rate, s.spectrum.failure_rate.value), add(c.mean, s.survivors.mean), add(c.sd, s.survivors.sd);
-      add(c.reach_end, s.steps.reach_end.value_or(unknown));
-      c.status.push_back(analysis::status_text(s.status));
-      c.message.push_back(s.message);
-      add_rigid_bodies(c, names, point);
-      ++done;
-      study.progress(0, "");
-    }, asked_rigid ? analysis::RigidBodies::asked : analysis::RigidBodies::left_out);
+    analysis::sweep(
+        base, all, 0, study,
+        [&](std::size_t, const analysis::SweepPoint& point) {
+          const analysis::Metastability& s = point.study;
+          const bool failed = point.failure != nullptr;
+          const auto add = [&](std::vector<double>& column, double value) {
+            column.push_back(failed ? unknown : value);
+          };
+          for (std::size_t a = 0; a < all.size(); ++a) c.at[a].push_back(point.at[a]);
+          add(c.steps, s.steps.from_start.value), add(c.low, s.steps.from_start.lower);
+          add(c.high, s.steps.from_start.upper), add(c.quasi, s.steps.from_quasi_stationary.value);
+          add(c.rate, s.spectrum.failure_rate.value), add(c.mean, s.survivors.mean), add(c.sd, s.survivors.sd);
+          add(c.reach_end, s.steps.reach_end.value_or(unknown));
+          c.status.push_back(analysis::status_text(s.status));
+          c.message.push_back(s.message);
+          add_rigid_bodies(c, names, point);
+          ++done;
+          study.progress(0, "");
+        },
+        asked_rigid ? analysis::RigidBodies::asked : analysis::RigidBodies::left_out);
   });
   py::dict columns;
   for (std::size_t a = 0; a < all.size(); ++a) columns[names[a].c_str()] = array_of(std::move(c.at[a]));

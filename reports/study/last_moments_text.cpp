@@ -155,8 +155,7 @@ std::vector<Figure> last_moments_figures(const LastMoments& moments, const std::
     figure.series = {band, line};
     const Estimate& regime = of(moments.regime);
     for (const double level : {regime.lower, regime.value, regime.upper}) {
-      Series usual{
-          level == regime.value ? "the same of all steps" : "", Style::dashed, line.x, {}, {}, {}, 0};
+      Series usual{level == regime.value ? "the same of all steps" : "", Style::dashed, line.x, {}, {}, {}, 0};
       usual.y.assign(line.x.size(), level);
       figure.series.push_back(std::move(usual));
     }

@@ -189,7 +189,8 @@ std::string compare_json(const analysis::Comparison& comparison,
     json["settings"].push_back({{"label", comparison.labels[i]}});
     json["settings"].back().update(study_json(comparison.studies[i], thresholds[i]));
     if (!extras.steps.empty()) json["settings"].back()["from_standard_errors"] = propagated_json(extras.steps[i]);
-    if (!extras.rigid_bodies.empty()) json["settings"].back()["rigid_bodies"] = rigid_bodies_json(extras.rigid_bodies[i]);
+    if (!extras.rigid_bodies.empty())
+      json["settings"].back()["rigid_bodies"] = rigid_bodies_json(extras.rigid_bodies[i]);
   }
   const auto estimate = [](const std::optional<analysis::Estimate>& value) {
     return value ? Json{{"value", number(value->value)}, {"interval_95", interval(*value)}} : Json(nullptr);

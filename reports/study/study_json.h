@@ -7,12 +7,12 @@
 
 #include "analysis/sensitivity/comparison.h"
 #include "analysis/sensitivity/propagation.h"
+#include "analysis/sensitivity/rigid_body_check.h"
 #include "analysis/sensitivity/sensitivity.h"
 #include "analysis/statistics/last_moments.h"
 #include "analysis/study/certify.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/rest_thresholds.h"
-#include "analysis/sensitivity/rigid_body_check.h"
 #include "reports/output/table.h"
 
 namespace metastable::reports {
@@ -28,8 +28,8 @@ struct StepsExtras {
 
 /// Holds what `compare` finds beyond the comparison; the first two are empty without standard errors.
 struct CompareExtras {
-  std::vector<analysis::Propagated> steps = {};   ///< a setting each
-  std::vector<analysis::Propagated> ratios = {};  ///< a contrast each
+  std::vector<analysis::Propagated> steps = {};                ///< a setting each
+  std::vector<analysis::Propagated> ratios = {};               ///< a contrast each
   std::vector<analysis::BesideRigidBodies> rigid_bodies = {};  ///< a setting each; empty where they were not asked for
 };
 

@@ -5,10 +5,10 @@
 #include <string>
 
 #include "analysis/sensitivity/propagation.h"
+#include "analysis/sensitivity/rigid_body_check.h"
 #include "analysis/sensitivity/sensitivity.h"
 #include "analysis/study/metastability.h"
 #include "analysis/study/rest_thresholds.h"
-#include "analysis/sensitivity/rigid_body_check.h"
 
 namespace metastable::reports {
 

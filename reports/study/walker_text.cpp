@@ -216,9 +216,9 @@ std::string map_text(const MapStudy& study, const std::optional<LastMoments>& mo
   const markov::NoiseFreeOrbit& orbit = study.passage.orbit;
   for (std::size_t phase = 0; phase < orbit.frames.size(); ++phase)
     for (std::size_t k = 0; k < study.names.size(); ++k)
-      lines.emplace_back(fmt::format("gait{}: {}", orbit.frames.size() > 1 ? fmt::format(", phase {}", phase) : "",
-                                     study.names[k]),
-                         fmt::format("{:.9g}", orbit.frames[phase].centre[k]));
+      lines.emplace_back(
+          fmt::format("gait{}: {}", orbit.frames.size() > 1 ? fmt::format(", phase {}", phase) : "", study.names[k]),
+          fmt::format("{:.9g}", orbit.frames[phase].centre[k]));
   lines.emplace_back("gait: eigenvalues", eigenvalues_text(orbit.eigenvalues));
   for (auto& line : mesh_lines(study.passage)) lines.push_back(std::move(line));
   return with_moments(lines_text(study.name, lines), moments, width);

@@ -53,8 +53,8 @@ int run(double spacing, double score_spacing) {
   if (ranks.rank() > 0) return 0;
   fmt::print("  expected steps on this mesh           {:.12g} (lower {:.12g}, by PETSc {:.12g})\n", followed.steps,
              followed.steps_lower, solved.steps);
-  fmt::print("  failure rate per step                 {:.12g} (with what leaves the mesh, by SLEPc {:.12g})\n", followed.failure_rate,
-             solved.failure_rate);
+  fmt::print("  failure rate per step                 {:.12g} (with what leaves the mesh, by SLEPc {:.12g})\n",
+             followed.failure_rate, solved.failure_rate);
   fmt::print("  mesh of spacing {:.3g} sd    {} nodes, {} entries\n", spacing, mesh.nodes(), mesh.entries());
   fmt::print("  work    {} products; {} restarts and {} products; {} iterations of GMRES, residual {:.2g}\n",
              followed.products, solved.eigen_iterations, solved.products, solved.linear_iterations, solved.residual);

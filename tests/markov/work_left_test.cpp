@@ -16,7 +16,7 @@ TEST(WorkLeft, ForetellsTheTimeLeft) {
   double now = 0;
   WorkLeft work([&] { return now; });
   now = 10;
-  work.plan(100, 0.1);  // ten seconds
+  work.plan(100, 0.1);   // ten seconds
   work.plan(1000, 0.2);  // two hundred
   EXPECT_DOUBLE_EQ(work.share(), 10.0 / 220);
   work.advance(50);

@@ -1,12 +1,11 @@
 #include "analysis/gap/collision_profile.h"
 
-#include "analysis/fitting/model_fit.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
+#include "analysis/fitting/model_fit.h"
 #include "tests/analysis/diagnosed.h"
 
 namespace metastable::analysis {

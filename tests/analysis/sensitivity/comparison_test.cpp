@@ -47,7 +47,8 @@ TEST(Comparison, NoRatioWhereOneSideIsInfinite) {
 // Of two geometric lifetimes, failure 0.5 and 0.25 a step, seen for 2 collisions, min(T, 3) is 1, 2, 3.
 TEST(Comparison, TrialsToTellApartAreOfStepsWithinTheCollisions) {
   const std::vector<double> a{1, 0.5, 0.25}, b{1, 0.75, 0.5625};
-  const auto design = trials_to_tell_apart(a, b, 2), by_hand = trials_for_power({0, 0.5, 0.25, 0.25}, {0, 0.25, 0.1875, 0.5625});
+  const auto design = trials_to_tell_apart(a, b, 2),
+             by_hand = trials_for_power({0, 0.5, 0.25, 0.25}, {0, 0.25, 0.1875, 0.5625});
   EXPECT_EQ(design->trials, by_hand->trials);
   EXPECT_EQ(design->power, by_hand->power);
   EXPECT_FALSE(trials_to_tell_apart(a, a, 2));

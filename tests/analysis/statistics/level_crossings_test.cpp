@@ -12,7 +12,9 @@ namespace {
 
 // Makes a curve that is known to `half` on either side.
 Curve known_to(double half, double (*height)(double)) {
-  return [half, height](double at, int) { return CurvePoint{at, {height(at), height(at) - half, height(at) + half}, ""}; };
+  return [half, height](double at, int) {
+    return CurvePoint{at, {height(at), height(at) - half, height(at) + half}, ""};
+  };
 }
 
 TEST(LevelCrossings, OfALineAreClosedForms) {
@@ -77,8 +79,8 @@ TEST(LevelCrossings, TakeJumpsAndInfiniteHeights) {
 }
 
 TEST(LevelCrossings, ScanEvenlyInTheLogarithmWhereAsked) {
-  const Crossings found =
-      level_crossings(known_to(0.1, [](double x) { return std::log(x) - 2; }), 1e-3, 1e3, {.points = 7, .logarithmic = true});
+  const Crossings found = level_crossings(known_to(0.1, [](double x) { return std::log(x) - 2; }), 1e-3, 1e3,
+                                          {.points = 7, .logarithmic = true});
   EXPECT_NEAR(found.scanned[1].at, 1e-2, 1e-12);
   ASSERT_EQ(found.crossings.size(), 1U);
   EXPECT_NEAR(std::log(found.crossings.front().at.lower), 1.9, 3e-3);
@@ -88,7 +90,8 @@ TEST(LevelCrossings, ScanEvenlyInTheLogarithmWhereAsked) {
 TEST(LevelCrossings, LeaveOutWhatIsUnknownAndFailBetween) {
   const auto unknown_near = [](double from, double to) {
     return [from, to](double x, int) {
-      return x > from && x < to ? CurvePoint{x, {}, "no answer here"} : CurvePoint{x, {x - 0.5, x - 0.51, x - 0.49}, ""};
+      return x > from && x < to ? CurvePoint{x, {}, "no answer here"}
+                                : CurvePoint{x, {x - 0.5, x - 0.51, x - 0.49}, ""};
     };
   };
   EXPECT_EQ(level_crossings(unknown_near(0.8, 0.9), 0, 1, {}).crossings.size(), 1U);
@@ -98,7 +101,8 @@ TEST(LevelCrossings, LeaveOutWhatIsUnknownAndFailBetween) {
 
 TEST(LevelCrossings, AreTheSameOnAnyNumberOfThreads) {
   const Curve curve = known_to(0.2, [](double x) { return std::cos(3 * x) + 0.1 * x; });
-  const Crossings one = level_crossings(curve, 0, 5, {.threads = 1}), two = level_crossings(curve, 0, 5, {.threads = 2});
+  const Crossings one = level_crossings(curve, 0, 5, {.threads = 1}),
+                  two = level_crossings(curve, 0, 5, {.threads = 2});
   ASSERT_EQ(one.crossings.size(), two.crossings.size());
   for (std::size_t i = 0; i < one.crossings.size(); ++i)
     EXPECT_EQ(one.crossings[i].at.value, two.crossings[i].at.value);

@@ -46,8 +46,8 @@ TEST(SteadyLaunch, IsWhatSurvivorsHaveLegByLeg) {
   double count = 0, sum = 0, squares = 0;
   const dynamics::WheelMap map = launched.map();
   for (std::uint64_t t = 0; t < 4000; ++t) {
-    const dynamics::Trial trial = dynamics::simulate_trial(
-        map, launched.launch(), {.max_collisions = 64, .ramp_length = 1000, .seed = 5}, t);
+    const dynamics::Trial trial =
+        dynamics::simulate_trial(map, launched.launch(), {.max_collisions = 64, .ramp_length = 1000, .seed = 5}, t);
     for (const dynamics::TrialCollision& c : trial.collisions) {
       if (c.number < 32 || c.leg != 3) continue;
       ++count, sum += c.omega_minus, squares += c.omega_minus * c.omega_minus;

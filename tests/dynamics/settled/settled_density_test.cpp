@@ -11,9 +11,9 @@
 #include <random>
 #include <vector>
 
+#include "dynamics/extended_wheel/extended_wheel.h"
 #include "dynamics/settled/settled_motion.h"
 #include "dynamics/settled/share_grid.h"
-#include "dynamics/extended_wheel/extended_wheel.h"
 
 namespace metastable::dynamics {
 namespace {

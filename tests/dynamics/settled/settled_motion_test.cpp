@@ -29,7 +29,8 @@ SettledWheel any_wheel() {
   return wheel;
 }
 
-// Values of an independent prototype of the law, J = 0.0025 kg m^2, the paper's legs, r = 0, v_tol = 1e-8: good to 4e-9.
+// Values of an independent prototype of the law, J = 0.0025 kg m^2, the paper's legs, r = 0, v_tol = 1e-8: good to
+// 4e-9.
 struct KnownAnswer {
   double slope_deg;
   int leg;

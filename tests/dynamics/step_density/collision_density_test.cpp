@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/numerics/truncated_normal.h"
 #include "dynamics/return_map/landing_density.h"
 #include "dynamics/return_map/rest_probability.h"
-#include "dynamics/numerics/truncated_normal.h"
 #include "tests/dynamics/support.h"
 
 namespace metastable::dynamics {

@@ -98,7 +98,8 @@ TEST(JoinedSteps, AnswerADearMapAsAnyOther) {
     return found;
   };
   std::vector<std::size_t> plain_rows, one_rows, three_rows;
-  const MeshStudy plain = study(false, 1, plain_rows), one = study(true, 1, one_rows), three = study(true, 3, three_rows);
+  const MeshStudy plain = study(false, 1, plain_rows), one = study(true, 1, one_rows),
+                  three = study(true, 3, three_rows);
   for (const MeshStudy* other : {&one, &three}) {
     EXPECT_EQ(other->steps.value, plain.steps.value);
     EXPECT_EQ(other->steps.upper, plain.steps.upper);

@@ -81,9 +81,21 @@ TEST_F(JsonOfEveryCommand, IsAFileBesideWhatIsPrintedOrRefused) {
 
 // What is printed without it is told with it, and the files that were written.
 TEST_F(JsonOfEveryCommand, TellsWhatIsPrinted) {
-  const std::vector<std::string> words{
-      "sweep", "--law", "published", "--friction-mean", "0.3,0.4", "--cells", "16", "--samples", "64", "--replicates", "2", "--threads", "1",
-      "--out", path("sweep.csv")};
+  const std::vector<std::string> words{"sweep",
+                                       "--law",
+                                       "published",
+                                       "--friction-mean",
+                                       "0.3,0.4",
+                                       "--cells",
+                                       "16",
+                                       "--samples",
+                                       "64",
+                                       "--replicates",
+                                       "2",
+                                       "--threads",
+                                       "1",
+                                       "--out",
+                                       path("sweep.csv")};
   const Json told = answer(words);
   std::string said;
   for (const Json& line : told["said"]) said += line.get<std::string>() + "\n";
