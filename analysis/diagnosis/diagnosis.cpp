@@ -307,7 +307,7 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
   const double share_of_effects =
       share_probabilities(d, model, ranking, ordered, candidates.size(), gap, chosen.unnamed);
   give_verdict(d, gap, chosen.unnamed, share_of_effects);
-  if (!d.causes.at_work.empty() && !held_out.gap.empty())
+  if (!d.causes.at_work.empty() && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
     add_closed_shares(d, model, ranking, given, recalibrated, held_out.gap, options,
                       [&] { progress(0.86, "what each effect closes"); });
 

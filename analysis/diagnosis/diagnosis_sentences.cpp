@@ -17,6 +17,7 @@ namespace {
 constexpr std::size_t most_parameters = 3;  // of an effect that a sentence names
 constexpr double shown_level = 0.05;        // of a cell, for a sentence
 constexpr double worth_saying = 3;          // evidence in a facet
+constexpr double worth_a_place = 0.2;       // probability of a facet where something without a name acts
 constexpr double worth_naming = 10;         // gain of the nearest effect where none explains the gap
 
 std::string with_parameters(const Cause& cause) {
@@ -73,8 +74,9 @@ void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
                   facet->facet, facet->aspect, facet->stance ? "stances" : d.data.step_name + "s"));
 }
 
+// A share of what is held out may come out below nothing or above all.
 std::string percent(double share) {
-  const double rounded = std::round(100 * share);
+  const double rounded = std::round(100 * std::clamp(share, 0.0, 1.0));
   return share > 0 && rounded < 1 ? "less than 1 %" : fmt::format("{:.0f} %", rounded + 0.0);
 }
 
@@ -95,10 +97,9 @@ void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
   for (const AtWork& one : d.causes.at_work) {
     if (one.probability < least_at_work) continue;
     std::string closes;
-    if (one.closes_alone)
-      closes = fmt::format(", closes {} of the gap alone", percent(std::max(0.0, one.closes_alone->value)));
+    if (one.closes_alone) closes = fmt::format(", closes {} of the gap alone", percent(one.closes_alone->value));
     if (one.closes_alone && one.closes_beside)
-      closes += fmt::format(" and {} as the last", percent(std::max(0.0, one.closes_beside->value)));
+      closes += fmt::format(" and {} as the last", percent(one.closes_beside->value));
     all.push_back(with_size(one) + closes);
   }
   if (!all.empty()) s.push_back(fmt::format("At work: {}.", fmt::join(all, "; ")));
@@ -107,11 +108,11 @@ void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
 // Says how much of the gap stays without a name, and where.
 void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
   std::string where;
-  if (!d.causes.unnamed_facets.empty()) {
+  if (!d.causes.unnamed_facets.empty() && d.causes.unnamed_facets.front().probability >= worth_a_place) {
     const UnnamedFacet& facet = d.causes.unnamed_facets.front();
-    where = fmt::format(" It acts by {}, on the {} of {}{}.", facet.facet, facet.aspect,
-                        facet.stance ? "stances" : d.data.step_name + "s",
-                        facet.size ? fmt::format(" ({:+.2g} {})", *facet.size, facet.unit) : "");
+    where = fmt::format(" It acts on the {} of {} (facet: {}{}).", facet.aspect,
+                        facet.stance ? "stances" : d.data.step_name + "s", facet.facet,
+                        facet.size ? fmt::format(", {:+.2g} {}", *facet.size, facet.unit) : "");
   }
   const bool known = !d.shrinkage.measures.empty() && d.shrinkage.measures[0].closed;
   s.push_back(fmt::format("Something without a name stays{}, with probability {:.2f}.{}",
@@ -277,9 +278,9 @@ std::string next_step(const Diagnosis& d) {
       for (const AtWork& one : d.causes.at_work)
         if (one.probability >= least_at_work) names.push_back(one.name);
       return fmt::format(
-          "Give the model {}, or take it out of the machine, and diagnose new trials: what stays is then the whole gap "
+          "Give the model {}, or take {} out of the machine, and diagnose new trials: what stays is then the whole gap "
           "and shows more clearly.",
-          fmt::join(names, " and "));
+          fmt::join(names, " and "), names.size() == 1 ? "it" : "them");
     }
     case Verdict::unexplained:
       if (const auto would_do = trials_to_explain(d))

@@ -12,6 +12,7 @@
 
 #include "analysis/drum_model/coast_down_transitions.h"
 #include "analysis/fitting/model_fit.h"
+#include "analysis/gap/held_out.h"
 #include "analysis/statistics/random.h"
 #include "tests/analysis/diagnosed.h"
 #include "tests/analysis/line.h"
@@ -41,6 +42,33 @@ TEST(GapShrinkage, TheTrueEffectClosesTheGap) {
     EXPECT_NEAR(*one.closed, 1, 0.1) << one.measure;
     EXPECT_LE(*one.closed_lower, *one.closed_upper);
     EXPECT_LE(one.baseline_lower, one.baseline_upper);
+  }
+}
+
+// What lies between two of its models as a part is what lies between them in the measure; the effect in the model as
+// given closes less than with the losses refitted, and something.
+TEST(HeldOut, PartsAreThoseOfTheMeasure) {
+  const auto design = coast_down_transitions(test::coasting_rotor());
+  const EffectTerm truth = test::term(*design, "rolling_resistance", {}, {0.02});
+  const auto data = design->simulate(nominal_values(*design), std::vector{truth}, 5);
+  const Fit recalibrated = fit(*data, nominal_values(*data), {});
+  const Fit with = fit(*data, recalibrated.nuisance, {test::term(*data, "rolling_resistance", {}, {0.01})});
+  Fit given = as_given(*data);
+  given.nuisance = nominal_values(*data);
+  Fit alone;
+  alone.nuisance = given.nuisance;
+  alone.terms = with.terms;
+  alone.converged = false;
+  const HeldOutGap held = gap_shrinkage(*data, given, recalibrated, {&with}, 4, 1, 1);
+  const Shrinkage& s = held.measures.front();
+  const std::vector<Estimate> parts =
+      parts_closed(*data, recalibrated, held.gap, {{&with, &recalibrated, true}, {&alone, &given, false}}, 4, 1, 1);
+  EXPECT_NEAR(parts[0].value, (s.recalibrated - s.with_effect) / s.baseline, 1e-9);
+  EXPECT_GT(parts[1].lower, 0.5);
+  EXPECT_LT(parts[1].value, 1.02);
+  for (const Estimate& part : parts) {
+    EXPECT_LE(part.lower, part.value);
+    EXPECT_GE(part.upper, part.value);
   }
 }
 
