@@ -1,7 +1,7 @@
 #pragma once
-// Makes the study of launches that are followed one by one: where there is no noise, or so little that cells smear it.
+// Makes the study of launches that are followed one by one, where there is no noise.
 
-#include <optional>
+#include <map>
 
 #include "analysis/study/metastability.h"
 #include "analysis/study/problem.h"
@@ -29,16 +29,11 @@ bool rests_at_once(const Problem& problem);
 /// the change from every second of the first cuts is added to it.
 Metastability followed_study(const Problem& problem, const StudyOptions& options);
 
-/// Follows a problem with noise from drawn launches, to the tolerance or to a bounded number of events; nothing where
-/// trials are too long for that. The interval is Student's, of independent trials; Problem::follow is followed where
-/// there is one, otherwise the map.
-std::optional<Metastability> trial_study(const Problem& problem, const StudyOptions& options);
+/// Shares of launches, or of trials, by the steps that they take.
+using StepShares = std::map<double, double>;
 
-/// Holds the chain's answer against drawn trials. Cells and nodes smear noise that is much narrower than they are, and
-/// an extrapolation from them does not show it: if the steps of 4096 trials, counted no further than `survival` is
-/// known, contradict the study's interval by more than 4 standard errors, the answer is that of trial_study(); where
-/// trials are too long for that, the interval is widened to what the trials say. A study that found no rest is tried
-/// with 64 trials of 2000 steps.
-Metastability held_against_trials(const Problem& problem, Metastability study, const StudyOptions& options);
+/// Fills in what such shares say of the steps: moments, quantiles, survival, and the chance of reaching the course's
+/// end.
+void fill_steps(const Problem& problem, const StepShares& shares, Metastability& result);
 
 }  // namespace metastable::analysis

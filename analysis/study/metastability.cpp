@@ -17,6 +17,7 @@
 #include "analysis/study/pilot.h"
 #include "analysis/study/rest_reachability.h"
 #include "analysis/study/steady_launch.h"
+#include "analysis/study/trial_study.h"
 #include "markov/parallel.h"
 #include "markov/rows/chain_pool.h"
 #include "markov/rows/discretization.h"
