@@ -54,8 +54,8 @@ struct BlindTruth {
   int strength = 0;  ///< 1, 2, 4; by size alone where an outside effect cannot be weighed; 0: not defined (none)
   double power = 0;  ///< expected 2 Delta log likelihood, true contact known
   double left = 0;   ///< realised, after recalibration; 0 until complete_truth()
-  /// Of several effects, by effect, it is what was realised after recalibration with the others in the model. Not
-  /// sealed, for it follows from the rest and the case; empty until complete_each().
+  /// The power left of each of several effects, after a recalibration that has the others in the model. It follows from
+  /// the rest and the case and is not sealed; empty until complete_each().
   std::vector<double> left_by_effect = {};
   bool nominal_is_true = true;
   Spread restitution, friction;  ///< true

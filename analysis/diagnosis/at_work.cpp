@@ -60,7 +60,8 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
   return mean;
 }
 
-// Where something without a name acts, were it beside the likeliest hypothesis that it was supposed beside, or alone.
+// Lists the facets in which something without a name would act: beside the likeliest hypothesis of those it was
+// supposed beside, or alone where that is likelier.
 std::vector<UnnamedFacet> facets_by_probability(const Diagnosis& d, const Odds& unnamed, double p_unnamed) {
   const Unnamed* supposed = nullptr;
   for (const Unnamed& one : d.causes.unnamed)

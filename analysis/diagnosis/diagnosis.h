@@ -70,14 +70,14 @@ struct AtWork {
   std::string name;                  ///< the effect's id, or what the group has in common
   std::vector<std::string> effects;  ///< ids
   double probability = 0;            ///< that it is, or that one of them is, given all hypotheses
-  /// Of the likeliest of them, averaged over the hypotheses that hold it; what lies between these is in the intervals.
+  /// The likeliest effect's parameters, averaged over the hypotheses that hold it; intervals hold what these differ by.
   std::vector<EstimatedParameter> parameters;
   /// Shares of the held-out gap as given that it closes, 90 %: added to the model as given, nothing else refitted; and
   /// added last, to the recalibrated model with the others at work.
   std::optional<Estimate> closes_alone, closes_beside;
 };
 
-/// Where something without a name acts, beside what is at work or alone.
+/// A facet in which something without a name may act, beside what is at work or alone.
 struct UnnamedFacet {
   std::string facet, aspect;
   bool stance = false;

@@ -18,8 +18,8 @@ namespace metastable::analysis {
 namespace {
 
 constexpr std::size_t most_points = 1000000;  // an axis has 100000 at most, so that their product fits
-// Of the wheels rolled under `settled`. A landing costs 15 to 60 us, so that all together take 1 to 4 s of one
-// processor.
+// These limits are of the wheels rolled under `settled`. A landing costs 15 to 60 us, so all together take 1 to 4 s of
+// one processor.
 constexpr double most_rolled = 16;
 constexpr std::uint64_t all_collisions = 65536, fewest_collisions = 1024;
 

@@ -203,13 +203,8 @@ Landings landings_by_number(WheelRuns& measured) {
   return alike;
 }
 
-// Digits round evenly: where they are most of the noise, the stances' errors have no tails, which no model of noise
-// foretells. A normal error of some digits is added, beside which that does not show; the noise knows of it.
-void blur_digits(WheelRuns& measured, double digits) {
-  constexpr double least_normal = 2;  // noise beside the digits', in those
-  const double rest = std::sqrt(std::max(0.0, measured.noise * measured.noise - digits * digits));
-  if (!(digits > 0) || rest >= least_normal * digits || !measured.speeds_after || measured.exact_stances) return;
-  const double added = std::sqrt(least_normal * least_normal * digits * digits - rest * rest);
+// Adds a normal error of that sd [rad/s] to every speed, the same for the same measured numbers; speeds stay positive.
+void add_normal_errors(WheelRuns& measured, double added) {
   const std::uint64_t seed = word_of(measured);
   std::uint64_t draw = 0;
   for (auto& [where, landings] : landings_by_number(measured)) {
@@ -221,6 +216,16 @@ void blur_digits(WheelRuns& measured, double digits) {
       if (m.after && *m.after > 0) m.after = std::max(1e-3 * *m.after, *m.after + added * after[i]);
     }
   }
+}
+
+// Digits round evenly: where they are most of the noise, the stances' errors have no tails, which no model of noise
+// foretells. A normal error of some digits is added, beside which that does not show; the noise knows of it.
+void blur_digits(WheelRuns& measured, double digits) {
+  constexpr double least_normal = 2;  // noise beside the digits', in those
+  const double rest = std::sqrt(std::max(0.0, measured.noise * measured.noise - digits * digits));
+  if (!(digits > 0) || rest >= least_normal * digits || !measured.speeds_after || measured.exact_stances) return;
+  const double added = std::sqrt(least_normal * least_normal * digits * digits - rest * rest);
+  add_normal_errors(measured, added);
   measured.noise = std::hypot(measured.noise, added);
   measured.notes.push_back(
       fmt::format("digits are most of the noise, and rounding has no tails: a normal error of {:.2g} rad/s is added to "
@@ -232,17 +237,7 @@ void blur_digits(WheelRuns& measured, double digits) {
 // good sensor is added, against which the model's collisions can be held.
 void blur_exact(WheelRuns& measured) {
   constexpr double added = imagined_noise;
-  const std::uint64_t seed = word_of(measured);
-  std::uint64_t draw = 0;
-  for (auto& [where, landings] : landings_by_number(measured)) {
-    const std::vector<double> before = even_normals(seed, draw++, landings.size());
-    const std::vector<double> after = even_normals(seed, draw++, landings.size());
-    for (std::size_t i = 0; i < landings.size(); ++i) {
-      landings[i]->before = std::max(1e-3, landings[i]->before + added * before[i]);
-      if (std::optional<double>& plus = landings[i]->after; plus && *plus > 0)
-        *plus = std::max(1e-3 * *plus, *plus + added * after[i]);
-    }
-  }
+  add_normal_errors(measured, added);
   measured.noise = added;
   measured.noise_stated = true;
   measured.exact_stances = false;

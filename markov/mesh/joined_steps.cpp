@@ -83,7 +83,7 @@ class Joining {
     if (request.error) std::rethrow_exception(request.error);
   }
 
-  /// Is called with the lock, which those that wait do not need before they are answered.
+  /// Makes the joined call once all wait. The caller holds the lock, which those that wait need only when answered.
   void step_if_all_wait() {
     if (waiting_.empty() || waiting_.size() < active_) return;
     try {

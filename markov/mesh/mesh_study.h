@@ -101,8 +101,8 @@ class Disagreement : public std::runtime_error {
 /// failures are then counted only, and no samples are guided: both would start in one gait and know nothing of the
 /// others. No number is given either where a gait is a trap, where blind spots may hold more than a tenth of the
 /// failures, or where the interval is wider than a factor of four.
-/// Where the chance of failing jumps from one state to the next (failing_jumps), rows are read off states around their
-/// nodes.
+/// Rows are read off states around their nodes where the chance of failing jumps from one state to the next
+/// (failing_jumps).
 /// A dear map's meshes grow side by side, as many as half the memory holds, in joined steps.
 /// The coarsest mesh comes first: what the finest will take, nodes by the spacing's power and entries
 /// with them, is foreseen from it.
