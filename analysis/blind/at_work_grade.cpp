@@ -23,13 +23,13 @@ bool is_there(const BlindTruth& truth, const BlindAnswer::SaidAtWork& said) {
 
 bool is_said(const BlindAnswer& answer, const std::string& effect) {
   return std::ranges::any_of(answer.at_work, [&](const BlindAnswer::SaidAtWork& said) {
-    return said.probability >= least_at_work && std::ranges::find(said.effects, effect) != said.effects.end();
+    return said.probability >= Rules{}.least_at_work && std::ranges::find(said.effects, effect) != said.effects.end();
   });
 }
 
 bool says_a_false_one(const BlindTruth& truth, const BlindAnswer& answer) {
   return std::ranges::any_of(answer.at_work, [&](const BlindAnswer::SaidAtWork& said) {
-    return said.probability >= least_at_work && !is_there(truth, said);
+    return said.probability >= Rules{}.least_at_work && !is_there(truth, said);
   });
 }
 
@@ -89,7 +89,7 @@ std::vector<Grade> at_work_grades(const std::vector<BlindTruth>& truths, const s
     count_kind(tally, truths[i], answers[i]);
     if (!answers[i] || truths[i].kind == BlindKind::left_out) continue;
     for (const BlindAnswer::SaidAtWork& said : answers[i]->at_work)
-      if (said.probability >= least_at_work)
+      if (said.probability >= Rules{}.least_at_work)
         (said.probability < 0.95 ? tally.likely : tally.surely).count(is_there(truths[i], said));
   }
   std::vector<Grade> grades;

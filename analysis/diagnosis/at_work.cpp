@@ -15,7 +15,6 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double half_90 = 1.6448536269514722;  // of a two-sided interval of a normal estimate, in sds
-constexpr double least_listed = 0.05;           // probability of an effect or a facet that is listed
 
 bool holds(const Cause& cause, const std::string& effect) {
   return std::ranges::find(cause.effects, effect) != cause.effects.end();
@@ -60,12 +59,57 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
   return mean;
 }
 
-// Lists the facets in which something without a name would act: beside the likeliest hypothesis of those it was
-// supposed beside, or alone where that is likelier.
-std::vector<UnnamedFacet> facets_by_probability(const Diagnosis& d, const Odds& unnamed, double p_unnamed) {
+}  // namespace
+
+std::vector<AtWork> list_at_work(const Probabilities& probabilities, const Odds& unnamed,
+                                 const std::vector<std::string>& alike, const std::vector<EffectGroup>& groups,
+                                 const Rules& rules) {
+  const std::vector<Cause>& ranked = probabilities.ranked;
+  const double sum = probabilities.of_effects();
+  std::vector<AtWork> all;
+  if (!(sum > 0)) return all;
+  const auto probability = [&](const std::vector<std::string>& effects) {
+    double share = 0;
+    for (const Cause& cause : ranked)
+      if (std::ranges::any_of(effects, [&](const std::string& id) { return holds(cause, id); }))
+        share += cause.probability / sum;
+    return probabilities.of_gap() * share * unnamed.of_catalogue();
+  };
+  // Effects of the first hypothesis, each with what stands in its place in those that are alike to it.
+  std::vector<std::string> listed;
+  for (const std::string& effect : ranked.front().effects) {
+    AtWork one{effect, {effect}, probability({effect}), averaged(ranked, effect), {}, {}};
+    if (one.probability < rules.least_at_work) {
+      for (const Cause& cause : ranked) {
+        if (std::ranges::find(alike, cause.name()) == alike.end() || holds(cause, effect)) continue;
+        for (const std::string& other : cause.effects)
+          if (!holds(ranked.front(), other) && std::ranges::find(one.effects, other) == one.effects.end())
+            one.effects.push_back(other);
+      }
+      if (one.effects.size() > 1) {
+        one.probability = probability(one.effects);
+        one.name = common_name(groups, one.effects);
+      }
+    }
+    listed.insert(listed.end(), one.effects.begin(), one.effects.end());
+    all.push_back(std::move(one));
+  }
+  for (const Cause& cause : ranked)
+    for (const std::string& effect : cause.effects) {
+      if (std::ranges::find(listed, effect) != listed.end()) continue;
+      listed.push_back(effect);
+      if (const double p = probability({effect}); p >= rules.least_listed)
+        all.push_back({effect, {effect}, p, averaged(ranked, effect), {}, {}});
+    }
+  std::ranges::stable_sort(all, std::ranges::greater{}, &AtWork::probability);
+  return all;
+}
+
+std::vector<UnnamedFacet> facets_by_probability(const Chosen& chosen, double p_unnamed, const Rules& rules) {
+  const Odds& odds = chosen.unnamed;
   const Unnamed* supposed = nullptr;
-  for (const Unnamed& one : d.causes.unnamed)
-    if (one.beside.empty() == (unnamed.alone > unnamed.beside + unnamed.left) &&
+  for (const Unnamed& one : chosen.supposed)
+    if (one.beside.empty() == (odds.alone > odds.beside + odds.left) &&
         (!supposed || one.evidence > supposed->evidence))
       supposed = &one;
   std::vector<UnnamedFacet> all;
@@ -76,8 +120,8 @@ std::vector<UnnamedFacet> facets_by_probability(const Diagnosis& d, const Odds& 
   for (const LeftInFacet& facet : supposed->facets) {
     UnnamedFacet one{facet.facet, facet.aspect, facet.stance, p_unnamed * std::exp(facet.evidence - most) / sum, {},
                      ""};
-    if (one.probability < least_listed) continue;
-    for (const GapCell& cell : d.gap.left.cells)
+    if (one.probability < rules.least_listed) continue;
+    for (const GapCell& cell : chosen.left.cells)
       if (cell.facet == facet.facet && cell.aspect == facet.aspect &&
           (!one.size || std::abs(cell.size) > std::abs(*one.size)))
         one.size = cell.size, one.unit = cell.unit;
@@ -87,68 +131,17 @@ std::vector<UnnamedFacet> facets_by_probability(const Diagnosis& d, const Odds& 
   return all;
 }
 
-}  // namespace
-
-void list_at_work(Diagnosis& d, const Odds& unnamed) {
-  const std::vector<Cause>& ranked = d.causes.ranked;
-  const double of_gap = 1 - d.causes.p_no_gap - d.causes.p_recalibrate;
-  double sum = 0;
-  for (const Cause& cause : ranked) sum += cause.probability;
-  if (!(sum > 0)) return;
-  const auto probability = [&](const std::vector<std::string>& effects) {
-    double share = 0;
-    for (const Cause& cause : ranked)
-      if (std::ranges::any_of(effects, [&](const std::string& id) { return holds(cause, id); }))
-        share += cause.probability / sum;
-    return of_gap * share * unnamed.of_catalogue();
-  };
-  // Effects of the first hypothesis, each with what stands in its place in those that are alike to it.
-  std::vector<std::string> listed;
-  for (const std::string& effect : ranked.front().effects) {
-    AtWork one{effect, {effect}, probability({effect}), averaged(ranked, effect), {}, {}};
-    if (one.probability < least_at_work) {
-      for (const Cause& cause : ranked) {
-        if (std::ranges::find(d.causes.alike, cause.name()) == d.causes.alike.end() || holds(cause, effect)) continue;
-        for (const std::string& other : cause.effects)
-          if (!holds(ranked.front(), other) && std::ranges::find(one.effects, other) == one.effects.end())
-            one.effects.push_back(other);
-      }
-      if (one.effects.size() > 1) {
-        one.probability = probability(one.effects);
-        one.name = common_name(d, one.effects);
-      }
-    }
-    listed.insert(listed.end(), one.effects.begin(), one.effects.end());
-    d.causes.at_work.push_back(std::move(one));
-  }
-  for (const Cause& cause : ranked)
-    for (const std::string& effect : cause.effects) {
-      if (std::ranges::find(listed, effect) != listed.end()) continue;
-      listed.push_back(effect);
-      if (const double p = probability({effect}); p >= least_listed)
-        d.causes.at_work.push_back({effect, {effect}, p, averaged(ranked, effect), {}, {}});
-    }
-  std::ranges::stable_sort(d.causes.at_work, std::ranges::greater{}, &AtWork::probability);
-  d.causes.unnamed_facets = facets_by_probability(d, unnamed, d.causes.p_unnamed);
-}
-
-void add_closed_shares(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking, const Fit& given,
-                       const Fit& recalibrated, const std::vector<double>& gap, const DiagnosisOptions& options,
+void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& model, const CauseRanking& ranking,
+                       const RankedCause& best, const Fit& given, const Fit& recalibrated,
+                       const std::vector<double>& gap, const DiagnosisOptions& options,
                        const std::function<void()>& heartbeat) {
-  const Cause& first = d.causes.ranked.front();
-  const auto fit_of = [&](const std::vector<std::string>& effects) -> const Fit* {
-    if (effects.empty()) return &recalibrated;
+  const auto fit_of = [&](const std::vector<EffectTerm>& terms) -> const Fit* {
+    if (terms.empty()) return &recalibrated;
     for (const auto* causes : {&ranking.singles, &ranking.pairs})
       for (const RankedCause& one : *causes)
-        if (one.terms.size() == effects.size() && !one.fit.nuisance.empty() &&
-            std::ranges::all_of(one.terms, [&](const EffectTerm& term) {
-              return std::ranges::find(effects, term.candidate->id) != effects.end();
-            }))
-          return &one.fit;
+        if (one.fitted() && one.terms.size() == terms.size() && extends(one.terms, terms)) return &one.fit;
     return nullptr;
   };
-  const Fit* all = fit_of(first.effects);
-  if (!all) return;
   struct Asked {
     AtWork* whose;
     std::optional<Estimate> AtWork::*which;
@@ -156,21 +149,21 @@ void add_closed_shares(Diagnosis& d, const TransitionModel& model, const CauseRa
   std::vector<GapPart> parts;
   std::vector<Asked> asked;
   std::deque<Fit> alone;  // the effect in the model as given
-  for (AtWork& one : d.causes.at_work) {
-    const auto own = std::ranges::find_if(all->terms, [&](const EffectTerm& term) {
+  for (AtWork& one : at_work) {
+    const auto own = std::ranges::find_if(best.fit.terms, [&](const EffectTerm& term) {
       return std::ranges::find(one.effects, term.candidate->id) != one.effects.end();
     });
-    if (own == all->terms.end() || one.probability < least_at_work) continue;
+    if (own == best.fit.terms.end() || one.probability < options.rules.least_at_work) continue;
     alone.push_back({});
     alone.back().nuisance = given.nuisance;
     alone.back().terms = {*own};
     alone.back().converged = false;  // it is a start, not a fit
     parts.push_back({&alone.back(), &given, false});
     asked.push_back({&one, &AtWork::closes_alone});
-    std::vector<std::string> others = first.effects;
-    std::erase(others, own->candidate->id);
+    std::vector<EffectTerm> others = best.fit.terms;
+    std::erase_if(others, [&](const EffectTerm& term) { return term.candidate == own->candidate; });
     if (const Fit* without = fit_of(others)) {
-      parts.push_back({all, without, true});
+      parts.push_back({&best.fit, without, true});
       asked.push_back({&one, &AtWork::closes_beside});
     }
   }

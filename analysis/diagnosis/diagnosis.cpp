@@ -9,6 +9,7 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "analysis/diagnosis/at_work.h"
@@ -20,6 +21,7 @@
 #include "analysis/diagnosis/verdict.h"
 #include "analysis/diagnosis/visibility.h"
 #include "analysis/fitting/cause_ranking.h"
+#include "analysis/fitting/evidence.h"
 #include "analysis/gap/collision_profile.h"
 #include "analysis/gap/fitted_variations.h"
 #include "analysis/gap/gap_map.h"
@@ -35,6 +37,8 @@ constexpr double rival_evidence = 4;    //   those no further behind the best. S
 // Beyond this rise another optimum of the recalibration is taken for one, and a recalibration that did not settle is
 // mentioned if its slope still promises it.
 constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likelihood; of the largest gain found
+
+using Progress = std::function<void(double, const char*)>;
 
 StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std::vector<double>& nominal,
                                         const Fit& recalibrated, const Fit& chosen, std::uint64_t seed) {
@@ -120,44 +124,49 @@ Fit unfitted(const TransitionModel& model, const std::vector<double>& nominal) {
   return given;
 }
 
-void describe_data(Diagnosis& d, const TransitionModel& model) {
-  d.data.trials = model.trials();
-  d.data.events = model.events().size();
-  for (const Event& e : model.events())
-    d.data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
-  for (std::size_t c = 0; c < model.conditions(); ++c) d.data.condition_names.push_back(model.condition_name(c));
-  d.data.notes = model.notes();
-  d.data.accepted_defects = model.accepted_defects();
-  d.data.step_name = model.step_name();
-  d.data.groups = model.groups();
-  d.gap.refitted = model.recalibrated();
-  d.gap.recalibration_id = model.recalibration_id();
+Diagnosis::Data described_data(const TransitionModel& model) {
+  Diagnosis::Data data;
+  data.trials = model.trials();
+  data.events = model.events().size();
+  for (const Event& e : model.events()) data.collisions += e.kind == EventKind::collision || e.kind == EventKind::step;
+  for (std::size_t c = 0; c < model.conditions(); ++c) data.condition_names.push_back(model.condition_name(c));
+  data.notes = model.notes();
+  data.accepted_defects = model.accepted_defects();
+  data.step_name = model.step_name();
+  data.groups = model.groups();
+  return data;
 }
 
-// What the data hold no information on is not decided, whatever its evidence.
-void leave_undecided(Diagnosis& d, CauseRanking& ranking, const std::vector<const Candidate*>& candidates) {
-  d.limits.visible = visibility(ranking.scan, candidates);
-  for (std::size_t i = 0; i < ranking.singles.size(); ++i)
-    if (ranking.singles[i].not_decided.empty() && !candidates[i]->parameters.empty() &&
-        d.limits.visible[i].smallest == 0)
-      ranking.singles[i].not_decided = d.limits.visible[i].undecidable;
-}
+// The model as given and recalibrated, and every hypothesis.
+struct Fitted {
+  Fit given;         // the model as given
+  Fit given_slopes;  // likewise, with the information on its parameters
+  Fit recalibrated;
+  CauseRanking ranking;  // at the recalibrated model
+  std::vector<Visibility> visible;
+  double gain() const { return 2 * (recalibrated.penalised - given.penalised); }
+};
 
-void note_what_is_rough(Diagnosis& d, const CauseRanking& ranking, const Fit& recalibrated, double largest_gain) {
-  // Where the model is far off its likelihood is rough; what the fit missed is said where it is not next to nothing.
-  for (const RankedCause& cause : ranking.singles) largest_gain = std::max(largest_gain, cause.gain);
+// Notes where the model is far off, so that its likelihood is rough; what a fit missed is said where it is not next to
+// nothing.
+std::vector<std::string> notes_on_roughness(const Fitted& fitted, const Diagnosis::Data& data) {
+  std::vector<std::string> notes;
+  const Fit& recalibrated = fitted.recalibrated;
+  double largest_gain = fitted.gain();
+  for (const RankedCause& cause : fitted.ranking.singles) largest_gain = std::max(largest_gain, cause.gain);
   if (!recalibrated.converged && recalibrated.promised > settled_rise + settled_share * largest_gain)
-    d.data.notes.push_back(
+    notes.push_back(
         fmt::format("the recalibrated parameters did not settle ({}): by its slope the likelihood could rise by {:.2g} "
                     "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
                     recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
-  if (!ranking.scan.trials_suffice)
-    d.data.notes.push_back(fmt::format(
+  if (!fitted.ranking.scan.trials_suffice)
+    notes.push_back(fmt::format(
         "{} {} of {:.2g} transitions: chance levels come from the model's information alone; from {} trials "
         "of {} transitions on, from the trials' own scatter",
-        d.data.trials, d.data.trials == 1 ? "trial" : "trials",
-        static_cast<double>(d.data.events) / static_cast<double>(std::max<std::size_t>(1, d.data.trials)),
-        enough_trials, enough_transitions));
+        data.trials, data.trials == 1 ? "trial" : "trials",
+        static_cast<double>(data.events) / static_cast<double>(std::max<std::size_t>(1, data.trials)),
+        Rules::enough_trials, Rules::enough_transitions));
+  return notes;
 }
 
 // Returns the fit without effects from the nuisances of the effect that gains most, where that is another optimum.
@@ -165,7 +174,7 @@ std::optional<Fit> other_recalibration(const TransitionModel& model, const Fit& 
                                        const CauseRanking& ranking) {
   const RankedCause* leader = nullptr;
   for (const RankedCause& cause : ranking.singles)
-    if (!cause.fit.nuisance.empty() && (!leader || cause.gain > leader->gain)) leader = &cause;
+    if (cause.fitted() && (!leader || cause.gain > leader->gain)) leader = &cause;
   if (!leader) return {};
   Fit other = fit(model, leader->fit.nuisance, {});
   if (other.penalised > recalibrated.penalised + settled_rise + settled_share * std::max(0.0, leader->gain))
@@ -178,9 +187,149 @@ std::vector<const Fit*> rivals(const std::vector<const RankedCause*>& ordered) {
   std::vector<const Fit*> all;
   for (const RankedCause* cause : ordered) {
     if (all.size() == most_rivals || cause->evidence < ordered.front()->evidence - rival_evidence) break;
-    if (!cause->fit.nuisance.empty()) all.push_back(&cause->fit);
+    if (cause->fitted()) all.push_back(&cause->fit);
   }
   return all;
+}
+
+// Ranks what causes the gap beside the recalibrated model. What an effect seems to gain may be a better optimum of the
+// recalibration that its fit came upon.
+Fitted fit_models(const TransitionModel& model, const std::vector<const Candidate*>& candidates,
+                  const DiagnosisOptions& options, const Progress& progress) {
+  Fitted fitted;
+  const std::vector<double> nominal = given_values(model);
+  fitted.given_slopes = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
+  fitted.given = unfitted(model, nominal);
+  fitted.recalibrated = best_fit(model, nominal, {});
+  const auto rank = [&] {
+    return rank_causes(model, fitted.recalibrated, candidates,
+                       {.threads = options.threads,
+                        .draws = options.draws,
+                        .seed = options.seed,
+                        .rules = options.rules,
+                        .pairs = wanted_pairs(candidates, options.catalogue),
+                        .progress = [&](double share) { progress(0.1 + 0.5 * share, "which effect"); }});
+  };
+  fitted.ranking = rank();
+  if (std::optional<Fit> other = other_recalibration(model, fitted.recalibrated, fitted.ranking)) {
+    fitted.recalibrated = *std::move(other);
+    fitted.ranking = rank();
+  }
+  // What the data hold no information on is not decided, whatever its evidence.
+  fitted.visible = visibility(fitted.ranking.scan, candidates, options.rules);
+  std::vector<RankedCause>& singles = fitted.ranking.singles;
+  for (std::size_t i = 0; i < singles.size(); ++i)
+    if (singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && fitted.visible[i].smallest == 0)
+      singles[i].not_decided = fitted.visible[i].undecidable;
+  return fitted;
+}
+
+// Says what gap there is, and what of it has no name.
+struct FoundGap {
+  Diagnosis::Gap gap;
+  Unnamed alone;  // what the recalibrated model leaves
+};
+FoundGap find_gap(const TransitionModel& model, const Fitted& fitted, std::size_t candidates,
+                  const DiagnosisOptions& options, const Progress& progress) {
+  const Fit& recalibrated = fitted.recalibrated;
+  const bool suffice = fitted.ranking.scan.trials_suffice;
+  FoundGap found;
+  Diagnosis::Gap& gap = found.gap;
+  gap.refitted = model.recalibrated();
+  gap.recalibration_id = model.recalibration_id();
+  gap.contact = contact_estimates(model, recalibrated);
+  gap.as_given = gap_map(model, fitted.given, options.draws / 2, options.seed);
+  progress(0.6, "where the gap lies");
+  gap.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
+  std::vector<LeftInFacet>& facets = found.alone.facets;
+  facets = left_by_facet(model, recalibrated, {}, options.rules);
+  GapPValues p{.recalibration = recalibration_p_value(model, fitted.given_slopes, fitted.gain()),
+               .effects = fitted.ranking.p_value,
+               .where = gap.recalibrated.p_value,
+               .facets = facets_p_value(fitted.ranking, facets),
+               .pairs = pairs_p_value(fitted.ranking, candidates, recalibrated)};
+  EffectScan variations;
+  if (suffice) variations = scan_variations(model, recalibrated, options.threads);
+  const auto fit_variations = [&] {
+    const auto beat = [&] { progress(0.66, "what has no name"); };
+    beat();
+    return fitted_variations(model, recalibrated, variations, options.rules, options.threads, beat);
+  };
+  std::vector<LeftInFacet> varied;
+  p.variations = variations_p_value(variations, promised_gains(variations), options.draws, options.seed);
+  if (p.variations < options.level) {  // what scores promise, fits must keep
+    varied = fit_variations();
+    std::vector<double> gains;
+    for (const LeftInFacet& one : varied) gains.push_back(std::max(0.0, one.quadratic - 2 * recalibrated.promised));
+    p.variations = std::max(p.variations, variations_p_value(variations, gains, options.draws, options.seed));
+  }
+  put_together(gap, p, options.rules);
+  if (gap.p_value < options.level && suffice) {
+    if (varied.empty()) varied = fit_variations();
+    std::ranges::move(varied, std::back_inserter(facets));
+  }
+  found.alone.evidence = evidence_of_more(facets);
+  return found;
+}
+
+// Returns the best hypothesis of a gap, or the recalibrated model where none is worth having.
+Chosen best_hypothesis(const TransitionModel& model, const Fitted& fitted, const Hypotheses& hypotheses, FoundGap found,
+                       bool gap, const DiagnosisOptions& options) {
+  const RankedCause* best = hypotheses.best();
+  if (gap && best && best->evidence > 0 && best->fitted())
+    return choose(model, fitted.ranking, hypotheses.ordered, fitted.recalibrated, std::move(found.alone), options);
+  Chosen chosen{.fit = &fitted.recalibrated, .left = std::move(found.gap.recalibrated)};
+  chosen.supposed.push_back(std::move(found.alone));
+  if (gap) chosen.unnamed.alone = options.rules.certain_odds;  // something stands out, and no effect does
+  return chosen;
+}
+
+// Measures the gap on trials held out. Even a cause that closes nearly all of a huge gap may leave a large one, which
+// is put down to something unnamed.
+HeldOutGap hold_out(const TransitionModel& model, const Fitted& fitted, const Hypotheses& hypotheses,
+                    const Diagnosis::Data& data, Chosen& chosen, const DiagnosisOptions& options,
+                    const Progress& progress) {
+  if (data.trials < trials_for_folds(options.folds)) return {};
+  const auto beat_at = [&](double share) { return [&progress, share] { progress(share, "how far it shrinks"); }; };
+  const bool named = chosen.fit != &fitted.recalibrated;
+  HeldOutGap held_out = gap_shrinkage(model, fitted.given, fitted.recalibrated,
+                                      named ? rivals(hypotheses.ordered) : std::vector<const Fit*>{}, options.folds,
+                                      options.threads, options.seed, beat_at(0.7));
+  const auto leaves = [&](double by_itself) {
+    return leaves_gap_held_out(held_out.measures.front(), data, chosen.bent, by_itself, options.rules);
+  };
+  if (named && !held_out.measures.empty() && leaves(0)) {
+    const double by_itself =
+        gap_by_itself(model, *chosen.fit, options.folds, options.threads, options.seed, beat_at(0.85));
+    if (leaves(std::max(0.0, by_itself))) chosen.unnamed.left = options.rules.certain_odds;
+  }
+  return held_out;
+}
+
+// Says which effects cause the gap, with what probability.
+std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, const Fitted& fitted,
+                                                  Hypotheses hypotheses, Chosen chosen, std::size_t candidates,
+                                                  const Diagnosis& d, const Tested& tested) {
+  Diagnosis::Causes causes;
+  Probabilities probabilities =
+      share_probabilities(model, fitted.ranking, hypotheses.ordered, candidates, tested, chosen.unnamed, d.rules);
+  Named named =
+      give_verdict(probabilities, chosen.unnamed, tested, fitted.visible, d.data, d.gap.recalibration_id, d.rules);
+  if (!named.at_work.empty()) causes.unnamed_facets = facets_by_probability(chosen, named.p_unnamed, d.rules);
+  causes.ranked = std::move(probabilities.ranked);
+  causes.not_decided = std::move(hypotheses.not_decided);
+  causes.unnamed = std::move(chosen.supposed);
+  causes.set = std::move(named.set);
+  causes.alike = std::move(named.alike);
+  causes.stepwise = stepwise_selection(model, fitted.recalibrated, fitted.ranking);
+  if (chosen.fit != &fitted.recalibrated) causes.size = model.size_in_words(chosen.fit->terms);
+  causes.p_no_gap = probabilities.no_gap;
+  causes.p_recalibrate = probabilities.recalibrate;
+  causes.p_none = probabilities.none;
+  causes.together = chosen.together;
+  causes.at_work = std::move(named.at_work);
+  causes.p_unnamed = named.p_unnamed;
+  return {named.verdict, std::move(causes)};
 }
 
 }  // namespace
@@ -214,113 +363,47 @@ std::string Cause::name() const { return fmt::format("{}", fmt::join(effects, "+
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options) {
   check(model, options);
   const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
-  const auto progress = [&](double share, const char* doing) {
+  const Progress progress = [&](double share, const char* doing) {
     if (options.progress) options.progress(share, doing);
   };
-
   Diagnosis d;
-  describe_data(d, model);
-
+  d.rules = options.rules;
+  d.data = described_data(model);
   progress(0, "the model as given");
-  const std::vector<double> nominal = given_values(model);
-  const Fit as_given = fit(model, nominal, {}, {.count = {}, .refit_nuisances = true, .most_iterations = 1});
-  const Fit given = unfitted(model, nominal);
-  d.gap.as_given = gap_map(model, given, options.draws / 2, options.seed);
-  Fit recalibrated = best_fit(model, nominal, {});
-  const auto rank = [&] {
-    return rank_causes(model, recalibrated, candidates,
-                       {.threads = options.threads,
-                        .draws = options.draws,
-                        .seed = options.seed,
-                        .pairs = wanted_pairs(candidates, options.catalogue),
-                        .progress = [&](double share) { progress(0.1 + 0.5 * share, "which effect"); }});
-  };
-  CauseRanking ranking = rank();
-  // What an effect seems to gain may be a better optimum that its fit came upon.
-  if (std::optional<Fit> other = other_recalibration(model, recalibrated, ranking)) {
-    recalibrated = *std::move(other);
-    ranking = rank();
-  }
-  d.gap.contact = contact_estimates(model, recalibrated);
-  const double recalibration_gain = 2 * (recalibrated.penalised - given.penalised);
-  d.gap.p_recalibration = recalibration_p_value(model, as_given, recalibration_gain);
+  Fitted fitted = fit_models(model, candidates, options, progress);
+  FoundGap found = find_gap(model, fitted, candidates.size(), options, progress);
+  std::ranges::move(notes_on_roughness(fitted, d.data), std::back_inserter(d.data.notes));
+  d.gap = found.gap;
+  const Tested tested{d.gap.p_value < options.level, d.gap.p_recalibration < options.level};
 
-  progress(0.6, "where the gap lies");
-  d.gap.recalibrated = gap_map(model, recalibrated, options.draws, options.seed);
-
-  d.causes.stepwise = stepwise_selection(model, recalibrated, ranking);
-  std::vector<LeftInFacet> left = left_by_facet(model, recalibrated, 0, 0);
-  const double of_left = evidence_of_more(left);
-  d.causes.unnamed.push_back({{}, of_left, std::move(left)});
-  EffectScan variations;
-  if (ranking.scan.trials_suffice) variations = scan_variations(model, recalibrated, options.threads);
-  d.gap.p_variations = variations_p_value(variations, promised_gains(variations), options.draws, options.seed);
-  std::vector<LeftInFacet> varied;
-  const auto fit_variations = [&] {
-    progress(0.66, "what has no name");
-    varied = fitted_variations(model, recalibrated, variations, options.threads,
-                               [&] { progress(0.66, "what has no name"); });
-  };
-  if (d.gap.p_variations < options.level) {  // what scores promise, fits must keep
-    fit_variations();
-    std::vector<double> gains;
-    for (const LeftInFacet& one : varied) gains.push_back(std::max(0.0, one.quadratic - 2 * recalibrated.promised));
-    d.gap.p_variations =
-        std::max(d.gap.p_variations, variations_p_value(variations, gains, options.draws, options.seed));
-  }
-  test_for_gap(d, ranking, candidates.size(), recalibrated);
-  note_what_is_rough(d, ranking, recalibrated, recalibration_gain);
-  leave_undecided(d, ranking, candidates);
-  const std::vector<const RankedCause*> ordered = hypotheses(d, model, ranking);
-  const bool gap = d.gap.p_value < options.level;
-
-  if (gap && ranking.scan.trials_suffice) {
-    if (varied.empty()) fit_variations();
-    Unnamed& alone = d.causes.unnamed.front();
-    std::ranges::move(varied, std::back_inserter(alone.facets));
-    alone.evidence = evidence_of_more(alone.facets);
-  }
-  Chosen chosen{&recalibrated, {}};
-  if (gap && !ordered.empty() && ordered.front()->evidence > 0 && !ordered.front()->fit.nuisance.empty()) {
-    progress(0.68, "what is left");
-    chosen = choose(d, model, ranking, ordered, recalibrated, options);
-  } else {
-    d.gap.left = d.gap.recalibrated;
-    if (gap) chosen.unnamed.alone = certain_odds;  // something stands out, and no effect does
-  }
+  progress(0.68, "what is left");
+  Hypotheses ranked = hypotheses(model, fitted.ranking);
+  const RankedCause* best = ranked.best();
+  const RankedCause* second = ranked.ordered.size() > 1 ? ranked.ordered[1] : nullptr;
+  Chosen chosen = best_hypothesis(model, fitted, ranked, std::move(found), tested.gap, options);
+  const Fit& cause = *chosen.fit;
+  d.gap.left = chosen.left;
   progress(0.7, "how far it shrinks");
-  const bool named = chosen.fit != &recalibrated;
-  if (named) d.causes.size = model.size_in_words(chosen.fit->terms);
-  HeldOutGap held_out;
-  if (d.data.trials >= trials_for_folds(options.folds))
-    held_out =
-        gap_shrinkage(model, given, recalibrated, named ? rivals(ordered) : std::vector<const Fit*>{}, options.folds,
-                      options.threads, options.seed, [&] { progress(0.7, "how far it shrinks"); });
+  const HeldOutGap held_out = hold_out(model, fitted, ranked, d.data, chosen, options, progress);
   d.shrinkage.measures = held_out.measures;
-  // Even a cause that closes nearly all of a huge gap may leave a large one.
-  if (named && !d.shrinkage.measures.empty() && leaves_gap_held_out(d, chosen.bent, 0)) {
-    const double by_itself = gap_by_itself(model, *chosen.fit, options.folds, options.threads, options.seed,
-                                           [&] { progress(0.85, "how far it shrinks"); });
-    if (leaves_gap_held_out(d, chosen.bent, std::max(0.0, by_itself))) chosen.unnamed.left = certain_odds;
-  }
-  if (gap && trials_to_explain(d)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, even_odds);
-  const double share_of_effects =
-      share_probabilities(d, model, ranking, ordered, candidates.size(), gap, chosen.unnamed);
-  give_verdict(d, gap, chosen.unnamed, share_of_effects);
-  if (!d.causes.at_work.empty() && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
-    add_closed_shares(d, model, ranking, given, recalibrated, held_out.gap, options,
-                      [&] { progress(0.86, "what each effect closes"); });
+  if (tested.gap && trials_to_explain(d.data)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, d.rules.even_odds);
+  std::tie(d.verdict, d.causes) =
+      name_causes(model, fitted, std::move(ranked), std::move(chosen), candidates.size(), d, tested);
+  if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
+    add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated, held_out.gap,
+                      options, [&] { progress(0.86, "what each effect closes"); });
 
   progress(0.88, "steps before failure");
-  d.shrinkage.steps = steps_before_failure(model, nominal, recalibrated, *chosen.fit, options.seed);
+  d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
   if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
     d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
-  d.shrinkage.profile = collision_profile(model, nominal, *chosen.fit, options.seed);
+  d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
   progress(0.93, "what could not be seen");
-  d.limits.missing = missing_columns(model, recalibrated, candidates, options.threads, options.seed);
+  d.limits.visible = std::move(fitted.visible);
+  d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);
   d.limits.not_possible = too_few(model, d, options);
-  if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && ordered.size() > 1)
-    d.limits.next = next_experiments(model, ordered[0]->fit, ordered[1]->terms, options.threads, options.seed);
+  if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && second)
+    d.limits.next = next_experiments(model, best->fit, second->terms, options.threads, options.seed);
   progress(1, "done");
   d.sentences = sentences(d);
   return d;

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "analysis/fitting/rules.h"
 #include "analysis/fitting/stepwise.h"
 #include "analysis/fitting/transition_model.h"
 #include "analysis/gap/collision_profile.h"
@@ -27,8 +28,9 @@ struct DiagnosisOptions {
   /// case, not only where the scores promise something.
   std::vector<std::string> catalogue = {};
   int draws = 2000;     ///< bootstrap draws of each chance level, >= 200; the map as given takes half
-  double level = 0.02;  ///< of the test for a gap after recalibration, in (0, 0.5)
+  double level = 0.02;  ///< of the tests for a gap, before and after recalibration, in (0, 0.5)
   int folds = 5;        ///< of the cross-validation by trial, >= 2
+  Rules rules = {};     ///< that decide
   /// It is called now and then with the share done, 0..1, and what is being done, and may throw to stop.
   std::function<void(double, const std::string&)> progress = {};
 };
@@ -130,19 +132,10 @@ struct NextExperiment {
   double separation = 0;  ///< 2 Delta log likelihood expected between the two leading causes, at the fitted size
 };
 
-/// Two causes at work at once gain what they gain alone, and what each had hidden of the other by its scatter (1.12
-/// times that at most, in some 80 simulated pairs); two that gain far more together bend each other into the shape of
-/// something else (1.3 to 2.4 times where a spread of restitution that depends on speed passed for two mean effects
-/// that cancel). Beyond this ratio a pair describes and does not explain.
-inline constexpr double most_together = 1.2;
-
-/// Pairs whose own data were drawn with both have gained up to 1.41 times as much together; pairs that imitate what no
-/// catalogue holds 1.6 times and more. Between the two ratios both are at work with something without a name.
-inline constexpr double surely_bent = 1.5;
-
 /// Holds the answer for one experiment.
 struct Diagnosis {
   std::shared_ptr<const TransitionModel> model;  ///< diagnosed; nothing where it was passed by reference
+  Rules rules;                                   ///< DiagnosisOptions::rules
   Verdict verdict = Verdict::no_gap;
   std::vector<std::string> sentences;  ///< the verdict in plain words
 
@@ -175,7 +168,7 @@ struct Diagnosis {
     std::string size;                      ///< of the likeliest beside the nominal model, a sentence; or empty
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
-    double together = 1;                       ///< of the best hypothesis, if a pair: see most_together
+    double together = 1;                       ///< of the best hypothesis, if a pair: see Rules::most_together
     std::vector<AtWork> at_work;               ///< by falling probability
     std::vector<UnnamedFacet> unnamed_facets;  ///< likewise
     double p_unnamed = 0;                      ///< that something without a name is at work, alone or beside effects

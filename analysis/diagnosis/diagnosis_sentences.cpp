@@ -5,10 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/diagnosis/at_work.h"
 #include "analysis/diagnosis/too_few.h"
-#include "analysis/diagnosis/verdict.h"
-#include "analysis/fitting/evidence.h"
 #include "analysis/statistics/number_text.h"
 
 namespace metastable::analysis {
@@ -17,7 +14,6 @@ namespace {
 constexpr std::size_t most_parameters = 3;  // of an effect that a sentence names
 constexpr double shown_level = 0.05;        // of a cell, for a sentence
 constexpr double worth_saying = 3;          // evidence in a facet
-constexpr double worth_a_place = 0.2;       // probability of a facet where something without a name acts
 constexpr double worth_naming = 10;         // gain of the nearest effect where none explains the gap
 
 std::string with_parameters(const Cause& cause) {
@@ -50,8 +46,8 @@ std::string grouped_set(const Diagnosis& d) {
     for (std::string& name : group)
       name = name.starts_with(common + "+") ? name.substr(common.size() + 1)
                                             : name.substr(0, name.size() - common.size() - 1);
-  std::string text = fmt::format("{}{} ({})", common_name(d, group), common.empty() ? "" : " beside " + common,
-                                 fmt::join(group, ", "));
+  std::string text = fmt::format("{}{} ({})", common_name(d.data.groups, group),
+                                 common.empty() ? "" : " beside " + common, fmt::join(group, ", "));
   for (const std::string& name : d.causes.set)
     if (std::ranges::find(d.causes.alike, name) == d.causes.alike.end()) text += ", " + name;
   return text;
@@ -59,8 +55,8 @@ std::string grouped_set(const Diagnosis& d) {
 
 // Says where something without a name acts, were it at work alone or beside a cause that is.
 void say_unnamed(std::vector<std::string>& s, const Diagnosis& d) {
-  const auto likelihood = [](const Unnamed& one) {
-    return one.evidence + std::log(one.beside.empty() ? unnamed_alone : unnamed_beside);
+  const auto likelihood = [&](const Unnamed& one) {
+    return one.evidence + std::log(one.beside.empty() ? d.rules.unnamed_alone : d.rules.unnamed_beside);
   };
   const auto most = std::ranges::max_element(d.causes.unnamed, {}, likelihood);
   if (most == d.causes.unnamed.end() || most->facets.empty()) return;
@@ -95,7 +91,7 @@ std::string with_size(const AtWork& one) {
 void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
   std::vector<std::string> all;
   for (const AtWork& one : d.causes.at_work) {
-    if (one.probability < least_at_work) continue;
+    if (one.probability < d.rules.least_at_work) continue;
     std::string closes;
     if (one.closes_alone) closes = fmt::format(", closes {} of the gap alone", percent(one.closes_alone->value));
     if (one.closes_alone && one.closes_beside)
@@ -108,7 +104,7 @@ void say_what_is_at_work(std::vector<std::string>& s, const Diagnosis& d) {
 // Says how much of the gap stays without a name, and where.
 void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
   std::string where;
-  if (!d.causes.unnamed_facets.empty() && d.causes.unnamed_facets.front().probability >= worth_a_place) {
+  if (!d.causes.unnamed_facets.empty() && d.causes.unnamed_facets.front().probability >= 1 - d.rules.least_at_work) {
     const UnnamedFacet& facet = d.causes.unnamed_facets.front();
     where = fmt::format(" It acts on the {} of {} (facet: {}{}).", facet.aspect,
                         facet.stance ? "stances" : d.data.step_name + "s", facet.facet,
@@ -146,7 +142,7 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
         s.push_back(
             fmt::format("It leaves {} {} of the map beyond chance, by no more than the {:.0f} % of its own size "
                         "that the form of a cause is allowed to be off.",
-                        left, left == 1 ? "cell" : "cells", 100 * model_error));
+                        left, left == 1 ? "cell" : "cells", 100 * d.rules.model_error));
       break;
     case Verdict::partly_explained:
       s.push_back("There is a gap that recalibration does not remove, and part of it has a name.");
@@ -154,7 +150,7 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
       say_what_stays(s, d);
       break;
     case Verdict::unexplained:
-      if (const auto would_do = trials_to_explain(d)) {
+      if (const auto would_do = trials_to_explain(d.data)) {
         s.push_back(fmt::format(
             "There is a gap as given, and {} {} with {} {} of a speed are too few to say what causes it: {} trials "
             "like these would do.",
@@ -171,7 +167,7 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
         break;
       }
       s.push_back("There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
-      if (d.causes.together > most_together)
+      if (d.causes.together > d.rules.most_together)
         s.push_back(fmt::format(
             "The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: two "
             "causes would add up, these bend each other into the shape of something else.",
@@ -233,8 +229,8 @@ void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
 
 }  // namespace
 
-std::string common_name(const Diagnosis& d, const std::vector<std::string>& alike) {
-  for (const EffectGroup& group : d.data.groups)
+std::string common_name(const std::vector<EffectGroup>& groups, const std::vector<std::string>& alike) {
+  for (const EffectGroup& group : groups)
     if (std::ranges::all_of(
             alike, [&](const std::string& id) { return std::ranges::find(group.members, id) != group.members.end(); }))
       return group.name;
@@ -276,14 +272,14 @@ std::string next_step(const Diagnosis& d) {
     case Verdict::partly_explained: {
       std::vector<std::string> names;
       for (const AtWork& one : d.causes.at_work)
-        if (one.probability >= least_at_work) names.push_back(one.name);
+        if (one.probability >= d.rules.least_at_work) names.push_back(one.name);
       return fmt::format(
           "Give the model {}, or take {} out of the machine, and diagnose new trials: what stays is then the whole gap "
           "and shows more clearly.",
           fmt::join(names, " and "), names.size() == 1 ? "it" : "them");
     }
     case Verdict::unexplained:
-      if (const auto would_do = trials_to_explain(d))
+      if (const auto would_do = trials_to_explain(d.data))
         return fmt::format("Run {} trials like these, or longer ones, and diagnose them together.", *would_do);
       return "Check the measurement first where the gap shows most (units, leg numbers, sensor noise). If it holds, "
              "see "

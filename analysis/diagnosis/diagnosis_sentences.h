@@ -22,6 +22,6 @@ bool closed_is_known(const Shrinkage& shrinkage);
 std::string closed_unknown(const Shrinkage& shrinkage);
 
 /// Names what effects that act alike have in common, where the field has a word for it.
-std::string common_name(const Diagnosis& d, const std::vector<std::string>& alike);
+std::string common_name(const std::vector<EffectGroup>& groups, const std::vector<std::string>& alike);
 
 }  // namespace metastable::analysis

@@ -11,15 +11,10 @@
 namespace metastable::analysis {
 namespace {
 
-// These levels decide whether there is a gap.
-constexpr double share_for_effects = 0.8;      // of the level; the rest is for gaps that no effect describes:
-constexpr double share_for_facets = 0.05;      //   in all cells of a facet together,
-constexpr double share_for_variations = 0.05;  //   in what varies without a name,
-constexpr double share_for_cells = 0.1;        //   in one cell of the map
-constexpr double share_for_pairs = 0.1;        // on top: pairs whose effects hide one another; hardly ever used up
-constexpr double least_p_value = 1e-12;        // smaller ones are beyond what chance levels can say
+constexpr double least_p_value = 1e-12;  // smaller ones are beyond what chance levels can say
 
-// Two effects may hide one another from the scores of each alone: judges the best pair's gain, for all pairs there are.
+}  // namespace
+
 double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit& recalibrated) {
   double least = 1;
   if (!ranking.scan.trials_suffice) return least;
@@ -38,7 +33,6 @@ double pairs_p_value(const CauseRanking& ranking, std::size_t effects, const Fit
   return least;
 }
 
-// Takes the facet with the least p-value, for as many facets; of a fit that did not settle there are none.
 double facets_p_value(const CauseRanking& ranking, const std::vector<LeftInFacet>& facets) {
   double least = 1;
   if (!ranking.scan.trials_suffice || facets.empty()) return least;
@@ -46,10 +40,6 @@ double facets_p_value(const CauseRanking& ranking, const std::vector<LeftInFacet
   return std::min(1.0, least * static_cast<double>(facets.size()));
 }
 
-}  // namespace
-
-// Says how likely a quadratic form of the nuisances' scores is as large by chance: the prior shrinks each direction of
-// the information.
 double recalibration_p_value(const TransitionModel& model, const Fit& as_given, double gain) {
   const Eigen::Index size = as_given.information.rows();
   Eigen::MatrixXd root_prior = Eigen::MatrixXd::Zero(size, size);
@@ -70,18 +60,17 @@ double recalibration_p_value(const TransitionModel& model, const Fit& as_given, 
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), std::max(0.0, gain) / scale));
 }
 
-// Puts the tests for a gap together.
-void test_for_gap(Diagnosis& d, const CauseRanking& ranking, std::size_t candidates, const Fit& recalibrated) {
-  d.gap.p_effects = std::max(least_p_value, ranking.p_value);
-  d.gap.p_where = std::max(least_p_value, d.gap.recalibrated.p_value);
-  d.gap.p_facets = std::max(least_p_value, facets_p_value(ranking, d.causes.unnamed.front().facets));
-  d.gap.p_recalibration = std::max(least_p_value, d.gap.p_recalibration);
-  const double pairs = std::max(least_p_value, pairs_p_value(ranking, candidates, recalibrated));
-  d.gap.p_variations = std::max(least_p_value, d.gap.p_variations);
-  d.gap.p_value =
-      std::min({1.0, d.gap.p_effects / share_for_effects, d.gap.p_where / share_for_cells,
-                d.gap.p_facets / share_for_facets, d.gap.p_variations / share_for_variations, pairs / share_for_pairs});
-  d.gap.p_as_given = std::min(1.0, 2 * std::min(d.gap.p_recalibration, d.gap.p_value));
+void put_together(Diagnosis::Gap& gap, const GapPValues& p, const Rules& rules) {
+  const auto bounded = [](double one) { return std::max(least_p_value, one); };
+  gap.p_recalibration = bounded(p.recalibration);
+  gap.p_effects = bounded(p.effects);
+  gap.p_where = bounded(p.where);
+  gap.p_facets = bounded(p.facets);
+  gap.p_variations = bounded(p.variations);
+  gap.p_value = std::min({1.0, gap.p_effects / rules.share_for_effects, gap.p_where / rules.share_for_cells,
+                          gap.p_facets / rules.share_for_facets, gap.p_variations / rules.share_for_variations,
+                          bounded(p.pairs) / rules.share_for_pairs});
+  gap.p_as_given = std::min(1.0, 2 * std::min(gap.p_recalibration, gap.p_value));
 }
 
 }  // namespace metastable::analysis

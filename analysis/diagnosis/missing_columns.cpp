@@ -14,7 +14,7 @@ constexpr std::size_t most_stand_ins = 6;          // of an effect, to stand for
 
 // Returns every effect's visibility in data drawn from the model, by its id.
 std::map<std::string, Visibility> look(const TransitionModel& model, const std::vector<double>& nuisance,
-                                       const std::vector<const Candidate*>& wanted, int threads) {
+                                       const std::vector<const Candidate*>& wanted, const Rules& rules, int threads) {
   std::vector<Candidate> few;
   for (const Candidate& candidate : model.candidates()) {
     if (std::none_of(wanted.begin(), wanted.end(), [&](const Candidate* w) { return w->id == candidate.id; })) continue;
@@ -26,7 +26,8 @@ std::map<std::string, Visibility> look(const TransitionModel& model, const std::
   std::vector<const Candidate*> candidates;
   for (const Candidate& candidate : few) candidates.push_back(&candidate);
   std::map<std::string, Visibility> seen;
-  for (Visibility& v : visibility(scan_effects(model, fit(model, nuisance, {}), candidates, threads), candidates))
+  for (Visibility& v :
+       visibility(scan_effects(model, fit(model, nuisance, {}), candidates, threads), candidates, rules))
     seen.emplace(v.effect, v);
   return seen;
 }
@@ -40,16 +41,17 @@ double share_of(const Visibility& v, const std::string& other) {
 }  // namespace
 
 std::vector<MissingColumn> missing_columns(const TransitionModel& model, const Fit& recalibrated,
-                                           const std::vector<const Candidate*>& candidates, int threads,
-                                           std::uint64_t seed) {
+                                           const std::vector<const Candidate*>& candidates, const Rules& rules,
+                                           int threads, std::uint64_t seed) {
   std::vector<MissingColumn> all;
   const auto completed = model.completed(recalibrated.nuisance, seed);
   if (completed.empty()) return all;
-  const auto now = look(*model.simulate(recalibrated.nuisance, {}, seed), recalibrated.nuisance, candidates, threads);
+  const auto now =
+      look(*model.simulate(recalibrated.nuisance, {}, seed), recalibrated.nuisance, candidates, rules, threads);
   for (const auto& [column, with_it] : completed) {
     MissingColumn missing;
     missing.column = column;
-    const auto then = look(*with_it, recalibrated.nuisance, candidates, threads);
+    const auto then = look(*with_it, recalibrated.nuisance, candidates, rules, threads);
     for (const Candidate* candidate : candidates) {
       const auto before = now.find(candidate->id), after = then.find(candidate->id);
       if (before == now.end() || after == then.end() || !after->second.undecidable.empty() ||

@@ -14,7 +14,7 @@ struct Fit;
 /// Both designs have data drawn from the recalibrated model, so that a gap does not blur the comparison.
 /// @param candidates  to be compared; of each a few variants stand for all
 std::vector<MissingColumn> missing_columns(const TransitionModel& model, const Fit& recalibrated,
-                                           const std::vector<const Candidate*>& candidates, int threads,
-                                           std::uint64_t seed);
+                                           const std::vector<const Candidate*>& candidates, const Rules& rules,
+                                           int threads, std::uint64_t seed);
 
 }  // namespace metastable::analysis

@@ -20,24 +20,24 @@ std::optional<std::size_t> whole(double trials) {
 
 }  // namespace
 
-std::optional<std::size_t> trials_to_explain(const Diagnosis& d) {
-  if (d.data.trials >= least_trials_to_explain && d.data.collisions >= least_transitions_to_explain) return {};
-  const double each = static_cast<double>(std::max<std::size_t>(1, d.data.collisions)) /
-                      static_cast<double>(std::max<std::size_t>(1, d.data.trials));
-  return std::max(least_trials_to_explain,
-                  static_cast<std::size_t>(std::ceil(static_cast<double>(least_transitions_to_explain) / each - 1e-9)));
+std::optional<std::size_t> trials_to_explain(const Diagnosis::Data& data) {
+  constexpr std::size_t trials = Rules::least_trials_to_explain, transitions = Rules::least_transitions_to_explain;
+  if (data.trials >= trials && data.collisions >= transitions) return {};
+  const double each = static_cast<double>(std::max<std::size_t>(1, data.collisions)) /
+                      static_cast<double>(std::max<std::size_t>(1, data.trials));
+  return std::max(trials, static_cast<std::size_t>(std::ceil(static_cast<double>(transitions) / each - 1e-9)));
 }
 
 std::vector<NotPossible> too_few(const TransitionModel& model, const Diagnosis& d, const DiagnosisOptions& options) {
   std::vector<NotPossible> all;
   const auto trials = static_cast<double>(d.data.trials);
   const bool gap = is_gap(d.verdict);
-  if (const auto would_do = trials_to_explain(d))
+  if (const auto would_do = trials_to_explain(d.data))
     all.push_back({"what causes a gap",
                    fmt::format("{} {} with {} {} of a speed; causes are named from {} trials and {} transitions on",
                                d.data.trials, d.data.trials == 1 ? "trial" : "trials", d.data.collisions,
-                               d.data.collisions == 1 ? "transition" : "transitions", least_trials_to_explain,
-                               least_transitions_to_explain),
+                               d.data.collisions == 1 ? "transition" : "transitions", Rules::least_trials_to_explain,
+                               Rules::least_transitions_to_explain),
                    would_do, true});
   if (d.data.trials < trials_for_folds(options.folds)) {
     all.push_back({"how far the gap shrinks, held out",

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "analysis/diagnosis/diagnosis.h"
@@ -10,18 +11,14 @@
 
 namespace metastable::analysis {
 
-struct Fit;
-
-inline constexpr double certain_odds = 1e6;  ///< of none, where a test decides against all that were fitted
-
-inline constexpr double even_odds = 1;  ///< of none, where too few trials cannot tell
-
-/// Says how likely something without a name is at first: odds to one effect where it acts alone; beside a hypothesis,
-/// to the hypothesis alone.
-inline constexpr double unnamed_alone = 4, unnamed_beside = 0.03;
-
-/// Lists all hypotheses by falling evidence; those that are not decided go to the diagnosis.
-std::vector<const RankedCause*> hypotheses(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking);
+/// All hypotheses by falling evidence, and those that are not decided.
+struct Hypotheses {
+  std::vector<const RankedCause*> ordered;
+  std::vector<Cause> not_decided;
+  const RankedCause* best() const { return ordered.empty() ? nullptr : ordered.front(); }
+};
+/// @param ranking  it outlives the answer
+Hypotheses hypotheses(const TransitionModel& model, const CauseRanking& ranking);
 
 /// Odds of something without a name to all hypotheses of the catalogue.
 struct Odds {
@@ -39,33 +36,61 @@ struct Odds {
   double of_unnamed() const { return (left / (1 + left) + beside + alone) / (1 + beside + alone); }
 };
 
-/// Holds the best hypothesis and what speaks against it.
+/// The best hypothesis and what speaks against it.
 struct Chosen {
-  const Fit* fit = nullptr;  ///< the recalibrated model where no hypothesis is worth having
-  Odds unnamed;              ///< of something else, in its place or beside it
-  double bent = 1;           ///< share of its gain that an error of form may bend
+  const Fit* fit = nullptr;            ///< the recalibrated model where no hypothesis is worth having
+  GapMap left = {};                    ///< the map of the gap under `fit`
+  std::vector<Unnamed> supposed = {};  ///< something without a name: alone, then beside the likeliest hypotheses
+  Odds unnamed = {};                   ///< of something else, in its place or beside it
+  double bent = 1;                     ///< share of its gain that an error of form may bend
+  double together = 1;                 ///< RankedCause::together
 };
 
-/// Chooses the first of the hypotheses. What it leaves on the map is judged beyond its own model error; that and the
-/// hypotheses beside which something without a name was supposed go to the diagnosis.
+/// Chooses the first of the hypotheses. What it leaves on the map is judged beyond its own model error.
 /// @param ordered  not empty, with a fit of the first
-Chosen choose(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
-              const std::vector<const RankedCause*>& ordered, const Fit& recalibrated, const DiagnosisOptions& options);
+/// @param alone  what the recalibrated model leaves
+Chosen choose(const TransitionModel& model, const CauseRanking& ranking, const std::vector<const RankedCause*>& ordered,
+              const Fit& recalibrated, Unnamed alone, const DiagnosisOptions& options);
 
 /// Says whether trials that the cause was not fitted to still show a gap, beyond what its form may be off.
+/// @param log_score  the first of the held-out measures
+/// @param bent  Chosen::bent
 /// @param by_itself  gap_by_itself() [nats a collision]
-bool leaves_gap_held_out(const Diagnosis& d, double bent, double by_itself);
+bool leaves_gap_held_out(const Shrinkage& log_score, const Diagnosis::Data& data, double bent, double by_itself,
+                         const Rules& rules);
 
-/// Shares probabilities over everything; the prior gives a gap even odds, shared by the effects. Returns the share of
-/// the effects together.
-double share_probabilities(Diagnosis& d, const TransitionModel& model, const CauseRanking& ranking,
-                           const std::vector<const RankedCause*>& ordered, std::size_t candidates, bool gap,
-                           const Odds& unnamed);
+/// What the tests say.
+struct Tested {
+  bool gap = false;           ///< after recalibration
+  bool recalibrates = false;  ///< by a recalibration that gains more than chance
+};
 
-/// Sets verdict, set, what of it acts alike, and what is at work but for the shares it closes. An effect or a group is
-/// at work from a probability of 0.8 on: the gap is explained where something without a name is less likely than 0.2,
-/// else partly explained. Of too few trials (trials_to_explain) neither an effect nor a recalibration is named: where
-/// they have a gap it is unexplained.
-void give_verdict(Diagnosis& d, bool gap, const Odds& unnamed, double share_of_effects);
+/// Probabilities of everything; they add up to one.
+struct Probabilities {
+  std::vector<Cause> ranked;  ///< the hypotheses with theirs, in their order
+  double no_gap = 0, recalibrate = 0, none = 0;
+  double of_effects() const;
+  double of_gap() const { return 1 - no_gap - recalibrate; }
+};
+/// Shares probabilities over everything; the prior gives a gap even odds, shared by the effects.
+/// @param candidates  how many effects were considered
+Probabilities share_probabilities(const TransitionModel& model, const CauseRanking& ranking,
+                                  const std::vector<const RankedCause*>& ordered, std::size_t candidates,
+                                  const Tested& tested, const Odds& unnamed, const Rules& rules);
+
+/// The verdict with what it names.
+struct Named {
+  Verdict verdict = Verdict::no_gap;
+  std::vector<std::string> set, alike;  ///< as Diagnosis::Causes
+  std::vector<AtWork> at_work;          ///< but for the shares they close
+  double p_unnamed = 0;
+};
+/// Gives a verdict. An effect or a group is at work from Rules::least_at_work on: the gap is explained where something
+/// without a name is less likely than its complement, else partly explained. Of too few trials (trials_to_explain)
+/// neither an effect nor a recalibration is named: where they have a gap it is unexplained.
+/// @param visible  Diagnosis::Limits::visible
+Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, const Tested& tested,
+                   const std::vector<Visibility>& visible, const Diagnosis::Data& data,
+                   const std::string& recalibration_id, const Rules& rules);
 
 }  // namespace metastable::analysis

@@ -9,8 +9,6 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double seen_gain = 16;
-
 // Returns the information that an effect's parameters, `count` columns of the scan, take up of what crosses with them.
 double taken_up(const EffectScan& scan, Eigen::Index first, Eigen::Index count, const Eigen::VectorXd& cross) {
   const Eigen::MatrixXd root = markov::resolved_root(scan.information.block(first, first, count, count),
@@ -20,7 +18,8 @@ double taken_up(const EffectScan& scan, Eigen::Index first, Eigen::Index count, 
 
 }  // namespace
 
-std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<const Candidate*>& candidates) {
+std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
+                                   const Rules& rules) {
   std::vector<Visibility> all;
   for (const Candidate* candidate : candidates) {
     Visibility v;
@@ -51,7 +50,7 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
       information -= (rest.transpose() * cross).squaredNorm();
     }
     const FreeParameter& p = candidate->parameters[0];
-    const double size = std::sqrt(seen_gain / std::max(information, least));
+    const double size = std::sqrt(rules.seen_gain / std::max(information, least));
     std::vector<double> values;
     for (const FreeParameter& one : candidate->parameters) values.push_back(one.neutral);
     const auto neutral = candidate->report(candidate->variants[found->best], values);

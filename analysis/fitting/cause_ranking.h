@@ -8,6 +8,7 @@
 #include "analysis/fitting/effect_fit.h"
 #include "analysis/fitting/effect_scan.h"
 #include "analysis/fitting/model_fit.h"
+#include "analysis/fitting/rules.h"
 
 namespace metastable::analysis {
 
@@ -24,7 +25,15 @@ struct RankedCause {
       1;  ///< of a pair: its gain over what its two effects gain alone, beside what each hides of the other
   std::string not_decided;  ///< why, where the data cannot tell or the fit did not settle
   bool candidate_undecided() const { return !terms[0].candidate->undecidable.empty(); }
+  bool fitted() const { return !fit.nuisance.empty(); }
+  /// Takes a better fit of the same effects: the likelihoods of their other variants, and so the prior, stay what they
+  /// were.
+  void take(Fit better, const Fit& recalibrated);
 };
+
+/// Returns a fit as a hypothesis that has its gain and is not weighed yet; its evidence is -infinity where the gain is
+/// not finite.
+RankedCause as_cause(Fit fit, const Fit& recalibrated);
 
 struct CauseRanking {
   EffectScan scan;                   ///< at the recalibrated model
@@ -37,6 +46,7 @@ struct RankingOptions {
   int threads = 0;
   int draws = 2000;
   std::uint64_t seed = 1;
+  Rules rules = {};
   std::vector<std::pair<const Candidate*, const Candidate*>> pairs = {};  ///< tried in any case
   std::function<void(double)> progress;  ///< share done; called from any thread, one at a time; may throw to stop
 };
@@ -46,6 +56,9 @@ struct RankingOptions {
 /// @param candidates  to be considered
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options);
+
+/// Says whether `terms` hold all effects of `others`.
+bool extends(const std::vector<EffectTerm>& terms, const std::vector<EffectTerm>& others);
 
 /// Returns the fit beyond which what `terms` gained may be off by an error of form: that of those of them that are
 /// exact, or `recalibrated`. @param singles  fitted causes

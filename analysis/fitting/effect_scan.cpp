@@ -170,7 +170,8 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
   for (Eigen::Index k = 0; k < events; ++k)
     scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
-  scan.trials_suffice = model.trials() >= enough_trials && model.events().size() >= enough_transitions * model.trials();
+  scan.trials_suffice =
+      model.trials() >= Rules::enough_trials && model.events().size() >= Rules::enough_transitions * model.trials();
   // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
   scan.scores = all.slope.colwise().sum();
 

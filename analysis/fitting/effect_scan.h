@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/fitting/model_fit.h"
+#include "analysis/fitting/rules.h"
 
 namespace metastable::analysis {
 
@@ -25,7 +26,7 @@ struct EffectScan {
   Eigen::MatrixXd by_trial;     ///< [trials x columns] efficient scores, summed over a trial's events
   Eigen::MatrixXd information;  ///< [columns x columns] efficient
   Eigen::VectorXd whole;        ///< [columns] its diagonal before the projection
-  bool trials_suffice = true;   ///< to draw chance from them
+  bool trials_suffice = true;   ///< to draw chance from them, by Rules::enough_trials and enough_transitions
   /// Returns what it says of a candidate, null if that was not scanned.
   const ScannedEffect* find(const Candidate* candidate) const;
 };
@@ -43,10 +44,6 @@ struct ScanBeside {
 ///   resolves
 EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
                         int threads, const ScanBeside& beside = {});
-
-/// The trials, and transitions of each on average, from which their scores tell how large chance is: below, false
-/// alarms soar.
-inline constexpr std::size_t enough_trials = 40, enough_transitions = 4;
 
 /// Knows how large the scan's gains get by chance alone, by signs and sizes of whole trials' scores drawn anew
 /// (multiplier bootstrap), and what that says of gains found. Few trials, or trials of few transitions, have too few

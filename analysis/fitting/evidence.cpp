@@ -4,14 +4,9 @@
 #include <cmath>
 
 namespace metastable::analysis {
-namespace {
 
-constexpr double expected_gain = 36;  // of an effect before its size is known
-
-}  // namespace
-
-double evidence_of_gain(double gain, double parameters) {
-  const double g = expected_gain / std::max(1.0, parameters);
+double evidence_of_gain(double gain, double parameters, const Rules& rules) {
+  const double g = rules.expected_gain / std::max(1.0, parameters);
   return 0.5 * g / (1 + g) * gain - 0.5 * parameters * std::log1p(g);
 }
 
@@ -23,21 +18,21 @@ PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit&
   return gain;
 }
 
-double evidence_of(const ScannedEffect& scanned, double gain) {
+double evidence_of(const ScannedEffect& scanned, double gain, const Rules& rules) {
   const auto parameters = static_cast<double>(scanned.candidate->parameters.size());
-  const double g = expected_gain / std::max(1.0, parameters), shrink = g / (1 + g);
+  const double g = rules.expected_gain / std::max(1.0, parameters), shrink = g / (1 + g);
   const double best = scanned.gain[scanned.best];
   double sum = 0;
   for (std::size_t v = 0; v < scanned.gain.size(); ++v) {
     const double share = v == scanned.best || !(best > 0) ? 1 : scanned.gain[v] / best;
     sum += std::exp(0.5 * shrink * gain * (std::min(1.0, share) - 1));
   }
-  return evidence_of_gain(gain, parameters) + std::log(sum / static_cast<double>(scanned.gain.size()));
+  return evidence_of_gain(gain, parameters, rules) + std::log(sum / static_cast<double>(scanned.gain.size()));
 }
 
-double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact) {
+double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact, const Rules& rules) {
   const PhaseGain before = phase_gain(model, first, exact), now = phase_gain(model, pair, first);
-  const double tolerated = model_error * model_error;
+  const double tolerated = rules.square_error();
   // What the second effect gained by itself counts alone: one phase may have paid for the other, or for a prior.
   const double all = 2 * (pair.penalised - first.penalised);
   const double beyond = std::max(0.0, now.collisions - tolerated * std::max(0.0, before.collisions)) +

@@ -3,22 +3,19 @@
 
 #include "analysis/fitting/effect_scan.h"
 #include "analysis/fitting/model_fit.h"
+#include "analysis/fitting/rules.h"
 
 namespace metastable::analysis {
 
-/// The share of an effect's size that its form may be off by: no catalogue entry has exactly the form of what nature
-/// did, and such a misfit of a large effect is no second effect.
-inline constexpr double model_error = 0.06;
-
 /// Evidence is the likelihood ratio averaged over an effect's variants and over a normal prior on its p parameters
-/// whose expected gain is 36 (so that effects of one and of eight parameters start level), by Laplace's approximation:
-/// log mean_v exp(gain_v g/(1+g)/2) - p/2 log(1+g), g = 36/p. Where an effect has a prior of its own
-/// (FreeParameter::prior_sd) its gain has paid for that besides.
+/// whose expected gain is Rules::expected_gain (so that effects of one and of eight parameters start level), by
+/// Laplace's approximation: log mean_v exp(gain_v g/(1+g)/2) - p/2 log(1+g), g = expected_gain / p. Where an effect has
+/// a prior of its own (FreeParameter::prior_sd) its gain has paid for that besides.
 /// @param gain  2 Delta penalised log likelihood; that of the best variant is fitted, the others' follow their scores
-double evidence_of(const ScannedEffect& scanned, double gain);
+double evidence_of(const ScannedEffect& scanned, double gain, const Rules& rules);
 
 /// Returns the evidence of an effect without variants. @param parameters  >= 0
-double evidence_of_gain(double gain, double parameters);
+double evidence_of_gain(double gain, double parameters, const Rules& rules);
 
 /// The gain, 2 Delta log likelihood of one fit over another, in stances and in everything else.
 struct PhaseGain {
@@ -26,8 +23,8 @@ struct PhaseGain {
 };
 PhaseGain phase_gain(const TransitionModel& model, const Fit& better, const Fit& worse);
 
-/// Returns the gain that counts for a second effect: what it gained beyond model_error^2 of what the first one gained
-/// in the same phase. @param exact  the part of the first that has no error of form (exact_part)
-double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact);
+/// Returns the gain that counts for a second effect: what it gained beyond Rules::square_error() of what the first one
+/// gained in the same phase. @param exact  the part of the first that has no error of form (exact_part)
+double earned(const TransitionModel& model, const Fit& pair, const Fit& first, const Fit& exact, const Rules& rules);
 
 }  // namespace metastable::analysis

@@ -14,14 +14,14 @@ namespace {
 
 constexpr double worth_fitting = 10;  // evidence promised below the best
 
-LeftInFacet as_left(const Variation& variation, const ScannedEffect& scanned, double gain) {
+LeftInFacet as_left(const Variation& variation, const ScannedEffect& scanned, double gain, const Rules& rules) {
   LeftInFacet left{.facet = variation.facet, .aspect = variation.aspect};
   left.quadratic = gain;
   left.degrees = static_cast<double>(variation.candidate.parameters.size());
   const boost::math::chi_squared chance(left.degrees);
   left.p_value = std::min(1.0, static_cast<double>(variation.candidate.variants.size()) *
                                    boost::math::cdf(boost::math::complement(chance, gain)));
-  left.evidence = evidence_of(scanned, gain);
+  left.evidence = evidence_of(scanned, gain, rules);
   return left;
 }
 
@@ -50,14 +50,14 @@ double variations_p_value(const EffectScan& variations, const std::vector<double
 }
 
 std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const Fit& recalibrated,
-                                           const EffectScan& scan, int threads,
+                                           const EffectScan& scan, const Rules& rules, int threads,
                                            const std::function<void()>& heartbeat) {
   if (scan.effects.empty()) return {};
   std::vector<LeftInFacet> all;
   std::vector<std::size_t> order(scan.effects.size());  // by falling evidence promised
   for (std::size_t i = 0; i < order.size(); ++i) {
     const ScannedEffect& scanned = scan.effects[i];
-    all.push_back(as_left(model.variations()[i], scanned, scanned.gain[scanned.best]));
+    all.push_back(as_left(model.variations()[i], scanned, scanned.gain[scanned.best], rules));
     order[i] = i;
   }
   std::sort(order.begin(), order.end(),
@@ -74,8 +74,8 @@ std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const F
     }
     const ScannedEffect& scanned = scan.effects[order[k]];
     const Fit best = fit_one_more(model, effort, recalibrated, scanned);
-    all[order[k]] =
-        as_left(model.variations()[order[k]], scanned, std::max(0.0, 2 * (best.penalised - recalibrated.penalised)));
+    all[order[k]] = as_left(model.variations()[order[k]], scanned,
+                            std::max(0.0, 2 * (best.penalised - recalibrated.penalised)), rules);
   });
   double most = 0, best = 0;
   for (std::size_t k = 0; k < fitted; ++k) {
@@ -84,7 +84,7 @@ std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const F
   }
   for (std::size_t k = fitted; k < order.size(); ++k) {
     LeftInFacet& left = all[order[k]];
-    left = as_left(model.variations()[order[k]], scan.effects[order[k]], std::min(left.quadratic, most));
+    left = as_left(model.variations()[order[k]], scan.effects[order[k]], std::min(left.quadratic, most), rules);
     left.evidence = std::min(left.evidence, best);
   }
   return all;

@@ -7,6 +7,7 @@
 
 #include "analysis/fitting/effect_scan.h"
 #include "analysis/fitting/model_fit.h"
+#include "analysis/fitting/rules.h"
 #include "analysis/gap/left_over.h"
 
 namespace metastable::analysis {
@@ -30,6 +31,7 @@ std::vector<double> promised_gains(const EffectScan& variations);
 /// @param scan  scan_variations()
 /// @param heartbeat  called before every fit, one at a time, from any thread; may throw to stop
 std::vector<LeftInFacet> fitted_variations(const TransitionModel& model, const Fit& recalibrated,
-                                           const EffectScan& scan, int threads, const std::function<void()>& heartbeat);
+                                           const EffectScan& scan, const Rules& rules, int threads,
+                                           const std::function<void()>& heartbeat);
 
 }  // namespace metastable::analysis

@@ -33,7 +33,7 @@ Units units_of_chance(const EfficientColumns& efficient, const TransitionModel& 
   for (Eigen::Index i = 0; i < count; ++i)
     by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(i)].trial)) +=
         efficient.dense.row(i);
-  if (model.trials() >= enough_trials) {
+  if (model.trials() >= Rules::enough_trials) {
     units.rows = std::move(by_trial);
     return units;
   }

@@ -11,7 +11,7 @@ namespace metastable::analysis {
 /// Scores the events of `fit` in every cell: mean, spread, tail share, correlation with the previous one, and of
 /// all: the trend over the trials, cosines and sines of the time since the previous collision. What the fitted
 /// parameters could take up is projected out. Chance levels come from `draws` multiplier-bootstrap draws: over trials,
-/// or over transitions where trials are fewer than `enough_trials`.
+/// or over transitions where trials are fewer than Rules::enough_trials.
 /// @param draws  >= 0; 0: adjusted p-values by their bounds alone
 GapMap gap_map(const TransitionModel& model, const Fit& fit, int draws, std::uint64_t seed);
 

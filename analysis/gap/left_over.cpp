@@ -112,7 +112,8 @@ bool is_form_of_contact(const GapCell& cell) { return cell.facet == "phase" && c
 
 // Weighs the columns' sums by what they scatter without a gap, in the directions that the fitted parameters leave.
 LeftInFacet judge(const Key& key, const Eigen::MatrixXd& dense, const Eigen::VectorXd& sums,
-                  const Eigen::VectorXd& whole, const std::vector<MapColumn>& columns, double forgiven) {
+                  const Eigen::VectorXd& whole, const std::vector<MapColumn>& columns, double forgiven,
+                  const Rules& rules) {
   LeftInFacet left{.facet = std::get<0>(key), .aspect = std::get<1>(key), .stance = std::get<2>(key)};
   const Eigen::ArrayXd root = whole.array().max(1e-300).sqrt();
   const Eigen::MatrixXd scaled = dense * root.inverse().matrix().asDiagonal();
@@ -132,14 +133,14 @@ LeftInFacet judge(const Key& key, const Eigen::MatrixXd& dense, const Eigen::Vec
   if (left.degrees == 0) return left;
   const boost::math::chi_squared chance(left.degrees);
   left.p_value = boost::math::cdf(boost::math::complement(chance, left.quadratic));
-  left.evidence = evidence_of_gain(std::max(0.0, left.quadratic - forgiven), left.degrees);
+  left.evidence = evidence_of_gain(std::max(0.0, left.quadratic - forgiven), left.degrees, rules);
   return left;
 }
 
 }  // namespace
 
-std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, double collisions,
-                                       double stances) {
+std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, const PhaseGain& forgiven,
+                                       const Rules& rules) {
   // Where the fit did not settle, what is left is mostly the fit's own.
   if (!fit.converged && fit.promised > most_promised) return {};
   Facets facets;
@@ -157,17 +158,18 @@ std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& 
     const EfficientColumns efficient = project(columns, model, fit);
     if (!efficient.sums.allFinite()) continue;  // a fit far off may have no slopes to project on
     all.push_back(judge(key, efficient.dense, efficient.sums.transpose(), efficient.whole_norm.transpose(), columns,
-                        std::get<2>(key) ? stances : collisions));
+                        std::get<2>(key) ? forgiven.stances : forgiven.collisions, rules));
   }
   return all;
 }
 
-void bound_evidence(std::vector<LeftInFacet>& alone, double gain, const std::vector<LeftInFacet>& beside) {
+void bound_evidence(std::vector<LeftInFacet>& alone, double gain, const std::vector<LeftInFacet>& beside,
+                    const Rules& rules) {
   for (LeftInFacet& facet : alone)
     for (const LeftInFacet& left : beside)
       if (left.facet == facet.facet && left.aspect == facet.aspect && left.stance == facet.stance)
-        facet.evidence = std::min(facet.evidence,
-                                  evidence_of_gain(std::max(0.0, gain) + left.quadratic, std::max(1.0, facet.degrees)));
+        facet.evidence = std::min(facet.evidence, evidence_of_gain(std::max(0.0, gain) + left.quadratic,
+                                                                   std::max(1.0, facet.degrees), rules));
 }
 
 double evidence_of_more(const std::vector<LeftInFacet>& facets) {

@@ -8,6 +8,8 @@ namespace metastable::analysis {
 
 class TransitionModel;
 struct Fit;
+struct Rules;
+struct PhaseGain;
 
 /// Holds what is left in one facet and aspect of it, all its cells together.
 struct LeftInFacet {
@@ -22,13 +24,15 @@ struct LeftInFacet {
 /// Judges the facets of the map; and what no effect of a catalogue does: every other trial, slow swings over the
 /// trials, smooth changes along them, trends of single legs, memory beyond the last collision, the change of speed
 /// since then. What the fit's parameters could take up is projected out. Empty of a fit that did not settle.
-/// @param collisions, stances  2 Delta log likelihood that an error of form may leave in a facet, see PhaseGain
-std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, double collisions, double stances);
+/// @param forgiven  2 Delta log likelihood that an error of form may leave in a facet
+std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, const PhaseGain& forgiven,
+                                       const Rules& rules);
 
 /// Bounds the evidence of facets by a hypothesis that was fitted: a facet beside it, which includes the facet alone,
 /// gains no more than it and what it leaves in the facet. Far from the fit scores promise more than that.
 /// @param gain  2 Delta log likelihood of the hypothesis over the fit of `alone`  @param beside  what it leaves
-void bound_evidence(std::vector<LeftInFacet>& alone, double gain, const std::vector<LeftInFacet>& beside);
+void bound_evidence(std::vector<LeftInFacet>& alone, double gain, const std::vector<LeftInFacet>& beside,
+                    const Rules& rules);
 
 /// Returns the log of the mean of the facets' Bayes factors: something without a name, in a facet that nobody told.
 /// -infinity where there are none.

@@ -130,7 +130,7 @@ TEST(Diagnosis, NamesBothOfTwoCauses) {
   const std::string name = d.causes.ranked[0].name();
   EXPECT_NE(name.find("contact_memory"), std::string::npos) << name;
   EXPECT_EQ(d.causes.ranked[0].effects.size(), 2u) << name;
-  EXPECT_LT(d.causes.together, most_together);
+  EXPECT_LT(d.causes.together, Rules{}.most_together);
 }
 
 // Without the true effect in the catalogue the answer is that nothing explains it.
@@ -174,7 +174,7 @@ TEST(Diagnosis, APairThatGainsOnlyTogetherDoesNotExplain) {
   const Diagnosis d = diagnose(*wheel_transitions(experiment), options);
   ASSERT_FALSE(d.causes.ranked.empty());
   EXPECT_EQ(d.causes.ranked[0].effects.size(), 2U) << d.causes.ranked[0].name();
-  EXPECT_GT(d.causes.together, most_together);
+  EXPECT_GT(d.causes.together, Rules{}.most_together);
   EXPECT_EQ(d.verdict, Verdict::unexplained);
   EXPECT_TRUE(d.causes.set.empty());
   ASSERT_GE(d.sentences.size(), 2U);

@@ -14,14 +14,11 @@ namespace {
 
 // Returns the tests where effects and cells show nothing, and so much is left by facet.
 Diagnosis::Gap tests_of(const std::vector<LeftInFacet>& facets) {
-  Diagnosis d;
-  d.gap.recalibrated.p_value = 0.5;
-  d.causes.unnamed.push_back({{}, 0, facets});
   CauseRanking ranking;
   ranking.scan.trials_suffice = true;
-  ranking.p_value = 0.5;
-  test_for_gap(d, ranking, 20, {});
-  return d.gap;
+  Diagnosis::Gap gap;
+  put_together(gap, {.effects = 0.5, .where = 0.5, .facets = facets_p_value(ranking, facets)}, Rules{});
+  return gap;
 }
 
 // A model as given that is so far off that its likelihood has no slope gains all the same.
@@ -51,14 +48,16 @@ TEST(GapTests, TheLeastOfTheFacetsCountsForAllOfThem) {
 }
 
 TEST(GapTests, WhatVariesWithoutANameIsAGap) {
-  Diagnosis d;
-  d.gap.recalibrated.p_value = 0.5;
-  d.gap.p_variations = 1e-9;
-  d.causes.unnamed.push_back({{}, 0, {}});
-  CauseRanking ranking;
-  ranking.p_value = 0.5;
-  test_for_gap(d, ranking, 20, {});
-  EXPECT_LT(d.gap.p_value, 1e-7);
+  Diagnosis::Gap gap;
+  put_together(gap, {.effects = 0.5, .where = 0.5, .variations = 1e-9}, Rules{});
+  EXPECT_LT(gap.p_value, 1e-7);
+}
+
+// The shares of the level add up to it, and pairs come on top.
+TEST(GapTests, SharesKeepTheLevel) {
+  const Rules rules;
+  EXPECT_NEAR(rules.share_for_effects + rules.share_for_cells + rules.share_for_facets + rules.share_for_variations, 1,
+              1e-12);
 }
 
 }  // namespace

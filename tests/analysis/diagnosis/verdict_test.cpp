@@ -13,19 +13,45 @@
 namespace metastable::analysis {
 namespace {
 
-// One effect, and something without a name; the rest is recalibration's.
-Diagnosis with_odds_of_none(double none) {
+Diagnosis::Data enough_data() {
+  Diagnosis::Data data;
+  data.trials = 50;
+  data.collisions = 500;
+  return data;
+}
+
+// Gives the verdict on causes with their probabilities; the rest is recalibration's.
+Diagnosis judged(std::vector<Cause> ranked, const Odds& unnamed, const Tested& tested, const Diagnosis::Data& data,
+                 const std::vector<Visibility>& visible = {}) {
   Diagnosis d;
-  d.data.trials = 50;
-  d.data.collisions = 500;
+  d.data = data;
+  Probabilities probabilities;
+  probabilities.none = unnamed.alone * ranked.front().probability;
+  probabilities.ranked = std::move(ranked);
+  Named named = give_verdict(probabilities, unnamed, tested, visible, data, "contact_distribution", d.rules);
+  d.verdict = named.verdict;
+  d.causes.ranked = std::move(probabilities.ranked);
+  d.causes.p_none = probabilities.none;
+  d.causes.set = std::move(named.set);
+  d.causes.alike = std::move(named.alike);
+  d.causes.at_work = std::move(named.at_work);
+  d.causes.p_unnamed = named.p_unnamed;
+  return d;
+}
+
+Cause patch_with(double probability) {
   Cause cause;
   cause.effects = {"friction_patch"};
   cause.parameters.emplace_back();
-  cause.probability = 0.9 / (1 + none);
-  d.causes.ranked = {cause};
-  d.causes.p_none = none * cause.probability;
-  give_verdict(d, true, {none, 0, 0}, cause.probability);
-  return d;
+  cause.probability = probability;
+  return cause;
+}
+
+constexpr Tested a_gap{true, false};
+
+// One effect, and something without a name.
+Diagnosis with_odds_of_none(double none) {
+  return judged({patch_with(0.9 / (1 + none))}, {none, 0, 0}, a_gap, enough_data());
 }
 
 TEST(Verdict, ANameIsGivenWhereItIsFourTimesAsLikelyAsNone) {
@@ -37,13 +63,7 @@ TEST(Verdict, ANameIsGivenWhereItIsFourTimesAsLikelyAsNone) {
 
 // What has no name beside an effect takes nothing from it: both are said. In its place it takes the name.
 TEST(Verdict, AnEffectBesideSomethingUnnamedExplainsAPart) {
-  const auto with = [](Odds unnamed) {
-    Diagnosis d = with_odds_of_none(0);
-    d.causes.set.clear();
-    d.causes.at_work.clear();
-    give_verdict(d, true, unnamed, d.causes.ranked[0].probability);
-    return d;
-  };
+  const auto with = [](Odds unnamed) { return judged({patch_with(0.9)}, unnamed, a_gap, enough_data()); };
   const Diagnosis beside = with({0.01, 5, 0});
   EXPECT_EQ(beside.verdict, Verdict::partly_explained);
   ASSERT_EQ(beside.causes.at_work.size(), 1u);
@@ -64,40 +84,38 @@ TEST(Verdict, AnEffectBesideSomethingUnnamedExplainsAPart) {
 // says how many would do.
 TEST(Verdict, TooFewTrialsAreNotExplained) {
   for (const auto& [trials, collisions, would_do] :
-       {std::tuple<std::size_t, std::size_t, std::size_t>{2, 2, least_transitions_to_explain},
-        {least_trials_to_explain - 1, 500, least_trials_to_explain},
-        {10, least_transitions_to_explain - 1, 11}}) {
+       {std::tuple<std::size_t, std::size_t, std::size_t>{2, 2, Rules::least_transitions_to_explain},
+        {Rules::least_trials_to_explain - 1, 500, Rules::least_trials_to_explain},
+        {10, Rules::least_transitions_to_explain - 1, 11}}) {
     SCOPED_TRACE(trials);
     for (const bool gap : {true, false}) {
-      Diagnosis d = with_odds_of_none(0.01);
-      d.causes.set.clear();
-      d.data.trials = trials;
-      d.data.collisions = collisions;
-      d.gap.p_recalibration = 1e-6;
-      give_verdict(d, gap, {0.01, 0, 0}, d.causes.ranked[0].probability);
+      Diagnosis::Data few;
+      few.trials = trials;
+      few.collisions = collisions;
+      const Diagnosis d = judged({patch_with(0.9)}, {0.01, 0, 0}, {gap, true}, few);
       EXPECT_EQ(d.verdict, Verdict::unexplained);
       EXPECT_TRUE(d.causes.set.empty());
-      ASSERT_TRUE(trials_to_explain(d));
-      EXPECT_EQ(*trials_to_explain(d), would_do);
+      ASSERT_TRUE(trials_to_explain(few));
+      EXPECT_EQ(*trials_to_explain(few), would_do);
       EXPECT_NE(sentences(d)[0].find("too few to say what causes it: " + std::to_string(would_do) + " trials"),
                 std::string::npos)
           << sentences(d)[0];
     }
   }
-  EXPECT_FALSE(trials_to_explain(with_odds_of_none(0.01)));
+  EXPECT_FALSE(trials_to_explain(enough_data()));
 }
 
 // What a likelihood leaves of data of its own is no gap.
 TEST(Verdict, HeldOutACauseIsJudgedBesideWhatItsOwnModelLeaves) {
-  Diagnosis d;
-  d.data.trials = 100;
-  d.data.collisions = 4000;
-  d.shrinkage.measures.emplace_back();
-  d.shrinkage.measures[0].with_effect = 0.003;  // 12 nats
-  d.shrinkage.measures[0].with_effect_least = 0.001;
-  EXPECT_TRUE(leaves_gap_held_out(d, 1, 0));
-  EXPECT_FALSE(leaves_gap_held_out(d, 1, 0.002));
-  EXPECT_TRUE(leaves_gap_held_out(d, 1, 0.0009));
+  Diagnosis::Data data;
+  data.trials = 100;
+  data.collisions = 4000;
+  Shrinkage log_score;
+  log_score.with_effect = 0.003;  // 12 nats
+  log_score.with_effect_least = 0.001;
+  EXPECT_TRUE(leaves_gap_held_out(log_score, data, 1, 0, Rules{}));
+  EXPECT_FALSE(leaves_gap_held_out(log_score, data, 1, 0.002, Rules{}));
+  EXPECT_TRUE(leaves_gap_held_out(log_score, data, 1, 0.0009, Rules{}));
 }
 
 // Something alone is likelier at first than something beside an effect: a little more evidence does not make up for it.
@@ -126,9 +144,7 @@ TEST(Verdict, SaysThatTheNearestIsTooUnsureForAName) {
 
 // A drift beside one of three, two of which the design hardly tells apart.
 Diagnosis with_pairs(double share) {
-  Diagnosis d;
-  d.data.trials = 50;
-  d.data.collisions = 500;
+  std::vector<Cause> ranked;
   for (const auto& [effects, gain, probability] :
        {std::tuple{std::vector<std::string>{"trial_drift", "inertia"}, 100.0, 0.5},
         {std::vector<std::string>{"slope_offset", "trial_drift"}, 99.0, 0.3},
@@ -139,14 +155,12 @@ Diagnosis with_pairs(double share) {
     cause.parameters.resize(effects.size());
     cause.gain = gain;
     cause.probability = probability;
-    d.causes.ranked.push_back(cause);
+    ranked.push_back(cause);
   }
   Visibility seen;
   seen.effect = "inertia";
   seen.alike = {{"slope_offset", share}, {"bounce", 0.6}};
-  d.limits.visible = {seen};
-  give_verdict(d, true, {}, 0.95);
-  return d;
+  return judged(std::move(ranked), {}, a_gap, enough_data(), {seen});
 }
 
 TEST(Verdict, PairsAreAlikeWhereWhatTheyDoNotShareIs) {

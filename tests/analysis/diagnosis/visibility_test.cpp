@@ -36,7 +36,7 @@ std::vector<Visibility> visible(const TransitionModel& model, const std::vector<
   std::vector<const Candidate*> pointers;
   for (const Candidate& candidate : candidates) pointers.push_back(&candidate);
   const Fit plain = fit(model, {3, std::log(0.5)}, {});
-  return visibility(scan_effects(model, plain, pointers, 1), pointers);
+  return visibility(scan_effects(model, plain, pointers, 1), pointers, Rules{});
 }
 
 TEST(Visibility, TheSmallestSizeIsThatOfAGainOfSixteen) {
@@ -67,7 +67,7 @@ TEST(Visibility, SaysWhatHidesAnEffect) {
   EXPECT_EQ(all[1].undecidable, "nobody measured it");
   EXPECT_EQ(all[1].smallest, 0);
   const EffectScan scan = scan_effects(model, fit(model, {3, std::log(0.5)}, {}), {}, 1);
-  EXPECT_EQ(visibility(scan, {&untold}).front().undecidable, "not scanned");
+  EXPECT_EQ(visibility(scan, {&untold}, Rules{}).front().undecidable, "not scanned");
 }
 
 // Models y = mean + a w + b v + noise with v of a given correlation with w, and changed experiments with others.

@@ -25,7 +25,7 @@ std::vector<LeftInFacet> left_of_line(unsigned seed, double shift) {
     y.push_back(3 + 0.5 * normal(generator) + (i / 4 % 2 == 0 ? shift : -shift));
   }
   const test::Line model(y, w);
-  return left_by_facet(model, fit(model, {3, -0.7}, {}), 0, 0);
+  return left_by_facet(model, fit(model, {3, -0.7}, {}), {}, Rules{});
 }
 
 // The quadratic form is noncentral chi-squared of one degree: n (shift / sd)^2 + 1 on average.
@@ -68,7 +68,7 @@ TEST(LeftOver, EventsThatScatterLittleAreNoSurer) {
     y.push_back(3 + (i % 4 == 1 ? 0.375 : 0.5) * normal(generator));
   }
   const test::Line model(y, w);
-  const std::vector<LeftInFacet> left = left_by_facet(model, fit(model, {3, -0.7}, {}), 0, 0);
+  const std::vector<LeftInFacet> left = left_by_facet(model, fit(model, {3, -0.7}, {}), {}, Rules{});
   const auto by_number = std::ranges::find_if(
       left, [](const LeftInFacet& one) { return one.facet == "collision" && one.aspect == "spread"; });
   ASSERT_NE(by_number, left.end());
@@ -84,11 +84,11 @@ TEST(LeftOver, AFacetExplainsNoMoreThanWhatRemovesIt) {
   LeftInFacet left = leg;
   left.quadratic = 3;
   std::vector<LeftInFacet> alone{leg, stance};
-  bound_evidence(alone, 20, {left});
-  EXPECT_EQ(alone[0].evidence, evidence_of_gain(20 + 3, 2));
+  bound_evidence(alone, 20, {left}, Rules{});
+  EXPECT_EQ(alone[0].evidence, evidence_of_gain(20 + 3, 2, Rules{}));
   EXPECT_EQ(alone[1].evidence, 15);  // nobody judged it
-  bound_evidence(alone, 1000, {left});
-  EXPECT_EQ(alone[0].evidence, evidence_of_gain(20 + 3, 2));
+  bound_evidence(alone, 1000, {left}, Rules{});
+  EXPECT_EQ(alone[0].evidence, evidence_of_gain(20 + 3, 2, Rules{}));
 }
 
 // How many collisions are far ones is how their distribution is shaped; the spread of all of them is judged.
@@ -105,10 +105,10 @@ TEST(LeftOver, TheFormOfTheContactIsNoFacet) {
 TEST(LeftOver, IsNotJudgedWhereTheFitDidNotSettle) {
   const test::Line model = test::line(0, 7);
   Fit plain = fit(model, {3, -0.7}, {});
-  EXPECT_FALSE(left_by_facet(model, plain, 0, 0).empty());
+  EXPECT_FALSE(left_by_facet(model, plain, {}, Rules{}).empty());
   plain.converged = false;
   plain.promised = 100;
-  EXPECT_TRUE(left_by_facet(model, plain, 0, 0).empty());
+  EXPECT_TRUE(left_by_facet(model, plain, {}, Rules{}).empty());
   EXPECT_EQ(evidence_of_more({}), -INFINITY);
 }
 

@@ -46,7 +46,7 @@ TEST(ContactVariation, FitsFindWhatTheDataWereDrawnWith) {
     for (std::size_t p = 0; p < one.values.size(); ++p)
       EXPECT_NEAR(with.terms[0].values[p], one.values[p], 0.03 + 0.3 * one.values[p]) << one.id;
     const std::vector<LeftInFacet> all =
-        fitted_variations(*data, without, scan_variations(*data, without, 1), 1, [] {});
+        fitted_variations(*data, without, scan_variations(*data, without, 1), Rules{}, 1, [] {});
     const auto best = std::ranges::max_element(all, {}, &LeftInFacet::evidence);
     EXPECT_EQ(best->aspect + " by " + best->facet, one.id);
     EXPECT_NEAR(best->quadratic, 2 * (with.penalised - without.penalised), 1) << one.id;
@@ -60,7 +60,7 @@ TEST(ContactVariation, NoneHasEvidenceWhereNothingVaries) {
   const Fit best = best_fit(*data, nominal_values(*data), {});
   const EffectScan scan = scan_variations(*data, best, 1);
   EXPECT_GT(variations_p_value(scan, promised_gains(scan), 500, 1), 0.05);
-  const std::vector<LeftInFacet> all = fitted_variations(*data, best, scan, 1, [] {});
+  const std::vector<LeftInFacet> all = fitted_variations(*data, best, scan, Rules{}, 1, [] {});
   EXPECT_EQ(all.size(), data->variations().size());
   for (const LeftInFacet& one : all) EXPECT_LT(one.evidence, 5) << one.aspect << " by " << one.facet;
 }
