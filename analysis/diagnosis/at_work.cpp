@@ -137,7 +137,7 @@ void add_closed_shares(std::vector<AtWork>& at_work, const TransitionModel& mode
                        const std::function<void()>& heartbeat) {
   const auto fit_of = [&](const std::vector<EffectTerm>& terms) -> const Fit* {
     if (terms.empty()) return &recalibrated;
-    for (const auto* causes : {&ranking.singles, &ranking.pairs})
+    for (const auto* causes : {&ranking.singles, &ranking.pairs, &ranking.sets})
       for (const RankedCause& one : *causes)
         if (one.fitted() && one.terms.size() == terms.size() && extends(one.terms, terms)) return &one.fit;
     return nullptr;

@@ -137,13 +137,18 @@ Diagnosis::Data described_data(const TransitionModel& model) {
   return data;
 }
 
+Progress told_to(const DiagnosisOptions& options) {
+  return [&options](double share, const char* doing) {
+    if (options.progress) options.progress(share, doing);
+  };
+}
+
 // The model as given and recalibrated, and every hypothesis.
 struct Fitted {
   Fit given;         // the model as given
   Fit given_slopes;  // likewise, with the information on its parameters
   Fit recalibrated;
   CauseRanking ranking;  // at the recalibrated model
-  std::vector<Visibility> visible;
   double gain() const { return 2 * (recalibrated.penalised - given.penalised); }
 };
 
@@ -216,11 +221,11 @@ Fitted fit_models(const TransitionModel& model, const std::vector<const Candidat
     fitted.ranking = rank();
   }
   // What the data hold no information on is not decided, whatever its evidence.
-  fitted.visible = visibility(fitted.ranking.scan, candidates, options.rules);
+  const std::vector<Visibility> visible = visibility(fitted.ranking.scan, candidates, options.rules);
   std::vector<RankedCause>& singles = fitted.ranking.singles;
   for (std::size_t i = 0; i < singles.size(); ++i)
-    if (singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && fitted.visible[i].smallest == 0)
-      singles[i].not_decided = fitted.visible[i].undecidable;
+    if (singles[i].not_decided.empty() && !candidates[i]->parameters.empty() && visible[i].smallest == 0)
+      singles[i].not_decided = visible[i].undecidable;
   return fitted;
 }
 
@@ -314,7 +319,7 @@ std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, 
   Probabilities probabilities =
       share_probabilities(model, fitted.ranking, hypotheses.ordered, candidates, tested, chosen.unnamed, d.rules);
   Named named =
-      give_verdict(probabilities, chosen.unnamed, tested, fitted.visible, d.data, d.gap.recalibration_id, d.rules);
+      give_verdict(probabilities, chosen.unnamed, tested, d.limits.visible, d.data, d.gap.recalibration_id, d.rules);
   if (!named.at_work.empty()) causes.unnamed_facets = facets_by_probability(chosen, named.p_unnamed, d.rules);
   causes.ranked = std::move(probabilities.ranked);
   causes.not_decided = std::move(hypotheses.not_decided);
@@ -330,6 +335,50 @@ std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, 
   causes.at_work = std::move(named.at_work);
   causes.p_unnamed = named.p_unnamed;
   return {named.verdict, std::move(causes)};
+}
+
+// Puts the answer together from what each stage says.
+Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::vector<const Candidate*>& candidates,
+                 const DiagnosisOptions& options, const Progress& progress) {
+  Diagnosis d;
+  d.rules = options.rules;
+  d.data = described_data(model);
+  d.limits.visible = visibility(fitted.ranking.scan, candidates, d.rules);
+  FoundGap found = find_gap(model, fitted, candidates.size(), options, progress);
+  std::ranges::move(notes_on_roughness(fitted, d.data), std::back_inserter(d.data.notes));
+  d.gap = found.gap;
+  const Tested tested{d.gap.p_value < options.level, d.gap.p_recalibration < options.level};
+
+  progress(0.68, "what is left");
+  Hypotheses ranked = hypotheses(model, fitted.ranking);
+  const RankedCause* best = ranked.best();
+  const RankedCause* second = ranked.ordered.size() > 1 ? ranked.ordered[1] : nullptr;
+  Chosen chosen = best_hypothesis(model, fitted, ranked, std::move(found), tested.gap, options);
+  const Fit& cause = *chosen.fit;
+  d.gap.left = chosen.left;
+  progress(0.7, "how far it shrinks");
+  const HeldOutGap held_out = hold_out(model, fitted, ranked, d.data, chosen, options, progress);
+  d.shrinkage.measures = held_out.measures;
+  if (tested.gap && trials_to_explain(d.data)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, d.rules.even_odds);
+  std::tie(d.verdict, d.causes) =
+      name_causes(model, fitted, std::move(ranked), std::move(chosen), candidates.size(), d, tested);
+  if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
+    add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated, held_out.gap,
+                      options, [&] { progress(0.86, "what each effect closes"); });
+
+  progress(0.88, "steps before failure");
+  d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
+  if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
+    d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
+  d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
+  progress(0.93, "what could not be seen");
+  d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);
+  d.limits.not_possible = too_few(model, d, options);
+  if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && second)
+    d.limits.next = next_experiments(model, best->fit, second->terms, options.threads, options.seed);
+  progress(1, "done");
+  d.sentences = sentences(d);
+  return d;
 }
 
 }  // namespace
@@ -363,50 +412,26 @@ std::string Cause::name() const { return fmt::format("{}", fmt::join(effects, "+
 Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options) {
   check(model, options);
   const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
-  const Progress progress = [&](double share, const char* doing) {
-    if (options.progress) options.progress(share, doing);
-  };
-  Diagnosis d;
-  d.rules = options.rules;
-  d.data = described_data(model);
+  const Progress progress = told_to(options);
   progress(0, "the model as given");
-  Fitted fitted = fit_models(model, candidates, options, progress);
-  FoundGap found = find_gap(model, fitted, candidates.size(), options, progress);
-  std::ranges::move(notes_on_roughness(fitted, d.data), std::back_inserter(d.data.notes));
-  d.gap = found.gap;
-  const Tested tested{d.gap.p_value < options.level, d.gap.p_recalibration < options.level};
+  return answer(model, fit_models(model, candidates, options, progress), candidates, options, progress);
+}
 
-  progress(0.68, "what is left");
-  Hypotheses ranked = hypotheses(model, fitted.ranking);
-  const RankedCause* best = ranked.best();
-  const RankedCause* second = ranked.ordered.size() > 1 ? ranked.ordered[1] : nullptr;
-  Chosen chosen = best_hypothesis(model, fitted, ranked, std::move(found), tested.gap, options);
-  const Fit& cause = *chosen.fit;
-  d.gap.left = chosen.left;
-  progress(0.7, "how far it shrinks");
-  const HeldOutGap held_out = hold_out(model, fitted, ranked, d.data, chosen, options, progress);
-  d.shrinkage.measures = held_out.measures;
-  if (tested.gap && trials_to_explain(d.data)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, d.rules.even_odds);
-  std::tie(d.verdict, d.causes) =
-      name_causes(model, fitted, std::move(ranked), std::move(chosen), candidates.size(), d, tested);
-  if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
-    add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated, held_out.gap,
-                      options, [&] { progress(0.86, "what each effect closes"); });
-
-  progress(0.88, "steps before failure");
-  d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
-  if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
-    d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
-  d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
-  progress(0.93, "what could not be seen");
-  d.limits.visible = std::move(fitted.visible);
-  d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);
-  d.limits.not_possible = too_few(model, d, options);
-  if (d.verdict == Verdict::explained && d.causes.set.size() > 1 && second)
-    d.limits.next = next_experiments(model, best->fit, second->terms, options.threads, options.seed);
-  progress(1, "done");
-  d.sentences = sentences(d);
-  return d;
+std::vector<Diagnosis> diagnose_each(const TransitionModel& model, const DiagnosisOptions& options,
+                                     const std::vector<Rules>& rules) {
+  check(model, options);
+  const std::vector<const Candidate*> candidates = wanted(model, options.catalogue);
+  const Progress progress = told_to(options);
+  std::vector<std::pair<Rules, Fitted>> known;
+  std::vector<Diagnosis> all;
+  for (const Rules& these : rules) {
+    DiagnosisOptions with = options;
+    with.rules = these;
+    auto same = std::ranges::find_if(known, [&](const auto& one) { return one.first.fits_as(these); });
+    if (same == known.end()) same = known.insert(same, {these, fit_models(model, candidates, with, progress)});
+    all.push_back(answer(model, same->second, candidates, with, progress));
+  }
+  return all;
 }
 
 Diagnosis diagnose(std::shared_ptr<const TransitionModel> model, const DiagnosisOptions& options) {

@@ -55,16 +55,16 @@ struct EstimatedParameter {
   bool fitted = true;  ///< false: chosen from a list (a leg, an interval), without interval
 };
 
-/// A hypothesis about the cause names an effect, or two at once.
+/// A hypothesis about the cause names an effect, or several at once.
 struct Cause {
-  std::vector<std::string> effects;  ///< one or two ids
+  std::vector<std::string> effects;  ///< ids
   double probability = 0;            ///< over all causes, "no_gap", "recalibration" and "none_of_these"
   double gain = 0;                   ///< 2 Delta log likelihood over the recalibrated model
   double p_value = 1;                ///< of the gain by chance, for this effect alone (RankedCause::p_value)
   double evidence = 0;               ///< log Bayes factor against the recalibrated model
   std::vector<std::vector<EstimatedParameter>> parameters;  ///< by effect
   std::string not_decided;   ///< why, if the fit failed or the data cannot tell; empty otherwise
-  std::string name() const;  ///< "a" or "a+b"
+  std::string name() const;  ///< "a", "a+b" or "a+b+c"
 };
 
 /// One effect, or several that these data cannot tell apart, whatever else is at work.
@@ -156,7 +156,7 @@ struct Diagnosis {
 
   /// Says which unmodelled effect causes it.
   struct Causes {
-    std::vector<Cause> ranked;  ///< by falling probability; singles, then pairs that were tried among them
+    std::vector<Cause> ranked;  ///< by falling probability; single effects and sets of several that were tried
     std::vector<Cause> not_decided;
     std::vector<Unnamed> unnamed;  ///< supposed beside the likeliest hypotheses
     std::vector<std::string> set;  ///< names; empty if unexplained or no gap
@@ -168,8 +168,8 @@ struct Diagnosis {
     std::string size;                      ///< of the likeliest beside the nominal model, a sentence; or empty
     /// These are probabilities. A gap has at least even odds where the tests find one, else at most even ones.
     double p_no_gap = 0, p_recalibrate = 0, p_none = 0;
-    double together = 1;                       ///< of the best hypothesis, if a pair: see Rules::most_together
-    std::vector<AtWork> at_work;               ///< by falling probability
+    double together = 1;          ///< of the best hypothesis, if of several effects: see Rules::most_together
+    std::vector<AtWork> at_work;  ///< by falling probability
     std::vector<UnnamedFacet> unnamed_facets;  ///< likewise
     double p_unnamed = 0;                      ///< that something without a name is at work, alone or beside effects
   } causes;
@@ -209,5 +209,11 @@ Diagnosis diagnose(const TransitionModel& model, const DiagnosisOptions& options
 /// Does the same, with Diagnosis::model in the answer.
 /// @throws std::invalid_argument also where there is no model
 Diagnosis diagnose(std::shared_ptr<const TransitionModel> model, const DiagnosisOptions& options = {});
+
+/// Diagnoses under each of several sets of rules (DiagnosisOptions::rules does not count); what is fitted alike is
+/// fitted once.
+/// @throws as diagnose()
+std::vector<Diagnosis> diagnose_each(const TransitionModel& model, const DiagnosisOptions& options,
+                                     const std::vector<Rules>& rules);
 
 }  // namespace metastable::analysis

@@ -88,25 +88,31 @@ bool acts_alike(const std::vector<Visibility>& visible, const std::string& effec
   return share != seen->alike.end() && (1 - share->second) * gain < rules.told_apart;
 }
 
-// Lists what the design itself cannot tell from the first of the set. Of a pair one effect may be another one, with
-// what it gains beside its partner.
+// Lists what the design itself cannot tell from the first of the set. Of several effects one may be another one, with
+// what it gains beside the others.
 std::vector<std::string> alike_of(const std::vector<std::string>& set, const std::vector<Cause>& ranked,
                                   const std::vector<Visibility>& visible, const Rules& rules) {
   const Cause& first = ranked.front();
-  const auto gain_of = [&](const std::string& name) {
-    const auto cause = std::ranges::find(ranked, name, &Cause::name);
+  // Returns the gain of a hypothesis of just these effects, in any order.
+  const auto gain_of = [&](std::vector<std::string> effects) {
+    const auto cause = std::ranges::find_if(
+        ranked, [&](const Cause& one) { return std::ranges::is_permutation(one.effects, effects); });
     return cause == ranked.end() ? 0 : cause->gain;
   };
+  const auto without = [](std::vector<std::string> effects, const std::string& one) {
+    std::erase(effects, one);
+    return effects;
+  };
   const auto alike_to_first = [&](const std::string& name) {
-    if (first.effects.size() == 1) return acts_alike(visible, first.name(), name, first.gain, rules);
     const auto other = std::ranges::find(ranked, name, &Cause::name);
-    if (other == ranked.end() || other->effects.size() != 2) return false;
-    for (const std::size_t own : {0, 1})
-      for (const std::size_t theirs : {0, 1})
-        if (first.effects[1 - own] == other->effects[1 - theirs] &&
-            acts_alike(visible, first.effects[own], other->effects[theirs],
-                       first.gain - gain_of(first.effects[1 - own]), rules))
+    if (other == ranked.end() || other->effects.size() != first.effects.size()) return false;
+    for (const std::string& own : first.effects) {
+      const std::vector<std::string> shared = without(first.effects, own);
+      for (const std::string& theirs : other->effects)
+        if (std::ranges::is_permutation(shared, without(other->effects, theirs)) &&
+            acts_alike(visible, own, theirs, first.gain - gain_of(shared), rules))
           return true;
+    }
     return false;
   };
   std::vector<std::string> alike;
@@ -141,7 +147,8 @@ Hypotheses hypotheses(const TransitionModel& model, const CauseRanking& ranking)
       all.not_decided.push_back(described_cause(model, cause, ranking.scan));
   };
   for (const RankedCause& cause : ranking.singles) list(cause, cause.not_decided.empty());
-  for (const RankedCause& pair : ranking.pairs) list(pair, std::isfinite(pair.evidence));
+  for (const auto* several : {&ranking.pairs, &ranking.sets})
+    for (const RankedCause& cause : *several) list(cause, std::isfinite(cause.evidence));
   std::ranges::stable_sort(all.ordered, std::ranges::greater{}, &RankedCause::evidence);
   return all;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "analysis/fitting/effect_pairs.h"
+#include "analysis/fitting/effect_sets.h"
 #include "analysis/fitting/single_effects.h"
 
 namespace metastable::analysis {
@@ -65,9 +66,15 @@ CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
   SingleEffects singles = rank_single_effects(problem, options, [&] { reach(0.5); });
   reach(0.6);
   EffectPairs ranked = rank_effect_pairs(problem, std::move(singles), options, [&] { reach(0.8); });
+  reach(0.95);
+  bound_by_parts(problem, ranked.singles.causes, ranked.pairs);
+  std::vector<RankedCause> sets = rank_larger_sets(problem, ranked.singles, ranked.pairs);
+  bound_by_parts(problem, ranked.singles.causes, ranked.pairs);
+  bound_by_parts(problem, ranked.pairs, sets);
   reach(1);
   const double p_value = ranked.singles.chance.look_elsewhere(ranked.singles.least_p);
-  return {std::move(ranked.singles.scan), std::move(ranked.singles.causes), std::move(ranked.pairs), p_value};
+  return {std::move(ranked.singles.scan), std::move(ranked.singles.causes), std::move(ranked.pairs), std::move(sets),
+          p_value};
 }
 
 }  // namespace metastable::analysis

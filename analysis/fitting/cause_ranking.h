@@ -1,5 +1,6 @@
 #pragma once
-// Finds which effect it is: every candidate is fitted, weighed and compared with chance, pairs where they earn it.
+// Finds which effect it is: every candidate is fitted, weighed and compared with chance, several at once where they
+// earn it.
 
 #include <functional>
 #include <string>
@@ -12,17 +13,17 @@
 
 namespace metastable::analysis {
 
-/// A hypothesis supposes one effect or two.
+/// A hypothesis supposes one effect or several.
 struct RankedCause {
   std::vector<EffectTerm> terms;
   Fit fit;
   double gain = 0;  ///< 2 Delta penalised log likelihood over the recalibrated model
   /// The probability of the gain by chance: of a single effect by the variants listed, before one between them was
-  /// sought; of a pair that of what the second effect earned beyond the first.
+  /// sought; of several that of what the last one earned beyond the others.
   double p_value = 1;
-  double evidence = 0;  ///< log Bayes factor against the recalibrated model, prior odds of pairs included
-  double together =
-      1;  ///< of a pair: its gain over what its two effects gain alone, beside what each hides of the other
+  double evidence = 0;  ///< log Bayes factor against the recalibrated model, prior odds of several effects included
+  /// Of several effects: its gain over what they gain alone, beside what each hides of the others.
+  double together = 1;
   std::string not_decided;  ///< why, where the data cannot tell or the fit did not settle
   bool candidate_undecided() const { return !terms[0].candidate->undecidable.empty(); }
   bool fitted() const { return !fit.nuisance.empty(); }
@@ -39,7 +40,8 @@ struct CauseRanking {
   EffectScan scan;                   ///< at the recalibrated model
   std::vector<RankedCause> singles;  ///< every candidate, in the order of the catalogue
   std::vector<RankedCause> pairs;
-  double p_value = 1;  ///< of the best single effect among those listed, with the look elsewhere
+  std::vector<RankedCause> sets;  ///< of three effects and more
+  double p_value = 1;             ///< of the best single effect among those listed, with the look elsewhere
 };
 
 struct RankingOptions {
@@ -51,8 +53,8 @@ struct RankingOptions {
   std::function<void(double)> progress;  ///< share done; called from any thread, one at a time; may throw to stop
 };
 
-/// Weighs hypotheses by their evidence (evidence.h); a second effect counts for what it earned. Candidates whose scores
-/// promise less than a fifth of a large best gain are not fitted.
+/// Weighs hypotheses by their evidence (evidence.h); each further effect counts for what it earned. Candidates whose
+/// scores promise less than a fifth of a large best gain are not fitted.
 /// @param candidates  to be considered
 CauseRanking rank_causes(const TransitionModel& model, const Fit& recalibrated,
                          const std::vector<const Candidate*>& candidates, const RankingOptions& options);

@@ -45,8 +45,8 @@ Effort effort_for(const TransitionModel& model, const Fit& recalibrated) {
   constexpr double far_off = 50;  // rise of the log likelihood that a recalibration has left
   if ((!recalibrated.converged && recalibrated.promised > far_off) ||
       (model.events().size() > few_events && is_far_off(recalibrated.evaluation.score)))
-    return {20, 1, 1, 1, 1, 2, 6};
-  if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 2, 12};
+    return {20, 1, 1, 1, 1, 2, 6, 2};
+  if (model.events().size() > many_events) return {6, 1, 1, 2, 2, 2, 12, 3};
   return {};
 }
 

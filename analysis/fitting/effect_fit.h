@@ -17,6 +17,7 @@ struct Effort {
   int refinements = 3;            ///< of a variant, each with half the moves
   int refining_steps = 4;         ///< of the fit at each move
   int most_iterations = FitOptions{}.most_iterations;
+  std::size_t most_effects = 4;  ///< of one hypothesis
 };
 Effort effort_for(const TransitionModel& model, const Fit& recalibrated);
 

@@ -5,16 +5,15 @@
 #include <map>
 #include <utility>
 
+#include "analysis/fitting/effect_sets.h"
 #include "analysis/fitting/evidence.h"
-#include "dynamics/numerics/truncated_normal.h"
 #include "markov/parallel.h"
 
 namespace metastable::analysis {
 namespace {
 
 // These numbers save time: they say which pairs are fitted.
-constexpr double least_pair_evidence = -4;  // promised beyond the first effect's, for a pair worth fitting
-constexpr double alike_margin = 4;          // evidence promised below the best second effect's, for one worth fitting
+constexpr double alike_margin = 4;  // evidence promised below the best second effect's, for one worth fitting
 
 // These numbers say when an effect is fitted again from where a pair has it.
 constexpr double gained_beside = 9;  // by the pair, beyond the effect's own gain
@@ -51,40 +50,14 @@ class ScansBeside {
   std::map<std::size_t, EffectScan> scans_;
 };
 
-double pair_log_prior(const RankingProblem& problem) {
-  return std::log(problem.rules.pair_prior / std::max(1.0, 0.5 * static_cast<double>(problem.candidates.size() - 1)));
-}
-
-// Says whether the model itself tells where the last term starts beside the others.
-bool knows_start(const TransitionModel& model, const std::vector<EffectTerm>& terms) {
-  const std::vector<FitStart> starts = model.starts(terms);
-  return std::any_of(starts.begin(), starts.end(),
-                     [&](const FitStart& start) { return start.values.back() != terms.back().values; });
-}
-
 bool is_tried(const std::vector<Try>& tries, std::size_t leader, const Candidate* second) {
   return std::ranges::any_of(tries, [&](const Try& t) { return t.leader == leader && t.second.candidate == second; });
 }
 
-// Lists what promises most beside a leader. Where the model knows better starts than the scores, the scores do not
-// decide.
-std::vector<Try> tries_beside(const RankingProblem& problem, const EffectScan& scan, const RankedCause& first,
-                              std::size_t leader) {
-  std::vector<Try> tries;
-  std::vector<std::pair<double, const ScannedEffect*>> promising;
-  for (const ScannedEffect& effect : scan.effects) {
-    const double promised = evidence_of(effect, effect.gain[effect.best], problem.rules);
-    std::vector<EffectTerm> both = first.terms;
-    both.push_back(term_at(effect, effect.best));
-    if (knows_start(problem.model, both))
-      tries.push_back({leader, effect});
-    else if (promised + pair_log_prior(problem) > least_pair_evidence)
-      promising.emplace_back(promised, &effect);
-  }
-  std::sort(promising.begin(), promising.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  for (std::size_t k = 0; k < std::min(problem.effort.most_partners, promising.size()); ++k)
-    tries.push_back({leader, *promising[k].second});
-  return tries;
+void add_promising(const RankingProblem& problem, const EffectScan& scan, const SingleEffects& singles,
+                   std::size_t leader, std::vector<Try>& tries) {
+  for (ScannedEffect& second : promising_beside(problem, scan, singles.causes[leader]))
+    tries.push_back({leader, std::move(second)});
 }
 
 // Scans the pairs asked for, whatever the scores promise.
@@ -104,48 +77,13 @@ void add_asked_pairs(const RankingProblem& problem, SingleEffects& singles,
   }
 }
 
-// Sums what the two effects of a pair gain each by itself. What one scatters hides part of the other: of n normal
-// errors a gain of g says that their variance falls by exp(-g / n), by which the other's gain rises.
-double gain_apart(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& pair) {
-  const auto gain_of = [&](const EffectTerm& term) {
-    return std::max(0.0, singles.causes[problem.index_of(term.candidate)].gain);
-  };
-  const auto collisions = static_cast<double>(std::ranges::count_if(problem.model.events(), [](const Event& event) {
-    return event.kind == EventKind::collision || event.kind == EventKind::step;
-  }));
-  const auto beside = [&](double one, double other) {
-    return one + other * std::exp(std::min(problem.rules.most_hidden, one / std::max(1.0, collisions)));
-  };
-  const double one = gain_of(pair.terms[0]), other = gain_of(pair.terms[1]);
-  return std::max(beside(one, other), beside(other, one));
-}
-
-double together(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& pair) {
-  return pair.gain / std::max(1.0, gain_apart(problem, singles, pair));
-}
-
-// Sets what a pair says of its second effect, and returns what that earned.
-double measure_second(const RankingProblem& problem, const SingleEffects& singles, RankedCause& pair) {
-  const RankedCause& first = singles.causes[problem.index_of(pair.terms[0].candidate)];
-  const double second = earned(problem.model, pair.fit, first.fit,
-                               exact_part(singles.causes, first.terms, problem.recalibrated), problem.rules);
-  pair.p_value = 2 * dynamics::normal_cdf(-std::sqrt(second));
-  pair.together = together(problem, singles, pair);
-  return second;
-}
-
 // Fits pairs. The same pair, from either side or once more, counts once, the better fit.
 void fit_pairs(const RankingProblem& problem, const SingleEffects& singles, const std::vector<Try>& tries,
                std::vector<RankedCause>& pairs) {
   std::vector<RankedCause> tried(tries.size());
   markov::parallel_for(tries.size(), problem.threads, [&](std::size_t i) {
     problem.heartbeat();
-    const RankedCause& first = singles.causes[tries[i].leader];
-    RankedCause& pair = tried[i];
-    pair = as_cause(fit_one_more(problem.model, problem.effort, first.fit, tries[i].second), problem.recalibrated);
-    if (!std::isfinite(pair.evidence)) return;
-    const double second = measure_second(problem, singles, pair);
-    pair.evidence = first.evidence + evidence_of(tries[i].second, second, problem.rules) + pair_log_prior(problem);
+    tried[i] = with_one_more(problem, singles, singles.causes[tries[i].leader], tries[i].second);
   });
   for (RankedCause& pair : tried) {
     const auto same =
@@ -189,7 +127,8 @@ void refit_from_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansB
   }
   if (!any) return;
   for (RankedCause& pair : ranked.pairs)
-    if (std::isfinite(pair.evidence)) measure_second(problem, singles, pair);
+    if (std::isfinite(pair.evidence))
+      measure_last(problem, singles, singles.causes[problem.index_of(pair.terms[0].candidate)], pair);
 }
 
 // Returns the best pair if its evidence is about as large as that of the best effect, else null.
@@ -211,13 +150,13 @@ void refine_paired(const RankingProblem& problem, EffectPairs& ranked, ScansBesi
     refine_effect(problem, ranked.singles, i);
     beside.forget(i);
     const EffectScan& scan = beside.of(ranked.singles, i);
-    for (Try& one : tries_beside(problem, scan, ranked.singles.causes[i], i)) tries.push_back(std::move(one));
+    add_promising(problem, scan, ranked.singles, i, tries);
     // Another law has nothing to scan.
     const ScannedEffect* second = scan.find(partner);
     if (second && !is_tried(tries, i, partner)) tries.push_back({i, *second});
   }
   if (tries.empty()) return;
-  for (RankedCause& pair : ranked.pairs) pair.together = together(problem, ranked.singles, pair);
+  for (RankedCause& pair : ranked.pairs) pair.together = gain_together(problem, ranked.singles, pair);
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
 }
 
@@ -245,21 +184,6 @@ void complete_pairs(const RankingProblem& problem, EffectPairs& ranked, ScansBes
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
 }
 
-// Evidence shrinks gains by the number of parameters: eight leg lengths, which take in an eccentric hub, would count
-// for less than the hub with them beside it. A pair that gains nothing beyond one of its effects is that effect.
-void bound_pairs(const RankingProblem& problem, EffectPairs& ranked) {
-  for (RankedCause& pair : ranked.pairs)
-    for (const std::size_t k : {std::size_t{0}, std::size_t{1}}) {
-      const RankedCause& one = ranked.singles.causes[problem.index_of(pair.terms[k].candidate)];
-      const double beyond = pair.gain - one.gain;
-      if (!one.fitted() || !std::isfinite(one.evidence) || beyond > gained_beside) continue;
-      const auto parameters = static_cast<double>(pair.terms[1 - k].candidate->parameters.size());
-      pair.evidence =
-          std::min(pair.evidence, one.evidence + evidence_of_gain(std::max(0.0, beyond), parameters, problem.rules) +
-                                      pair_log_prior(problem));
-    }
-}
-
 }  // namespace
 
 EffectPairs rank_effect_pairs(const RankingProblem& problem, SingleEffects singles, const RankingOptions& options,
@@ -268,15 +192,13 @@ EffectPairs rank_effect_pairs(const RankingProblem& problem, SingleEffects singl
   ScansBeside beside(problem);
   std::vector<Try> tries;
   for (const std::size_t leader : leading_effects(problem, ranked.singles))
-    for (Try& one : tries_beside(problem, beside.of(ranked.singles, leader), ranked.singles.causes[leader], leader))
-      tries.push_back(std::move(one));
+    add_promising(problem, beside.of(ranked.singles, leader), ranked.singles, leader, tries);
   add_asked_pairs(problem, ranked.singles, options.pairs, tries);
   chosen();
   fit_pairs(problem, ranked.singles, tries, ranked.pairs);
   refit_from_pairs(problem, ranked, beside);
   refine_paired(problem, ranked, beside);
   complete_pairs(problem, ranked, beside);
-  bound_pairs(problem, ranked);
   return ranked;
 }
 

@@ -113,6 +113,11 @@ struct Rules {
   /// would pass for its cause.
   static constexpr std::size_t least_trials_to_explain = 4, least_transitions_to_explain = 40;
 
+  /// Says whether hypotheses are fitted and weighed alike under other rules.
+  bool fits_as(const Rules& other) const {
+    return expected_gain == other.expected_gain && model_error == other.model_error && pair_prior == other.pair_prior &&
+           most_hidden == other.most_hidden;
+  }
   /// Returns the odds of something without a name below which a gap is explained.
   double most_odds_of_none() const { return (1 - least_at_work) / least_at_work; }
   /// Returns what an error of form leaves of a gain of one, or of each cell.
@@ -150,5 +155,6 @@ inline constexpr std::array named_rules{
     std::pair{"seen_gain", &Rules::seen_gain},
     std::pair{"least_listed", &Rules::least_listed},
 };
+static_assert(sizeof(Rules) == named_rules.size() * sizeof(double), "every rule has its name in named_rules");
 
 }  // namespace metastable::analysis

@@ -1,0 +1,49 @@
+#pragma once
+// Builds hypotheses of several effects: what is worth a fit beside one, what its last effect earns, and sets of three
+// and more.
+
+#include <cstddef>
+#include <vector>
+
+#include "analysis/fitting/single_effects.h"
+
+namespace metastable::analysis {
+
+/// Returns the log prior odds of a set of effects to the same without its last one, any of the others in its place.
+/// @param size  effects of the set, >= 2
+double log_prior_of_one_more(const RankingProblem& problem, std::size_t size);
+
+/// Lists what promises most beside a hypothesis. Where the model knows better starts than the scores, the scores do not
+/// decide.
+/// @param scan  beside it
+std::vector<ScannedEffect> promising_beside(const RankingProblem& problem, const EffectScan& scan,
+                                            const RankedCause& base);
+
+/// Fits one more effect beside a hypothesis, and weighs the two together by what the last one earns.
+RankedCause with_one_more(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& base,
+                          const ScannedEffect& more);
+
+/// Sets what a hypothesis says of its last effect, and returns what that earned beyond `base`.
+double measure_last(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& base,
+                    RankedCause& set);
+
+/// Returns RankedCause::together of a hypothesis: what it gains over what its effects gain alone. What one scatters
+/// hides part of the others: of n normal errors a gain of g says that their variance falls by exp(-g / n), by which the
+/// gain of another one rises.
+double gain_together(const RankingProblem& problem, const SingleEffects& singles, const RankedCause& set);
+
+/// Extends the best pair, one effect after the other, as long as the last one earns its place, up to
+/// Effort::most_effects. What the larger set leaves out again is tried, too: without each of its effects in turn.
+/// @param pairs  gets pairs that a larger set came upon
+/// @return sets of three and more
+std::vector<RankedCause> rank_larger_sets(const RankingProblem& problem, const SingleEffects& singles,
+                                          std::vector<RankedCause>& pairs);
+
+/// Bounds the evidence of sets by the same without one effect. Evidence shrinks gains by the number of parameters:
+/// eight leg lengths, which take in an eccentric hub, would count for less than the hub with them beside it. A set that
+/// gains nothing beyond a part of it is that part.
+/// @param parts  hypotheses of one effect less
+void bound_by_parts(const RankingProblem& problem, const std::vector<RankedCause>& parts,
+                    std::vector<RankedCause>& sets);
+
+}  // namespace metastable::analysis
