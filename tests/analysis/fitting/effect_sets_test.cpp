@@ -1,0 +1,97 @@
+#include "analysis/fitting/effect_sets.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "analysis/fitting/cause_ranking.h"
+#include "tests/analysis/line.h"
+
+namespace metastable::analysis {
+namespace {
+
+using test::Line;
+using test::line;
+
+// A line with six effects, waves of six frequencies, of which the first `at_work` are there with an amplitude of 0.2
+// noises.
+class Waves : public Line {
+ public:
+  Waves(const Line& from, std::size_t at_work) : Line(from) {
+    const Candidate wave = candidates_[0];
+    candidates_.assign(6, wave);
+    for (std::size_t k = 0; k < candidates_.size(); ++k) {
+      candidates_[k].id = "wave " + std::to_string(k);
+      if (k < at_work)
+        for (std::size_t i = 0; i < y_.size(); ++i) y_[i] += 0.2 * at(k, i);
+    }
+  }
+  Evaluation evaluate(std::span<const double> n, std::span<const EffectTerm> terms) const override {
+    Evaluation e = Line::evaluate(n, {});
+    for (std::size_t i = 0; i < e.score.size(); ++i) {
+      for (const EffectTerm& term : terms)
+        e.score[i] -= term.values[0] / std::exp(n[1]) * at(static_cast<std::size_t>(term.candidate->id.back() - '0'), i);
+      e.log_density[i] = -0.5 * e.score[i] * e.score[i] - 0.91893853320467274 - n[1];
+    }
+    return e;
+  }
+
+ private:
+  static double at(std::size_t wave, std::size_t i) {
+    return std::sin((1.3 + 0.7 * static_cast<double>(wave)) * static_cast<double>(i));
+  }
+};
+
+CauseRanking ranked(const Waves& model) {
+  std::vector<const Candidate*> candidates;
+  for (const Candidate& candidate : model.candidates()) candidates.push_back(&candidate);
+  return rank_causes(model, fit(model, {0, 0}, {}), candidates,
+                     {.threads = 1, .draws = 300, .seed = 1, .progress = {}});
+}
+
+std::set<std::string> best_of(const CauseRanking& ranking) {
+  const RankedCause* best = &ranking.singles.front();
+  for (const auto* all : {&ranking.singles, &ranking.pairs, &ranking.sets})
+    for (const RankedCause& one : *all)
+      if (one.evidence > best->evidence) best = &one;
+  std::set<std::string> ids;
+  for (const EffectTerm& term : best->terms) ids.insert(term.candidate->id);
+  return ids;
+}
+
+TEST(EffectSets, NameAsManyEffectsAsAreThere) {
+  const Line noise = line(0, 1, 2400);
+  const std::set<std::string> two{"wave 0", "wave 1"}, three{"wave 0", "wave 1", "wave 2"},
+      four{"wave 0", "wave 1", "wave 2", "wave 3"};
+  EXPECT_EQ(best_of(ranked(Waves(noise, 2))), two);
+  EXPECT_EQ(best_of(ranked(Waves(noise, 3))), three);
+  EXPECT_EQ(best_of(ranked(Waves(noise, 4))), four);
+}
+
+// Effects that are independent of one another gain together what they gain alone.
+TEST(EffectSets, IndependentEffectsGainTogetherWhatTheyGainAlone) {
+  const CauseRanking ranking = ranked(Waves(line(0, 1, 2400), 3));
+  ASSERT_FALSE(ranking.sets.empty());
+  for (const RankedCause& set : ranking.sets) EXPECT_NEAR(set.together, 1, 0.1) << set.terms.size();
+}
+
+// One more effect is as likely as the rule says, whichever of the others it is.
+TEST(EffectSets, TheOddsOfOneMoreAreSharedByTheOthers) {
+  const Waves model(line(0, 1, 40), 0);
+  std::vector<const Candidate*> candidates;
+  for (const Candidate& candidate : model.candidates()) candidates.push_back(&candidate);
+  const Fit recalibrated;
+  const Rules rules;
+  const RankingProblem problem{model, recalibrated, candidates, rules, 1, {}, [] {}};
+  // Six effects have 6 singles, 15 pairs and 20 sets of three: all pairs together 0.05 of all singles.
+  EXPECT_NEAR(15 * std::exp(log_prior_of_one_more(problem, 2)), 0.05 * 6, 1e-12);
+  EXPECT_NEAR(20 * std::exp(log_prior_of_one_more(problem, 3)), 0.05 * 15, 1e-12);
+}
+
+}  // namespace
+}  // namespace metastable::analysis
