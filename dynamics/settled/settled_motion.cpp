@@ -306,207 +306,290 @@ SettledRoll::Event SettledRoll::resolve() {
   return Event::carries;
 }
 
-// Carries one foot on the ground, until it lifts, jams, settles, rests, or another one touches.
-SettledRoll::Event SettledRoll::carry(bool until_settled) {
-  const SettledWheel& wheel = motion_->wheel();
-  const StandingFoot& foot = motion_->foot(foot_);
-  const double jams = 1e-6 * wheel.gyration_sq(), top = apex(foot_);
-  Footing on{&wheel, wheel.length(foot_), sine_, cosine_, contact_of(foot_).friction, 0};
-  FootState state{angle_of(foot_), velocity_.spin, lever(foot_).slip(velocity_), tip_along(foot_)};
-  constexpr double no_slip = 1e-13;  // [m/s]: rounding of a foot that sticks
-  if (std::abs(state.slip) < no_slip) state.slip = 0;
-  has_other_ = false;
-  const auto write_back = [&] {
-    angle_ = state.angle + (foot_ - leg_) * wheel.leg_angle();
-    const double ahead = on.length * std::sin(state.angle);
-    height_ = on.length * std::cos(state.angle) + wheel.tip_radius;
-    along_ = state.along + ahead;
-    velocity_ = {state.slip + state.spin * height_, -state.spin * ahead, state.spin};
-  };
-  const auto strikes = [&](int leg) {
-    has_other_ = leg != foot_;
-    other_ = foot_;
-    foot_ = leg;
-    return Event::strikes;
-  };
-  // Says of a foot without slip whether it lifts; else `way` says whether it sticks or which way it is driven.
-  const auto lifts = [&] {
+// One foot on the ground, with what bounds its motion.
+struct SettledRoll::GroundedFoot {
+  Footing on;
+  FootState state;
+  double landing_angle, next_angle;  // where the leg before and the next one touch [rad]
+  double top;                        // of the barrier [rad]
+  double jams;                       // the stiffness at which slip jams [m^2]
+
+  // Says of a foot without slip whether it lifts; else `on.way` says whether it sticks or which way it is driven.
+  bool lifts() {
     on.way = 0;
     const FootForces f = foot_forces(on, state.angle, state.spin);
     if (f.normal <= 0) return true;
     if (std::abs(f.tangential) <= on.friction * f.normal) return false;
     on.way = f.tangential > 0 ? -1 : 1;
     return foot_forces(on, state.angle, state.spin).stiffness <= jams;
-  };
-  bool stands = false;  // the landed foot, noted when it began to
-  write_back();
-  if (state.slip == 0) {
-    if (lifts()) return Event::flies;
-  } else {
-    on.way = state.slip > 0 ? 1 : -1;
-    const FootForces f = foot_forces(on, state.angle, state.spin);
-    const bool pressed = cosine_ - on.length * std::cos(state.angle) * state.spin * state.spin > 0;
-    if (f.stiffness <= jams) return pressed ? strikes(foot_) : Event::flies;
-    if (f.normal <= 0) return Event::flies;
   }
+};
+
+// The end of one piece of a foot's motion: the earliest of several values that fall below 0.
+struct SettledRoll::PieceEnd {
+  enum Kind { turns, backward, forward, stops, lifts_off, jammed, next_leg, leg_before, none };
+  double when;  // [s] from the beginning of the piece
+  Kind kind = none;
+
+  void look(Kind of, const TimeSeries& value, double sign, double least) {
+    TimeSeries above = value;
+    for (double& term : above.term) term *= sign;
+    above.term[0] -= least;
+    const double at = above.falls_below_zero(when);
+    if (at <= when) when = at, kind = of;
+  }
+};
+
+// Finds what ends a piece of the motion first. @param longest [s]
+SettledRoll::PieceEnd SettledRoll::end_of_piece(const GroundedFoot& foot, const FootMotion& motion, double longest) {
+  const Footing& on = foot.on;
+  PieceEnd end{longest};
+  end.look(PieceEnd::next_leg, motion.angle, -1, -foot.next_angle);
+  end.look(PieceEnd::leg_before, motion.angle, 1, foot.landing_angle);
+  if (on.way != 0) {
+    end.look(PieceEnd::stops, motion.slip, on.way, 0);
+    end.look(PieceEnd::lifts_off, motion.normal, 1, 0);
+    end.look(PieceEnd::jammed, motion.stiffness, 1, foot.jams);
+    return end;
+  }
+  if (foot.state.spin > 0)
+    end.look(PieceEnd::turns, motion.spin, 1, 0);
+  else
+    end.look(PieceEnd::turns, motion.angle, 1, foot.top);
+  for (const int way : {1, -1}) {  // the cone of friction
+    TimeSeries room;
+    for (std::size_t k = 0; k < room.term.size(); ++k)
+      room.term[k] = on.friction * motion.normal.term[k] + way * motion.tangential.term[k];
+    end.look(way == 1 ? PieceEnd::forward : PieceEnd::backward, room, 1, 0);
+  }
+  return end;
+}
+
+SettledRoll::GroundedFoot SettledRoll::grounded_foot() const {
+  const SettledWheel& wheel = motion_->wheel();
+  const StandingFoot& foot = motion_->foot(foot_);
+  constexpr double no_slip = 1e-13;  // [m/s]: rounding of a foot that sticks
+  GroundedFoot grounded{{&wheel, wheel.length(foot_), sine_, cosine_, contact_of(foot_).friction, 0},
+                        {angle_of(foot_), velocity_.spin, lever(foot_).slip(velocity_), tip_along(foot_)},
+                        foot.landing_angle(),
+                        foot.next_angle(),
+                        apex(foot_),
+                        1e-6 * wheel.gyration_sq()};
+  if (std::abs(grounded.state.slip) < no_slip) grounded.state.slip = 0;
+  return grounded;
+}
+
+// Moves the hub to where its foot has it.
+void SettledRoll::follow(const GroundedFoot& foot) {
+  const SettledWheel& wheel = motion_->wheel();
+  angle_ = foot.state.angle + (foot_ - leg_) * wheel.leg_angle();
+  const double ahead = foot.on.length * std::sin(foot.state.angle);
+  height_ = foot.on.length * std::cos(foot.state.angle) + wheel.tip_radius;
+  along_ = foot.state.along + ahead;
+  velocity_ = {foot.state.slip + foot.state.spin * height_, -foot.state.spin * ahead, foot.state.spin};
+}
+
+// Lets the foot of a leg strike, while the one that carried may be on the ground.
+SettledRoll::Event SettledRoll::strikes(int leg) {
+  has_other_ = leg != foot_;
+  other_ = foot_;
+  foot_ = leg;
+  return Event::strikes;
+}
+
+// Says which way the foot slips, or what happens to one that cannot begin to carry.
+std::optional<SettledRoll::Event> SettledRoll::begin_to_carry(GroundedFoot& foot) {
+  Footing& on = foot.on;
+  const FootState& state = foot.state;
+  if (state.slip == 0) return foot.lifts() ? std::optional(Event::flies) : std::nullopt;
+  on.way = state.slip > 0 ? 1 : -1;
+  const FootForces f = foot_forces(on, state.angle, state.spin);
+  const bool pressed = cosine_ - on.length * std::cos(state.angle) * state.spin * state.spin > 0;
+  if (f.stiffness <= foot.jams) return pressed ? strikes(foot_) : Event::flies;
+  return f.normal <= 0 ? std::optional(Event::flies) : std::nullopt;
+}
+
+// Says that the landed foot has begun to stand, and whether that ends the landing.
+std::optional<SettledRoll::Event> SettledRoll::begin_to_stand(const GroundedFoot& foot, bool until_settled) {
+  const StandingFoot& standing = motion_->foot(foot_);
+  note_stand(foot_, foot.state.angle, foot.state.spin);
+  landing_.end = LandingEnd::settled;
+  const double energy = standing.energy(foot.state.angle, foot.state.spin);
+  if (!until_settled || motion_->wheel().drags() || !stands_on(foot_, foot.state.angle, energy)) return std::nullopt;
+  return foot.state.angle < foot.top && energy <= standing.potential(foot.top) ? Event::rests : Event::settled;
+}
+
+// Goes on to the end of a piece of the motion.
+void SettledRoll::carry_to(const PieceEnd& end, const FootMotion& motion, GroundedFoot& foot) {
+  const double energy_before = energy();
+  foot.state = motion.at(end.when);
+  time_ += end.when;
+  if (end.kind == PieceEnd::turns && foot.state.angle <= foot.top) foot.state.spin = std::min(foot.state.spin, 0.0);
+  if (end.kind == PieceEnd::stops || end.kind == PieceEnd::forward || end.kind == PieceEnd::backward)
+    foot.state.slip = 0;
+  follow(foot);
+  if (foot.on.way != 0) landing_.friction_loss += energy_before - energy();
+}
+
+// Says what follows a piece of the motion; nothing if the foot carries on.
+std::optional<SettledRoll::Event> SettledRoll::after_piece(const PieceEnd& end, GroundedFoot& foot) {
+  switch (end.kind) {
+    case PieceEnd::none:
+    case PieceEnd::turns:
+      return std::nullopt;
+    case PieceEnd::forward:
+      foot.on.way = 1;
+      return std::nullopt;
+    case PieceEnd::backward:
+      foot.on.way = -1;
+      return std::nullopt;
+    case PieceEnd::stops:
+      if (end.when > 0) return foot.lifts() ? std::optional(Event::flies) : std::nullopt;
+      foot.on.way = 0;  // at the cone's edge, and back inside
+      return std::nullopt;
+    case PieceEnd::lifts_off:
+      return Event::flies;
+    case PieceEnd::jammed:
+      return strikes(foot_);
+    case PieceEnd::next_leg:
+      if (foot_ != leg_) return strikes(foot_ + 1);
+      strikes(leg_ + 1);
+      if (foot.on.way != 0) note_moving_touch();
+      return Event::next_touch;
+    case PieceEnd::leg_before:
+      return strikes(foot_ - 1);
+  }
+  return std::nullopt;
+}
+
+// Carries one foot on the ground, until it lifts, jams, settles, rests, or another one touches.
+SettledRoll::Event SettledRoll::carry(bool until_settled) {
+  GroundedFoot foot = grounded_foot();
+  has_other_ = false;
+  bool stands = false;  // the landed foot, noted when it began to
+  follow(foot);
+  if (const std::optional<Event> event = begin_to_carry(foot)) return *event;
   for (;;) {
-    if (++events_ >= wheel.max_events) return Event::given_up;
-    if (on.way == 0) {
-      if (state.spin <= 0 && state.angle <= top) return Event::rests;
+    if (++events_ >= motion_->wheel().max_events) return Event::given_up;
+    if (foot.on.way == 0) {
+      if (foot.state.spin <= 0 && foot.state.angle <= foot.top) return Event::rests;
       if (foot_ == leg_ && !stands) {
         stands = true;
-        note_stand(foot_, state.angle, state.spin);
-        landing_.end = LandingEnd::settled;
-        const double energy = foot.energy(state.angle, state.spin);
-        if (until_settled && !wheel.drags() && stands_on(foot_, state.angle, energy))
-          return state.angle < top && energy <= foot.potential(top) ? Event::rests : Event::settled;
+        if (const std::optional<Event> event = begin_to_stand(foot, until_settled)) return *event;
       }
     } else {
       stands = false;
       if (spent()) return Event::rests;
     }
-    // This is one piece of the motion; what ends it is a value that falls below 0.
-    const FootMotion motion = on.from(state);
-    double when = std::min(motion.horizon, 0.3 / std::max(1.0, std::abs(state.spin)));
-    if (when < 1e-9) return strikes(foot_);  // the pressure grows without bounds: slip jams
-    enum { turns, backward, forward, stops, lifts_off, jammed, next_leg, leg_before, none } event = none;
-    const auto look = [&](auto kind, const TimeSeries& value, double sign, double least) {
-      TimeSeries above = value;
-      for (double& term : above.term) term *= sign;
-      above.term[0] -= least;
-      const double at = above.falls_below_zero(when);
-      if (at <= when) when = at, event = kind;
-    };
-    look(next_leg, motion.angle, -1, -foot.next_angle());
-    look(leg_before, motion.angle, 1, foot.landing_angle());
-    if (on.way == 0) {
-      if (state.spin > 0)
-        look(turns, motion.spin, 1, 0);
-      else
-        look(turns, motion.angle, 1, top);
-      for (const int way : {1, -1}) {
-        TimeSeries room;
-        for (std::size_t k = 0; k < room.term.size(); ++k)
-          room.term[k] = on.friction * motion.normal.term[k] + way * motion.tangential.term[k];
-        look(way == 1 ? forward : backward, room, 1, 0);
-      }
-    } else {
-      look(stops, motion.slip, on.way, 0);
-      look(lifts_off, motion.normal, 1, 0);
-      look(jammed, motion.stiffness, 1, jams);
-    }
-    const double energy_before = energy();
-    state = motion.at(when);
-    time_ += when;
-    if (event == turns && state.angle <= top) state.spin = std::min(state.spin, 0.0);
-    if (event == stops || event == forward || event == backward) state.slip = 0;
-    write_back();
-    if (on.way != 0) landing_.friction_loss += energy_before - energy();
-    switch (event) {
-      case none:
-      case turns:
-        break;
-      case forward:
-        on.way = 1;
-        break;
-      case backward:
-        on.way = -1;
-        break;
-      case stops:
-        if (when == 0)
-          on.way = 0;  // at the cone's edge, and back inside
-        else if (lifts())
-          return Event::flies;
-        break;
-      case lifts_off:
-        return Event::flies;
-      case jammed:
-        return strikes(foot_);
-      case next_leg:
-        if (foot_ != leg_) return strikes(foot_ + 1);
-        strikes(leg_ + 1);
-        if (on.way != 0) note_moving_touch();
-        return Event::next_touch;
-      case leg_before:
-        return strikes(foot_ - 1);
-    }
+    const FootMotion motion = foot.on.from(foot.state);
+    const double longest = std::min(motion.horizon, 0.3 / std::max(1.0, std::abs(foot.state.spin)));
+    if (longest < 1e-9) return strikes(foot_);  // the pressure grows without bounds: slip jams
+    const PieceEnd end = end_of_piece(foot, motion, longest);
+    carry_to(end, motion, foot);
+    if (const std::optional<Event> event = after_piece(end, foot)) return *event;
   }
+}
+
+// A stretch of flight from now on: a parabola at constant angular acceleration.
+struct SettledRoll::Flight {
+  double slowing = 0;  // [rad/s^2]
+  double lasts = 0;    // [s]: no leg but those looked at touches before
+  bool high = false;   // the hub is higher than legs are long
+};
+
+// While the wheel turns by one leg no others may touch than those looked at, and none before a hub that is higher
+// than legs are long is down again.
+SettledRoll::Flight SettledRoll::flight(double longest_leg) const {
+  const SettledWheel& wheel = motion_->wheel();
+  const double spin = velocity_.spin, out = velocity_.out;
+  Flight flight;
+  flight.lasts = wheel.leg_angle() / std::max(1e-3, std::abs(spin));
+  flight.high = height_ > longest_leg * (1 + 1e-9);
+  if (flight.high) {
+    const double above = height_ - longest_leg, root = std::sqrt(out * out + 2 * cosine_ * above);
+    flight.lasts = out > 0 ? (out + root) / cosine_ : 2 * above / (root - out);
+  }
+  if (wheel.drags()) {
+    flight.lasts = std::min(flight.lasts, 1e-3);
+    flight.slowing =
+        -wheel.drag(spin - wheel.drag(spin) / wheel.gyration_sq() * flight.lasts / 2) / wheel.gyration_sq();
+  }
+  return flight;
+}
+
+// Finds when the tip of a leg touches; a time that is not before flight.lasts if it does not. The tip can fall no
+// faster than at `fall` for a while; advancing by the time that takes never misses a touch.
+// @param lifts  the tip is leaving the plane, where it is exactly
+double SettledRoll::touch_in(const Flight& flight, int leg, bool lifts) const {
+  const SettledWheel& wheel = motion_->wheel();
+  const double spin = velocity_.spin, slowing = flight.slowing;
+  const double length = wheel.length(leg), angle = angle_of(leg);
+  const double sine = std::sin(angle), cosine = std::cos(angle);
+  const double gap0 = lifts ? 0 : std::max(0.0, height_ - length * cosine - wheel.tip_radius);
+  double t = 0;
+  while (t < flight.lasts) {
+    const double by = t * (spin + slowing * t / 2);
+    const auto [half_sine, half_cosine] = sine_cosine(by / 2);
+    const double gap = gap0 + t * (velocity_.out - cosine_ * t / 2) +
+                       2 * length * (sine * half_cosine + cosine * half_sine) * half_sine;
+    const double turned = sine + 2 * half_sine * (cosine * half_cosine - sine * half_sine);
+    const double speed = velocity_.out - cosine_ * t + (spin + slowing * t) * length * turned;
+    if (gap <= 0 && speed < 0) break;
+    if (lifts && t == 0 && speed < wheel.rest_speed) {
+      t = lift_off;
+      continue;
+    }
+    if (lifts && gap <= 0 && t == lift_off) break;
+    const double lean = std::abs(angle + by) + steady_turn;
+    const double fall =
+        std::max(0.05 * cosine_, cosine_ - length * spin * spin * (1 - lean * lean / 2) + length * std::abs(slowing));
+    const double above = std::max(gap, 0.0), rate = std::sqrt(speed * speed + 2 * fall * above);
+    const double safe = speed > 0 ? (speed + rate) / fall : 2 * above / (rate - speed);
+    if (speed < 0 && safe <= 1e-15 * t) break;
+    t += std::min(safe, steady_turn / std::max(1e-3, std::abs(spin)));
+  }
+  return t;
+}
+
+// Finds the leg that touches first, and shortens the flight to that touch; nothing if none does while it lasts.
+// @param leaves  the feet that carried lift from the plane
+std::optional<int> SettledRoll::first_touch(Flight& flight, bool leaves) const {
+  const SettledWheel& wheel = motion_->wheel();
+  const int reach = wheel.legs() < 5 ? 1 : 2;
+  std::optional<int> touches;
+  const auto look = [&](int leg, bool lifts) {
+    const double when = touch_in(flight, leg, lifts);
+    if (when < flight.lasts) flight.lasts = when, touches = leg;
+  };
+  if (leaves) {
+    look(foot_, true);
+    if (has_other_) look(other_, true);
+  }
+  const int lowest = leg_ + static_cast<int>(std::lround(angle_ / wheel.leg_angle()));
+  for (int leg = lowest - reach; leg <= lowest + reach && !flight.high; ++leg)
+    if (!(leaves && (leg == foot_ || (has_other_ && leg == other_)))) look(leg, false);
+  return touches;
 }
 
 // Flies with no foot on the ground: a parabola at constant spin (drag: constant acceleration over a millisecond), until
 // a tip touches.
 SettledRoll::Event SettledRoll::fly() {
   const SettledWheel& wheel = motion_->wheel();
-  const double turn = wheel.leg_angle();
-  const int reach = wheel.legs() < 5 ? 1 : 2;
-  const double longest = *std::max_element(wheel.leg_length.begin(), wheel.leg_length.end());
-  bool leaves = true;  // the feet that lift are at 0 exactly
+  const double longest_leg = *std::max_element(wheel.leg_length.begin(), wheel.leg_length.end());
   if (++events_ >= wheel.max_events) return Event::given_up;
-  for (;;) {
-    const double spin = velocity_.spin;
-    const double out = velocity_.out;
-    // While the wheel turns by one leg no others may touch than those looked at, and none before a hub that is higher
-    // than legs are long is down again.
-    double slowing = 0, first = turn / std::max(1e-3, std::abs(spin));
-    const bool high = height_ > longest * (1 + 1e-9);
-    if (high) {
-      const double above = height_ - longest, root = std::sqrt(out * out + 2 * cosine_ * above);
-      first = out > 0 ? (out + root) / cosine_ : 2 * above / (root - out);
-    }
-    if (wheel.drags()) {
-      first = std::min(first, 1e-3);
-      slowing = -wheel.drag(spin - wheel.drag(spin) / wheel.gyration_sq() * first / 2) / wheel.gyration_sq();
-    }
-    int touches = 0;
-    bool found = false;
-    // Finds the earliest touch of a leg before `first`.
-    const auto look = [&](int leg, bool lifts) {
-      const double length = wheel.length(leg), angle = angle_of(leg);
-      const double sine = std::sin(angle), cosine = std::cos(angle);
-      const double gap0 = lifts ? 0 : std::max(0.0, height_ - length * cosine - wheel.tip_radius);
-      // The tip can fall no faster than at `fall` for a while; advancing by the time that takes never misses a touch.
-      double t = 0;
-      while (t < first) {
-        const double by = t * (spin + slowing * t / 2);
-        const auto [half_sine, half_cosine] = sine_cosine(by / 2);
-        const double gap = gap0 + t * (velocity_.out - cosine_ * t / 2) +
-                           2 * length * (sine * half_cosine + cosine * half_sine) * half_sine;
-        const double turned = sine + 2 * half_sine * (cosine * half_cosine - sine * half_sine);
-        const double speed = velocity_.out - cosine_ * t + (spin + slowing * t) * length * turned;
-        if (gap <= 0 && speed < 0) break;
-        if (lifts && t == 0 && speed < wheel.rest_speed) {
-          t = lift_off;
-          continue;
-        }
-        if (lifts && gap <= 0 && t == lift_off) break;
-        const double lean = std::abs(angle + by) + steady_turn;
-        const double fall = std::max(
-            0.05 * cosine_, cosine_ - length * spin * spin * (1 - lean * lean / 2) + length * std::abs(slowing));
-        const double above = std::max(gap, 0.0), rate = std::sqrt(speed * speed + 2 * fall * above);
-        const double safe = speed > 0 ? (speed + rate) / fall : 2 * above / (rate - speed);
-        if (speed < 0 && safe <= 1e-15 * t) break;
-        t += std::min(safe, steady_turn / std::max(1e-3, std::abs(spin)));
-      }
-      if (t < first) first = t, touches = leg, found = true;
-    };
-    if (leaves) {
-      look(foot_, true);
-      if (has_other_) look(other_, true);
-    }
-    const int lowest = leg_ + static_cast<int>(std::lround(angle_ / turn));
-    for (int leg = lowest - reach; leg <= lowest + reach && !high; ++leg)
-      if (!(leaves && (leg == foot_ || (has_other_ && leg == other_)))) look(leg, false);
-    const double by = first * (spin + slowing * first / 2);
-    along_ += first * (velocity_.along + sine_ * first / 2);
-    height_ += first * (velocity_.out - cosine_ * first / 2);
-    angle_ += by;
-    time_ += first;
-    velocity_ = {velocity_.along + sine_ * first, velocity_.out - cosine_ * first, spin + slowing * first};
-    leaves = false;
-    if (!found) continue;
-    foot_ = touches;
+  for (bool leaves = true;; leaves = false) {
+    Flight way = flight(longest_leg);
+    const std::optional<int> touches = first_touch(way, leaves);
+    const double lasts = way.lasts, spin = velocity_.spin;
+    along_ += lasts * (velocity_.along + sine_ * lasts / 2);
+    height_ += lasts * (velocity_.out - cosine_ * lasts / 2);
+    angle_ += lasts * (spin + way.slowing * lasts / 2);
+    time_ += lasts;
+    velocity_ = {velocity_.along + sine_ * lasts, velocity_.out - cosine_ * lasts, spin + way.slowing * lasts};
+    if (!touches) continue;
+    foot_ = *touches;
     has_other_ = false;
-    if (touches <= leg_) return Event::strikes;
+    if (foot_ <= leg_) return Event::strikes;
     note_moving_touch();
     return Event::next_touch;
   }

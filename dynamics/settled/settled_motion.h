@@ -11,6 +11,8 @@
 
 namespace metastable::dynamics {
 
+struct FootMotion;
+
 enum class LandingEnd {
   settled,    ///< the landed foot stands and will until the next leg touches
   rest,       ///< turned back on a standing foot, or stands on two
@@ -110,10 +112,24 @@ class SettledRoll {
 
  private:
   enum class Event { strikes, carries, flies, next_touch, settled, rests, given_up };
+  struct GroundedFoot;
+  struct PieceEnd;
+  struct Flight;
   Event run(bool until_settled);
   Event resolve();
   Event carry(bool until_settled);
+  GroundedFoot grounded_foot() const;
+  void follow(const GroundedFoot& foot);
+  Event strikes(int leg);
+  std::optional<Event> begin_to_carry(GroundedFoot& foot);
+  std::optional<Event> begin_to_stand(const GroundedFoot& foot, bool until_settled);
+  static PieceEnd end_of_piece(const GroundedFoot& foot, const FootMotion& motion, double longest);
+  void carry_to(const PieceEnd& end, const FootMotion& motion, GroundedFoot& foot);
+  std::optional<Event> after_piece(const PieceEnd& end, GroundedFoot& foot);
   Event fly();
+  Flight flight(double longest_leg) const;
+  double touch_in(const Flight& flight, int leg, bool lifts) const;
+  std::optional<int> first_touch(Flight& flight, bool leaves) const;
   const Contact& contact_of(int leg) const;
   double angle_of(int leg) const;
   ContactLever lever(int leg) const;
