@@ -522,18 +522,19 @@ SettledRoll::Flight SettledRoll::flight(double longest_leg) const {
 // @param lifts  the tip is leaving the plane, where it is exactly
 double SettledRoll::touch_in(const Flight& flight, int leg, bool lifts) const {
   const SettledWheel& wheel = motion_->wheel();
-  const double spin = velocity_.spin, slowing = flight.slowing;
+  const double spin = velocity_.spin, out = velocity_.out, press = cosine_;
+  const double slowing = flight.slowing, lasts = flight.lasts;
   const double length = wheel.length(leg), angle = angle_of(leg);
   const double sine = std::sin(angle), cosine = std::cos(angle);
   const double gap0 = lifts ? 0 : std::max(0.0, height_ - length * cosine - wheel.tip_radius);
   double t = 0;
-  while (t < flight.lasts) {
+  while (t < lasts) {
     const double by = t * (spin + slowing * t / 2);
     const auto [half_sine, half_cosine] = sine_cosine(by / 2);
-    const double gap = gap0 + t * (velocity_.out - cosine_ * t / 2) +
-                       2 * length * (sine * half_cosine + cosine * half_sine) * half_sine;
+    const double gap =
+        gap0 + t * (out - press * t / 2) + 2 * length * (sine * half_cosine + cosine * half_sine) * half_sine;
     const double turned = sine + 2 * half_sine * (cosine * half_cosine - sine * half_sine);
-    const double speed = velocity_.out - cosine_ * t + (spin + slowing * t) * length * turned;
+    const double speed = out - press * t + (spin + slowing * t) * length * turned;
     if (gap <= 0 && speed < 0) break;
     if (lifts && t == 0 && speed < wheel.rest_speed) {
       t = lift_off;
@@ -542,7 +543,7 @@ double SettledRoll::touch_in(const Flight& flight, int leg, bool lifts) const {
     if (lifts && gap <= 0 && t == lift_off) break;
     const double lean = std::abs(angle + by) + steady_turn;
     const double fall =
-        std::max(0.05 * cosine_, cosine_ - length * spin * spin * (1 - lean * lean / 2) + length * std::abs(slowing));
+        std::max(0.05 * press, press - length * spin * spin * (1 - lean * lean / 2) + length * std::abs(slowing));
     const double above = std::max(gap, 0.0), rate = std::sqrt(speed * speed + 2 * fall * above);
     const double safe = speed > 0 ? (speed + rate) / fall : 2 * above / (rate - speed);
     if (speed < 0 && safe <= 1e-15 * t) break;

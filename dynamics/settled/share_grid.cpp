@@ -146,6 +146,50 @@ void fill_rates(LandingShares& grid, const LandingShares& heavier, int leg) {
     if (std::abs(grid.kept_rate[i] - plastic) > most_rate) grid.kept_rate[i] = static_cast<float>(plastic);
 }
 
+// Returns a grid without landings: its axes, and what is known of each leg.
+LandingShares empty_grid(const SettledMap& map, double slowest, double fastest, const ContactSpread& contact,
+                         bool every_speed) {
+  LandingShares grid;
+  const double mean = contact.restitution_mean, sd = contact.restitution_sd;
+  const double reach = std::max(sds * sd, least_width / 2);
+  const double top = std::clamp(mean + reach, least_width, most_settled_restitution);
+  grid.restitution = {std::clamp(mean - reach, 0.0, top - least_width), top, grid_restitutions};
+  double settles = slowest;
+  for (int leg = 0; leg < map.motion().wheel().legs(); ++leg) {
+    LandingShares::Leg one = plain_leg(map, leg);
+    one.settles_below =
+        settles_below(map, leg, std::min(mean + nearly_all * sd, most_settled_restitution), slowest, fastest);
+    settles = std::max(settles, one.settles_below);
+    one.drag =
+        drag_of(map.motion(), leg, (slowest + one.settles_below) / 2, std::clamp(mean, 0.0, most_settled_restitution));
+    grid.legs.push_back(one);
+  }
+  grid.speed = {slowest, every_speed ? fastest : std::max(settles, slowest + (fastest - slowest) / 10), speeds};
+  grid.resize();
+  return grid;
+}
+
+// Returns a coarse grid without landings, of a wheel with more inertia, over the axes of `grid`.
+LandingShares empty_coarse_grid(const LandingShares& grid, const SettledMap& heavier) {
+  LandingShares coarse = grid;
+  coarse.speed.count = (speeds - 1) / speed_stride + 1;
+  coarse.restitution.count = (grid_restitutions - 1) / restitution_stride + 1;
+  for (int leg = 0; leg < heavier.motion().wheel().legs(); ++leg)
+    coarse.legs[static_cast<std::size_t>(leg)] = plain_leg(heavier, leg);
+  coarse.resize();
+  return coarse;
+}
+
+// Gives every leg of a wheel whose legs are alike what was followed of the first.
+void copy_first_leg(LandingShares& grid) {
+  for (std::vector<float>* values :
+       {&grid.resting, &grid.kept, &grid.displacement, &grid.resting_rate, &grid.kept_rate, &grid.displacement_rate}) {
+    const auto of_leg = static_cast<std::ptrdiff_t>(values->size() / grid.legs.size());
+    for (std::size_t leg = 1; leg < grid.legs.size(); ++leg)
+      std::copy_n(values->begin(), of_leg, values->begin() + static_cast<std::ptrdiff_t>(leg) * of_leg);
+  }
+}
+
 }  // namespace
 
 std::shared_ptr<const LandingShares> share_grid(
@@ -154,34 +198,14 @@ std::shared_ptr<const LandingShares> share_grid(
     bool every_speed) {
   SettledMapOptions options;
   options.direct = true;
-  const std::shared_ptr<const SettledMap> map = SettledMap::of(wheel, options);
-  auto grid = std::make_shared<LandingShares>();
-  const double mean = contact.restitution_mean, sd = contact.restitution_sd;
-  const double reach = std::max(sds * sd, least_width / 2);
-  const double top = std::clamp(mean + reach, least_width, most_settled_restitution);
-  grid->restitution = {std::clamp(mean - reach, 0.0, top - least_width), top, grid_restitutions};
-  double settles = slowest;
-  for (int leg = 0; leg < wheel.legs(); ++leg) {
-    LandingShares::Leg one = plain_leg(*map, leg);
-    one.settles_below =
-        settles_below(*map, leg, std::min(mean + nearly_all * sd, most_settled_restitution), slowest, fastest);
-    settles = std::max(settles, one.settles_below);
-    one.drag =
-        drag_of(map->motion(), leg, (slowest + one.settles_below) / 2, std::clamp(mean, 0.0, most_settled_restitution));
-    grid->legs.push_back(one);
-  }
-  grid->speed = {slowest, every_speed ? fastest : std::max(settles, slowest + (fastest - slowest) / 10), speeds};
-  grid->resize();
-  if (every_speed) fill_settling(*grid, *map);
   SettledWheel more = wheel;
   more.radius_of_gyration *= std::sqrt(more_inertia);
-  const std::shared_ptr<const SettledMap> map_of_more = SettledMap::of(more, options);
-  LandingShares heavier = *grid;
-  heavier.speed.count = (speeds - 1) / speed_stride + 1;
-  heavier.restitution.count = (grid_restitutions - 1) / restitution_stride + 1;
-  for (int leg = 0; leg < wheel.legs(); ++leg)
-    heavier.legs[static_cast<std::size_t>(leg)] = plain_leg(*map_of_more, leg);
-  heavier.resize();
+  const std::shared_ptr<const SettledMap> map = SettledMap::of(wheel, options),
+                                          map_of_more = SettledMap::of(more, options);
+  auto grid = std::make_shared<LandingShares>(empty_grid(*map, slowest, fastest, contact, every_speed));
+  if (every_speed) fill_settling(*grid, *map);
+  LandingShares heavier = empty_coarse_grid(*grid, *map_of_more);
+
   const auto rows = static_cast<std::size_t>(grid_restitutions),
              coarse = static_cast<std::size_t>(heavier.restitution.count);
   const bool alike = std::all_of(wheel.leg_length.begin(), wheel.leg_length.end(),
@@ -199,16 +223,12 @@ std::shared_ptr<const LandingShares> share_grid(
     executor(all, work);
   else
     for (std::size_t i = 0; i < all; ++i) work(i);
+
   grid->resting_rate.resize(grid->resting.size());
   grid->kept_rate.resize(grid->kept.size());
   grid->displacement_rate.resize(grid->displacement.size());
   for (std::size_t leg = 0; leg < followed; ++leg) fill_rates(*grid, heavier, static_cast<int>(leg));
-  for (std::vector<float>* values : {&grid->resting, &grid->kept, &grid->displacement, &grid->resting_rate,
-                                     &grid->kept_rate, &grid->displacement_rate}) {
-    const auto of_leg = static_cast<std::ptrdiff_t>(values->size() / grid->legs.size());
-    for (std::size_t leg = followed; leg < grid->legs.size(); ++leg)
-      std::copy_n(values->begin(), of_leg, values->begin() + static_cast<std::ptrdiff_t>(leg) * of_leg);
-  }
+  if (alike) copy_first_leg(*grid);
   return grid;
 }
 
