@@ -91,7 +91,7 @@ double outside_power(const Experiment& experiment, const dynamics::NominalValues
   std::vector<std::vector<double>> with;  // [what a trial drew][trial]
   for (const Drawn& one : drawn) {
     WheelHypothesis h = without;
-    h.extension.rolling += one.torque;
+    h.extension.torques.rolling += one.torque;
     if (change)
       h.varied = [&](const CollisionPlace& place, dynamics::StepContext& step) {
         dynamics::OutsideRatios ratios;

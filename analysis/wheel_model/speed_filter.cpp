@@ -38,20 +38,20 @@ SpeedFilter::SpeedFilter(const Extension& extension, const ScoreTilt& tilt, doub
                          double law_error, double slide_error, const MemoryOfScores& memory)
     : extension_(extension),
       tilt_(tilt),
-      noise2_(noise * noise + extension.noise_sd * extension.noise_sd),
+      noise2_(noise * noise + extension.sensor.noise_sd * extension.sensor.noise_sd),
       slack2_(slack * slack),
       law2_(law_error * law_error),
       slide_error_(slide_error),
-      memory_(extension.memory),
+      memory_(extension.contact.memory),
       // Where scores go mostly with the squares of contacts' a negative memory may turn them the other way: that is not
       // followed.
       told_(memory_ == 0 ? 0 : std::max(0.0, memory(memory_) / memory_)),
-      blurred_(noise > least_blur || extension.noise_sd > least_blur) {}
+      blurred_(noise > least_blur || extension.sensor.noise_sd > least_blur) {}
 
 SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported) {
-  const double mean = condition.initial_speed->mean + extension_.launch_shift;
-  const double sd = std::max(0.01, condition.initial_speed->sd + extension_.launch_widening);
-  const double seen = reported - extension_.bias_before, total = std::sqrt(sd * sd + noise2_);
+  const double mean = condition.initial_speed->mean + extension_.sensor.launch_shift;
+  const double sd = std::max(0.01, condition.initial_speed->sd + extension_.sensor.launch_widening);
+  const double seen = reported - extension_.sensor.bias_before, total = std::sqrt(sd * sd + noise2_);
   const double z = (seen - mean) / total, gain = sd * sd / (total * total);
   mean_ = mean + gain * (seen - mean);
   variance_ = gain * noise2_;
@@ -59,13 +59,13 @@ SpeedFilter::Out SpeedFilter::launch(const Condition& condition, double reported
 }
 
 void SpeedFilter::start(double reported) {
-  mean_ = reported - extension_.bias_before;
+  mean_ = reported - extension_.sensor.bias_before;
   variance_ = noise2_;
   before_.reset();
 }
 
 SpeedFilter::Out SpeedFilter::collision(const ExtendedWheel& wheel, const StepContext& context, double reported) {
-  const double seen = std::max(1e-3, reported - extension_.bias_after);
+  const double seen = std::max(1e-3, reported - extension_.sensor.bias_after);
   const Before before{mean_, variance_};
   const Out out = transition(wheel, context, seen, 1, std::sqrt(noise2_ + square(seen / mean_) * variance_));
   update(wheel, out, seen);
@@ -75,7 +75,7 @@ SpeedFilter::Out SpeedFilter::collision(const ExtendedWheel& wheel, const StepCo
 
 SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepContext& context, const Touch& touch) {
   if (wheel.settles()) return settled_step(wheel, context, touch);
-  const double seen = touch.speed - extension_.bias_before;
+  const double seen = touch.speed - extension_.sensor.bias_before;
   const auto next = wheel.next(context, mean_);
   if (!next) {
     start(touch.speed);
@@ -91,7 +91,7 @@ SpeedFilter::Out SpeedFilter::stance(const ExtendedWheel& wheel, const StepConte
 
 SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext& context, const Touch& touch) {
   if (wheel.settles()) return settled_step(wheel, context, touch);
-  const double seen = std::max(1e-3, touch.speed - extension_.bias_before);
+  const double seen = std::max(1e-3, touch.speed - extension_.sensor.bias_before);
   const auto plus = wheel.back(context, seen);
   if (!plus) {
     start(touch.speed);
@@ -115,7 +115,7 @@ SpeedFilter::Out SpeedFilter::step(const ExtendedWheel& wheel, const StepContext
 // that leaves is weighed here; else the landing is the collision.
 SpeedFilter::Out SpeedFilter::settled_step(const ExtendedWheel& wheel, const StepContext& context, const Touch& touch) {
   constexpr double carried_on = 0.5;  // d next / d omega-, times the ratio of the two
-  const double reported = std::max(1e-3, touch.speed - extension_.bias_before);
+  const double reported = std::max(1e-3, touch.speed - extension_.sensor.bias_before);
   const double seen = std::max(1e-3, reported + touch.law_error);
   const Before before = before_.value_or(Before{mean_, variance_});
   const double rate = carried_on * before.mean / seen;

@@ -56,7 +56,7 @@ TrialFollower::TrialFollower(const WheelRuns& measured, const WheelRun& run, con
       wheel_(wheel),
       hypothesis_(hypothesis),
       day_shift_(hypothesis.shift_of(run.condition)),
-      friction_sd_(hypothesis.extension.trial_friction_sd),
+      friction_sd_(hypothesis.extension.contact.trial_friction_sd),
       nodes_(nodes_for(friction_sd_ * std::sqrt(static_cast<double>(run.collisions.size())) /
                        hypothesis.contact.friction_sd)),
       filters_(nodes_.size(),

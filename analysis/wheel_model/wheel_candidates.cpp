@@ -17,28 +17,34 @@ using Values = std::vector<double>;
 
 constexpr double degree = std::numbers::pi / 180;
 
+// Finds the number that an effect changes.
+using Field = std::function<double&(Extension&)>;
+template <class Part>
+Field in(Part Extension::*part, double Part::*number) {
+  return [=](Extension& e) -> double& { return e.*part.*number; };
+}
+
 // The plain effect has one free parameter, which goes into one field and is reported under one name.
-WheelCandidate simple(std::string id, std::string name, double Extension::*field, FreeParameter parameter,
-                      double unit = 1) {
+WheelCandidate simple(std::string id, std::string name, const Field& field, FreeParameter parameter, double unit = 1) {
   WheelCandidate c;
   c.candidate.id = std::move(id);
   c.candidate.parameters = {parameter};
   c.candidate.report = [name = std::move(name)](const Values&, const Values& v) {
     return std::vector<NamedValue>{{name, v[0]}};
   };
-  c.apply = [field, unit](Extension& e, const Values&, const Values& v) { e.*field = v[0] * unit; };
+  c.apply = [field, unit](Extension& e, const Values&, const Values& v) { field(e) = v[0] * unit; };
   return c;
 }
 
 // A standard deviation is fitted as its square: there the likelihood has a slope at nothing.
-WheelCandidate spread(std::string id, std::string name, double Extension::*field, double largest, double try_at) {
+WheelCandidate spread(std::string id, std::string name, const Field& field, double largest, double try_at) {
   WheelCandidate c =
       simple(std::move(id), "", field, {0, 0, largest * largest, 1e-3 * try_at * try_at, try_at * try_at});
   c.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] * v[0]}}; };
   c.candidate.report = [name = std::move(name)](const Values&, const Values& v) {
     return std::vector<NamedValue>{{name, std::sqrt(std::max(0.0, v[0]))}};
   };
-  c.apply = [field](Extension& e, const Values&, const Values& v) { e.*field = std::sqrt(std::max(0.0, v[0])); };
+  c.apply = [field](Extension& e, const Values&, const Values& v) { field(e) = std::sqrt(std::max(0.0, v[0])); };
   return c;
 }
 
@@ -58,8 +64,8 @@ WheelCandidate initial_speed(const WheelDesign& design) {
     return std::vector<NamedValue>{{"mean_rad_s", v[0]}, {"sd_rad_s", v[1]}};
   };
   c.apply = [](Extension& e, const Values&, const Values& v) {
-    e.launch_shift = v[0];
-    e.launch_widening = v[1];
+    e.sensor.launch_shift = v[0];
+    e.sensor.launch_widening = v[1];
   };
   if (!design.launches_stated) c.candidate.undecidable = "no launch speed is stated to compare with";
   return c;
@@ -81,7 +87,7 @@ WheelCandidate leg_lengths(const WheelDesign& design) {
     for (std::size_t i = 0; i < v.size(); ++i) form.values.push_back(v[i] - stated.at(i));
     return form;
   };
-  c.apply = [](Extension& e, const Values&, const Values& v) { e.leg_change = v; };
+  c.apply = [](Extension& e, const Values&, const Values& v) { e.geometry.leg_change = v; };
   if (!design.legs_known) c.candidate.undecidable = "which leg landed is not known";
   return c;
 }
@@ -104,8 +110,8 @@ WheelCandidate leg_contact(const WheelDesign& design) {
     return FittedForm{{v[0], friction ? 0.0 : 1.0}, {friction ? v[1] : v[2]}};
   };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
-    e.leg = static_cast<int>(variant[0]);
-    (variant[1] == 0 ? e.leg_friction : e.leg_restitution) = v[0];
+    e.contact.leg = static_cast<int>(variant[0]);
+    (variant[1] == 0 ? e.contact.leg_friction : e.contact.leg_restitution) = v[0];
   };
   if (!design.legs_known) c.candidate.undecidable = "which leg landed is not known";
   return c;
@@ -120,8 +126,8 @@ WheelCandidate hub_eccentricity(const WheelDesign& design) {
   };
   c.candidate.form_of = [](const Values& v) { return FittedForm{{}, {v[0] * std::cos(v[1]), v[0] * std::sin(v[1])}}; };
   c.apply = [](Extension& e, const Values&, const Values& v) {
-    e.hub_forward = v[0];
-    e.hub_aside = v[1];
+    e.geometry.hub_forward = v[0];
+    e.geometry.hub_aside = v[1];
   };
   if (!design.legs_known) c.candidate.undecidable = "which leg landed is not known";
   return c;
@@ -148,10 +154,10 @@ WheelCandidate slope_profile(const WheelDesign& design) {
     return FittedForm{{0, v[1], v[2] > 0 ? v[2] : end}, {v[0]}};
   };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
-    e.sag_shape = static_cast<Extension::Shape>(static_cast<int>(variant[0]));
-    e.sag_from = variant[1];
-    e.sag_to = variant[2];
-    e.sag = v[0];
+    e.geometry.sag_shape = static_cast<Extension::Geometry::Shape>(static_cast<int>(variant[0]));
+    e.geometry.sag_from = variant[1];
+    e.geometry.sag_to = variant[2];
+    e.geometry.sag = v[0];
   };
   return c;
 }
@@ -167,8 +173,8 @@ WheelCandidate speed_dependent_friction() {
   };
   c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0]}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
-    e.stribeck_speed = variant[0];
-    e.stribeck = v[0];
+    e.contact.stribeck_speed = variant[0];
+    e.contact.stribeck = v[0];
   };
   return c;
 }
@@ -204,9 +210,9 @@ WheelCandidate friction_patch(const WheelDesign& design) {
   };
   c.apply = [is_patch](Extension& e, const Values& variant, const Values& v) {
     if (!is_patch(variant[0], variant[1])) return;  // nothing is gained by such a variant
-    e.patch_from = variant[0];
-    e.patch_to = variant[1];
-    e.patch_friction = v[0];
+    e.contact.patch_from = variant[0];
+    e.contact.patch_to = variant[1];
+    e.contact.patch_friction = v[0];
   };
   return c;
 }
@@ -222,8 +228,8 @@ WheelCandidate contact_outliers() {
   };
   c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0]}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
-    e.outlier_friction = variant[0];
-    e.outlier_share = v[0];
+    e.contact.outlier_friction = variant[0];
+    e.contact.outlier_share = v[0];
   };
   return c;
 }
@@ -240,8 +246,8 @@ WheelCandidate sensor_bias(const WheelDesign& design) {
   };
   c.candidate.form_of = [](const Values& v) { return FittedForm{{1, 1}, {v[0]}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
-    e.bias_before = v[0] * variant[0];
-    e.bias_after = v[0] * variant[1];
+    e.sensor.bias_before = v[0] * variant[0];
+    e.sensor.bias_after = v[0] * variant[1];
   };
   return c;
 }
@@ -259,15 +265,15 @@ WheelCandidate ramp_vibration() {
   };
   c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0], 0}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
-    e.ring_frequency = variant[0];
-    e.ring_cosine = v[0];
-    e.ring_sine = v[1];
+    e.contact.ring_frequency = variant[0];
+    e.contact.ring_cosine = v[0];
+    e.contact.ring_sine = v[1];
   };
   return c;
 }
 
 WheelCandidate sensor_noise(const WheelDesign& design) {
-  WheelCandidate c = spread("sensor_noise", "sd_rad_s", &Extension::noise_sd, 1, 0.01);
+  WheelCandidate c = spread("sensor_noise", "sd_rad_s", in(&Extension::sensor, &Extension::Sensor::noise_sd), 1, 0.01);
   c.candidate.exact = true;
   FreeParameter& variance = c.candidate.parameters[0];
   variance.step = std::min(variance.step, 0.01 * design.noise * design.noise);  // slopes are those at what is stated
@@ -292,8 +298,8 @@ WheelCandidate bounce(const WheelDesign& design) {
   };
   c.candidate.form_of = [](const Values& v) { return FittedForm{{v[1]}, {v[0]}}; };
   c.apply = [](Extension& e, const Values& variant, const Values& v) {
-    e.rebound_lost = v[0];
-    e.hops_from = variant[0];
+    e.contact.rebound_lost = v[0];
+    e.contact.hops_from = variant[0];
   };
   if (design.law == dynamics::Law::settled) c.candidate.undecidable = "`settled` follows the hops itself";
   return c;
@@ -303,7 +309,7 @@ WheelCandidate slip_reversal(const WheelDesign& design) {
   WheelCandidate c;
   c.candidate.id = "slip_reversal";
   c.candidate.report = [](const Values&, const Values&) { return std::vector<NamedValue>{}; };
-  c.apply = [](Extension& e, const Values&, const Values&) { e.law = dynamics::Law::coulomb; };
+  c.apply = [](Extension& e, const Values&, const Values&) { e.contact.law = dynamics::Law::coulomb; };
   if (design.law != dynamics::Law::published) c.candidate.undecidable = "the nominal law is not `published`";
   return c;
 }
@@ -328,21 +334,27 @@ std::vector<WheelCandidate> wheel_candidates(const WheelDesign& design) {
       leg_lengths(design),
       leg_contact(design),
       hub_eccentricity(design),
-      simple("inertia", "ratio", &Extension::inertia_ratio, {1, 0.5, 2, 1e-4}),
-      simple("slope_offset", "offset_deg", &Extension::slope_offset_rad, {0, -3, 3, 1e-3}, degree),
+      simple("inertia", "ratio", in(&Extension::geometry, &Extension::Geometry::inertia_ratio), {1, 0.5, 2, 1e-4}),
+      simple("slope_offset", "offset_deg", in(&Extension::geometry, &Extension::Geometry::slope_offset_rad),
+             {0, -3, 3, 1e-3}, degree),
       needing(2, design.away, away, slope_profile(design)),
-      simple("axle_drag_viscous", "n_m_s", &Extension::viscous, {0, -0.1, 0.1, 1e-6}),
-      simple("rolling_resistance", "torque_n_m", &Extension::rolling, {0, -0.3, 0.3, 1e-5}),
-      simple("air_drag", "n_m_s2", &Extension::air, {0, -0.02, 0.02, 1e-7}),
-      simple("speed_dependent_restitution", "exponent", &Extension::restitution_exponent, {0, -2, 2, 1e-3}),
+      simple("axle_drag_viscous", "n_m_s", in(&Extension::torques, &Extension::Torques::viscous), {0, -0.1, 0.1, 1e-6}),
+      simple("rolling_resistance", "torque_n_m", in(&Extension::torques, &Extension::Torques::rolling),
+             {0, -0.3, 0.3, 1e-5}),
+      simple("air_drag", "n_m_s2", in(&Extension::torques, &Extension::Torques::air), {0, -0.02, 0.02, 1e-7}),
+      simple("speed_dependent_restitution", "exponent",
+             in(&Extension::contact, &Extension::ContactChange::restitution_exponent), {0, -2, 2, 1e-3}),
       speed_dependent_friction(),
       needing(2, design.successive, after_another,
-              simple("contact_memory", "correlation", &Extension::memory, {0, -0.95, 0.95, 1e-3})),
+              simple("contact_memory", "correlation", in(&Extension::contact, &Extension::ContactChange::memory),
+                     {0, -0.95, 0.95, 1e-3})),
       needing(2, design.away, away, friction_patch(design)),
       needing(3, design.trials, "trials",
-              simple("trial_drift", "relative_change", &Extension::drift, {0, -0.9, 5, 1e-3})),
+              simple("trial_drift", "relative_change", in(&Extension::contact, &Extension::ContactChange::drift),
+                     {0, -0.9, 5, 1e-3})),
       needing(5, design.trials, "trials",
-              spread("trial_spread", "friction_sd", &Extension::trial_friction_sd, 0.3, 0.01)),
+              spread("trial_spread", "friction_sd",
+                     in(&Extension::contact, &Extension::ContactChange::trial_friction_sd), 0.3, 0.01)),
       contact_outliers(),
       sensor_noise(design),
       sensor_bias(design),

@@ -53,11 +53,11 @@ WheelHypothesis hypothesis_at(std::span<const double> nuisance) {
                              .extension = {}};
   if (nuisance.size() == Slot::log_noise_sd + 1) hypothesis.noise = std::exp(nuisance[Slot::log_noise_sd]);
   if (nuisance.size() > Slot::next_by_slope) {
-    hypothesis.extension.hub_inertia_ratio = std::exp(nuisance[Slot::log_hub_inertia_ratio]);
-    hypothesis.extension.sticking_ratio = std::exp(nuisance[Slot::log_sticking_ratio]);
-    hypothesis.extension.plus_ratio = std::exp(nuisance[Slot::log_plus_ratio]);
-    hypothesis.extension.next_ratio = std::exp(nuisance[Slot::log_next_ratio]);
-    hypothesis.extension.next_by_slope = nuisance[Slot::next_by_slope];
+    hypothesis.extension.geometry.hub_inertia_ratio = std::exp(nuisance[Slot::log_hub_inertia_ratio]);
+    hypothesis.extension.law_error.sticking_ratio = std::exp(nuisance[Slot::log_sticking_ratio]);
+    hypothesis.extension.law_error.plus_ratio = std::exp(nuisance[Slot::log_plus_ratio]);
+    hypothesis.extension.law_error.next_ratio = std::exp(nuisance[Slot::log_next_ratio]);
+    hypothesis.extension.law_error.next_by_slope = nuisance[Slot::next_by_slope];
   }
   if (nuisance.size() > Slot::log_settled_noise_sd) hypothesis.noise = std::exp(nuisance[Slot::log_settled_noise_sd]);
   return hypothesis;

@@ -36,16 +36,16 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
   const dynamics::TruncatedNormal restitution(contact.restitution_mean, contact.restitution_sd, 0, 1);
   const dynamics::TruncatedNormal friction(contact.friction_mean, contact.friction_sd, 0);
   const ExtendedWheel& wheel = wheels[design.condition];
-  const double noise = std::hypot(hypothesis.noise.value_or(all.noise), e.noise_sd);
+  const double noise = std::hypot(hypothesis.noise.value_or(all.noise), e.sensor.noise_sd);
   const auto score = [](double u) { return dynamics::normal_quantile(u); };
   const auto first = uniforms(seed, index, 0);
   WheelRun run = design;
   run.collisions.clear();
-  const double shift = hypothesis.shift_of(design.condition) + e.trial_friction_sd * score(first[0]);
+  const double shift = hypothesis.shift_of(design.condition) + e.contact.trial_friction_sd * score(first[0]);
   double omega = design.collisions.front().before;
   if (const auto& launch = all.conditions[design.condition].initial_speed)
-    omega =
-        std::max(0.1, launch->mean + e.launch_shift + std::max(0.01, launch->sd + e.launch_widening) * score(first[1]));
+    omega = std::max(0.1, launch->mean + e.sensor.launch_shift +
+                              std::max(0.01, launch->sd + e.sensor.launch_widening) * score(first[1]));
   std::optional<double> eta_score, mu_score;
   double slid = 0;
   const std::size_t most =
@@ -64,7 +64,7 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
     }
     m.context.friction_shift = shift;
     if (hypothesis.varied) hypothesis.varied(collision_place(run, index % all.runs.size(), k, m, omega), m.context);
-    const double rho = e.memory, left = std::sqrt(1 - rho * rho);
+    const double rho = e.contact.memory, left = std::sqrt(1 - rho * rho);
     std::optional<double> plus;
     ExtendedWheel::Drawn landed;
     for (std::uint64_t attempt = 0; attempt < 60; ++attempt) {  // the tilt by rejection
@@ -75,10 +75,10 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
         b = rho * *mu_score + left * b;
       }
       const dynamics::Contact drawn{restitution.at_score(a), friction.at_score(b)};
-      plus = wheel.omega_plus(m.context, omega, drawn, u[2] < e.outlier_share);
+      plus = wheel.omega_plus(m.context, omega, drawn, u[2] < e.contact.outlier_share);
       double below = plus ? wheel.after_collision(m.context, omega, *plus).below : 0.0;
       if (wheel.settles()) {
-        landed = wheel.land(m.context, omega, drawn, u[2] < e.outlier_share);
+        landed = wheel.land(m.context, omega, drawn, u[2] < e.contact.outlier_share);
         if (!like.after)
           below = landed.next ? wheel.at_next_touch(m.context, omega, {}, noise, *landed.next).speed.below : 0.0;
       }
@@ -92,10 +92,10 @@ WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t ind
     visit(hypothesis.tilt.below(wheel.settles() ? wheel.rest_share(m.context, omega, std::nullopt)
                                                 : wheel.after_collision(m.context, omega, barrier).below));
     const auto error = uniforms(seed ^ 0x6e6f697365ULL, index, k);
-    m.before = std::max(1e-3, omega + e.bias_before + noise * score(error[0]));
+    m.before = std::max(1e-3, omega + e.sensor.bias_before + noise * score(error[0]));
     m.law_error = all.law_error * score(error[2]);
     const bool rests = wheel.settles() ? !landed.next : !plus || *plus < barrier;
-    if (like.after && plus) m.after = std::max(1e-3, *plus + e.bias_after + noise * score(error[1]));
+    if (like.after && plus) m.after = std::max(1e-3, *plus + e.sensor.bias_after + noise * score(error[1]));
     if (like.after && !plus) m.after = 0;
     m.slide.reset();
     slid = all.slides_seen ? landed.displacement : 0;

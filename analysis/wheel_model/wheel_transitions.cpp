@@ -347,7 +347,7 @@ std::vector<NamedValue> WheelTransitions::report_nuisances(std::span<const doubl
   if (measured_.law == dynamics::Law::settled) {
     const dynamics::ContactModel model = dynamics::contact_model(measured_.wheel, measured_.law);
     named.emplace_back("hub_inertia_kg_m2", model.mass * model.radius_of_gyration * model.radius_of_gyration *
-                                                at.extension.hub_inertia_ratio);
+                                                at.extension.geometry.hub_inertia_ratio);
   }
   for (std::size_t k = days_from_; k < nuisances_.size(); ++k) named.emplace_back(nuisances_[k].name, nuisance[k]);
   return named;

@@ -12,9 +12,9 @@ constexpr double pi = std::numbers::pi;
 constexpr double reference_speed = 5;         // [rad/s], of speed_dependent_restitution
 constexpr double usual_slope = 8 * pi / 180;  // [rad], about which the error of `settled` may tilt
 
-Wheel changed(Wheel wheel, const Extension& extension) {
-  for (std::size_t i = 0; i < wheel.leg_length.size() && i < extension.leg_change.size(); ++i)
-    wheel.leg_length[i] += extension.leg_change[i];
+Wheel changed(Wheel wheel, const std::vector<double>& leg_change) {
+  for (std::size_t i = 0; i < wheel.leg_length.size() && i < leg_change.size(); ++i)
+    wheel.leg_length[i] += leg_change[i];
   wheel.validate();
   return wheel;
 }
@@ -24,63 +24,77 @@ Wheel changed(Wheel wheel, const Extension& extension) {
 ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const ContactSpread& contact,
                              const Extension& extension, std::shared_ptr<const LandingShares> landings)
     : extension_(extension),
-      slope_(slope + extension.slope_offset_rad),
-      model_(contact_model(stated, extension.law.value_or(law))),
+      slope_(slope + extension.geometry.slope_offset_rad),
+      model_(contact_model(stated, extension.contact.law.value_or(law))),
       contact_(contact),
       density_(certain() ? std::nullopt : std::optional<CollisionDensity>(std::in_place, model_, contact)),
       landings_(std::move(landings)) {
-  Wheel wheel = changed(stated, extension);
+  Wheel wheel = changed(stated, extension.geometry.leg_change);
   if (model_.law == Law::settled) {  // feet are discs about points that much nearer to the hub
     tip_radius_ = stated.tip_radius;
     for (double& length : wheel.leg_length) length -= tip_radius_;
   }
-  const auto legs = wheel.leg_length.size();
-  for (std::size_t k = 0; k < legs; ++k) {
-    const double first = wheel.leg_length[(k + legs - 1) % legs], second = wheel.leg_length[k];
-    Leg leg;
-    leg.triangle = triangle(first, second, wheel.leg_angle());
-    leg.length = second;
-    // This is the stated wheel's: legs that differ from the stated lengths do not change what is known of the inertia.
-    leg.before = stance_inertia(stated, model_.law, first);
-    leg.inertia = stance_inertia(stated, model_.law, second);
-    if (model_.law == Law::settled) {
-      const double hub = model_.mass * model_.radius_of_gyration * model_.radius_of_gyration;
-      const double height = leg.triangle.hub_height + tip_radius_;
-      const double ahead = leg.triangle.contact_x, behind = leg.triangle.chord - ahead;
-      leg.before = hub * extension.hub_inertia_ratio + model_.mass * (behind * behind + height * height);
-      leg.inertia = hub * extension.hub_inertia_ratio + model_.mass * (ahead * ahead + height * height);
-    }
-    leg.before *= extension.inertia_ratio;
-    leg.inertia *= extension.inertia_ratio;
-    leg.eccentric_phase = -static_cast<double>(k) * wheel.leg_angle();
-    const double offset2 = extension.hub_forward * extension.hub_forward + extension.hub_aside * extension.hub_aside;
-    if (offset2 > 0) {
-      // A centre of mass nearer to the foot or farther from it changes the inertia by parallel axes.
-      const auto along = [&](double phase) {  // of the offset, towards the leg
-        return extension.hub_forward * std::cos(phase) - extension.hub_aside * std::sin(phase);
-      };
-      leg.inertia += model_.mass * (offset2 - 2 * second * along(leg.eccentric_phase));
-      leg.before += model_.mass * (offset2 - 2 * first * along(leg.eccentric_phase + wheel.leg_angle()));
-    }
-    geometry_.push_back(leg);
-  }
-  drag_ = extension.viscous != 0 || extension.rolling != 0 || extension.air != 0;
-  profile_ = extension.sag != 0;
+  for (std::size_t k = 0; k < wheel.leg_length.size(); ++k) geometry_.push_back(leg_of(stated, wheel, k));
+  const Extension::Torques& torques = extension.torques;
+  drag_ = torques.viscous != 0 || torques.rolling != 0 || torques.air != 0;
+  profile_ = extension.geometry.sag != 0;
   if (!settles()) return;
-  const ExtendedWheel as_stated(stated, slope, law, contact, Extension{});
-  for (std::size_t k = 0; k < legs; ++k) {
+  hold_against_stated(ExtendedWheel(stated, slope, law, contact, Extension{}));
+  read_landings_at_own_inertia();
+}
+
+// Returns what a leg is before anything is known of its landings. @param wheel  with the changed lengths
+ExtendedWheel::Leg ExtendedWheel::leg_of(const Wheel& stated, const Wheel& wheel, std::size_t k) const {
+  const Extension::Geometry& geometry = extension_.geometry;
+  const auto legs = wheel.leg_length.size();
+  const double first = wheel.leg_length[(k + legs - 1) % legs], second = wheel.leg_length[k];
+  Leg leg;
+  leg.triangle = triangle(first, second, wheel.leg_angle());
+  leg.length = second;
+  // This is the stated wheel's: legs that differ from the stated lengths do not change what is known of the inertia.
+  leg.before = stance_inertia(stated, model_.law, first);
+  leg.inertia = stance_inertia(stated, model_.law, second);
+  if (model_.law == Law::settled) {
+    const double hub = model_.mass * model_.radius_of_gyration * model_.radius_of_gyration;
+    const double height = leg.triangle.hub_height + tip_radius_;
+    const double ahead = leg.triangle.contact_x, behind = leg.triangle.chord - ahead;
+    leg.before = hub * geometry.hub_inertia_ratio + model_.mass * (behind * behind + height * height);
+    leg.inertia = hub * geometry.hub_inertia_ratio + model_.mass * (ahead * ahead + height * height);
+  }
+  leg.before *= geometry.inertia_ratio;
+  leg.inertia *= geometry.inertia_ratio;
+  leg.eccentric_phase = -static_cast<double>(k) * wheel.leg_angle();
+  const double offset2 = geometry.hub_forward * geometry.hub_forward + geometry.hub_aside * geometry.hub_aside;
+  if (offset2 > 0) {
+    // A centre of mass nearer to the foot or farther from it changes the inertia by parallel axes.
+    const auto along = [&](double phase) {  // of the offset, towards the leg
+      return geometry.hub_forward * std::cos(phase) - geometry.hub_aside * std::sin(phase);
+    };
+    leg.inertia += model_.mass * (offset2 - 2 * second * along(leg.eccentric_phase));
+    leg.before += model_.mass * (offset2 - 2 * first * along(leg.eccentric_phase + wheel.leg_angle()));
+  }
+  return leg;
+}
+
+// Notes of each leg what the stated wheel has, and how much more torques take off a landing than off a standing foot.
+void ExtendedWheel::hold_against_stated(const ExtendedWheel& stated) {
+  const Extension::Torques& torques = extension_.torques;
+  for (std::size_t k = 0; k < geometry_.size(); ++k) {
     const StepContext here{.leg = static_cast<int>(k)};
-    geometry_[k].stated_gain = as_stated.path(here).gain;
-    geometry_[k].stated_barrier = as_stated.barrier(here);
+    geometry_[k].stated_gain = stated.path(here).gain;
+    geometry_[k].stated_barrier = stated.barrier(here);
     const LandingShares::Drag& drag = landings_->legs[k].drag;
-    const double standing = work(as_stated.path(here), drag.carried_squared);
-    const double landing =
-        extension.rolling * drag.lost[0] + extension.viscous * drag.lost[1] + extension.air * drag.lost[2];
+    const double standing = work(stated.path(here), drag.carried_squared);
+    const double landing = torques.rolling * drag.lost[0] + torques.viscous * drag.lost[1] + torques.air * drag.lost[2];
     if (std::abs(standing) > 0) geometry_[k].drag_ratio = landing / standing;
   }
+}
+
+// Takes the landings to the wheel's own inertia about its centre of mass, where that is not the grid's.
+void ExtendedWheel::read_landings_at_own_inertia() {
   std::vector<double> gyration_sq;
   bool same = true;
-  for (std::size_t k = 0; k < legs; ++k) {
+  for (std::size_t k = 0; k < geometry_.size(); ++k) {
     const Collision c = collision({.leg = static_cast<int>(k)}, 1);
     gyration_sq.push_back(geometry_[k].inertia / model_.mass - c.contact_x * c.contact_x - c.contact_y * c.contact_y);
     geometry_[k].gyration_sq = gyration_sq.back();
@@ -92,20 +106,20 @@ ExtendedWheel::ExtendedWheel(const Wheel& stated, double slope, Law law, const C
 
 double ExtendedWheel::local_slope(double position) const {
   if (!profile_) return slope_;
-  const Extension& e = extension_;
-  const double half = (e.sag_to - e.sag_from) / 2;
-  const double t = (position - e.sag_from) / half - 1;  // -1..1 along the stretch
+  const Extension::Geometry& ground = extension_.geometry;
+  const double half = (ground.sag_to - ground.sag_from) / 2;
+  const double t = (position - ground.sag_from) / half - 1;  // -1..1 along the stretch
   double change = 0;
   if (std::abs(t) <= 1.05) {
-    switch (e.sag_shape) {
-      case Extension::Shape::parabola:
-        change = -2 * e.sag / half * t;
+    switch (ground.sag_shape) {
+      case Extension::Geometry::Shape::parabola:
+        change = -2 * ground.sag / half * t;
         break;
-      case Extension::Shape::sine:
-        change = e.sag * pi / (2 * half) * std::cos(pi / 2 * (t + 1));
+      case Extension::Geometry::Shape::sine:
+        change = ground.sag * pi / (2 * half) * std::cos(pi / 2 * (t + 1));
         break;
-      case Extension::Shape::step:
-        change = (t < 0 ? e.sag : -e.sag) / half;
+      case Extension::Geometry::Shape::step:
+        change = (t < 0 ? ground.sag : -ground.sag) / half;
         break;
     }
   }
@@ -122,11 +136,12 @@ ExtendedWheel::Path ExtendedWheel::path(const StepContext& context) const {
   p.inertia = leg.inertia;
   p.pendulum = weight * leg.length;
   p.gain = p.pendulum * (std::sin(p.start) - std::sin(p.end));
-  if (extension_.hub_forward != 0 || extension_.hub_aside != 0) {
+  const Extension::Geometry& geometry = extension_.geometry;
+  if (geometry.hub_forward != 0 || geometry.hub_aside != 0) {
     // The centre of mass is L sin(theta) - e sin(theta - phase of the offset from this leg) over the foot.
     const auto height = [&](double theta) {
       const double at = theta - leg.eccentric_phase;
-      return extension_.hub_aside * std::cos(at) - extension_.hub_forward * std::sin(at);
+      return geometry.hub_aside * std::cos(at) - geometry.hub_forward * std::sin(at);
     };
     p.gain += weight * (height(p.start) - height(p.end));
   }
@@ -137,9 +152,10 @@ ExtendedWheel::Path ExtendedWheel::path(const StepContext& context) const {
 double ExtendedWheel::work(const Path& p, double omega_plus_squared) const {
   if (!drag_) return 0;
   using Rule = boost::math::quadrature::gauss<double, 7>;
+  const Extension::Torques& torques = extension_.torques;
   const auto torque = [&](double squared) {
     squared = std::max(0.0, squared);
-    return extension_.rolling + extension_.viscous * std::sqrt(squared) + extension_.air * squared;
+    return torques.rolling + torques.viscous * std::sqrt(squared) + torques.air * squared;
   };
   const double slowing = 2 * torque(omega_plus_squared) / p.inertia;  // what the torques have taken off on the way
   const auto along = [&](double theta) {
@@ -155,7 +171,8 @@ double ExtendedWheel::barrier(const StepContext& context) const {
   if (p.start >= pi / 2) return 0;
   const double climb = p.pendulum * (1 - std::sin(p.start));
   const double mean = std::sqrt(climb) / 2;
-  const double torque = extension_.rolling + extension_.viscous * mean + extension_.air * mean * mean;
+  const Extension::Torques& torques = extension_.torques;
+  const double torque = torques.rolling + torques.viscous * mean + torques.air * mean * mean;
   return std::sqrt(climb + 2 * torque * (pi / 2 - p.start) / leg.inertia);
 }
 
@@ -195,10 +212,11 @@ Collision ExtendedWheel::collision(const StepContext& context, double omega) con
   c.landing_length = leg.length;
   c.contact_x = leg.triangle.contact_x;
   c.contact_y = leg.triangle.hub_height + tip_radius_;
-  if (extension_.hub_forward != 0 || extension_.hub_aside != 0) {  // the impulse acts about the centre of mass
+  const Extension::Geometry& geometry = extension_.geometry;
+  if (geometry.hub_forward != 0 || geometry.hub_aside != 0) {  // the impulse acts about the centre of mass
     const double at = leg.triangle.beta_second_rad - leg.eccentric_phase;
-    c.contact_x -= extension_.hub_forward * std::cos(at) + extension_.hub_aside * std::sin(at);
-    c.contact_y += extension_.hub_aside * std::cos(at) - extension_.hub_forward * std::sin(at);
+    c.contact_x -= geometry.hub_forward * std::cos(at) + geometry.hub_aside * std::sin(at);
+    c.contact_y += geometry.hub_aside * std::cos(at) - geometry.hub_forward * std::sin(at);
   }
   c.chord = leg.triangle.chord;
   c.normal_speed = leg.triangle.chord * omega;
@@ -207,13 +225,14 @@ Collision ExtendedWheel::collision(const StepContext& context, double omega) con
 }
 
 CollisionChange ExtendedWheel::change(const StepContext& context, double omega) const {
-  const Extension& e = extension_;
+  const Extension::ContactChange& e = extension_.contact;
   CollisionChange change;
   change.friction_shift = context.friction_shift;
   change.friction_scatter = context.friction_scatter;
   change.restitution_ratio = context.restitution_ratio;
   if (omega >= e.hops_from) change.rebound_lost = e.rebound_lost;
-  change.friction_ratio = context.friction_ratio * (1 + e.drift * context.run_share) / e.sticking_ratio;
+  change.friction_ratio =
+      context.friction_ratio * (1 + e.drift * context.run_share) / extension_.law_error.sticking_ratio;
   if (e.stribeck != 0) change.friction_ratio *= 1 + e.stribeck * std::exp(-omega / e.stribeck_speed);
   if (e.patch_friction != 1 && context.position >= e.patch_from && context.position <= e.patch_to)
     change.friction_ratio *= e.patch_friction;
@@ -236,18 +255,18 @@ SpeedDensity ExtendedWheel::after_collision(const StepContext& context, double o
   CollisionChange usual = change(context, omega);
   if (settles()) {
     SpeedDensity first =
-        after_first_impact(landing(context, omega), this->contact(usual), omega_plus / extension_.plus_ratio);
-    first.density /= extension_.plus_ratio;
+        after_first_impact(landing(context, omega), this->contact(usual), omega_plus / extension_.law_error.plus_ratio);
+    first.density /= extension_.law_error.plus_ratio;
     return first;
   }
   if (certain()) return {0, omega_plus > this->omega_plus(context, omega, {}, false).value_or(0) ? 1.0 : 0.0};
   const Collision at = collision(context, omega);
   SpeedDensity result = density_->at(at, leg.before, leg.inertia, usual, omega_plus);
-  if (extension_.outlier_share > 0) {
-    usual.friction_ratio *= extension_.outlier_friction;
+  if (extension_.contact.outlier_share > 0) {
+    usual.friction_ratio *= extension_.contact.outlier_friction;
     const SpeedDensity rare = density_->at(at, leg.before, leg.inertia, usual, omega_plus);
-    result.density += extension_.outlier_share * (rare.density - result.density);
-    result.below += extension_.outlier_share * (rare.below - result.below);
+    result.density += extension_.contact.outlier_share * (rare.density - result.density);
+    result.below += extension_.contact.outlier_share * (rare.below - result.below);
   }
   return result;
 }
@@ -257,7 +276,7 @@ Contact ExtendedWheel::changed_contact(const CollisionChange& c, const Contact& 
   contact.restitution = std::clamp(drawn.restitution * c.restitution_ratio, 0.0, 1.0);
   const double widened = (c.friction_scatter - 1) * (drawn.friction - contact_.friction_mean);
   contact.friction = std::max(0.0, drawn.friction + widened + c.friction_shift) * c.friction_ratio;
-  if (outlier) contact.friction *= extension_.outlier_friction;
+  if (outlier) contact.friction *= extension_.contact.outlier_friction;
   return contact;
 }
 
@@ -267,7 +286,7 @@ std::optional<double> ExtendedWheel::omega_plus(const StepContext& context, doub
   const CollisionChange c = change(context, omega);
   const Contact contact = changed_contact(c, drawn, outlier);
   if (settles()) {
-    const double plus = extension_.plus_ratio * omega * landing(context, omega).first_impact(contact);
+    const double plus = extension_.law_error.plus_ratio * omega * landing(context, omega).first_impact(contact);
     return plus > 0 ? std::optional(plus) : std::nullopt;
   }
   const Loss loss = collide(model_, collision(context, omega), contact);
@@ -300,7 +319,8 @@ SettledLanding ExtendedWheel::landing(const StepContext& context, double omega) 
   const Path way = path(context);
   at.next_rate = stated.next_rate;
   at.next_gain = stated.next_gain + way.gain - leg.stated_gain;
-  at.next_ratio = extension_.next_ratio * std::exp(extension_.next_by_slope * (slope_ - usual_slope));
+  at.next_ratio =
+      extension_.law_error.next_ratio * std::exp(extension_.law_error.next_by_slope * (slope_ - usual_slope));
   if (drag_) {  // the parabola through three places between the barrier and a foot that sticks
     const double low = at.barrier_squared, half = std::max(1.0, stated.plastic * omega * omega - low) / 2;
     const double first = leg.drag_ratio * work(way, low), middle = leg.drag_ratio * work(way, low + half),
@@ -316,19 +336,19 @@ SettledContact ExtendedWheel::contact(const CollisionChange& c) const {
           contact_.restitution_sd * c.restitution_ratio,
           (contact_.friction_mean + c.friction_shift) * c.friction_ratio,
           contact_.friction_sd * c.friction_scatter * c.friction_ratio,
-          extension_.outlier_share,
-          extension_.outlier_friction};
+          extension_.contact.outlier_share,
+          extension_.contact.outlier_friction};
 }
 
 NextTouch ExtendedWheel::at_next_touch(const StepContext& context, double omega, const SeenOfLanding& seen, double blur,
                                        double next) const {
   SeenOfLanding first = seen;
-  if (first.omega_plus) *first.omega_plus /= extension_.plus_ratio;
+  if (first.omega_plus) *first.omega_plus /= extension_.law_error.plus_ratio;
   return dynamics::at_next_touch(landing(context, omega), contact(change(context, omega)), first, blur, next);
 }
 
 double ExtendedWheel::rest_share(const StepContext& context, double omega, std::optional<double> omega_plus) const {
-  if (omega_plus) *omega_plus /= extension_.plus_ratio;
+  if (omega_plus) *omega_plus /= extension_.law_error.plus_ratio;
   return dynamics::rest_share(landing(context, omega), contact(change(context, omega)), omega_plus);
 }
 

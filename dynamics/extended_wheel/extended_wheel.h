@@ -11,46 +11,68 @@
 
 namespace metastable::dynamics {
 
-/// Holds all that may be added to the model; the defaults add nothing. An effect has one field or two, in physical
-/// units.
+/// Holds all that may be added to the model, in five parts; the defaults add nothing. An effect has one field or two,
+/// in physical units.
 struct Extension {
-  std::vector<double> leg_change;         ///< added to each leg's length [m]; empty: none
-  double hub_forward = 0, hub_aside = 0;  ///< centre of mass off the hub [m]: towards leg 0, and a right angle further
-  double inertia_ratio = 1;               ///< of the inertia about the foot
-  double slope_offset_rad = 0;            ///< true minus stated slope [rad]
-  enum class Shape { parabola, sine, step };
-  Shape sag_shape = Shape::parabola;             ///< of the surface between sag_from and sag_to
-  double sag = 0;                                ///< depth in the middle of that stretch [m]
-  double sag_from = 0, sag_to = 1;               ///< [m] down the ramp from foot 1
-  double viscous = 0;                            ///< resisting torque by omega [N m s]
-  double rolling = 0;                            ///< constant resisting torque [N m]
-  double air = 0;                                ///< resisting torque by omega^2 [N m s^2]
-  double restitution_exponent = 0;               ///< p in eta (omega / 5 rad/s)^-p
-  double stribeck = 0;                           ///< a in mu (1 + a exp(-omega / stribeck_speed))
-  double stribeck_speed = 5;                     ///< [rad/s]
-  int leg = -1;                                  ///< the leg with another contact; -1: none
-  double leg_friction = 1, leg_restitution = 1;  ///< its ratios
-  double patch_from = 0, patch_to = 0;           ///< [m] down the ramp from foot 1
-  double patch_friction = 1;                     ///< ratio of mu in the patch
-  double drift = 0;                              ///< r in mu (1 + r share of the run gone by)
-  double trial_friction_sd = 0;                  ///< of what each trial adds to mu
-  double memory = 0;                             ///< correlation of successive collisions of a trial
-  double outlier_share = 0;                      ///< probability of a collision with outlier_friction
-  double outlier_friction = 1;                   ///< ratio of its mu
-  double noise_sd = 0;                           ///< of reported speeds, beyond the stated [rad/s]
-  double bias_before = 0, bias_after = 0;        ///< of reported omega-, omega+ [rad/s]
-  double rebound_lost = 0;                       ///< share
-  double hops_from = 0;                          ///< omega- from which on it is lost [rad/s]
-  double ring_cosine = 0, ring_sine = 0;         ///< loss times 1 + cosine cos(2 pi f dt) + sine sin(2 pi f dt)
-  double ring_frequency = 10;                    ///< f [Hz]
-  double launch_shift = 0;                       ///< added to the mean launch speed [rad/s]
-  double launch_widening = 0;                    ///< added to its sd [rad/s]
-  std::optional<Law> law;                        ///< another contact law
-  double hub_inertia_ratio = 1;                  ///< of J about the hub; `settled`
-  double sticking_ratio = 1;  ///< of every mu_c, a little off in engines that move by time steps; `settled`
-  double plus_ratio = 1;      ///< of every omega+, which is seen a little after the impact; `settled`
-  double next_ratio = 1;      ///< of every next omega-: how good the law is; `settled`
-  double next_by_slope = 0;   ///< what the logarithm of that gains by slope beyond 8 deg [1/rad]; `settled`
+  /// Changes of the wheel's shape and mass and of the ramp's surface.
+  struct Geometry {
+    std::vector<double> leg_change;  ///< added to each leg's length [m]; empty: none
+    double hub_forward = 0,
+           hub_aside = 0;          ///< centre of mass off the hub [m]: towards leg 0, and a right angle further
+    double inertia_ratio = 1;      ///< of the inertia about the foot
+    double hub_inertia_ratio = 1;  ///< of J about the hub; `settled`
+    double slope_offset_rad = 0;   ///< true minus stated slope [rad]
+    enum class Shape { parabola, sine, step };
+    Shape sag_shape = Shape::parabola;  ///< of the surface between sag_from and sag_to
+    double sag = 0;                     ///< depth in the middle of that stretch [m]
+    double sag_from = 0, sag_to = 1;    ///< [m] down the ramp from foot 1
+  };
+  /// Torques that resist the stance.
+  struct Torques {
+    double viscous = 0;  ///< by omega [N m s]
+    double rolling = 0;  ///< constant [N m]
+    double air = 0;      ///< by omega^2 [N m s^2]
+  };
+  /// Changes of what a foothold is like and of what a collision takes.
+  struct ContactChange {
+    std::optional<Law> law;                        ///< another contact law
+    double restitution_exponent = 0;               ///< p in eta (omega / 5 rad/s)^-p
+    double stribeck = 0;                           ///< a in mu (1 + a exp(-omega / stribeck_speed))
+    double stribeck_speed = 5;                     ///< [rad/s]
+    int leg = -1;                                  ///< the leg with another contact; -1: none
+    double leg_friction = 1, leg_restitution = 1;  ///< its ratios
+    double patch_from = 0, patch_to = 0;           ///< [m] down the ramp from foot 1
+    double patch_friction = 1;                     ///< ratio of mu in the patch
+    double drift = 0;                              ///< r in mu (1 + r share of the run gone by)
+    double trial_friction_sd = 0;                  ///< of what each trial adds to mu
+    double memory = 0;                             ///< correlation of successive collisions of a trial
+    double outlier_share = 0;                      ///< probability of a collision with outlier_friction
+    double outlier_friction = 1;                   ///< ratio of its mu
+    double rebound_lost = 0;                       ///< share
+    double hops_from = 0;                          ///< omega- from which on it is lost [rad/s]
+    double ring_cosine = 0, ring_sine = 0;         ///< loss times 1 + cosine cos(2 pi f dt) + sine sin(2 pi f dt)
+    double ring_frequency = 10;                    ///< f [Hz]
+  };
+  /// Errors of what is reported of a trial: its speeds, and how it is launched.
+  struct Sensor {
+    double noise_sd = 0;                     ///< of reported speeds, beyond the stated [rad/s]
+    double bias_before = 0, bias_after = 0;  ///< of reported omega-, omega+ [rad/s]
+    double launch_shift = 0;                 ///< added to the stated mean launch speed [rad/s]
+    double launch_widening = 0;              ///< added to its sd [rad/s]
+  };
+  /// How far the law `settled` may be off.
+  struct LawError {
+    double sticking_ratio = 1;  ///< of every mu_c, a little off in engines that move by time steps
+    double plus_ratio = 1;      ///< of every omega+, which is seen a little after the impact
+    double next_ratio = 1;      ///< of every next omega-
+    double next_by_slope = 0;   ///< what the logarithm of next_ratio gains by slope beyond 8 deg [1/rad]
+  };
+
+  Geometry geometry;
+  Torques torques;
+  ContactChange contact;
+  Sensor sensor;
+  LawError law_error;
 };
 
 /// Holds what one collision's place in the experiment tells.
@@ -130,6 +152,9 @@ class ExtendedWheel {
     double start = 0, end = 0, pendulum = 0, gain = 0, inertia = 0;
   };
   std::size_t index(int leg) const { return static_cast<std::size_t>(leg) % geometry_.size(); }
+  Leg leg_of(const Wheel& stated, const Wheel& wheel, std::size_t k) const;
+  void hold_against_stated(const ExtendedWheel& stated);
+  void read_landings_at_own_inertia();
   double local_slope(double position) const;
   Path path(const StepContext& context) const;
   double work(const Path& path, double omega_plus_squared) const;

@@ -20,12 +20,12 @@ constexpr double degree = std::numbers::pi / 180;
 // for the rests it predicts would win over the truth.
 TEST(SpeedFilter, NextSpeedAndRestShareAProbabilityOfOne) {
   dynamics::Extension plain, steeper, softer, dragged;
-  steeper.slope_offset_rad = 2 * degree;
-  softer.restitution_exponent = 0.4;
-  softer.stribeck = -0.27;
-  softer.stribeck_speed = 8;
-  dragged.rolling = 0.02;
-  dragged.air = 4e-4;
+  steeper.geometry.slope_offset_rad = 2 * degree;
+  softer.contact.restitution_exponent = 0.4;
+  softer.contact.stribeck = -0.27;
+  softer.contact.stribeck_speed = 8;
+  dragged.torques.rolling = 0.02;
+  dragged.torques.air = 4e-4;
   const dynamics::ContactSpread narrow{0.487, 0.034, 0.435, 0.037}, wide{0.466, 0.187, 0.44, 0.044};
   for (const dynamics::Extension* extension : {&plain, &steeper, &softer, &dragged})
     for (const dynamics::ContactSpread& contact : {narrow, wide})
@@ -58,7 +58,7 @@ TEST(SpeedFilter, WhatContactsRememberOutlastsTheLastScore) {
   constexpr int collisions = 3000;
   const dynamics::ContactSpread contact{0.487, 0.034, 0.435, 0.037};
   dynamics::Extension extension;
-  extension.memory = rho;
+  extension.contact.memory = rho;
   const dynamics::ExtendedWheel wheel(dynamics::Wheel{}, 7.02 * degree, dynamics::Law::published, contact, extension);
   const ScoreTilt tilt(0, 0);
   SpeedFilter filter(extension, tilt, 1e-4, 0, 0, 1e-3, {.linear = told});
@@ -86,7 +86,7 @@ TEST(SpeedFilter, WhatContactsRememberOutlastsTheLastScore) {
 TEST(SpeedFilter, ANegativeMemoryOfSquaresIsNone) {
   constexpr double omega = 4.9;
   dynamics::Extension extension;
-  extension.memory = -0.475;
+  extension.contact.memory = -0.475;
   const dynamics::ExtendedWheel wheel(dynamics::Wheel{}, 7.02 * degree, dynamics::Law::published,
                                       {0.487, 0.034, 0.435, 0.037}, extension);
   const ScoreTilt tilt(0, 0);

@@ -17,7 +17,7 @@ const dynamics::ContactSpread contact{0.54, 0.045, 0.352, 0.043};
 
 WheelHypothesis hypothesis(double trial_friction_sd = 0) {
   WheelHypothesis h{.contact = contact, .tilt = ScoreTilt(0, 0), .extension = {}};
-  h.extension.trial_friction_sd = trial_friction_sd;
+  h.extension.contact.trial_friction_sd = trial_friction_sd;
   return h;
 }
 

@@ -38,9 +38,9 @@ TEST(ExtendedWheel, WithoutExtensionIsTheReturnMap) {
 // Holds the stance with torques, step by step in time, against the energy balance of the extension.
 TEST(ExtendedWheel, TorquesTakeTheirWork) {
   Extension extension;
-  extension.rolling = 0.008;
-  extension.viscous = 0.0015;
-  extension.air = 0.0003;
+  extension.torques.rolling = 0.008;
+  extension.torques.viscous = 0.0015;
+  extension.torques.air = 0.0003;
   const ExtendedWheel wheel = extended(extension);
   const Wheel plain;
   const double inertia = stance_inertia(plain, Law::published, 0.1519);
@@ -56,7 +56,7 @@ TEST(ExtendedWheel, TorquesTakeTheirWork) {
     while (theta < end) {  // midpoint rule
       const auto rate = [&](double angle, double speed) {
         return (-plain.hub_mass * plain.gravity * plain.leg_length[static_cast<std::size_t>(leg)] * std::cos(angle) -
-                extension.rolling - extension.viscous * speed - extension.air * speed * speed) /
+                extension.torques.rolling - extension.torques.viscous * speed - extension.torques.air * speed * speed) /
                inertia;
       };
       const double half_angle = theta + omega * step / 2, half_speed = omega + rate(theta, omega) * step / 2;
@@ -74,15 +74,16 @@ TEST(ExtendedWheel, TorquesTakeTheirWork) {
 
 TEST(ExtendedWheel, DensityIsThatOfDrawnSteps) {
   std::vector<Extension> cases(10);
-  cases[0].leg = 2, cases[0].leg_friction = 1.2, cases[0].leg_restitution = 0.9;
-  cases[1].stribeck = 0.4, cases[1].stribeck_speed = 4;
-  cases[2].restitution_exponent = 0.3;
-  cases[3].patch_from = 0.2, cases[3].patch_to = 0.6, cases[3].patch_friction = 0.8;
-  cases[4].drift = 0.2;
-  cases[5].outlier_share = 0.2, cases[5].outlier_friction = 1.3;
-  cases[6].rebound_lost = 0.3;
-  cases[7].ring_cosine = 0.1, cases[7].ring_sine = -0.05, cases[7].ring_frequency = 7;
-  cases[8].inertia_ratio = 1.05, cases[8].slope_offset_rad = 0.5 * degree, cases[8].leg_change.assign(8, 1e-3);
+  cases[0].contact.leg = 2, cases[0].contact.leg_friction = 1.2, cases[0].contact.leg_restitution = 0.9;
+  cases[1].contact.stribeck = 0.4, cases[1].contact.stribeck_speed = 4;
+  cases[2].contact.restitution_exponent = 0.3;
+  cases[3].contact.patch_from = 0.2, cases[3].contact.patch_to = 0.6, cases[3].contact.patch_friction = 0.8;
+  cases[4].contact.drift = 0.2;
+  cases[5].contact.outlier_share = 0.2, cases[5].contact.outlier_friction = 1.3;
+  cases[6].contact.rebound_lost = 0.3;
+  cases[7].contact.ring_cosine = 0.1, cases[7].contact.ring_sine = -0.05, cases[7].contact.ring_frequency = 7;
+  cases[8].geometry.inertia_ratio = 1.05, cases[8].geometry.slope_offset_rad = 0.5 * degree,
+  cases[8].geometry.leg_change.assign(8, 1e-3);
   const StepContext context{
       .leg = 2, .position = 0.4, .since_previous = 0.21, .run_share = 0.7, .friction_shift = 0.01};
   StepContext varied = context;  // the last case: nothing but what this collision's friction does by itself
@@ -99,7 +100,7 @@ TEST(ExtendedWheel, DensityIsThatOfDrawnSteps) {
       int below = 0;
       for (int i = 0; i < draws; ++i) {
         const Contact drawn{0.54 + 0.045 * normal(generator), 0.352 + 0.043 * normal(generator)};
-        const auto plus = wheel.omega_plus(here, 5.3, drawn, uniform(generator) < extension.outlier_share);
+        const auto plus = wheel.omega_plus(here, 5.3, drawn, uniform(generator) < extension.contact.outlier_share);
         below += !plus || *plus <= at;
       }
       const double expected = wheel.after_collision(here, 5.3, at).below;
@@ -110,8 +111,8 @@ TEST(ExtendedWheel, DensityIsThatOfDrawnSteps) {
 
 TEST(ExtendedWheel, FeetHopFromTheirOnsetOn) {
   Extension hopping;
-  hopping.rebound_lost = 0.5;
-  hopping.hops_from = 5;
+  hopping.contact.rebound_lost = 0.5;
+  hopping.contact.hops_from = 5;
   const ExtendedWheel wheel = extended(hopping), plain = extended({});
   const Contact drawn{0.5, 0.35};
   EXPECT_EQ(wheel.omega_plus({.leg = 0}, 4.9, drawn, false), plain.omega_plus({.leg = 0}, 4.9, drawn, false));
@@ -122,11 +123,12 @@ TEST(ExtendedWheel, FeetHopFromTheirOnsetOn) {
 
 // A sag is a stretch of another slope's mean: the energy over the whole stretch is that of the drop in height.
 TEST(ExtendedWheel, SagGivesBackWhatItTook) {
-  for (const auto shape : {Extension::Shape::parabola, Extension::Shape::sine, Extension::Shape::step}) {
+  for (const auto shape :
+       {Extension::Geometry::Shape::parabola, Extension::Geometry::Shape::sine, Extension::Geometry::Shape::step}) {
     Extension extension;
-    extension.sag = 0.004;
-    extension.sag_shape = shape;
-    extension.sag_to = 1.8;
+    extension.geometry.sag = 0.004;
+    extension.geometry.sag_shape = shape;
+    extension.geometry.sag_to = 1.8;
     const ExtendedWheel wheel = extended(extension), level = extended({});
     double gained = 0, plain = 0;
     for (double position = 0.06; position < 1.8; position += 0.12) {
@@ -142,8 +144,8 @@ TEST(ExtendedWheel, SagGivesBackWhatItTook) {
 // The centre of mass of a wheel with equal legs comes back to its height after a revolution.
 TEST(ExtendedWheel, EccentricityAveragesOut) {
   Extension extension;
-  extension.hub_forward = 0.001;
-  extension.hub_aside = -0.0005;
+  extension.geometry.hub_forward = 0.001;
+  extension.geometry.hub_aside = -0.0005;
   const ExtendedWheel wheel(test::even_wheel(), 9.59 * degree, Law::published, contact, extension);
   const ExtendedWheel plain(test::even_wheel(), 9.59 * degree, Law::published, contact, {});
   double change = 0, size = 0;

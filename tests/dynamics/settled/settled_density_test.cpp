@@ -133,7 +133,7 @@ TEST(SettledDensity, OfTheFirstImpactIsSmoothInTheLoss) {
   const ExtendedWheel plain = extended();
   for (const double ring : {-0.01, 0.003, 0.01}) {
     Extension rings;
-    rings.ring_cosine = ring;
+    rings.contact.ring_cosine = ring;
     const ExtendedWheel wheel = extended(rings);
     Draws draws;
     std::vector<double> drawn;
@@ -238,8 +238,8 @@ TEST(SettledDensity, TheErrorOfItsFormTiltsWithTheSlope) {
   const Contact sticks{0.4, 10};
   const double stated = extended().land(context, 4.9, sticks, false).next.value();
   Extension tilted;
-  tilted.next_ratio = 1.002;
-  tilted.next_by_slope = 0.1;
+  tilted.law_error.next_ratio = 1.002;
+  tilted.law_error.next_by_slope = 0.1;
   const double off = extended(tilted).land(context, 4.9, sticks, false).next.value();
   EXPECT_NEAR(off / stated, 1.002 * std::exp(0.1 * (7.02 - 8) * degree), 1e-12);
 }
@@ -337,17 +337,17 @@ std::vector<BuiltEffect> built_effects() {
     return SettledMotion(wheel);
   };
   return {
-      {"slope_offset", with([](Extension& e) { e.slope_offset_rad = 0.25 * degree; }),
+      {"slope_offset", with([](Extension& e) { e.geometry.slope_offset_rad = 0.25 * degree; }),
        [] { return SettledMotion(rigid(equal_wheel(), slope + 0.25 * degree)); }, 0.05},
-      {"hub_inertia", with([](Extension& e) { e.hub_inertia_ratio = 1.2; }),
+      {"hub_inertia", with([](Extension& e) { e.geometry.hub_inertia_ratio = 1.2; }),
        [heavier] { return heavier(rigid(equal_wheel()), 1.2); }, 0.02},
-      {"axle_drag_viscous", with([](Extension& e) { e.viscous = 0.002; }),
+      {"axle_drag_viscous", with([](Extension& e) { e.torques.viscous = 0.002; }),
        [dragged] { return dragged([](SettledWheel& w) { w.linear_drag = 0.002; }); }, 0.1},
-      {"rolling_resistance", with([](Extension& e) { e.rolling = 0.01; }),
+      {"rolling_resistance", with([](Extension& e) { e.torques.rolling = 0.01; }),
        [dragged] { return dragged([](SettledWheel& w) { w.constant_drag = 0.01; }); }, 0.1},
-      {"air_drag", with([](Extension& e) { e.air = 0.0004; }),
+      {"air_drag", with([](Extension& e) { e.torques.air = 0.0004; }),
        [dragged] { return dragged([](SettledWheel& w) { w.quadratic_drag = 0.0004; }); }, 0.1},
-      {"leg_lengths", with([](Extension& e) { e.leg_change = {0, 0.001, 0, 0, 0, 0, 0, 0}; }),
+      {"leg_lengths", with([](Extension& e) { e.geometry.leg_change = {0, 0.001, 0, 0, 0, 0, 0, 0}; }),
        [] {
          Wheel wheel = equal_wheel();
          wheel.leg_length[1] += 0.001;
