@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 namespace metastable::dynamics {
 namespace {
@@ -43,6 +44,13 @@ class Stance {
     rate = {s[1], (weight - drag - coupling) / inertia_, body_.fluid_inertia > 0 ? coupling / body_.fluid_inertia : 0};
   }
 
+  // Returns the state some time later, by one step of the method.
+  RollingState after(const RollingState& from, double began, double time) const {
+    if (!(time > 0)) return from;
+    RollingState s{};
+    Stepper().do_step(std::cref(*this), from, began, s, time);
+    return s;
+  }
   Pose pose(const RollingState& s) const { return {start_.foot, start_.leg, s[0], s[1], s[2]}; }
   // Says how high the next leg's tip is over the surface.
   double clearance(const RollingState& s) const {
@@ -73,6 +81,26 @@ class Stance {
   Pose start_;
   double inertia_;
 };
+
+enum class StepEnd { none, turns_back, touches, lifts };
+
+// Finds what happens first in a step of the stance from one state to another: it turns back, the next foot touches, or,
+// where wheels fly, the old one lifts; and the time until then [s].
+std::pair<StepEnd, double> end_of_step(const Stance& stance, const RollingState& from, const RollingState& to,
+                                       double began, double step, bool flight) {
+  std::pair<StepEnd, double> end{StepEnd::none, step};
+  const auto look = [&](StepEnd kind, const auto& value) {
+    if (value(from) <= 0 || value(to) > 0) return;
+    const auto later = [&](double time) { return value(stance.after(from, began, time)); };
+    const double when = root(later, value(from), step, value(to));
+    if (end.first == StepEnd::none || when < end.second) end = {kind, when};
+  };
+  look(StepEnd::turns_back, [](const RollingState& s) { return s[1]; });
+  look(StepEnd::touches, [&](const RollingState& s) { return stance.clearance(s); });
+  if (!flight) return end;
+  look(StepEnd::lifts, [&](const RollingState& s) { return stance.reaction(s); });
+  return began == 0 && stance.reaction(from) <= 0 ? std::pair(StepEnd::lifts, 0.0) : end;
+}
 
 // From the pose at which the foot lifts the centre of mass follows its parabola and the wheel turns evenly.
 Touch fly(const RollingBody& body, const RampSurface& surface, const Pose& lift, double energy, const auto& note) {
@@ -191,42 +219,21 @@ Touch roll_on(const RollingBody& body, const RampSurface& surface, const Pose& s
     const RollingState from = state;
     const double began = time;
     const double step = std::min(0.08 * pendulum_time, 0.1 / std::max(1e-3, std::abs(from[1])));
-    const auto moved = [&](double part) {
-      RollingState s{};
-      Stepper().do_step(std::cref(stance), from, began, s, part);
-      return part > 0 ? s : from;
-    };
-    state = moved(step);
+    state = stance.after(from, began, step);
     time = began + step;
-    // The earliest of these counts: it turns back, the next foot touches, the old one lifts.
-    double first = step;
-    enum { none, turned, touched, lifted } event = none;
-    const auto look = [&](const auto& value, auto kind) {
-      if (value(from) <= 0 || value(state) > 0) return;
-      const double at = root([&](double part) { return value(moved(part)); }, value(from), step, value(state));
-      if (event == none || at < first) first = at, event = kind;
-    };
-    look([](const RollingState& s) { return s[1]; }, turned);
-    look([&](const RollingState& s) { return stance.clearance(s); }, touched);
-    if (body.flight) look([&](const RollingState& s) { return stance.reaction(s); }, lifted);
-    if (body.flight && began == 0 && stance.reaction(from) <= 0) first = 0, event = lifted;
-    if (event == none) {
+    const auto [end, after] = end_of_step(stance, from, state, began, step, body.flight);
+    if (end == StepEnd::none) {
       note(time, state[0] - start.angle_rad, state[1]);
       continue;
     }
-    const RollingState at = moved(first);
-    const double when = began + first;
-    note(when, at[0] - start.angle_rad, at[1]);
-    if (event == touched) {
-      Touch touch = touch_standing(body, stance.pose(at), inertia);
-      touch.time = when;
-      touch.turn_rad = at[0] - start.angle_rad;
-      return touch;
-    }
-    if (event == turned) return rest_at(stance.pose(at), when);
-    const double turn = at[0] - start.angle_rad;
-    Touch touch = fly(body, surface, stance.pose(at), stance.inertia() * at[1] * at[1] / 2,
-                      [&](double t, double turned_on, double speed) { note(when + t, turn + turned_on, speed); });
+    const RollingState at = stance.after(from, began, after);
+    const double when = began + after, turn = at[0] - start.angle_rad;
+    note(when, turn, at[1]);
+    if (end == StepEnd::turns_back) return rest_at(stance.pose(at), when);
+    Touch touch = end == StepEnd::touches
+                      ? touch_standing(body, stance.pose(at), inertia)
+                      : fly(body, surface, stance.pose(at), stance.inertia() * at[1] * at[1] / 2,
+                            [&](double t, double turned_on, double speed) { note(when + t, turn + turned_on, speed); });
     touch.time += when;
     touch.turn_rad += turn;
     return touch;

@@ -170,49 +170,58 @@ std::vector<LandingDensity::Piece> LandingDensity::pieces(double level) const {
   return found;
 }
 
-double LandingDensity::integrate(const std::vector<Piece>& all, double level) const {
-  struct Panel {
-    const Piece* piece;
-    double from, to, value, error;
-    bool operator<(const Panel& other) const { return error < other.error; }
-  };
-  Guess guess;
-  const auto integrand = [&](const Piece& p, double t) {
-    const MappedPoint at = mapped_point(p.lower, p.upper, p.fold_below, p.fold_above, t);
-    const double weight = at.speed * restitution_.density(at.restitution);
-    return weight > 0 ? weight * given_restitution(at.restitution, level, guess) : 0;
-  };
-  std::vector<Panel> panels;
+// A part of a piece with the integral over it.
+struct LandingDensity::Panel {
+  const Piece* piece;
+  double from, to, value = 0, error = 0;
+  bool operator<(const Panel& other) const { return error < other.error; }
+};
+
+double LandingDensity::integrand(const Piece& p, double t, double level, Guess& guess) const {
+  const MappedPoint at = mapped_point(p.lower, p.upper, p.fold_below, p.fold_above, t);
+  const double weight = at.speed * restitution_.density(at.restitution);
+  return weight > 0 ? weight * given_restitution(at.restitution, level, guess) : 0;
+}
+
+// Cuts the pieces into panels and leaves out those whose size, by three points, does not count.
+std::vector<LandingDensity::Panel> LandingDensity::panels(const std::vector<Piece>& all, double level,
+                                                          Guess& guess) const {
+  std::vector<Panel> panels, kept;
   std::vector<double> size;
   double largest = 0;
   const double step = std::min(1.5 * restitution_.sd(), 3 * friction_.sd());
   for (const Piece& p : all) {
     const int count = std::clamp(static_cast<int>(std::ceil((p.upper - p.lower) / step)), 1, 80);
-    double left = integrand(p, 0);
+    double left = integrand(p, 0, level, guess);
     if (p.fold_below) left = 0;
     for (int i = 0; i < count; ++i) {
       const double from = static_cast<double>(i) / count, to = static_cast<double>(i + 1) / count;
-      const double middle = integrand(p, 0.5 * (from + to)),
-                   right = i + 1 == count && p.fold_above ? 0 : integrand(p, to);
-      panels.push_back({&p, from, to, 0, 0});
+      const double middle = integrand(p, 0.5 * (from + to), level, guess),
+                   right = i + 1 == count && p.fold_above ? 0 : integrand(p, to, level, guess);
+      panels.push_back({&p, from, to});
       size.push_back(std::max({left, middle, right}) * (to - from));
       largest = std::max(largest, size.back());
       left = right;
     }
   }
-  if (largest == 0) return 0;
-  const auto evaluate = [&](Panel& p) {
-    p.value = LandingRule::integrate([&](double t) { return integrand(*p.piece, t); }, p.from, p.to, 0, 0.0, &p.error);
-    // As in rest_probability.cpp, Boost's estimate is that of the Gauss rule on [-1, 1].
-    const double difference = p.error * (p.to - p.from) / 2;
-    p.error = p.value > 0 ? p.value * std::min(1.0, std::pow(200 * difference / p.value, 1.5)) : 0;
-  };
-  std::vector<Panel> kept;
-  for (std::size_t i = 0; i < panels.size(); ++i) {
-    if (size[i] < negligible * largest) continue;
-    evaluate(panels[i]);
-    kept.push_back(panels[i]);
-  }
+  for (std::size_t i = 0; largest > 0 && i < panels.size(); ++i)
+    if (!(size[i] < negligible * largest)) kept.push_back(panels[i]);
+  return kept;
+}
+
+void LandingDensity::evaluate(Panel& p, double level, Guess& guess) const {
+  p.value = LandingRule::integrate([&](double t) { return integrand(*p.piece, t, level, guess); }, p.from, p.to, 0, 0.0,
+                                   &p.error);
+  // As in rest_probability.cpp, Boost's estimate is that of the Gauss rule on [-1, 1].
+  const double difference = p.error * (p.to - p.from) / 2;
+  p.error = p.value > 0 ? p.value * std::min(1.0, std::pow(200 * difference / p.value, 1.5)) : 0;
+}
+
+// Halves the panel with the largest error until their sum is small enough.
+double LandingDensity::integrate(const std::vector<Piece>& all, double level) const {
+  Guess guess;
+  std::vector<Panel> kept = panels(all, level, guess);
+  for (Panel& p : kept) evaluate(p, level, guess);
   std::make_heap(kept.begin(), kept.end());
   double sum = 0, error = 0;
   const auto add_up = [&] {
@@ -228,7 +237,7 @@ double LandingDensity::integrate(const std::vector<Piece>& all, double level) co
     lower.to = upper.from = 0.5 * (lower.from + lower.to);
     kept.pop_back();
     for (Panel* half : {&lower, &upper}) {
-      evaluate(*half);
+      evaluate(*half, level, guess);
       kept.push_back(*half);
       std::push_heap(kept.begin(), kept.end());
     }

@@ -47,6 +47,10 @@ class LandingDensity {
   double given_restitution(double restitution, double level, Guess& guess) const;
   double sticking(double level) const;
   std::vector<Piece> pieces(double level) const;
+  struct Panel;
+  double integrand(const Piece& piece, double t, double level, Guess& guess) const;
+  std::vector<Panel> panels(const std::vector<Piece>& pieces, double level, Guess& guess) const;
+  void evaluate(Panel& panel, double level, Guess& guess) const;
   double integrate(const std::vector<Piece>& pieces, double level) const;
 
   const TruncatedNormal restitution_, friction_;

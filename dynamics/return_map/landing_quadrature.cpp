@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 
 #include "dynamics/return_map/loss_curve.h"
@@ -244,6 +245,55 @@ std::vector<Turn> turns(const WheelMap& map, int phase, double friction) {
   return found;
 }
 
+// Finds the state from which `contact`, which may depend on the state, leads to a landing; nothing if none does.
+template <class ContactOf>
+std::optional<double> state_leading_to(const WheelMap& map, int phase, double landing, const ContactOf& contact) {
+  const double level = landing - map.stance(phase).gain;
+  double state = map.state_interval(phase).first;
+  for (int i = 0; i < 5; ++i) {
+    const StepCoefficients c = map.coefficients(phase, contact(state));
+    if (!(c.scale > 0) || !std::isfinite(c.drag)) return std::nullopt;
+    const double root = (c.drag + std::sqrt(std::max(0.0, c.drag * c.drag + 4 * c.scale * level))) / (2 * c.scale);
+    state = root * root;
+  }
+  return state;
+}
+
+// Returns the restitutions at which landings have an extreme: the constant one, or the ends of its range.
+std::vector<double> extreme_restitutions(const WheelMap& map) {
+  const TruncatedNormal& restitution = map.noise().restitution();
+  if (restitution.constant()) return {restitution.mean()};
+  std::vector<double> etas;
+  const auto [lower, upper] = reach(restitution, depth);
+  if (lower == restitution.lower() && (map.law() == Law::coulomb || lower > 0)) etas.push_back(lower);
+  if (upper == restitution.upper()) etas.push_back(upper);
+  return etas;
+}
+
+// Calls `add` with each contact of this friction whose landing is extreme.
+template <class Add>
+void add_at_one_friction(const WheelMap& map, int phase, double mu, double landing, const std::vector<double>& etas,
+                         const Add& add) {
+  const TruncatedNormal& restitution = map.noise().restitution();
+  const Stance& stance = map.stance(phase);
+  for (const double eta : etas) add(landing, [&](double) { return Contact{eta, mu}; });
+  const bool at_rest = landing <= (stance.barrier + stance.gain) * (1 + 1e-12);
+  if (map.law() == Law::published && at_rest && !restitution.constant() && reach(restitution, depth).lower == 0)
+    for (const double eta : {1e-1, 1e-2, 1e-4, 1e-8, 1e-16}) add(landing, [&](double) { return Contact{eta, mu}; });
+  if (restitution.constant()) return;
+  // These are states where the loss turns over eta: brackets come from a grid at the lowest, refined at each.
+  for (const Turn& turn : turns(map, phase, mu))
+    add(landing, [&](double state) {
+      std::uintmax_t iterations = 100;
+      const auto turning = boost::math::tools::brent_find_minima(
+          [&](double eta) {
+            return turn.sign * map.after_collision(state, phase, {eta, mu});
+          },
+          turn.lower, turn.upper, 50, iterations);
+      return Contact{turning.first, mu};
+    });
+}
+
 }  // namespace
 
 double landing_points(const WheelMap& map, double state, int phase, std::span<const double> breaks,
@@ -271,61 +321,24 @@ double landing_points(const WheelMap& map, double state, int phase, std::span<co
 
 std::vector<double> states_of_extremes(const WheelMap& map, int phase, std::span<const double> next) {
   const ContactNoise& noise = map.noise();
-  const Stance& stance = map.stance(phase);
   std::vector<double> found;
-  // Finds the state from which `contact`, which may depend on the state, leads to `landing`.
   const auto add = [&](double landing, auto contact) {
-    const double level = landing - stance.gain;
-    double state = map.state_interval(phase).first;
-    for (int i = 0; i < 5; ++i) {
-      const StepCoefficients c = map.coefficients(phase, contact(state));
-      if (!(c.scale > 0) || !std::isfinite(c.drag)) return;
-      const double root = (c.drag + std::sqrt(std::max(0.0, c.drag * c.drag + 4 * c.scale * level))) / (2 * c.scale);
-      state = root * root;
-    }
-    found.push_back(state);
+    if (const auto state = state_leading_to(map, phase, landing, contact)) found.push_back(*state);
   };
-  if (map.law() == Law::plastic || noise.is_empirical()) {
-    for (const double landing : next) {
+  const bool listed = map.law() == Law::plastic || noise.is_empirical();
+  const std::vector<double> etas = listed ? std::vector<double>{} : extreme_restitutions(map);
+  const double sticks = listed ? 0 : LossCurve(map, map.state_interval(phase).first, phase).end();
+  for (const double landing : next) {
+    if (listed) {
       if (!noise.is_empirical()) add(landing, [](double) { return Contact{}; });
       for (const Contact& c : noise.pairs()) add(landing, [&c](double) { return c; });
-    }
-  } else {
-    const TruncatedNormal &restitution = noise.restitution(), &friction = noise.friction();
-    std::vector<double> etas;
-    if (restitution.constant()) {
-      etas.push_back(restitution.mean());
+    } else if (noise.friction().constant()) {
+      const double mu = noise.friction().mean();
+      add_at_one_friction(map, phase, map.law() == Law::coulomb ? std::min(mu, sticks) : mu, landing, etas, add);
     } else {
-      const auto [lower, upper] = reach(restitution, depth);
-      if (lower == restitution.lower() && (map.law() == Law::coulomb || lower > 0)) etas.push_back(lower);
-      if (upper == restitution.upper()) etas.push_back(upper);
-    }
-    const double sticks = LossCurve(map, map.state_interval(phase).first, phase).end();
-    for (const double landing : next) {
-      if (friction.constant()) {
-        const double mu = map.law() == Law::coulomb ? std::min(friction.mean(), sticks) : friction.mean();
-        for (const double eta : etas) add(landing, [&](double) { return Contact{eta, mu}; });
-        const bool at_rest = landing <= (stance.barrier + stance.gain) * (1 + 1e-12);
-        if (map.law() == Law::published && at_rest && !restitution.constant() && reach(restitution, depth).lower == 0)
-          for (const double eta : {1e-1, 1e-2, 1e-4, 1e-8, 1e-16})
-            add(landing, [&](double) { return Contact{eta, mu}; });
-        if (restitution.constant()) continue;
-        // These are states where the loss turns over eta: brackets come from a grid at the lowest, refined at each.
-        for (const Turn& turn : turns(map, phase, mu))
-          add(landing, [&](double state) {
-            std::uintmax_t iterations = 100;
-            const auto turning = boost::math::tools::brent_find_minima(
-                [&](double eta) {
-                  return turn.sign * map.after_collision(state, phase, {eta, mu});
-                },
-                turn.lower, turn.upper, 50, iterations);
-            return Contact{turning.first, mu};
-          });
-        continue;
-      }
       for (const double eta : etas) {
-        if (reach(friction, depth).lower == friction.lower())
-          add(landing, [&](double) { return Contact{eta, friction.lower()}; });
+        if (reach(noise.friction(), depth).lower == noise.friction().lower())
+          add(landing, [&](double) { return Contact{eta, noise.friction().lower()}; });
         add(landing, [&](double state) {
           const LossCurve curve(map, state, phase);
           return Contact{eta, curve.extreme(curve.at(eta), 0).friction};

@@ -430,6 +430,88 @@ double stretched(double eta, double rounding) {  // s
   return std::sqrt(pi2 + log_eta * log_eta);
 }
 
+// Sets what a row has of the contact; geometry, kappa, rounding and mu_c are set.
+void set_contact(Row& r, const TruncatedNormal& restitution, const TruncatedNormal& friction) {
+  r.restitution = restitution.mean();
+  r.restitution_rate = 1 / restitution.sd();
+  r.friction = friction.mean();
+  r.friction_rate = 1 / friction.sd();
+  r.friction_middle = std::max(r.friction, r.sticking);
+  if (r.a1 > 0) r.friction_middle = std::min(r.friction_middle, 0.5 * r.a0 / r.a1);
+  r.s_usual = stretched(std::clamp(r.restitution, 0.1, 1.0), 0);
+  r.potential_zero = r.kappa * stretched(r.rounding, 0);
+}
+
+// Sets a row's values on the grid over eta; its contact is set. @param s  on the grid
+void set_grid(Row& r, const std::vector<double>& grid, const std::vector<double>& s, double lower) {
+  const double normal_middle = r.a0 - r.a1 * r.friction_middle;
+  r.lower = lower;
+  r.upper = grid.back();
+  r.points = grid.size();
+  for (std::size_t q = 0; q < grid.size(); ++q) {
+    const double eta = r.eta[q] = grid[q];
+    r.a[q] = 1 - eta * eta;
+    r.b_middle[q] = (1 + eta) * (1 + eta) + r.kappa * (1 + eta) * s[q] * normal_middle;
+    r.exponent[q] = restitution_exponent(r, eta);
+  }
+}
+
+// Sets a row's values on the grid over -ln eta. @param restitution  eta there
+void set_tail(Row& r, const std::vector<double>& tail, const std::vector<double>& restitution) {
+  const double normal_middle = r.a0 - r.a1 * r.friction_middle;
+  r.tail_points = tail.size();
+  for (std::size_t q = 0; q < tail.size(); ++q) {
+    const double y = r.y[q] = tail[q], eta = restitution[q], more = 1 + eta;
+    r.y_a[q] = 1 - eta * eta;
+    r.y_b_middle[q] = more * more + r.kappa * more * std::sqrt(pi2 + y * y) * normal_middle;
+    r.y_exponent[q] = y + restitution_exponent(r, eta);
+  }
+}
+
+// Finds the least loss at eta = 0, below mu_c, by halving.
+void set_least(Row& r) {
+  double low = 0, high = r.sticking;
+  for (int i = 0; i < 40; ++i) {
+    const double mu = 0.5 * (low + high), normal = r.a0 - r.a1 * mu;
+    const double product = mu * (r.t1 * mu - r.t0), rise = (2 * r.t1 * mu - r.t0) * normal;
+    const double slope =
+        r.a1 * normal + rise + 2 * product * r.a1 + r.potential_zero * normal * (rise + product * r.a1);
+    (slope < 0 ? low : high) = mu;
+  }
+  r.least = low;
+  const double normal_least = r.a0 - r.a1 * r.least, product_least = r.least * (r.t1 * r.least - r.t0);
+  r.level_least = (1 + product_least * (1 / normal_least + r.potential_zero)) / normal_least;
+}
+
+// Returns a level that no loss is below: it falls with eta below mu_c, where the least one is.
+// @param s_upper  s at the largest eta
+double least_level(const Row& r, double s_upper) {
+  double least = 0;
+  constexpr int steps = 16;
+  for (int k = 0; k < steps; ++k) {
+    const double mu = r.sticking * k / steps, normal = r.a0 - r.a1 * mu, ratio = mu * (r.t1 * mu - r.t0) / normal;
+    const double more = 1 + r.upper;
+    least = std::min(least, more * ((1 - r.upper + more * ratio) / normal + r.kappa * s_upper * ratio));
+  }
+  return least - 0.01;  // what steps of mu may miss
+}
+
+Rules rules_of(const Row& r, double restitution_sd, double friction_sd) {
+  // The curve bends by so many sds over one sd of eta: d^2 mu/d eta^2 is about 0.6 on it.
+  const double bend = 0.6 * restitution_sd * restitution_sd / friction_sd;
+  // Where eta = 0 meets the least loss, below mu_c, |grad g| is small and the curve turns sharply.
+  const double corner = restitution_exponent(r, r.lower) + friction_exponent(r, r.least);
+  const bool minor = r.friction > r.sticking + 2 * friction_sd;
+  const bool sharp = r.sticking > 0 && corner < 11;
+  return {bend < 0.1 ? &nodes<24>() : &nodes<40>(), &nodes<24>(), sharp ? &nodes<24>() : &nodes<10>(),
+          sharp   ? &nodes<60>()
+          : minor ? &nodes<6>()
+                  : &nodes<16>(),
+          sharp   ? &nodes<60>()
+          : minor ? &nodes<10>()
+                  : &nodes<16>()};
+}
+
 }  // namespace
 
 bool PublishedDensity::covers(const WheelMap& map) {
@@ -513,74 +595,21 @@ double PublishedDensity::operator()(double state, std::span<const double> next, 
   r.rounding = form == forms_.end() ? rounding() : form->rounding;
   r.sticking = sticking_;
   r.normal_sticking = a0_ - a1_ * r.sticking;
-  r.restitution = restitution_.mean();
-  r.restitution_rate = 1 / restitution_.sd();
-  r.friction = friction_.mean();
-  r.friction_rate = 1 / friction_.sd();
-  r.friction_middle = std::max(r.friction, r.sticking);
-  if (a1_ > 0) r.friction_middle = std::min(r.friction_middle, 0.5 * a0_ / a1_);
-  const double normal_middle = a0_ - a1_ * r.friction_middle;
-  r.s_usual = stretched(std::clamp(r.restitution, 0.1, 1.0), 0);
-  r.potential_zero = r.kappa * stretched(r.rounding, 0);
-  r.lower = lower_;
-  r.upper = grid_.back();
-  r.points = grid_.size();
-  for (std::size_t q = 0; q < grid_.size(); ++q) {
-    const double eta = r.eta[q] = grid_[q];
-    r.a[q] = 1 - eta * eta;
-    r.b_middle[q] = (1 + eta) * (1 + eta) + r.kappa * (1 + eta) * duration_[q] * normal_middle;
-    r.exponent[q] = restitution_exponent(r, eta);
-  }
-  r.tail_points = tail_.size();
-  for (std::size_t q = 0; q < tail_.size(); ++q) {
-    const double y = r.y[q] = tail_[q], eta = tail_restitution_[q], more = 1 + eta;
-    r.y_a[q] = 1 - eta * eta;
-    r.y_b_middle[q] = more * more + r.kappa * more * std::sqrt(pi2 + y * y) * normal_middle;
-    r.y_exponent[q] = y + restitution_exponent(r, eta);
-  }
-  double low = 0, high = r.sticking;
-  for (int i = 0; i < 40; ++i) {
-    const double mu = 0.5 * (low + high), normal = a0_ - a1_ * mu;
-    const double product = mu * (t1_ * mu - t0_), rise = (2 * t1_ * mu - t0_) * normal;
-    const double slope = a1_ * normal + rise + 2 * product * a1_ + r.potential_zero * normal * (rise + product * a1_);
-    (slope < 0 ? low : high) = mu;
-  }
-  r.least = low;
-  const double normal_least = a0_ - a1_ * r.least, product_least = r.least * (t1_ * r.least - t0_);
-  r.level_least = (1 + product_least * (1 / normal_least + r.potential_zero)) / normal_least;
-
-  // No loss is less: it falls with eta below mu_c, where the least one is.
-  double least_level = 0;
-  constexpr int steps = 16;
-  for (int k = 0; k < steps; ++k) {
-    const double mu = r.sticking * k / steps, normal = a0_ - a1_ * mu, ratio = mu * (t1_ * mu - t0_) / normal;
-    const double more = 1 + r.upper;
-    least_level =
-        std::min(least_level, more * ((1 - r.upper + more * ratio) / normal + r.kappa * duration_.back() * ratio));
-  }
-  least_level -= 0.01;  // what steps of mu may miss
+  set_contact(r, restitution_, friction_);
+  set_grid(r, grid_, duration_, lower_);
+  set_tail(r, tail_, tail_restitution_);
+  set_least(r);
 
   const double energy = energy_ * state;
   const auto level = [&](double landing) { return (before_ * state - inertia_ * (landing - gain_)) / (2 * energy); };
   const double per_loss = 0.5 * inertia_ / energy * normalisation(restitution_) * normalisation(friction_);
-  // The curve bends by so many sds over one sd of eta: d^2 mu/d eta^2 is about 0.6 on it.
-  const double bend = 0.6 * restitution_.sd() * restitution_.sd() / friction_.sd();
-  // Where eta = 0 meets the least loss, below mu_c, |grad g| is small and the curve turns sharply.
-  const double corner = restitution_exponent(r, r.lower) + friction_exponent(r, r.least);
-  const bool minor = r.friction > r.sticking + 2 * friction_.sd();
-  const bool sharp = r.sticking > 0 && corner < 11;
-  const Rules rules{bend < 0.1 ? &nodes<24>() : &nodes<40>(), &nodes<24>(), sharp ? &nodes<24>() : &nodes<10>(),
-                    sharp   ? &nodes<60>()
-                    : minor ? &nodes<6>()
-                            : &nodes<16>(),
-                    sharp   ? &nodes<60>()
-                    : minor ? &nodes<10>()
-                            : &nodes<16>()};
+  const double lowest_level = least_level(r, duration_.back());
+  const Rules rules = rules_of(r, restitution_.sd(), friction_.sd());
   for (std::size_t first = 0; first < next.size(); first += lanes) {
     std::array<double, lanes> levels, sums;
     const std::size_t count = std::min(lanes, next.size() - first);
     for (std::size_t l = 0; l < lanes; ++l) levels[l] = level(next[first + std::min(l, count - 1)]);
-    if (*std::max_element(levels.begin(), levels.end()) < least_level) {
+    if (*std::max_element(levels.begin(), levels.end()) < lowest_level) {
       std::fill_n(density.begin() + static_cast<std::ptrdiff_t>(first), count, 0.0);
       continue;
     }

@@ -49,6 +49,27 @@ void over_panels(double from, double to, double panel, const F& f) {
     by_rule<16>(from, to, static_cast<std::size_t>(std::ceil(std::numbers::pi / 2 * (to - from) / panel)), f);
 }
 
+// Cuts [low, high], frictions of feet that slide before they stand, where the landing `next` is one of `breaks` or has
+// a kink. @param next  the landing as a function of mu, rising, not less than `from`
+template <class Next>
+std::vector<double> cuts_of_sliding(double low, double high, const Next& next, double from,
+                                    std::span<const double> breaks, std::span<const double> kinks) {
+  const double to = next(high);
+  std::vector<double> cuts{low, high};
+  for (const double b : breaks) {
+    if (!(b > from && b < to)) continue;
+    std::uintmax_t iterations = 60;
+    const auto bracket =
+        boost::math::tools::toms748_solve([&](double mu) { return std::max(next(mu), from) - b; }, low, high, from - b,
+                                          to - b, boost::math::tools::eps_tolerance<double>(40), iterations);
+    cuts.push_back(0.5 * (bracket.first + bracket.second));
+  }
+  for (const double kink : kinks)
+    if (kink > low && kink < high) cuts.push_back(kink);
+  std::sort(cuts.begin(), cuts.end());
+  return cuts;
+}
+
 SettledMapOptions widened(SettledMapOptions options, double highest_speed) {
   double& high = options.range.omega_high;
   while (high < highest_speed && high < most_speed) high = std::min(high + speed_steps, most_speed);
@@ -178,28 +199,30 @@ std::optional<double> SettledReturnMap::rest_probability(double state, int phase
   return std::min(1.0, sum);
 }
 
+// Adds the landings from each pair of a list of contacts; returns the share that rests.
+double SettledReturnMap::listed_points(double omega, int phase, std::vector<std::pair<double, double>>& points) const {
+  const double weight = 1.0 / static_cast<double>(noise().pairs().size());
+  double rest = 0;
+  for (const Contact& c : noise().pairs()) {
+    const double next = next_state(phase, omega, c);
+    if (next == rests)
+      rest += weight;
+    else
+      points.emplace_back(next, weight);
+  }
+  return std::min(1.0, rest);
+}
+
 double SettledReturnMap::landing_points(double state, int phase, std::span<const double> breaks,
                                         std::vector<std::pair<double, double>>& points) const {
   const double omega = std::sqrt(state);
-  if (noise().is_empirical()) {
-    const double weight = 1.0 / static_cast<double>(noise().pairs().size());
-    double rest = 0;
-    for (const Contact& c : noise().pairs()) {
-      const double next = next_state(phase, omega, c);
-      if (next == rests)
-        rest += weight;
-      else
-        points.emplace_back(next, weight);
-    }
-    return std::min(1.0, rest);
-  }
+  if (noise().is_empirical()) return listed_points(omega, phase, points);
   if (noise().correlation() != 0)
     throw std::invalid_argument(
         "method integrated: correlated restitution and friction have no rows by quadrature; use the sampled method");
   const TruncatedNormal& friction = noise().friction();
   const double sticks = landings_->sticking_friction(phase);
   double rest = 0;
-  std::vector<double> cuts;
   for (const EtaPoint& p : restitutions(omega, phase)) {
     const std::optional<SettledSlice> slice = landings_->slice(phase, p.eta);
     const auto place = slice && omega >= slice->lowest_speed() ? std::optional(slice->at(omega)) : std::nullopt;
@@ -216,30 +239,17 @@ double SettledReturnMap::landing_points(double state, int phase, std::span<const
     }
     rest += p.weight * friction.cdf(p.resting_friction);
     if (p.resting_friction == std::numeric_limits<double>::infinity()) continue;
-    if (p.resting_friction < sticks) {
-      const double low =
-          std::max({p.resting_friction, friction.lower(), friction.mean() - farthest_contact * friction.sd()});
-      const double high = std::min(sticks, friction.mean() + farthest_contact * friction.sd());
-      if (low < high) {
-        const double from = next(std::nextafter(low, high)), to = next(high);
-        cuts.assign({low, high});
-        for (const double b : breaks) {
-          if (!(b > from && b < to)) continue;
-          std::uintmax_t iterations = 60;
-          const auto bracket = boost::math::tools::toms748_solve(
-              [&](double mu) { return std::max(next(mu), from) - b; }, low, high, from - b, to - b,
-              boost::math::tools::eps_tolerance<double>(40), iterations);
-          cuts.push_back(0.5 * (bracket.first + bracket.second));
-        }
-        if (place)
-          for (const double kink : place->edges())
-            if (kink > low && kink < high) cuts.push_back(kink);
-        std::sort(cuts.begin(), cuts.end());
-        for (std::size_t c = 0; c + 1 < cuts.size(); ++c)
-          over_panels(cuts[c], cuts[c + 1], mu_panel * friction.sd(), [&](double mu, double weight) {
-            points.emplace_back(std::max(from, next(mu)), p.weight * weight * friction.density(mu));
-          });
-      }
+    const double low =
+        std::max({p.resting_friction, friction.lower(), friction.mean() - farthest_contact * friction.sd()});
+    const double high = std::min(sticks, friction.mean() + farthest_contact * friction.sd());
+    if (p.resting_friction < sticks && low < high) {
+      const double from = next(std::nextafter(low, high));
+      const std::vector<double> cuts =
+          cuts_of_sliding(low, high, next, from, breaks, place ? place->edges() : std::span<const double>{});
+      for (std::size_t c = 0; c + 1 < cuts.size(); ++c)
+        over_panels(cuts[c], cuts[c + 1], mu_panel * friction.sd(), [&](double mu, double weight) {
+          points.emplace_back(std::max(from, next(mu)), p.weight * weight * friction.density(mu));
+        });
     }
     const double stuck = friction.complement(std::max(sticks, p.resting_friction));
     if (stuck > 0)

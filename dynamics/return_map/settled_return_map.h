@@ -97,6 +97,7 @@ class SettledReturnMap {
   double worth(int phase, const Landing& landing, const std::function<double(double)>& f) const;
   double resting_friction(const SettledRoll& roll, double restitution, double guess) const;
   std::vector<EtaPoint> restitutions(double omega, int phase) const;
+  double listed_points(double omega, int phase, std::vector<std::pair<double, double>>& points) const;
   double mean_slide(int phase) const;
 
   WheelMap geometry_;
