@@ -13,92 +13,119 @@ namespace {
 constexpr double kStill = 1e-6;  // distance between distributions a revolution apart
 constexpr int kInARow = 3;
 
+// The fate, in one revolution, of those alive at its beginning, as shares of them.
+struct Revolution {
+  std::vector<double> survival;                                 // after each phase
+  double failures = 0, steps = 0;                               // if what leaves the mesh goes on as the others do
+  double failures_lower = 0, alive_lower = 1, steps_lower = 0;  // if it fails at once
+  std::vector<double> distribution, visits;  // of the survivors of each phase; of the steps that begin in each node
+  bool extinct = false;                      // nobody survives
+};
+
+std::array<double, 2> total(const MassRows& rows, std::array<double, 2> own) {
+  if (rows.add_up) rows.add_up(own);
+  return own;
+}
+
+// Follows survivors over one revolution. @param x  their distribution, before and after @param y  of the same size
+Revolution revolve(const MassRows& rows, std::vector<double>& x, std::vector<double>& y) {
+  const std::size_t n = x.size();
+  Revolution turn;
+  turn.distribution.assign(n, 0.0);
+  turn.visits.assign(n, 0.0);
+  double here = 1;
+  for (int phase = 0; phase < rows.phases; ++phase) {
+    std::array<double, 2> lost{};
+    for (std::size_t i = 0; i < n; ++i) {
+      lost[0] += x[i] * rows.kill[i];
+      lost[1] += x[i] * rows.leave[i];
+      turn.distribution[i] += x[i];
+      turn.visits[i] += here * x[i];
+    }
+    const auto [kill, leave] = total(rows, lost);
+    turn.steps += here;
+    turn.failures += here * kill;
+    here *= 1 - kill;
+    turn.steps_lower += turn.alive_lower;
+    turn.failures_lower += turn.alive_lower * std::min(1.0, kill + leave);
+    turn.alive_lower *= std::max(0.0, 1 - kill - leave);
+    turn.survival.push_back(here);
+    rows.apply_left(x, y);
+    const double mass = total(rows, {std::accumulate(y.begin(), y.end(), 0.0), 0})[0];
+    turn.extinct = !(mass > 0);
+    if (turn.extinct) return turn;
+    for (std::size_t i = 0; i < n; ++i) x[i] = y[i] / mass;
+  }
+  return turn;
+}
+
+// Returns the total variation between two distributions, as far as a process holds them.
+double distance_of(const std::vector<double>& x, const std::vector<double>& before) {
+  double moved = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) moved += 0.5 * std::abs(x[i] - before[i]);
+  return moved;
+}
+
+// The distance falls by |lambda_2 / lambda_1| a step, oscillating: its decline over the second half tells. Returns 0
+// where it does not fall. @param distances  between distributions a revolution apart
+double mixing_steps_of(const std::vector<double>& distances, int phases) {
+  const std::size_t last = distances.size() - 1, first = last / 2;
+  if (!(distances[last] > 0 && distances[first] > distances[last])) return 0;
+  return static_cast<double>((last - first) * static_cast<std::size_t>(phases)) /
+         std::log(distances[first] / distances[last]);
+}
+
 }  // namespace
 
 MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double settled_change, int most_products,
                              bool or_stop) {
   const std::size_t n = rows.kill.size();
-  const int phases = rows.phases;
-  std::vector<double> y(n), before;
-  const auto total = [&](std::array<double, 2> own) {
-    if (rows.add_up) rows.add_up(own);
-    return own;
-  };
   MeshPassage passage;
   double alive = 1, alive_lower = 1, steps_lower = 0, last_failures = 0;
-  std::vector<double> distances;
+  std::vector<double> y(n), distances;
   int settled = 0;
   passage.visits.assign(n, 0.0);
-  std::vector<double> met(n);
-  const auto visit = [&](double times) {
-    for (std::size_t i = 0; i < n; ++i) passage.visits[i] += times * met[i];
+  const auto visit = [&](const Revolution& turn, double times) {
+    for (std::size_t i = 0; i < n; ++i) passage.visits[i] += times * turn.visits[i];
   };
   while (settled < kInARow) {
     if (passage.products >= most_products && !or_stop)
       throw ConvergenceError("mesh", last_failures,
                              "survivors still change after " + std::to_string(most_products) + " products");
-    // Of those alive at the beginning of a revolution this finds which fail in it, and how many steps they take.
-    before = x;
-    std::fill(met.begin(), met.end(), 0.0);
-    double here = 1, failures = 0, taken = 0, here_lower = 1, failures_lower = 0, taken_lower = 0;
-    std::vector<double> distribution(n, 0.0);
-    for (int phase = 0; phase < phases; ++phase) {
-      std::array<double, 2> lost{};
-      for (std::size_t i = 0; i < n; ++i) {
-        lost[0] += x[i] * rows.kill[i];
-        lost[1] += x[i] * rows.leave[i];
-        distribution[i] += x[i];
-        met[i] += here * x[i];
-      }
-      const auto [kill, leave] = total(lost);
-      taken += here;
-      failures += here * kill;
-      here *= 1 - kill;
-      taken_lower += here_lower;
-      failures_lower += here_lower * std::min(1.0, kill + leave);
-      here_lower *= std::max(0.0, 1 - kill - leave);
-      passage.survival.push_back(alive * here);
-      rows.apply_left(x, y);
-      ++passage.products;
-      const double mass = total({std::accumulate(y.begin(), y.end(), 0.0), 0})[0];
-      if (!(mass > 0)) {  // nobody survives
-        passage.steps = passage.steps_upper = passage.steps + alive * taken;
-        passage.steps_lower = steps_lower + alive_lower * taken_lower;
-        passage.failure_rate = 1;
-        visit(alive);
-        passage.distribution = std::move(distribution);
-        return passage;
-      }
-      for (std::size_t i = 0; i < n; ++i) x[i] = y[i] / mass;
+    const std::vector<double> before = x;
+    Revolution turn = revolve(rows, x, y);
+    passage.products += static_cast<int>(turn.survival.size());
+    for (const double share : turn.survival) passage.survival.push_back(alive * share);
+    if (turn.extinct) {
+      passage.steps = passage.steps_upper = passage.steps + alive * turn.steps;
+      passage.steps_lower = steps_lower + alive_lower * turn.steps_lower;
+      passage.failure_rate = 1;
+      visit(turn, alive);
+      passage.distribution = std::move(turn.distribution);
+      return passage;
     }
-    double moved = 0;
-    for (std::size_t i = 0; i < n; ++i) moved += 0.5 * std::abs(x[i] - before[i]);
-    const double distance = total({moved, 0})[0];
-    distances.push_back(distance);
-    const bool still = std::abs(failures - last_failures) <= settled_change * failures && distance <= kStill;
+    distances.push_back(total(rows, {distance_of(x, before), 0})[0]);
+    const bool still =
+        std::abs(turn.failures - last_failures) <= settled_change * turn.failures && distances.back() <= kStill;
     settled = still ? settled + 1 : 0;
     if (or_stop && passage.products >= most_products) settled = kInARow;
-    last_failures = failures;
+    last_failures = turn.failures;
     if (settled == kInARow) {
-      passage.steps_upper = passage.steps + alive * taken / failures;
-      passage.steps_lower = steps_lower + alive_lower * taken_lower / failures_lower;
+      passage.steps_upper = passage.steps + alive * turn.steps / turn.failures;
+      passage.steps_lower = steps_lower + alive_lower * turn.steps_lower / turn.failures_lower;
       passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);
-      passage.failure_rate = phases == 1 ? failures : -std::expm1(std::log1p(-failures) / phases);
-      passage.distribution = std::move(distribution);
-      visit(alive / failures);
+      passage.failure_rate = rows.phases == 1 ? turn.failures : -std::expm1(std::log1p(-turn.failures) / rows.phases);
+      passage.distribution = std::move(turn.distribution);
+      visit(turn, alive / turn.failures);
     } else {
-      visit(alive);
-      passage.steps += alive * taken;
-      steps_lower += alive_lower * taken_lower;
-      alive *= here;
-      alive_lower *= here_lower;
+      visit(turn, alive);
+      passage.steps += alive * turn.steps;
+      steps_lower += alive_lower * turn.steps_lower;
+      alive *= turn.survival.back();
+      alive_lower *= turn.alive_lower;
     }
   }
-  // The distance falls by |lambda_2 / lambda_1| a step, oscillating: its decline over the second half tells.
-  const std::size_t last = distances.size() - 1, first = last / 2;
-  if (distances[last] > 0 && distances[first] > distances[last])
-    passage.mixing_steps = static_cast<double>((last - first) * static_cast<std::size_t>(phases)) /
-                           std::log(distances[first] / distances[last]);
+  passage.mixing_steps = mixing_steps_of(distances, rows.phases);
   return passage;
 }
 

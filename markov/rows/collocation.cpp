@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "markov/parallel.h"
 
@@ -39,10 +40,7 @@ NodeRow make_row(const AnyReturnMap& map, const NodeSpace& space, double state, 
   const int next = (phase + 1) % space.phases();
   std::vector<std::pair<double, double>> points;
   const std::optional<double> rest = map.landing_points(state, phase, space.edges(next), points);
-  if (!rest)
-    throw std::invalid_argument(
-        "method integrated: the map does not tell its landing's distribution; use the sampled "
-        "method");
+  if (!rest) throw std::invalid_argument(no_points);
   std::vector<Legendre> moments(space.panels(), Legendre{});
   double sum = 0;
   std::array<double, lanes> place{};
@@ -92,6 +90,99 @@ MakeNodeRow rows(const AnyReturnMap& map, const NodeSpace& space) {
 std::vector<double> launch_kinks(const AnyReturnMap& map, const NodeSpace& space, const LaunchState& launch) {
   const std::span<const double> met = space.edges((launch.phase + 1) % space.phases());
   return map.states_of_extremes(launch.phase, cheap(map) ? met.first(met.size() - 1) : met.first(1));
+}
+
+// Coarse cells of every phase, to find how far states go: equal, or as far apart as nodes where there is a bulk.
+class CoarseCells {
+ public:
+  CoarseCells(const AnyReturnMap& map, std::vector<std::pair<double, double>> ranges, double bulk)
+      : map_(map), ranges_(std::move(ranges)), bulk_(bulk), inner_edges_(ranges_.size()) {
+    for (std::size_t p = 0; p < phases(); ++p)
+      for (std::size_t c = 1; c < cells; ++c) inner_edges_[p].push_back(edge(p, c));
+  }
+  std::size_t phases() const { return ranges_.size(); }
+  double edge(std::size_t phase, std::size_t cell) const {
+    const auto [from, to] = ranges_[phase];
+    const double share = static_cast<double>(cell) / cells;
+    return std::isfinite(bulk_) ? graded_edge(ranges_[phase], bulk_, share) : from + (to - from) * share;
+  }
+  double middle(std::size_t phase, std::size_t cell) const { return 0.5 * (edge(phase, cell) + edge(phase, cell + 1)); }
+  // Says in which cells of the next phase a state lands.
+  NodeRow row(double state, int phase) const {
+    const std::vector<double>& above = inner_edges_[(static_cast<std::size_t>(phase) + 1) % phases()];
+    NodeRow result;
+    result.landing.assign(cells, 0.0);
+    std::vector<std::pair<double, double>> points;
+    const std::optional<double> rest = map_.landing_points(state, phase, {}, points);
+    if (!rest) throw std::invalid_argument(no_points);
+    result.rest = *rest;
+    for (const auto& [landing, weight] : points) {
+      const auto cell = std::upper_bound(above.begin(), above.end(), landing) - above.begin();
+      result.landing[static_cast<std::size_t>(cell)] += weight;
+    }
+    return result;
+  }
+
+ private:
+  const AnyReturnMap& map_;
+  std::vector<std::pair<double, double>> ranges_;
+  double bulk_;
+  std::vector<std::vector<double>> inner_edges_;
+};
+
+// Returns the chain of the cells, each a start at its middle; nothing if rest is out of reach for one of them.
+std::optional<Chain> chain_of_cells(const CoarseCells& coarse, int threads) {
+  const std::size_t n = coarse.phases() * cells;
+  std::vector<NodeRow> of_cells(n);
+  parallel_for(n, threads, [&](std::size_t i) {
+    const auto phase = i / cells;
+    of_cells[i] = coarse.row(coarse.middle(phase, i % cells), static_cast<int>(phase));
+  });
+  std::vector<std::size_t> row_start{0};
+  std::vector<std::uint32_t> column;
+  std::vector<double> value, kill;
+  bool rests = false;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t base = (i / cells + 1) % coarse.phases() * cells;
+    for (std::size_t j = 0; j < cells; ++j) {
+      if (base + j == i || of_cells[i].landing[j] == 0) continue;
+      column.push_back(static_cast<std::uint32_t>(base + j));
+      value.push_back(of_cells[i].landing[j]);
+    }
+    row_start.push_back(value.size());
+    kill.push_back(of_cells[i].rest);
+    rests = rests || of_cells[i].rest > 0;
+  }
+  if (!rests) return std::nullopt;
+  Chain chain(std::move(row_start), std::move(column), std::move(value), std::move(kill));
+  const Reachability reachable = classify(chain);
+  if (std::find(reachable.must_rest.begin(), reachable.must_rest.end(), 0) != reachable.must_rest.end())
+    return std::nullopt;
+  return chain;
+}
+
+// Returns the first cell from which on hardly any survivor is, nor any launch after its first step.
+std::size_t first_cell_above(const CoarseCells& coarse, const Chain& chain, const LaunchState& launch) {
+  std::vector<double> of_launch(coarse.phases() * cells, 0.0);
+  const std::size_t met = (static_cast<std::size_t>(launch.phase) + 1) % coarse.phases();
+  const auto after = std::span(of_launch).subspan(met * cells, cells);
+  for (const auto& [score, weight] : launch_points(launch, {})) {
+    const NodeRow landed = coarse.row(launch.state(score), launch.phase);
+    for (std::size_t j = 0; j < cells; ++j) after[j] += weight * landed.landing[j];
+  }
+  const std::vector<double> quasi = survivors_or_visits(chain, of_launch);
+  std::size_t first = 0;
+  for (std::size_t p = 0; p < coarse.phases(); ++p) {
+    double above = 0, launched_above = 0;
+    std::size_t k = cells;
+    while (k > 0 && above + quasi[p * cells + k - 1] <= most_above && launched_above + after[k - 1] <= most_launched) {
+      --k;
+      above += quasi[p * cells + k];
+      launched_above += after[k];
+    }
+    first = std::max(first, k);
+  }
+  return first;
 }
 
 }  // namespace
@@ -171,83 +262,17 @@ std::vector<std::pair<double, double>> collocation_ranges(const AnyReturnMap& ma
   for (;;) {
     std::vector<std::pair<double, double>> ranges;
     for (int p = 0; p < phases; ++p) ranges.emplace_back(map.state_interval(p).first, upper);
-    // Cells are equal, or as far apart as nodes where there is a bulk.
-    const auto edge = [&](std::size_t phase, std::size_t cell) {
-      const auto [from, to] = ranges[phase];
-      const double share = static_cast<double>(cell) / cells;
-      return std::isfinite(bulk) ? graded_edge(ranges[phase], bulk, share) : from + (to - from) * share;
-    };
-    std::vector<std::vector<double>> edges(static_cast<std::size_t>(phases));
-    for (std::size_t p = 0; p < edges.size(); ++p)
-      for (std::size_t c = 1; c < cells; ++c) edges[p].push_back(edge(p, c));
-    const auto row = [&](double state, int phase) {
-      const std::vector<double>& above = edges[static_cast<std::size_t>((phase + 1) % phases)];
-      NodeRow result;
-      result.landing.assign(cells, 0.0);
-      std::vector<std::pair<double, double>> points;
-      const std::optional<double> rest = map.landing_points(state, phase, {}, points);
-      if (!rest) throw std::invalid_argument(no_points);
-      result.rest = *rest;
-      for (const auto& [landing, weight] : points)
-        result
-            .landing[static_cast<std::size_t>(std::upper_bound(above.begin(), above.end(), landing) - above.begin())] +=
-            weight;
-      return result;
-    };
-    const auto n = static_cast<std::size_t>(phases) * cells;
-    std::vector<NodeRow> of_cells(n);
-    parallel_for(n, threads, [&](std::size_t i) {
-      const auto phase = i / cells;
-      of_cells[i] = row(0.5 * (edge(phase, i % cells) + edge(phase, i % cells + 1)), static_cast<int>(phase));
-    });
-    std::vector<std::size_t> row_start{0};
-    std::vector<std::uint32_t> column;
-    std::vector<double> value, kill;
-    bool rests = false;
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t base = (i / cells + 1) % static_cast<std::size_t>(phases) * cells;
-      for (std::size_t j = 0; j < cells; ++j) {
-        if (base + j == i || of_cells[i].landing[j] == 0) continue;
-        column.push_back(static_cast<std::uint32_t>(base + j));
-        value.push_back(of_cells[i].landing[j]);
-      }
-      row_start.push_back(value.size());
-      kill.push_back(of_cells[i].rest);
-      rests = rests || of_cells[i].rest > 0;
+    const CoarseCells coarse(map, ranges, bulk);
+    const std::optional<Chain> chain = chain_of_cells(coarse, threads);
+    if (!chain) return {};
+    const std::size_t first = first_cell_above(coarse, *chain, launch);
+    if (first < cells || upper >= highest) {
+      for (std::size_t p = 0; p < ranges.size(); ++p) ranges[p].second = coarse.edge(p, first);
+      return ranges;
     }
-    if (!rests) return {};
-    const Chain chain(std::move(row_start), std::move(column), std::move(value), std::move(kill));
-    const Reachability reachable = classify(chain);
-    if (std::find(reachable.must_rest.begin(), reachable.must_rest.end(), 0) != reachable.must_rest.end()) return {};
-    std::vector<double> of_launch(n, 0.0);
-    const auto after =
-        std::span(of_launch).subspan(static_cast<std::size_t>((launch.phase + 1) % phases) * cells, cells);
-    for (const auto& [score, weight] : launch_points(launch, {})) {
-      const NodeRow landed = row(launch.state(score), launch.phase);
-      for (std::size_t j = 0; j < cells; ++j) after[j] += weight * landed.landing[j];
-    }
-    const std::vector<double> quasi = survivors_or_visits(chain, of_launch);
-    std::size_t first = 0;
-    for (std::size_t p = 0; p < static_cast<std::size_t>(phases); ++p) {
-      double above = 0, launched_above = 0;
-      std::size_t k = cells;
-      while (k > 0 && above + quasi[p * cells + k - 1] <= most_above &&
-             launched_above + after[k - 1] <= most_launched) {
-        --k;
-        above += quasi[p * cells + k];
-        launched_above += after[k];
-      }
-      first = std::max(first, k);
-    }
-    if (first == cells && upper < highest) {
-      upper = std::min(highest, lower + 1.5 * (upper - lower));
-      if (upper > lower + most_growth * length)
-        throw ConvergenceError("method integrated", upper, "states grow without limit; method sampled takes them");
-      continue;
-    }
-    std::vector<std::pair<double, double>> cut = ranges;
-    for (std::size_t p = 0; p < cut.size(); ++p) cut[p].second = edge(p, first);
-    return cut;
+    upper = std::min(highest, lower + 1.5 * (upper - lower));
+    if (upper > lower + most_growth * length)
+      throw ConvergenceError("method integrated", upper, "states grow without limit; method sampled takes them");
   }
 }
 
