@@ -26,125 +26,186 @@ std::array<double, 4> uniforms(std::uint64_t seed, std::uint64_t index, std::uin
   return u;
 }
 
+double score(double u) { return dynamics::normal_quantile(u); }
+
+// A wheel under a hypothesis, whose trials are drawn like those that were measured.
+struct Simulation {
+  Simulation(const WheelRuns& like, const WheelHypothesis& h, std::uint64_t from_seed)
+      : measured(like),
+        hypothesis(h),
+        seed(from_seed),
+        wheels(wheels_on_ramps(like, h.contact, h.extension)),
+        restitution(h.contact.restitution_mean, h.contact.restitution_sd, 0, 1),
+        friction(h.contact.friction_mean, h.contact.friction_sd, 0),
+        noise(std::hypot(h.noise.value_or(like.noise), h.extension.sensor.noise_sd)) {}
+
+  const WheelRuns& measured;
+  const WheelHypothesis& hypothesis;
+  std::uint64_t seed;
+  std::vector<ExtendedWheel> wheels;  // by condition
+  dynamics::TruncatedNormal restitution, friction;
+  double noise;  // of reported speeds [rad/s]
+};
+
+struct Launch {
+  double omega;           // [rad/s]
+  double friction_shift;  // what the trial adds to the mean of mu
+};
+
+Launch drawn_launch(const Simulation& s, const WheelRun& design, std::size_t index) {
+  const dynamics::Extension& e = s.hypothesis.extension;
+  const auto first = uniforms(s.seed, index, 0);
+  const double shift = s.hypothesis.shift_of(design.condition) + e.contact.trial_friction_sd * score(first[0]);
+  const auto& launch = s.measured.conditions[design.condition].initial_speed;
+  if (!launch) return {design.collisions.front().before, shift};
+  const double sd = std::max(0.01, launch->sd + e.sensor.launch_widening);
+  return {std::max(0.1, launch->mean + e.sensor.launch_shift + sd * score(first[1])), shift};
+}
+
+// Returns the place of the collision that follows those of the run. @param slid  by the last foot [m]
+dynamics::StepContext next_context(const ExtendedWheel& wheel, const WheelRun& run, const RunCollision& like,
+                                   double slid, double friction_shift) {
+  dynamics::StepContext context = like.context;
+  if (run.collisions.empty()) {
+    context.since_previous.reset();
+  } else {
+    const dynamics::StepContext& previous = run.collisions.back().context;
+    context.leg = (previous.leg + 1) % wheel.legs();
+    context.position = previous.position + wheel.advance(previous.leg) + slid;
+  }
+  context.friction_shift = friction_shift;
+  return context;
+}
+
+struct ContactScores {
+  double restitution, friction;
+};
+
+struct DrawnCollision {
+  ContactScores scores;
+  std::optional<double> plus;     // omega+ [rad/s]; nothing: no energy is left
+  ExtendedWheel::Drawn landed{};  // where a landing is a motion of its own
+};
+
+// Draws the contact of collision k by rejection: landings are as likely as the hypothesis tilts them.
+// @param before  scores of the collision before, which is remembered; nothing: there is none
+DrawnCollision drawn_collision(const Simulation& s, const ExtendedWheel& wheel, const RunCollision& like,
+                               const dynamics::StepContext& context, double omega,
+                               const std::optional<ContactScores>& before, std::size_t index, std::size_t k) {
+  const dynamics::Extension::ContactChange& e = s.hypothesis.extension.contact;
+  const double rho = e.memory, left = std::sqrt(1 - rho * rho);
+  constexpr std::uint64_t attempts = 60;
+  for (std::uint64_t attempt = 0;; ++attempt) {
+    const auto u = uniforms(s.seed, index, 1 + k * 64 + attempt);
+    DrawnCollision drawn{{score(u[0]), score(u[1])}, {}};
+    if (rho != 0 && before) {
+      drawn.scores.restitution = rho * before->restitution + left * drawn.scores.restitution;
+      drawn.scores.friction = rho * before->friction + left * drawn.scores.friction;
+    }
+    const dynamics::Contact contact{s.restitution.at_score(drawn.scores.restitution),
+                                    s.friction.at_score(drawn.scores.friction)};
+    drawn.plus = wheel.omega_plus(context, omega, contact, u[2] < e.outlier_share);
+    double below = drawn.plus ? wheel.after_collision(context, omega, *drawn.plus).below : 0.0;
+    if (wheel.settles()) {
+      drawn.landed = wheel.land(context, omega, contact, u[2] < e.outlier_share);
+      if (!like.after)
+        below =
+            drawn.landed.next ? wheel.at_next_touch(context, omega, {}, s.noise, *drawn.landed.next).speed.below : 0.0;
+    }
+    const ScoreTilt& tilt = s.hypothesis.tilt;
+    if (attempt + 1 == attempts || u[3] * tilt.largest_density() <= std::exp(tilt.log_density(below))) return drawn;
+  }
+}
+
+// Sets what is reported of a collision, with the errors of sensors and law.
+void report(const Simulation& s, const RunCollision& like, const DrawnCollision& drawn, double omega, bool rests,
+            const std::array<double, 4>& error, RunCollision& m) {
+  const dynamics::Extension::Sensor& sensor = s.hypothesis.extension.sensor;
+  m.before = std::max(1e-3, omega + sensor.bias_before + s.noise * score(error[0]));
+  m.law_error = s.measured.law_error * score(error[2]);
+  if (like.after)
+    m.after = drawn.plus ? std::max(1e-3, *drawn.plus + sensor.bias_after + s.noise * score(error[1])) : 0;
+  m.slide.reset();
+  if (s.measured.slides_seen && !rests)
+    m.slide = drawn.landed.displacement + s.measured.slide_error * dynamics::slide_score(error[3]);
+}
+
+// Leaves of a drawn run what is known of a measured one, with the times that its speeds give.
+void make_as_measured(const Simulation& s, const WheelRun& design, const ExtendedWheel& wheel, WheelRun& run) {
+  for (std::size_t k = 1; k < run.collisions.size(); ++k) {
+    const RunCollision& previous = run.collisions[k - 1];
+    const auto from = previous.after ? previous.after : wheel.back(previous.context, run.collisions[k].before);
+    if (from && *from > 0) run.collisions[k].context.since_previous = wheel.duration(previous.context, *from);
+  }
+  for (RunCollision& m : run.collisions) {
+    m.context.friction_shift = 0;
+    m.context.friction_ratio = m.context.friction_scatter = m.context.restitution_ratio = 1;
+  }
+  if (!design.outcome) run.outcome.reset();
+  if (run.collisions.back().slide && run.outcome != dynamics::Outcome::rest) run.collisions.back().slide.reset();
+  mark_counted(s.measured, run);
+  mark_jam(s.measured, run);
+}
+
 // Simulates one trial; `visit` sees the probability of rest in each of its collisions.
 template <class Visit>
-WheelRun drawn_run(const WheelRuns& all, const WheelRun& design, std::size_t index,
-                   const std::vector<ExtendedWheel>& wheels, const WheelHypothesis& hypothesis, std::uint64_t seed,
-                   Visit visit) {
-  const dynamics::Extension& e = hypothesis.extension;
-  const dynamics::ContactSpread& contact = hypothesis.contact;
-  const dynamics::TruncatedNormal restitution(contact.restitution_mean, contact.restitution_sd, 0, 1);
-  const dynamics::TruncatedNormal friction(contact.friction_mean, contact.friction_sd, 0);
-  const ExtendedWheel& wheel = wheels[design.condition];
-  const double noise = std::hypot(hypothesis.noise.value_or(all.noise), e.sensor.noise_sd);
-  const auto score = [](double u) { return dynamics::normal_quantile(u); };
-  const auto first = uniforms(seed, index, 0);
+WheelRun drawn_run(const Simulation& s, const WheelRun& design, std::size_t index, Visit visit) {
+  const ExtendedWheel& wheel = s.wheels[design.condition];
+  const WheelHypothesis& hypothesis = s.hypothesis;
+  const Launch launch = drawn_launch(s, design, index);
   WheelRun run = design;
   run.collisions.clear();
-  const double shift = hypothesis.shift_of(design.condition) + e.contact.trial_friction_sd * score(first[0]);
-  double omega = design.collisions.front().before;
-  if (const auto& launch = all.conditions[design.condition].initial_speed)
-    omega = std::max(0.1, launch->mean + e.sensor.launch_shift +
-                              std::max(0.01, launch->sd + e.sensor.launch_widening) * score(first[1]));
-  std::optional<double> eta_score, mu_score;
-  double slid = 0;
+  run.outcome = dynamics::Outcome::max_collisions;
+  double omega = launch.omega, slid = 0;
+  std::optional<ContactScores> before;
   const std::size_t most =
       std::max<std::size_t>(design.outcome == dynamics::Outcome::rest ? 16 : 1, design.collisions.size());
-  run.outcome = dynamics::Outcome::max_collisions;
   for (std::size_t k = 0; k < most; ++k) {
-    RunCollision m;
     const RunCollision& like = design.collisions[std::min(k, design.collisions.size() - 1)];
-    m.context = like.context;
-    if (k > 0) {
-      const RunCollision& previous = run.collisions.back();
-      m.context.leg = (previous.context.leg + 1) % wheel.legs();
-      m.context.position = previous.context.position + wheel.advance(previous.context.leg) + slid;
-    } else {
-      m.context.since_previous.reset();
-    }
-    m.context.friction_shift = shift;
-    if (hypothesis.varied) hypothesis.varied(collision_place(run, index % all.runs.size(), k, m, omega), m.context);
-    const double rho = e.contact.memory, left = std::sqrt(1 - rho * rho);
-    std::optional<double> plus;
-    ExtendedWheel::Drawn landed;
-    for (std::uint64_t attempt = 0; attempt < 60; ++attempt) {  // the tilt by rejection
-      const auto u = uniforms(seed, index, 1 + k * 64 + attempt);
-      double a = score(u[0]), b = score(u[1]);
-      if (rho != 0 && eta_score) {
-        a = rho * *eta_score + left * a;
-        b = rho * *mu_score + left * b;
-      }
-      const dynamics::Contact drawn{restitution.at_score(a), friction.at_score(b)};
-      plus = wheel.omega_plus(m.context, omega, drawn, u[2] < e.contact.outlier_share);
-      double below = plus ? wheel.after_collision(m.context, omega, *plus).below : 0.0;
-      if (wheel.settles()) {
-        landed = wheel.land(m.context, omega, drawn, u[2] < e.contact.outlier_share);
-        if (!like.after)
-          below = landed.next ? wheel.at_next_touch(m.context, omega, {}, noise, *landed.next).speed.below : 0.0;
-      }
-      if (attempt == 59 || u[3] * hypothesis.tilt.largest_density() <= std::exp(hypothesis.tilt.log_density(below))) {
-        eta_score = a;
-        mu_score = b;
-        break;
-      }
-    }
+    RunCollision m;
+    m.context = next_context(wheel, run, like, slid, launch.friction_shift);
+    if (hypothesis.varied)
+      hypothesis.varied(collision_place(run, index % s.measured.runs.size(), k, m, omega), m.context);
+    const DrawnCollision drawn = drawn_collision(s, wheel, like, m.context, omega, before, index, k);
+    before = drawn.scores;
     const double barrier = wheel.barrier(m.context);
     visit(hypothesis.tilt.below(wheel.settles() ? wheel.rest_share(m.context, omega, std::nullopt)
                                                 : wheel.after_collision(m.context, omega, barrier).below));
-    const auto error = uniforms(seed ^ 0x6e6f697365ULL, index, k);
-    m.before = std::max(1e-3, omega + e.sensor.bias_before + noise * score(error[0]));
-    m.law_error = all.law_error * score(error[2]);
-    const bool rests = wheel.settles() ? !landed.next : !plus || *plus < barrier;
-    if (like.after && plus) m.after = std::max(1e-3, *plus + e.sensor.bias_after + noise * score(error[1]));
-    if (like.after && !plus) m.after = 0;
-    m.slide.reset();
-    slid = all.slides_seen ? landed.displacement : 0;
-    if (all.slides_seen && !rests) m.slide = slid + all.slide_error * dynamics::slide_score(error[3]);
+    const bool rests = wheel.settles() ? !drawn.landed.next : !drawn.plus || *drawn.plus < barrier;
+    report(s, like, drawn, omega, rests, uniforms(s.seed ^ 0x6e6f697365ULL, index, k), m);
+    slid = s.measured.slides_seen ? drawn.landed.displacement : 0;
     run.collisions.push_back(m);
-    const auto next = rests ? std::nullopt : wheel.settles() ? landed.next : wheel.next(m.context, *plus);
+    const auto next = rests ? std::nullopt : wheel.settles() ? drawn.landed.next : wheel.next(m.context, *drawn.plus);
     if (!next) {
       run.outcome = dynamics::Outcome::rest;
       break;
     }
     omega = *next;
   }
-  for (std::size_t k = 1; k < run.collisions.size(); ++k) {
-    const RunCollision& previous = run.collisions[k - 1];
-    const auto from = previous.after ? previous.after : wheel.back(previous.context, run.collisions[k].before);
-    if (from && *from > 0) run.collisions[k].context.since_previous = wheel.duration(previous.context, *from);
-  }
-  for (RunCollision& m : run.collisions) {  // what was drawn there is not known of the run
-    m.context.friction_shift = 0;
-    m.context.friction_ratio = m.context.friction_scatter = m.context.restitution_ratio = 1;
-  }
-  if (!design.outcome) run.outcome.reset();
-  if (run.collisions.back().slide && run.outcome != dynamics::Outcome::rest) run.collisions.back().slide.reset();
-  mark_counted(all, run);
-  mark_jam(all, run);
+  make_as_measured(s, design, wheel, run);
   return run;
 }
 
 }  // namespace
 
 std::vector<WheelRun> simulated_runs(const WheelRuns& design, const WheelHypothesis& hypothesis, std::uint64_t seed) {
-  const std::vector<ExtendedWheel> wheels = wheels_on_ramps(design, hypothesis.contact, hypothesis.extension);
+  const Simulation simulation(design, hypothesis, seed);
   std::vector<WheelRun> runs;
   for (std::size_t t = 0; t < design.runs.size(); ++t)
-    runs.push_back(drawn_run(design, design.runs[t], t, wheels, hypothesis, seed, [](double) {}));
+    runs.push_back(drawn_run(simulation, design.runs[t], t, [](double) {}));
   return runs;
 }
 
 double simulated_steps(const WheelRuns& design, const WheelHypothesis& hypothesis, std::uint64_t seed) {
-  const std::vector<ExtendedWheel> wheels = wheels_on_ramps(design, hypothesis.contact, hypothesis.extension);
+  const Simulation simulation(design, hypothesis, seed);
   double steps = 0, hazard = 0;
   constexpr std::size_t rounds = 4;
   for (std::size_t round = 0; round < rounds; ++round)
     for (std::size_t t = 0; t < design.runs.size(); ++t)
-      drawn_run(design, design.runs[t], t + round * design.runs.size(), wheels, hypothesis, seed,
-                [&](double probability) {
-                  steps += 1;
-                  hazard += probability;
-                });
+      drawn_run(simulation, design.runs[t], t + round * design.runs.size(), [&](double probability) {
+        steps += 1;
+        hazard += probability;
+      });
   return hazard > 0 ? steps / hazard : std::numeric_limits<double>::infinity();
 }
 
