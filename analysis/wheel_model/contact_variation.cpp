@@ -108,82 +108,120 @@ void ContactVariation::apply(const CollisionPlace& place, const EffectTerm& term
   changed *= ratio;
 }
 
-std::vector<ContactVariation> contact_variations(const WheelRuns& measured) {
-  if (measured.law == dynamics::Law::plastic) return {};  // it has no contact that could vary
-  const double trials = static_cast<double>(std::max<std::size_t>(1, measured.runs.size()));
-  const int legs = measured.legs_known ? measured.wheel.legs() : 0,
-            conditions = static_cast<int>(measured.conditions.size());
+namespace {
+
+// What of the measured trials the variations are scaled by.
+struct VariedDesign {
+  explicit VariedDesign(const WheelRuns& measured)
+      : trials(static_cast<double>(std::max<std::size_t>(1, measured.runs.size()))),
+        legs(measured.legs_known ? measured.wheel.legs() : 0),
+        conditions(static_cast<int>(measured.conditions.size())),
+        launch(launch_speed(measured)),
+        speed(standardised(measured, [](const Place& at) { return at.omega; })),
+        gained(standardised(measured, [](const Place& at) { return at.gained; })) {
+    for (std::size_t t = 0; t < measured.runs.size(); ++t) {
+      const WheelRun& run = measured.runs[t];
+      const std::size_t last = run.collisions.size() - 1;
+      longest = std::max(longest, collision_place(run, t, last, run.collisions[last], 0).clock);
+      furthest = std::max(furthest, run.collisions[last].context.position);
+    }
+  }
+  double trials;
+  int legs, conditions;                   // legs: 0 where they are not known
   double longest = 1e-3, furthest = 0.1;  // [s], [m]
-  for (std::size_t t = 0; t < measured.runs.size(); ++t) {
-    const WheelRun& run = measured.runs[t];
-    const std::size_t last = run.collisions.size() - 1;
-    longest = std::max(longest, collision_place(run, t, last, run.collisions[last], 0).clock);
-    furthest = std::max(furthest, run.collisions[last].context.position);
-  }
+  Weights launch, speed, gained;
+};
+
+double first_collision(const Place& at, const Values&, std::size_t) { return at.number == 1 ? 1.0 : 0.0; }
+
+// Lists the variations with the order of trials and collisions, with time and with the condition.
+std::vector<ContactVariation> variations_with_order(const VariedDesign& design, ContactAspect mean) {
   std::vector<ContactVariation> all;
-  const Weights launch = launch_speed(measured);
-  const Weights speed = standardised(measured, [](const Place& at) { return at.omega; });
-  const Weights gained = standardised(measured, [](const Place& at) { return at.gained; });
-  const auto first = [](const Place& at, const Values&, std::size_t) { return at.number == 1 ? 1.0 : 0.0; };
-  for (const ContactAspect mean : {ContactAspect::mean_friction, ContactAspect::mean_restitution}) {
-    all.push_back(variation("clock", mean, 2, {{}}, [longest](const Place& at, const Values&, std::size_t p) {
-      return std::cos(std::numbers::pi * static_cast<double>(p + 1) * std::min(1.0, at.clock / longest));
-    }));
-    std::vector<Values> swings = from_one_to(std::min(most_swings, static_cast<int>(trials) / trials_a_swing));
-    if (swings.size() > 1) swings.erase(swings.begin());  // half a one is a drift
-    if (!swings.empty())
-      all.push_back(
-          variation("order", mean, 2, std::move(swings), [trials](const Place& at, const Values& v, std::size_t p) {
-            return swing(static_cast<double>(at.trial) / trials, v[0], p);
-          }));
-    all.push_back(variation("every other trial", mean, 1, {{}}, [](const Place& at, const Values&, std::size_t) {
-      return is_odd(static_cast<long>(at.trial));
-    }));
-    all.push_back(variation("every other collision", mean, 1, {{}},
-                            [even = legs > 0 && legs % 2 == 0](const Place& at, const Values&, std::size_t) {
-                              return is_odd(even ? at.step.leg : at.number);
+  all.push_back(
+      variation("clock", mean, 2, {{}}, [longest = design.longest](const Place& at, const Values&, std::size_t p) {
+        return std::cos(std::numbers::pi * static_cast<double>(p + 1) * std::min(1.0, at.clock / longest));
+      }));
+  std::vector<Values> swings = from_one_to(std::min(most_swings, static_cast<int>(design.trials) / trials_a_swing));
+  if (swings.size() > 1) swings.erase(swings.begin());  // half a one is a drift
+  if (!swings.empty())
+    all.push_back(variation("order", mean, 2, std::move(swings),
+                            [trials = design.trials](const Place& at, const Values& v, std::size_t p) {
+                              return swing(static_cast<double>(at.trial) / trials, v[0], p);
                             }));
-    if (conditions > 1)
-      all.push_back(variation("condition", mean, 1, from_one_to(conditions > 2 ? conditions : 1),
-                              [](const Place& at, const Values& v, std::size_t) {
-                                return static_cast<double>(at.condition) + 1 == v[0] ? 1.0 : 0.0;
-                              }));
-    all.push_back(variation("launch speed", mean, 1, {{}}, launch));
-    all.push_back(variation("first collision", mean, 1, {{}}, first));
-    all.push_back(
-        variation("change of speed", mean, 2, {{}}, [gained](const Place& at, const Values& v, std::size_t p) {
-          const double change = gained(at, v, p);
-          return p == 0 ? change : std::abs(change) - std::sqrt(2 / std::numbers::pi);
-        }));
-    all.push_back(variation("speed", mean, 3, {{}}, [speed](const Place& at, const Values& v, std::size_t p) {
-      constexpr double widest = 2.5;  // on either side [sds]
-      const double share = std::clamp(0.5 + speed(at, v, p) / (2 * widest), 0.0, 1.0);
-      return std::cos(std::numbers::pi * static_cast<double>(p + 1) * share);
-    }));
-    all.push_back(variation("position", mean, 2, from_one_to(most_waves),
-                            [furthest](const Place& at, const Values& v, std::size_t p) {
-                              return swing(at.step.position / furthest, 2 * v[0], p);
+  all.push_back(variation("every other trial", mean, 1, {{}}, [](const Place& at, const Values&, std::size_t) {
+    return is_odd(static_cast<long>(at.trial));
+  }));
+  all.push_back(
+      variation("every other collision", mean, 1, {{}},
+                [even = design.legs > 0 && design.legs % 2 == 0](const Place& at, const Values&, std::size_t) {
+                  return is_odd(even ? at.step.leg : at.number);
+                }));
+  if (design.conditions > 1)
+    all.push_back(variation("condition", mean, 1, from_one_to(design.conditions > 2 ? design.conditions : 1),
+                            [](const Place& at, const Values& v, std::size_t) {
+                              return static_cast<double>(at.condition) + 1 == v[0] ? 1.0 : 0.0;
                             }));
-    if (legs > 0)
-      all.push_back(variation(
-          "leg in order", mean, 1, from_one_to(legs), [trials](const Place& at, const Values& v, std::size_t) {
-            return static_cast<double>(at.step.leg) + 1 == v[0] ? 2 * static_cast<double>(at.trial) / trials - 1 : 0.0;
-          }));
-  }
+  return all;
+}
+
+// Lists those, and the variations with speed, place and leg.
+std::vector<ContactVariation> variations_of_mean(const VariedDesign& design, ContactAspect mean) {
+  std::vector<ContactVariation> all = variations_with_order(design, mean);
+  all.push_back(variation("launch speed", mean, 1, {{}}, design.launch));
+  all.push_back(variation("first collision", mean, 1, {{}}, first_collision));
+  all.push_back(variation("change of speed", mean, 2, {{}},
+                          [gained = design.gained](const Place& at, const Values& v, std::size_t p) {
+                            const double change = gained(at, v, p);
+                            return p == 0 ? change : std::abs(change) - std::sqrt(2 / std::numbers::pi);
+                          }));
+  all.push_back(
+      variation("speed", mean, 3, {{}}, [speed = design.speed](const Place& at, const Values& v, std::size_t p) {
+        constexpr double widest = 2.5;  // on either side [sds]
+        const double share = std::clamp(0.5 + speed(at, v, p) / (2 * widest), 0.0, 1.0);
+        return std::cos(std::numbers::pi * static_cast<double>(p + 1) * share);
+      }));
+  all.push_back(variation("position", mean, 2, from_one_to(most_waves),
+                          [furthest = design.furthest](const Place& at, const Values& v, std::size_t p) {
+                            return swing(at.step.position / furthest, 2 * v[0], p);
+                          }));
+  if (design.legs > 0)
+    all.push_back(variation("leg in order", mean, 1, from_one_to(design.legs),
+                            [trials = design.trials](const Place& at, const Values& v, std::size_t) {
+                              return static_cast<double>(at.step.leg) + 1 == v[0]
+                                         ? 2 * static_cast<double>(at.trial) / trials - 1
+                                         : 0.0;
+                            }));
+  return all;
+}
+
+std::vector<ContactVariation> variations_of_scatter(const WheelRuns& measured, const VariedDesign& design) {
   constexpr ContactAspect scatter = ContactAspect::scatter_of_friction;
-  all.push_back(variation("speed", scatter, 1, {{}}, speed));
+  std::vector<ContactVariation> all;
+  all.push_back(variation("speed", scatter, 1, {{}}, design.speed));
   all.push_back(variation("position", scatter, 1, {{}},
                           standardised(measured, [](const Place& at) { return at.step.position; })));
   all.push_back(variation("trial", scatter, 1, {{}},
                           standardised(measured, [](const Place& at) { return static_cast<double>(at.trial); })));
-  all.push_back(variation("first collision", scatter, 1, {{}}, first));
-  if (legs > 0) {
-    all.push_back(variation("leg", scatter, static_cast<std::size_t>(legs), {{}},
+  all.push_back(variation("first collision", scatter, 1, {{}}, first_collision));
+  if (design.legs > 0) {
+    all.push_back(variation("leg", scatter, static_cast<std::size_t>(design.legs), {{}},
                             [](const Place& at, const Values&, std::size_t p) {
                               return static_cast<std::size_t>(at.step.leg) == p ? 1.0 : 0.0;
                             }));
     for (FreeParameter& of_leg : all.back().variation.candidate.parameters) of_leg.prior_sd = usual_scatter;
   }
+  return all;
+}
+
+}  // namespace
+
+std::vector<ContactVariation> contact_variations(const WheelRuns& measured) {
+  if (measured.law == dynamics::Law::plastic) return {};  // it has no contact that could vary
+  const VariedDesign design(measured);
+  std::vector<ContactVariation> all = variations_of_mean(design, ContactAspect::mean_friction);
+  for (ContactVariation& one : variations_of_mean(design, ContactAspect::mean_restitution))
+    all.push_back(std::move(one));
+  for (ContactVariation& one : variations_of_scatter(measured, design)) all.push_back(std::move(one));
   return all;
 }
 
