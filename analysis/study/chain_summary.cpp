@@ -29,7 +29,8 @@ constexpr double same_spectrum = 1e-6;        // and of two ways to its lambda_1
 constexpr double frequent_rest = 0.01;        // a step
 constexpr double rarest_launch = 1e-15;       // that counts: beyond 8 sds
 constexpr double rarest_rest = 1e-9;          // worth a word where the others never rest
-constexpr double least_regime = 1e-12;        // survivors of a step: fewer are the rounding of row sums
+constexpr double unending = std::numeric_limits<double>::infinity();
+constexpr double least_regime = 1e-12;  // survivors of a step: fewer are the rounding of row sums
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -198,13 +199,12 @@ SolvedChain::SolvedChain(const markov::SampledChain& sampled, const std::vector<
       from_start(1 + dot(sampled.launch.after, mean)) {}
 
 Metastability rest_unresolved(const Problem& problem, const StudyOptions& options, const std::string& message) {
-  constexpr double infinite = std::numeric_limits<double>::infinity();
   Metastability result;
   result.method = options.method;
   result.status = Status::rest_unresolved;
   result.phases = problem.map.phases();
   result.message = "rest is possible, but " + message;
-  result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, 1.0, infinite};
+  result.steps.from_start = result.steps.from_quasi_stationary = result.steps.worst_start = {unending, 1.0, unending};
   result.spectrum.failure_rate = {0, 0, 1};
   return result;
 }
@@ -305,99 +305,137 @@ void compare_survivors(const Problem& problem, std::span<const double> states, c
     fine.restart_error = std::max(std::abs(fine.restart_mean - again.mean), std::abs(fine.restart_sd - again.sd));
 }
 
-void summarize_endless(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
-                       const StudyOptions& options, Metastability& result) {
-  constexpr double infinite = std::numeric_limits<double>::infinity();
-  const markov::Launch& launch = sampled.launch;
-  const markov::Reachability reach = markov::classify(sampled.chain);
-  const std::vector<std::uint8_t> met = markov::reachable_from(sampled.chain, launch.after);
-  std::vector<std::uint32_t> mortal;  // states from which rest can be reached
-  std::vector<double> rolling(space.size(), 0.0), met_rolling(space.size(), 0.0);
-  for (std::size_t i = 0; i < space.size(); ++i) {
-    if (reach.can_rest[i]) mortal.push_back(static_cast<std::uint32_t>(i));
-    rolling[i] = reach.can_rest[i] ? 0 : 1;
-    met_rolling[i] = rolling[i] * met[i];
-  }
-  const bool ever = dot(met_rolling, met_rolling) > 0;
-  result.phases = space.phases();
+namespace {
 
-  std::vector<double> stationary;
+// The states from which rest can be reached, and those that roll for ever, as weights of 1 and 0.
+struct RollingStates {
+  std::vector<std::uint32_t> mortal;
+  std::vector<double> rolling, met;  // met: those of them that a launch can reach
+};
+
+RollingStates rolling_states(const markov::SampledChain& sampled) {
+  const std::size_t size = sampled.chain.size();
+  const markov::Reachability reach = markov::classify(sampled.chain);
+  const std::vector<std::uint8_t> met = markov::reachable_from(sampled.chain, sampled.launch.after);
+  RollingStates states{{}, std::vector<double>(size, 0.0), std::vector<double>(size, 0.0)};
+  for (std::size_t i = 0; i < size; ++i) {
+    if (reach.can_rest[i]) states.mortal.push_back(static_cast<std::uint32_t>(i));
+    states.rolling[i] = reach.can_rest[i] ? 0 : 1;
+    states.met[i] = states.rolling[i] * met[i];
+  }
+  return states;
+}
+
+std::vector<double> stationary_of(const markov::Chain& chain, const std::vector<double>& rolling) {
   try {
-    stationary = markov::stationary(sampled.chain, ever ? met_rolling : rolling);
+    return markov::stationary(chain, rolling);
   } catch (const std::domain_error& error) {  // a speed that noise hardly moves, between two cells that both keep it
     throw markov::ConvergenceError(
         "rolling for ever", 1,
-        fmt::format("{}: {} cells are too coarse to tell at which speed; take more", error.what(), space.size()));
+        fmt::format("{}: {} cells are too coarse to tell at which speed; take more", error.what(), chain.size()));
   }
+}
+
+// Fills the spectrum of the chain of states that a wheel rolling for ever comes back to.
+void describe_recurrent(const markov::Chain& chain, const std::vector<double>& stationary, int eigenvalues,
+                        Metastability& result) {
   std::vector<std::uint32_t> recurrent;
   for (std::size_t i = 0; i < stationary.size(); ++i)
     if (stationary[i] > 0) recurrent.push_back(static_cast<std::uint32_t>(i));
-  const markov::Chain closed = sampled.chain.restricted_to(recurrent);
+  const markov::Chain closed = chain.restricted_to(recurrent);
   const markov::Period period = markov::find_period(closed);
   result.spectrum.period = period.period;
-  result.spectrum.moduli = moduli_per_step(markov::revolution_chain(closed, period), period.period, options.eigenvalues,
-                                           0.0, result.message);
+  result.spectrum.moduli =
+      moduli_per_step(markov::revolution_chain(closed, period), period.period, eigenvalues, 0.0, result.message);
   result.spectrum.mixing_steps = markov::spectral_mixing_steps(result.spectrum.moduli);
+}
+
+// The share of launches that never rest, and the expected steps of the others until rest or until they roll for ever.
+struct LaunchEnds {
+  double never = 0, steps = 1;
+};
+
+LaunchEnds launch_ends(const markov::SampledChain& sampled, const RollingStates& states) {
+  LaunchEnds ends{dot(sampled.launch.after, states.rolling)};
+  if (states.mortal.empty()) return ends;
+  const markov::ChainSolver until(sampled.chain.restricted_to(states.mortal));
+  std::vector<double> entering, after;
+  const std::vector<double> leads = markov::apply(sampled.chain, states.rolling);
+  for (const std::uint32_t i : states.mortal) {
+    entering.push_back(leads[i]);
+    after.push_back(sampled.launch.after[i]);
+  }
+  const std::vector<double> visits = until.solve_left(after);
+  ends.never += dot(visits, entering);
+  ends.steps += std::accumulate(visits.begin(), visits.end(), 0.0);
+  return ends;
+}
+
+// The launch followed forwards: survival until only those who never rest are left, visits of the first `shown` steps.
+struct ForwardCourse {
+  std::vector<double> survival{1.0}, visits;
+};
+
+ForwardCourse followed_course(const markov::SampledChain& sampled, double never, std::size_t shown) {
+  std::vector<double> alive = sampled.launch.after;
+  ForwardCourse course;
+  course.visits.assign(alive.size(), 0.0);
+  for (std::size_t n = 1; n < most_forward; ++n) {
+    const double surviving = std::min(course.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
+    if (n >= shown && surviving <= never * (1 + 1e-12)) break;
+    course.survival.push_back(surviving);
+    if (n < shown)
+      for (std::size_t i = 0; i < course.visits.size(); ++i) course.visits[i] += alive[i];
+    alive = markov::apply_left(sampled.chain, alive);
+  }
+  return course;
+}
+
+// Reads sd and quantiles of the steps off their survival.
+Accumulated accumulated(double mean, bool finite, const std::vector<double>& survival) {
+  double square = 0;
+  for (std::size_t n = 0; finite && n < survival.size(); ++n) square += (2 * static_cast<double>(n) + 1) * survival[n];
+  Accumulated steps{mean, finite ? std::sqrt(std::max(0.0, square - mean * mean)) : unending, {}};
+  for (const double level : quantile_levels) {
+    const auto reached =
+        std::find_if(survival.begin(), survival.end(), [&](double surviving) { return surviving <= 1 - level; });
+    steps.quantiles.push_back(
+        {level, reached == survival.end() ? unending : static_cast<double>(reached - survival.begin())});
+  }
+  return steps;
+}
+
+}  // namespace
+
+void summarize_endless(const Problem& problem, const markov::StateSpace& space, const markov::SampledChain& sampled,
+                       const StudyOptions& options, Metastability& result) {
+  const RollingStates states = rolling_states(sampled);
+  const bool ever = dot(states.met, states.met) > 0;
+  result.phases = space.phases();
+  const std::vector<double> stationary = stationary_of(sampled.chain, ever ? states.met : states.rolling);
+  describe_recurrent(sampled.chain, stationary, options.eigenvalues, result);
   describe_survivors(problem, space, midpoints(space), stationary, result);
 
-  // Launches are followed until rest or for ever: the share that never rests, and the steps of the
-  // others.
-  double never = dot(launch.after, rolling), steps = 1;
-  if (!mortal.empty()) {
-    const markov::ChainSolver until(sampled.chain.restricted_to(mortal));
-    std::vector<double> entering, after;
-    const std::vector<double> leads = markov::apply(sampled.chain, rolling);
-    for (const std::uint32_t i : mortal) {
-      entering.push_back(leads[i]);
-      after.push_back(launch.after[i]);
-    }
-    const std::vector<double> visits = until.solve_left(after);
-    never += dot(visits, entering);
-    steps += std::accumulate(visits.begin(), visits.end(), 0.0);
-  }
-  const bool finite = never < rarest_launch;
+  const LaunchEnds ends = launch_ends(sampled, states);
+  const bool finite = ends.never < rarest_launch;
   const bool relaunches = ever && !finite;  // else the long run is one of launches that rest
   result.survivors.restart_mean = relaunches ? result.survivors.mean : std::numeric_limits<double>::quiet_NaN();
   result.survivors.restart_sd = relaunches ? result.survivors.sd : std::numeric_limits<double>::quiet_NaN();
-  result.steps.from_quasi_stationary = result.steps.worst_start = {infinite, infinite, infinite};
-  result.steps.from_start = finite ? Estimate{steps, steps, steps} : result.steps.from_quasi_stationary;
-
-  // This goes forward from the launch: survival, and visits on the course.
-  std::vector<double> alive = launch.after, visits(space.size(), 0.0);
-  result.steps.survival = {1.0};
-  const std::size_t shown = survival_steps(problem);
-  for (std::size_t n = 1; n < most_forward; ++n) {
-    const double surviving = std::min(result.steps.survival.back(), std::accumulate(alive.begin(), alive.end(), 0.0));
-    if (n >= shown && surviving <= never * (1 + 1e-12)) break;
-    result.steps.survival.push_back(surviving);
-    if (n < shown)
-      for (std::size_t i = 0; i < visits.size(); ++i) visits[i] += alive[i];
-    alive = markov::apply_left(sampled.chain, alive);
-  }
-  double square = infinite;
-  if (finite) {
-    square = 0;
-    for (std::size_t n = 0; n < result.steps.survival.size(); ++n)
-      square += (2 * static_cast<double>(n) + 1) * result.steps.survival[n];
-  }
-  result.steps.distribution = {
-      result.steps.from_start.value, finite ? std::sqrt(std::max(0.0, square - steps * steps)) : infinite, {}};
-  if (!finite && 1 - never > rarest_rest)
+  result.steps.from_quasi_stationary = result.steps.worst_start = {unending, unending, unending};
+  result.steps.from_start = finite ? Estimate{ends.steps, ends.steps, ends.steps} : result.steps.from_quasi_stationary;
+  if (!finite && 1 - ends.never > rarest_rest)
     result.message =
-        fmt::format("infinite: rest is unreachable for {:.4g} % of the launches, the others rest", 100 * never);
-  for (const double level : quantile_levels) {
-    const auto reached = std::find_if(result.steps.survival.begin(), result.steps.survival.end(),
-                                      [&](double surviving) { return surviving <= 1 - level; });
-    result.steps.distribution.quantiles.push_back(
-        {level, reached == result.steps.survival.end() ? infinite
-                                                       : static_cast<double>(reached - result.steps.survival.begin())});
-  }
+        fmt::format("infinite: rest is unreachable for {:.4g} % of the launches, the others rest", 100 * ends.never);
+
+  const std::size_t shown = survival_steps(problem);
+  ForwardCourse course = followed_course(sampled, ends.never, shown);
+  result.steps.distribution = accumulated(result.steps.from_start.value, finite, course.survival);
   if (problem.last_event)  // beyond what was followed nobody rests any more
     result.steps.reach_end =
-        result.steps
-            .survival[std::min(static_cast<std::size_t>(*problem.last_event), result.steps.survival.size() - 1)];
-  result.steps.survival.resize(std::min(result.steps.survival.size(), shown));
-  describe_violations(problem, space, stationary, visits, options, result);
+        course.survival[std::min(static_cast<std::size_t>(*problem.last_event), course.survival.size() - 1)];
+  course.survival.resize(std::min(course.survival.size(), shown));
+  result.steps.survival = std::move(course.survival);
+  describe_violations(problem, space, stationary, course.visits, options, result);
 }
 
 }  // namespace metastable::analysis

@@ -107,6 +107,79 @@ std::size_t more(std::size_t panels) {
 
 Estimate estimate(double value, double error) { return {value, value * std::exp(-error), value * std::exp(error)}; }
 
+// The last two levels of nodes, and the errors left in what the finer one says.
+struct Refinement {
+  explicit Refinement(double rows) : steps_error(rows), rate_error(rows), worst_error(rows) {}
+  // Makes the finer level the coarser one, before the next is solved: three would need half as much memory again.
+  void make_room() { coarse = std::move(fine); }
+  void add(std::optional<Level> level) {
+    fine = std::move(level);
+    if (!coarse || !fine) return;
+    steps_error.refine(fine->from_start(), coarse->from_start());
+    rate_error.refine(fine->failure_rate(), coarse->failure_rate());
+    worst_error.refine(fine->worst_start, coarse->worst_start);
+    error = std::max(steps_error.error(), rate_error.error());
+  }
+  bool meets(double tolerance) const { return coarse && fine && error <= tolerance; }
+
+  std::optional<Level> coarse, fine;
+  ErrorLeft steps_error, rate_error, worst_error;
+  double error = 0;
+};
+
+// Adds nodes until the errors are small enough, or to the number that is asked for.
+// @throws markov::ConvergenceError if the last two levels are too few nodes for an answer
+Refinement refined(const Problem& problem, const ExactRows& rows, const StudyOptions& options) {
+  const bool free = options.cells == 0;
+  const std::size_t most =
+      (problem.map.phases() > 1 ? options.largest_cells / 2 : options.largest_cells) / rows.coarsest();
+  const std::size_t given = (options.cells + rows.coarsest() - 1) / rows.coarsest();
+  std::size_t panels = free ? first_panels : std::max<std::size_t>(1, given / 2);
+  Refinement levels(rows.error());
+  double done = 0.02;
+  for (;;) {
+    if (options.progress) options.progress(done, fmt::format("{} nodes", panels * rows.coarsest()));
+    levels.make_room();
+    levels.add(solve(problem, rows, panels));
+    done += 0.5 * (0.95 - done);
+    const bool last = free ? levels.meets(options.tolerance) || more(panels) > std::max<std::size_t>(most, 4)
+                           : panels >= given && (given == 1 || levels.coarse || !levels.fine);
+    if (last) break;
+    panels = free ? more(panels) : std::max(given, panels + 1);
+  }
+  if (!levels.fine || !levels.coarse)
+    throw markov::ConvergenceError(
+        "integrated rows", 1,
+        fmt::format("{} nodes are too few to follow the launch and lead to rest; method sampled may tell",
+                    panels * rows.coarsest()));
+  return levels;
+}
+
+// Returns the estimates with their errors; all else of a study is read off the chain.
+// @param launch_error  of the expected steps, by the launch's quadrature
+Metastability estimates(const Refinement& levels, double launch_error, const StudyOptions& options) {
+  const Level& fine = *levels.fine;
+  Metastability result;
+  result.method = Method::integrated;
+  result.cells = fine.space.nodes();
+  result.steps.from_start = estimate(fine.from_start(), levels.steps_error.error() + launch_error);
+  result.spectrum.failure_rate = estimate(fine.failure_rate(), levels.rate_error.error());
+  result.steps.from_quasi_stationary = estimate(1 / fine.failure_rate(), levels.rate_error.error());
+  result.steps.worst_start = estimate(fine.worst_start, levels.worst_error.error());
+  for (Estimate* steps : {&result.steps.from_start, &result.steps.from_quasi_stationary, &result.steps.worst_start})
+    steps->lower = std::max(1.0, steps->lower);
+  result.spectrum.failure_rate.upper = std::min(1.0, result.spectrum.failure_rate.upper);
+  result.steps.discretization_error = std::max(levels.error, levels.steps_error.error() + launch_error);
+  if (result.steps.discretization_error > options.tolerance) {
+    const bool free = options.cells == 0;
+    result.status = free ? Status::tolerance_not_met : Status::fixed_resolution;
+    if (free)
+      result.message = fmt::format("tolerance {} not met: the error left is {:.2g} at {} nodes", options.tolerance,
+                                   result.steps.discretization_error, result.cells);
+  }
+  return result;
+}
+
 }  // namespace
 
 Metastability integrated_study(const Problem& problem, const StudyOptions& options) {
@@ -123,64 +196,16 @@ Metastability integrated_study(const Problem& problem, const StudyOptions& optio
   const ExactRows rows(problem, options.tolerance, options.threads);
   if (rows.unresolved()) return rest_unresolved(problem, options, "only by noise beyond probabilities of 1e-300");
 
-  const bool free = options.cells == 0;
-  const std::size_t most =
-      (problem.map.phases() > 1 ? options.largest_cells / 2 : options.largest_cells) / rows.coarsest();
-  const std::size_t given = (options.cells + rows.coarsest() - 1) / rows.coarsest();
-  std::size_t panels = free ? first_panels : std::max<std::size_t>(1, given / 2);
-  std::optional<Level> coarse, fine;
-  ErrorLeft steps_error(rows.error()), rate_error(rows.error()), worst_error(rows.error());
-  double done = 0.02, error = 0;
-  for (;;) {
-    tell(done, fmt::format("{} nodes", panels * rows.coarsest()));
-    coarse = std::move(fine);
-    fine = solve(problem, rows, panels);
-    done += 0.5 * (0.95 - done);
-    bool met = false;
-    if (coarse && fine) {
-      steps_error.refine(fine->from_start(), coarse->from_start());
-      rate_error.refine(fine->failure_rate(), coarse->failure_rate());
-      worst_error.refine(fine->worst_start, coarse->worst_start);
-      error = std::max(steps_error.error(), rate_error.error());
-      met = error <= options.tolerance;
-    }
-    const bool last = free ? met || more(panels) > std::max<std::size_t>(most, 4)
-                           : panels >= given && (given == 1 || coarse || !fine);
-    if (last) break;
-    panels = free ? more(panels) : std::max(given, panels + 1);
-  }
-  if (!fine || !coarse)
-    throw markov::ConvergenceError(
-        "integrated rows", 1,
-        fmt::format("{} nodes are too few to follow the launch and lead to rest; method sampled may tell",
-                    panels * rows.coarsest()));
-
-  const double launch_error = refine_launch(problem, rows, options.tolerance / 10, *fine);
-  error = std::max(error, steps_error.error() + launch_error);
-
-  Metastability result;
-  result.method = Method::integrated;
-  result.cells = fine->space.nodes();
-  result.steps.from_start = estimate(fine->from_start(), steps_error.error() + launch_error);
-  result.spectrum.failure_rate = estimate(fine->failure_rate(), rate_error.error());
-  result.steps.from_quasi_stationary = estimate(1 / fine->failure_rate(), rate_error.error());
-  result.steps.worst_start = estimate(fine->worst_start, worst_error.error());
-  for (Estimate* steps : {&result.steps.from_start, &result.steps.from_quasi_stationary, &result.steps.worst_start})
-    steps->lower = std::max(1.0, steps->lower);
-  result.spectrum.failure_rate.upper = std::min(1.0, result.spectrum.failure_rate.upper);
-  result.steps.discretization_error = error;
+  Refinement levels = refined(problem, rows, options);
+  Level &fine = *levels.fine, &coarse = *levels.coarse;
+  const double launch_error = refine_launch(problem, rows, options.tolerance / 10, fine);
+  Metastability result = estimates(levels, launch_error, options);
   result.steps.safe_state = reach.safe_state;
-  if (result.steps.discretization_error > options.tolerance) {
-    result.status = free ? Status::tolerance_not_met : Status::fixed_resolution;
-    if (free)
-      result.message = fmt::format("tolerance {} not met: the error left is {:.2g} at {} nodes", options.tolerance,
-                                   result.steps.discretization_error, result.cells);
-  }
   tell(0.96, "summary");
-  const std::span<const double> states = fine->space.states();
-  summarize(problem, fine->space.cells(), states, fine->chain, fine->solved, options, result);
-  if (!options.brief) compare_survivors(problem, coarse->space.states(), coarse->chain, coarse->solved, result);
-  add_landing_error(result, landing_error(problem, result.phases, states, fine->chain, fine->solved, options),
+  const std::span<const double> states = fine.space.states();
+  summarize(problem, fine.space.cells(), states, fine.chain, fine.solved, options, result);
+  if (!options.brief) compare_survivors(problem, coarse.space.states(), coarse.chain, coarse.solved, result);
+  add_landing_error(result, landing_error(problem, result.phases, states, fine.chain, fine.solved, options),
                     options.tolerance);
   return result;
 }
