@@ -95,6 +95,83 @@ std::vector<std::string> draw_dropped(const std::set<std::string>& needed, Blind
   return dropped;
 }
 
+// Draws what contacts are like, before any effect.
+BlindTruth draw_contact(const BlindPlan& plan, int number, BlindDice& dice) {
+  BlindTruth truth;
+  truth.number = number;
+  truth.kind = plan.kind;
+  truth.strength = plan.strength;
+  truth.seed = dice.word();
+  truth.law = plan.law;
+  truth.restitution.mean = dice.uniform(0.5, 0.58);
+  truth.restitution.sd = dice.uniform(0.035, 0.06);
+  truth.friction.mean = dice.uniform(0.33, 0.38);
+  truth.friction.sd = dice.uniform(0.035, 0.05);
+  if (plan.law == dynamics::Law::settled) {  // as rigid-body engines roll steadily, and now and then rest
+    truth.restitution.mean -= 0.15;
+    truth.friction = {truth.friction.mean + 0.05, truth.friction.sd - 0.01};
+  }
+  return truth;
+}
+
+// Draws the trials of a case and the noise of its sensor.
+PowerDesign draw_design(BlindTruth& truth, BlindDice& dice) {
+  Setting base = base_setting(truth.law);
+  base.restitution = truth.restitution;
+  base.friction = truth.friction;
+  PowerDesign design;
+  design.conditions = draw_conditions(base, dice);
+  design.reality.sensor_noise = truth.noise = dice.uniform(0.003, 0.02);
+  design.reality.shuffled = dice.chance(0.5);
+  design.reality.flight = false;  // the models know no flight: it would be an effect of its own
+  design.reality.seed = truth.seed;
+  design.reality.threads = 1;
+  return design;
+}
+
+// Sizes the effect that no catalogue holds and adds it to the design and the truth.
+// @param target  power of each of the catalogue's effects
+void size_outside(const BlindPlan& plan, double target, const Power& power, BlindDice& dice, PowerDesign& design,
+                  BlindTruth& truth) {
+  const dynamics::OutsideInfo& outside = dynamics::outside_info(plan.outside);
+  // Beside effects of the catalogue it is half as strong to twice as strong as each of them.
+  const double of_outside = plan.effects.empty() ? target : target * std::exp2(dice.uniform(-1, 1));
+  const auto power_of = [&](double size) {
+    design.reality.outside = {{outside.id, size}};
+    return power(design, {});
+  };
+  // Twice the size is four times the power: 0.4 of the range stands for 2x where no likelihood says so.
+  const bool weighed = can_be_weighed(outside.id);
+  const double size = weighed ? find_size(0.03 * outside.upper, outside.upper, of_outside, power_of)
+                              : 0.2 * outside.upper * plan.strength * dice.uniform(0.85, 1.15);
+  if (weighed) truth.power += power_of(size);
+  truth.outside = {outside.id, size};
+  design.reality.outside = {*truth.outside};
+}
+
+// Draws what the modeller states: the truth, or something near it. Nobody states the shape of the noise.
+FolderOptions draw_statement(const BlindPlan& plan, BlindTruth& truth, BlindDice& dice) {
+  FolderOptions folder;
+  folder.title = fmt::format("Blind case {}", truth.number);
+  const bool recalibrated = plan.kind == BlindKind::effect && plan.effects.front() == recalibration;
+  truth.nominal_is_true = dice.chance(0.5) || recalibrated;
+  folder.restitution = truth.restitution;
+  folder.friction = truth.friction;
+  if (!truth.nominal_is_true) {
+    folder.restitution->mean += dice.uniform(-0.03, 0.03);
+    folder.restitution->sd *= std::exp(dice.uniform(-0.25, 0.25));
+    folder.friction->mean += dice.uniform(-0.02, 0.02);
+    folder.friction->sd *= std::exp(dice.uniform(-0.25, 0.25));
+    for (Spread* spread : {&*folder.restitution, &*folder.friction}) {
+      spread->mean = std::round(spread->mean * 1000) / 1000;
+      spread->sd = std::round(spread->sd * 1000) / 1000;
+    }
+  }
+  if (dice.chance(0.5)) truth.skewness = dice.uniform(-0.8, 0.8);
+  if (truth.skewness != 0) truth.nominal_is_true = false;  // no model of the contact states a skewness
+  return folder;
+}
+
 }  // namespace
 
 std::string_view blind_kind_name(BlindKind kind) { return kinds[static_cast<std::size_t>(kind)].first; }
@@ -179,35 +256,13 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
   BlindDice dice(seed, static_cast<std::uint64_t>(number));
   BlindCase made;
   BlindTruth& truth = made.truth;
-  truth.number = number;
-  truth.kind = plan.kind;
-  truth.strength = plan.strength;
-  truth.seed = dice.word();
-  truth.law = plan.law;
-  truth.restitution = {dice.uniform(0.5, 0.58), dice.uniform(0.035, 0.06)};
-  truth.friction = {dice.uniform(0.33, 0.38), dice.uniform(0.035, 0.05)};
-  if (plan.law == dynamics::Law::settled) {  // as rigid-body engines roll steadily, and now and then rest
-    truth.restitution.mean -= 0.15;
-    truth.friction = {truth.friction.mean + 0.05, truth.friction.sd - 0.01};
-  }
-  Setting base = base_setting(plan.law);
-  base.restitution = truth.restitution;
-  base.friction = truth.friction;
-  const dynamics::NominalValues contact = stated_values(truth.restitution, truth.friction, base.wheel.leg_length);
-  PowerDesign design;
-  design.conditions = draw_conditions(base, dice);
-  design.reality.sensor_noise = truth.noise = dice.uniform(0.003, 0.02);
-  design.reality.shuffled = dice.chance(0.5);
-  design.reality.flight = false;  // the models know no flight: it would be an effect of its own
-  design.reality.seed = truth.seed;
-  design.reality.threads = 1;
-  std::vector<SizedEffect> sized;
+  truth = draw_contact(plan, number, dice);
+  PowerDesign design = draw_design(truth, dice);
   std::set<std::string> needed;
-  const dynamics::OutsideInfo* outside = nullptr;
-  if (!plan.outside.empty()) {
-    outside = &dynamics::outside_info(plan.outside);
-    needed = columns_needed(outside->id);
-  }
+  if (!plan.outside.empty()) needed = columns_needed(dynamics::outside_info(plan.outside).id);
+  std::vector<SizedEffect> sized;
+  const dynamics::NominalValues contact =
+      stated_values(truth.restitution, truth.friction, design.conditions.front().setting.wheel.leg_length);
   for (const std::string& id : plan.effects) {
     sized.push_back(sized_effect(id, contact, dice));
     needed.insert(sized.back().needs.begin(), sized.back().needs.end());
@@ -219,42 +274,10 @@ BlindCase blind_case(const BlindPlan& plan, int number, std::uint64_t seed, cons
     truth.effects.push_back(one.at(size));
   }
   if (!truth.effects.empty()) truth.power = power(design, truth.effects);
-  if (outside) {
-    // Beside effects of the catalogue it is half as strong to twice as strong as each of them.
-    const double of_outside = plan.effects.empty() ? target : target * std::exp2(dice.uniform(-1, 1));
-    const auto power_of = [&](double size) {
-      design.reality.outside = {{outside->id, size}};
-      return power(design, {});
-    };
-    // Twice the size is four times the power: 0.4 of the range stands for 2x where no likelihood says so.
-    const bool weighed = can_be_weighed(outside->id);
-    const double size = weighed ? find_size(0.03 * outside->upper, outside->upper, of_outside, power_of)
-                                : 0.2 * outside->upper * plan.strength * dice.uniform(0.85, 1.15);
-    if (weighed) truth.power += power_of(size);
-    truth.outside = {outside->id, size};
-    design.reality.outside = {*truth.outside};
-  }
+  if (!plan.outside.empty()) size_outside(plan, target, power, dice, design, truth);
 
-  // The modeller believes the truth, or something near it; nobody states the shape of the noise.
-  FolderOptions folder;
-  folder.title = fmt::format("Blind case {}", number);
+  FolderOptions folder = draw_statement(plan, truth, dice);
   folder.dropped = design.dropped;
-  const bool recalibrated = plan.kind == BlindKind::effect && plan.effects.front() == recalibration;
-  truth.nominal_is_true = dice.chance(0.5) || recalibrated;
-  folder.restitution = truth.restitution;
-  folder.friction = truth.friction;
-  if (!truth.nominal_is_true) {
-    folder.restitution->mean += dice.uniform(-0.03, 0.03);
-    folder.restitution->sd *= std::exp(dice.uniform(-0.25, 0.25));
-    folder.friction->mean += dice.uniform(-0.02, 0.02);
-    folder.friction->sd *= std::exp(dice.uniform(-0.25, 0.25));
-    for (Spread* spread : {&*folder.restitution, &*folder.friction}) {
-      spread->mean = std::round(spread->mean * 1000) / 1000;
-      spread->sd = std::round(spread->sd * 1000) / 1000;
-    }
-  }
-  if (dice.chance(0.5)) truth.skewness = dice.uniform(-0.8, 0.8);
-  if (truth.skewness != 0) truth.nominal_is_true = false;  // no model of the contact states a skewness
   design.reality.restitution_skewness = truth.skewness;
   design.reality.effects = truth.effects;
   const dynamics::LaboratorySetup setup = laboratory_setup(design.conditions, design.reality);

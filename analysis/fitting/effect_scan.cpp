@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <stdexcept>
+#include <utility>
 
 #include "analysis/statistics/falling_order.h"
 #include "analysis/statistics/random.h"
@@ -93,65 +94,55 @@ std::vector<char> scanned_variants(const Candidate& candidate, const ScanBeside&
   return scanned;
 }
 
-}  // namespace
+// A term at its neutral values, and the first of its columns.
+struct ScannedTerm {
+  Eigen::Index first;
+  EffectTerm term;
+};
 
-const ScannedEffect* EffectScan::find(const Candidate* candidate) const {
-  const auto found = std::ranges::find(effects, candidate, &ScannedEffect::candidate);
-  return found == effects.end() ? nullptr : &*found;
+// Gives a candidate's variants their columns and lists the terms that are scanned.
+ScannedEffect list_terms(const Candidate& candidate, const ScanBeside& beside, Eigen::Index& columns,
+                         std::vector<ScannedTerm>& terms) {
+  ScannedEffect effect;
+  effect.candidate = &candidate;
+  const std::vector<char> scanned = scanned_variants(candidate, beside);
+  for (std::size_t v = 0; v < candidate.variants.size(); ++v) {
+    effect.first.push_back(columns);
+    columns += static_cast<Eigen::Index>(candidate.parameters.size());
+    if (!scanned[v]) continue;
+    EffectTerm term{&candidate, candidate.variants[v], {}};
+    for (const FreeParameter& p : candidate.parameters) term.values.push_back(p.neutral);
+    terms.push_back({effect.first.back(), std::move(term)});
+  }
+  return effect;
 }
 
-EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
-                        int threads, const ScanBeside& beside) {
-  EffectScan scan;
-  struct Work {
-    Eigen::Index first;  // of its columns
-    std::vector<EffectTerm> terms;
-  };
-  std::vector<Work> work;
-  Eigen::Index columns = 0;
-  for (const Candidate* candidate : candidates) {
-    if (candidate->parameters.empty() || !candidate->undecidable.empty()) continue;
-    ScannedEffect effect;
-    effect.candidate = candidate;
-    const std::vector<char> scanned = scanned_variants(*candidate, beside);
-    for (std::size_t v = 0; v < candidate->variants.size(); ++v) {
-      effect.first.push_back(columns);
-      columns += static_cast<Eigen::Index>(candidate->parameters.size());
-      if (!scanned[v]) continue;
-      EffectTerm term{candidate, candidate->variants[v], {}};
-      for (const FreeParameter& p : candidate->parameters) term.values.push_back(p.neutral);
-      Work one{effect.first.back(), fit.terms};
-      one.terms.push_back(term);
-      work.push_back(one);
-    }
-    scan.effects.push_back(std::move(effect));
-  }
-  const auto events = static_cast<Eigen::Index>(model.events().size());
-  Derivatives all{Eigen::MatrixXd::Zero(events, columns), Eigen::MatrixXd::Zero(events, columns)};
-  markov::parallel_for(work.size(), threads, [&](std::size_t i) {
-    const Work& one = work[i];
-    // Only the new term's parameters are moved, by a small share of what the data resolve.
-    const std::size_t count = one.terms.back().values.size();
-    for (std::size_t p = 0; p < count; ++p) {
-      const auto column = one.first + static_cast<Eigen::Index>(p);
-      double step = first_step(beside, one.terms.back(), p);
-      for (int attempt = 0; attempt < 2; ++attempt) {
-        std::vector<EffectTerm> moved = one.terms;
-        moved.back().values[p] += step;
-        const Evaluation there = model.evaluate(fit.nuisance, moved);
-        for (Eigen::Index k = 0; k < events; ++k) {
-          const auto event = static_cast<std::size_t>(k);
-          all.slope(k, column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
-          all.change(k, column) = (there.score[event] - fit.evaluation.score[event]) / step;
-        }
-        const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(column).squaredNorm()));
-        if (step < largest_step * resolved) break;
-        step = small_step * resolved;
+// Fills a term's columns. Only its parameters are moved, by a small share of what the data resolve.
+void differentiate(const TransitionModel& model, const Fit& fit, const ScannedTerm& scanned, const ScanBeside& beside,
+                   Derivatives& all) {
+  for (std::size_t p = 0; p < scanned.term.values.size(); ++p) {
+    const auto column = scanned.first + static_cast<Eigen::Index>(p);
+    double step = first_step(beside, scanned.term, p);
+    for (int attempt = 0; attempt < 2; ++attempt) {
+      std::vector<EffectTerm> moved = fit.terms;
+      moved.push_back(scanned.term);
+      moved.back().values[p] += step;
+      const Evaluation there = model.evaluate(fit.nuisance, moved);
+      for (Eigen::Index k = 0; k < all.slope.rows(); ++k) {
+        const auto event = static_cast<std::size_t>(k);
+        all.slope(k, column) = (there.log_density[event] - fit.evaluation.log_density[event]) / step;
+        all.change(k, column) = (there.score[event] - fit.evaluation.score[event]) / step;
       }
+      const double resolved = 1 / std::sqrt(std::max(1e-300, all.change.col(column).squaredNorm()));
+      if (step < largest_step * resolved) break;
+      step = small_step * resolved;
     }
-  });
+  }
+}
 
-  // What the fitted parameters could take up is projected out of scores and information, which makes them efficient.
+// Projects what the fitted parameters could take up out of scores and information, which makes them efficient.
+void project(const TransitionModel& model, const Fit& fit, const Derivatives& all, EffectScan& scan) {
+  const Eigen::Index events = all.slope.rows();
   const Eigen::Map<const Eigen::VectorXd> z(fit.evaluation.score.data(), events);
   const Eigen::MatrixXd stretch = all.slope + z.asDiagonal() * all.change;
   const Derivatives& held = fit.derivatives;
@@ -167,14 +158,35 @@ EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std:
   scan.whole = scan.information.diagonal();
   scan.information -= cross.transpose() * weights;
   const Eigen::MatrixXd efficient = all.slope - held.slope * weights;
-  scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), columns);
+  scan.by_trial = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.trials()), all.slope.cols());
   for (Eigen::Index k = 0; k < events; ++k)
     scan.by_trial.row(static_cast<Eigen::Index>(model.events()[static_cast<std::size_t>(k)].trial)) += efficient.row(k);
   scan.trials_suffice =
       model.trials() >= Rules::enough_trials && model.events().size() >= Rules::enough_transitions * model.trials();
   // At the fit the nuisances' scores balance their prior's: the plain sum of the slopes is efficient already.
   scan.scores = all.slope.colwise().sum();
+}
 
+}  // namespace
+
+const ScannedEffect* EffectScan::find(const Candidate* candidate) const {
+  const auto found = std::ranges::find(effects, candidate, &ScannedEffect::candidate);
+  return found == effects.end() ? nullptr : &*found;
+}
+
+EffectScan scan_effects(const TransitionModel& model, const Fit& fit, const std::vector<const Candidate*>& candidates,
+                        int threads, const ScanBeside& beside) {
+  EffectScan scan;
+  std::vector<ScannedTerm> scanned;
+  Eigen::Index columns = 0;
+  for (const Candidate* candidate : candidates)
+    if (!candidate->parameters.empty() && candidate->undecidable.empty())
+      scan.effects.push_back(list_terms(*candidate, beside, columns, scanned));
+  const auto events = static_cast<Eigen::Index>(model.events().size());
+  Derivatives all{Eigen::MatrixXd::Zero(events, columns), Eigen::MatrixXd::Zero(events, columns)};
+  markov::parallel_for(scanned.size(), threads,
+                       [&](std::size_t i) { differentiate(model, fit, scanned[i], beside, all); });
+  project(model, fit, all, scan);
   for (ScannedEffect& effect : scan.effects) {
     const auto count = static_cast<Eigen::Index>(effect.candidate->parameters.size());
     for (const Eigen::Index first : effect.first) {

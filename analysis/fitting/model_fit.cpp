@@ -190,6 +190,71 @@ FreeParts free_parts(const std::vector<Point::Slot>& slots, const Eigen::VectorX
   return parts;
 }
 
+// What one iteration of a climb came to; rises of the penalised likelihood.
+struct Stride {
+  double promised = 0;  // by an undamped step of all parameters, to first order
+  double foretold = 0;  // by the last step that was tried
+  double risen = 0;     // in truth
+  bool better = false;  // or nothing is promised
+};
+
+// A climb of the penalised likelihood by damped steps. `fit` holds the evaluation and the slopes where it stands.
+class Climb {
+ public:
+  Climb(Point& point, const Eigen::VectorXd& weights, Fit& fit)
+      : point_(point), weights_(weights), fit_(fit), best_(counted(fit.evaluation, weights) + point.log_prior()) {}
+
+  double best() const { return best_; }
+
+  // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves, and all of them
+  // by steps that are damped more. @param settled  a promise below it is not resolved
+  Stride stride(const FreeParts& parts, double settled, bool both_sides) {
+    const double before = best_;
+    Stride stride;
+    step_of(parts.all, 0, stride);
+    stride.promised = stride.foretold;
+    stride.better = !(stride.promised > worth_a_step) || rises(parts.all, level_, most_halvings, before, stride);
+    const bool at_the_top = both_sides && stride.promised < settled;
+    if (!stride.better && !at_the_top)
+      stride.better = rises(parts.of_terms, 0, most_halvings, before, stride) ||
+                      rises(parts.of_nuisances, 0, most_halvings, before, stride);
+    for (std::size_t damped = 0; !stride.better && !at_the_top && damped < std::size(dampings); ++damped)
+      if (damped != level_ && (damped == 0 || stride.promised > settled) &&
+          rises(parts.all, damped, few_halvings, before, stride)) {
+        stride.better = true;
+        level_ = damped;
+      }
+    stride.risen = best_ - before;
+    return stride;
+  }
+
+  void damp_next(const Stride& stride) {
+    if (stride.risen < least_kept * stride.foretold)
+      level_ = std::min(level_ + 1, std::size(dampings) - 1);
+    else if (level_ > 0)
+      --level_;
+  }
+
+ private:
+  Eigen::VectorXd step_of(const std::vector<Eigen::Index>& part, std::size_t damped, Stride& stride) const {
+    const Eigen::VectorXd step = gauss_newton(fit_.information, fit_.gradient, part, dampings[damped]);
+    stride.foretold = 0.5 * step.dot(picked(fit_.gradient, part));
+    return step;
+  }
+  bool rises(const std::vector<Eigen::Index>& part, std::size_t damped, int halvings, double before, Stride& stride) {
+    if (part.empty()) return false;
+    const Eigen::VectorXd step = step_of(part, damped, stride);
+    if (stride.foretold > worth_a_step) search(point_, part, step, weights_, halvings, best_, fit_.evaluation);
+    return best_ - before >= worth_a_step;
+  }
+
+  Point& point_;
+  const Eigen::VectorXd& weights_;
+  Fit& fit_;
+  double best_;
+  std::size_t level_ = 0;  // of damping
+};
+
 }  // namespace
 
 Eigen::MatrixXd resolved_root(const Eigen::MatrixXd& information) {
@@ -220,76 +285,47 @@ Derivatives derivatives(const TransitionModel& model, const std::vector<double>&
 Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const std::vector<EffectTerm>& terms,
         const FitOptions& options) {
   Point point(model, nuisance, terms, options.refit_nuisances);
-  auto& slots = point.slots();
   const Eigen::VectorXd weights = event_weights(model, options.count);
   Fit result;
   result.evaluation = options.from ? options.from->evaluation : point.evaluate();
-  double best = counted(result.evaluation, weights) + point.log_prior();
-  const double start = best;
-  std::size_t level = 0;    // of damping
+  Climb climb(point, weights, result);
+  const double start = climb.best();
+  const bool finite = std::isfinite(start);
   bool both_sides = false;  // are differenced: at a kink of some event's density one side promises what is not there
-  const bool finite = std::isfinite(best);
-  result.converged = slots.empty() && finite;
+  result.converged = point.slots().empty() && finite;
   if (!finite) result.reason = "its likelihood is not finite";
-  for (int iteration = 0; finite && iteration < options.most_iterations + both_sides && !slots.empty(); ++iteration) {
+  for (int iteration = 0; finite && iteration < options.most_iterations + both_sides && !point.slots().empty();
+       ++iteration) {
     result.derivatives =
         options.from && iteration == 0 ? options.from->derivatives : differences(point, result.evaluation, both_sides);
     result.information = information(result.derivatives, result.evaluation, weights);
-    result.gradient = penalised_gradient(slots, weights, result);
-    const FreeParts parts = free_parts(slots, result.gradient, result.information);
+    result.gradient = penalised_gradient(point.slots(), weights, result);
+    const FreeParts parts = free_parts(point.slots(), result.gradient, result.information);
     if (parts.all.empty()) {
       result.converged = true;
       break;
     }
-    // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves, and all of them
-    // by steps that are damped more.
-    const double before = best;
-    double foretold = 0;  // rise by the last step
-    const auto step_of = [&](const std::vector<Eigen::Index>& part, std::size_t damped) {
-      const Eigen::VectorXd step = gauss_newton(result.information, result.gradient, part, dampings[damped]);
-      foretold = 0.5 * step.dot(picked(result.gradient, part));
-      return step;
-    };
-    const auto rises = [&](const std::vector<Eigen::Index>& part, std::size_t damped, int halvings) {
-      if (part.empty()) return false;
-      const Eigen::VectorXd step = step_of(part, damped);
-      if (foretold > worth_a_step) search(point, part, step, weights, halvings, best, result.evaluation);
-      return best - before >= worth_a_step;
-    };
-    step_of(parts.all, 0);
-    const double promised = foretold;
     // What is promised below this differences do not resolve.
-    const double settled = unresolved + unresolved_share * (best - start);
-    bool better = !(promised > worth_a_step) || rises(parts.all, level, most_halvings);
-    const bool at_the_top = both_sides && promised < settled;
-    if (!better && !at_the_top)
-      better = rises(parts.of_terms, 0, most_halvings) || rises(parts.of_nuisances, 0, most_halvings);
-    for (std::size_t damped = 0; !better && !at_the_top && damped < std::size(dampings); ++damped)
-      if (damped != level && (damped == 0 || promised > settled) && rises(parts.all, damped, few_halvings)) {
-        better = true;
-        level = damped;
-      }
-    result.promised = promised;
-    if (options.from && better && std::abs(best - before - foretold) < as_foretold * foretold) {
+    const double settled = unresolved + unresolved_share * (climb.best() - start);
+    const Stride stride = climb.stride(parts, settled, both_sides);
+    result.promised = stride.promised;
+    if (options.from && stride.better && std::abs(stride.risen - stride.foretold) < as_foretold * stride.foretold) {
       result.converged = true;
       break;
     }
-    if (!better && promised >= settled && !both_sides) {
+    if (!stride.better && stride.promised >= settled && !both_sides) {
       both_sides = true;
       continue;
     }
-    if (best - before < least_kept * foretold)
-      level = std::min(level + 1, std::size(dampings) - 1);
-    else if (level > 0)
-      --level;
-    if (!(promised > worth_a_step)) {
-      result.converged = std::isfinite(promised);
+    climb.damp_next(stride);
+    if (!(stride.promised > worth_a_step)) {
+      result.converged = std::isfinite(stride.promised);
       if (!result.converged) result.reason = "its information matrix is singular";
       break;
     }
-    if (!better) {
+    if (!stride.better) {
       // This is the optimum, up to what the differences resolve.
-      result.converged = promised < settled;
+      result.converged = stride.promised < settled;
       if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
       break;
     }
@@ -299,7 +335,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
   result.nuisance = point.nuisance();
   result.terms = point.terms();
   result.log_likelihood = counted(result.evaluation, weights);
-  result.penalised = best;
+  result.penalised = climb.best();
   return result;
 }
 
