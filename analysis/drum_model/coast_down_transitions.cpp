@@ -141,6 +141,12 @@ class CoastDownTransitions : public TransitionModel {
 
  private:
   Losses losses(std::span<const double> nuisance, std::span<const EffectTerm> terms) const;
+  struct Stretches {
+    std::vector<double> omega, beyond;  // [rad/s], of omega^2 a revolution
+  };
+  Stretches stretches() const;
+  std::vector<FitStart> starts_of_scatter(FitStart start, const Eigen::VectorXd& left,
+                                          const std::vector<double>& omega) const;
   void set_up_nuisances();
   void set_up_effects();
   const DrumEffect& effect_of(const EffectTerm& term) const;
@@ -422,6 +428,53 @@ Evaluation CoastDownTransitions::evaluate(std::span<const double> nuisance, std:
   return result;
 }
 
+// Returns the mean loss of short stretches beyond the nominal one, with their mean speeds.
+CoastDownTransitions::Stretches CoastDownTransitions::stretches() const {
+  Stretches all;
+  for (const auto& speeds : speeds_) {
+    const std::size_t span = std::min(stretch, speeds.size() - std::min<std::size_t>(1, speeds.size()));
+    for (std::size_t k = 0; span > 0 && k + span < speeds.size(); k += span) {
+      const double w = 0.5 * (speeds[k] + speeds[k + span]);
+      const double lost = (speeds[k] * speeds[k] - speeds[k + span] * speeds[k + span]) / static_cast<double>(span);
+      all.omega.push_back(w);
+      all.beyond.push_back(lost - stated_.constant - stated_.linear * w - stated_.quadratic * w * w);
+    }
+  }
+  return all;
+}
+
+// Lists starts with the effects of `start`, whose nuisances are nominal: what is left may be several things.
+// @param left  loss of each stretch beyond what its effects take @param omega  its mean speed
+std::vector<FitStart> CoastDownTransitions::starts_of_scatter(FitStart start, const Eigen::VectorXd& left,
+                                                              const std::vector<double>& omega) const {
+  const double scatter = std::sqrt(left.squaredNorm() / static_cast<double>(left.size()));
+  const auto set = [&](std::size_t slot, double value) {
+    const Nuisance& n = nuisances_[slot];
+    start.nuisance[slot] = std::clamp(std::log(std::max(1e-9, value)), n.lower, n.upper);
+  };
+  std::vector<FitStart> all;
+  // The scatter may be a wandering loss, short or long, or noise.
+  set(DrumSlot::log_wander_sd, scatter);
+  for (const double revolutions : {5.0, 50.0}) {
+    set(DrumSlot::log_wander_revolutions, revolutions);
+    all.push_back(start);
+  }
+  // Or it may be that the stretch that lost most is where the rig rings.
+  Eigen::Index most = 0;
+  const double ring = left.maxCoeff(&most);
+  start.nuisance[DrumSlot::resonance] = std::clamp(ring, 0.0, nuisances_[DrumSlot::resonance].upper);
+  set(DrumSlot::log_resonance_rad_s, omega[static_cast<std::size_t>(most)]);
+  set(DrumSlot::log_wander_sd, 0.3 * scatter);
+  all.push_back(start);
+  set(DrumSlot::log_wander_revolutions, 5);
+  set(DrumSlot::log_noise_sd, scatter);
+  all.push_back(start);
+  start.nuisance = nominal_values(*this);
+  set(DrumSlot::log_noise_sd, 3 * scatter);
+  all.push_back(start);
+  return all;
+}
+
 // Starts from the mean loss of short stretches beyond the nominal one, by least squares on the terms: close to what
 // they are in the end, where the slopes of the likelihood without them point anywhere.
 std::vector<FitStart> CoastDownTransitions::starts(std::span<const EffectTerm> terms) const {
@@ -434,16 +487,7 @@ std::vector<FitStart> CoastDownTransitions::starts(std::span<const EffectTerm> t
     fitted.push_back(i);
     power.push_back(*p);
   }
-  std::vector<double> beyond, omega;  // by stretch
-  for (const auto& speeds : speeds_) {
-    const std::size_t span = std::min(stretch, speeds.size() - std::min<std::size_t>(1, speeds.size()));
-    for (std::size_t k = 0; span > 0 && k + span < speeds.size(); k += span) {
-      const double w = 0.5 * (speeds[k] + speeds[k + span]);
-      const double lost = (speeds[k] * speeds[k] - speeds[k + span] * speeds[k + span]) / static_cast<double>(span);
-      omega.push_back(w);
-      beyond.push_back(lost - stated_.constant - stated_.linear * w - stated_.quadratic * w * w);
-    }
-  }
+  const auto [omega, beyond] = stretches();
   if (omega.size() < fitted.size() + 2) return {};
   const auto rows = static_cast<Eigen::Index>(omega.size());
   const Eigen::Map<const Eigen::ArrayXd> w(omega.data(), rows);
@@ -462,32 +506,7 @@ std::vector<FitStart> CoastDownTransitions::starts(std::span<const EffectTerm> t
     const FreeParameter& p = terms[fitted[c]].candidate->parameters[0];
     start.values[fitted[c]][0] = std::clamp(sizes[static_cast<Eigen::Index>(c)] / per_torque, p.lower, p.upper);
   }
-  const double scatter = std::sqrt(left.squaredNorm() / static_cast<double>(rows));
-  const auto set = [&](std::size_t slot, double value) {
-    const Nuisance& n = nuisances_[slot];
-    start.nuisance[slot] = std::clamp(std::log(std::max(1e-9, value)), n.lower, n.upper);
-  };
-  std::vector<FitStart> all;
-  // The scatter may be a wandering loss, short or long, or noise.
-  set(DrumSlot::log_wander_sd, scatter);
-  for (const double revolutions : {5.0, 50.0}) {
-    set(DrumSlot::log_wander_revolutions, revolutions);
-    all.push_back(start);
-  }
-  // Or it may be that the stretch that lost most is where the rig rings.
-  Eigen::Index most = 0;
-  const double ring = left.maxCoeff(&most);
-  start.nuisance[DrumSlot::resonance] = std::clamp(ring, 0.0, nuisances_[DrumSlot::resonance].upper);
-  set(DrumSlot::log_resonance_rad_s, w[most]);
-  set(DrumSlot::log_wander_sd, 0.3 * scatter);
-  all.push_back(start);
-  set(DrumSlot::log_wander_revolutions, 5);
-  set(DrumSlot::log_noise_sd, scatter);
-  all.push_back(start);
-  start.nuisance = nominal_values(*this);
-  set(DrumSlot::log_noise_sd, 3 * scatter);
-  all.push_back(start);
-  return all;
+  return starts_of_scatter(std::move(start), left, omega);
 }
 
 std::string CoastDownTransitions::size_in_words(std::span<const EffectTerm> terms) const {

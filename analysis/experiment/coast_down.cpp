@@ -25,7 +25,8 @@ constexpr int least_block = 10;                          // revolutions
 constexpr std::size_t around = 5;                        // periods on either side that a period is compared with
 constexpr double missed_from = 1.5, double_below = 0.6;  // of the median period
 constexpr double most_left_out = 0.1;                    // of a run's revolutions
-constexpr double huber = 1.345;                          // 95 % efficiency under normal noise
+constexpr double whole_turn = 2 * std::numbers::pi;
+constexpr double huber = 1.345;  // 95 % efficiency under normal noise
 constexpr std::array<const char*, 5> columns{"time_us", "drum_speed_km_h", "drum_revolutions", "wheel_speed_km_h",
                                              "wheel_revolutions"};
 
@@ -51,120 +52,56 @@ std::vector<double> bends(const std::vector<double>& periods, const std::vector<
   return off;
 }
 
-}  // namespace
+// One row of a log, and its columns by what they are.
+struct CounterRow {
+  std::array<double, 5> values{};
+  double time = 0, drum = 0, wheel = 0;  // [s], revolutions
+};
 
-void CoastDownOptions::validate() const {
-  if (!(stop > 0) || !std::isfinite(stop))
-    throw std::invalid_argument(fmt::format("stop: {} rad/s is outside (0, inf)", stop));
-  if (block < least_block || block > 100000)
-    throw std::invalid_argument(fmt::format("block: {} is outside {}..100000", block, least_block));
+// Says what is wrong with the text of a column; nothing if it is a number in range, of a counter a whole one.
+std::optional<std::string> field_defect(std::string_view field, std::size_t column, double& value) {
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (error != std::errc{} || end != field.data() + field.size() || !std::isfinite(value))
+    return fmt::format("{}: {} is not a number", columns[column], shown_text(field));
+  if (!dynamics::range::log.holds(value))
+    return fmt::format("{}: {} is outside {}", columns[column], value, dynamics::range::log.text());
+  const bool counter = column == 2 || column == 4;
+  if (counter && value != std::floor(value)) return fmt::format("{}: {} is no whole number", columns[column], value);
+  return std::nullopt;
 }
 
-CounterLog parse_counter_log(const std::string& file, std::string_view text) {
-  Defects defects;
-  CounterLog log;
-  double last_time = 0, last_drum = 0, last_wheel = 0;
-  bool begun = false;
-  std::size_t number = 0;
-  while (!text.empty()) {
-    ++number;
-    const auto feed = text.find('\n');
-    std::string_view line = text.substr(0, feed);
-    text = feed == std::string_view::npos ? std::string_view{} : text.substr(feed + 1);
-    if (line.ends_with('\r')) line.remove_suffix(1);
-    if (line.empty() && text.find_first_not_of("\r\n") == std::string_view::npos) break;  // after the last row
-    const std::string_view whole = line;
-    std::array<double, 5> values{};
-    std::size_t read = 0;
-    bool fine = true;
-    const auto column = [&] { return static_cast<std::size_t>(line.data() - whole.data()) + 1; };
-    for (; read < values.size(); ++read) {
-      const auto comma = line.find(',');
-      const std::string_view field = line.substr(0, comma);
-      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), values[read]);
-      if (error != std::errc{} || end != field.data() + field.size() || !std::isfinite(values[read])) {
-        defects.add(file, {number, column()}, fmt::format("{}: {} is not a number", columns[read], shown_text(field)));
-        fine = false;
-        break;
-      }
-      const bool counter = read == 2 || read == 4;
-      const bool within = dynamics::range::log.holds(values[read]);
-      if (!within || (counter && values[read] != std::floor(values[read]))) {
-        defects.add(file, {number, column()},
-                    fmt::format("{}: {} is {}", columns[read], values[read],
-                                within ? "no whole number" : "outside " + dynamics::range::log.text()));
-        fine = false;
-        break;
-      }
-      if (comma == std::string_view::npos) {
-        line = {};
-        ++read;
-        break;
-      }
-      line.remove_prefix(comma + 1);
-      if (read + 1 == values.size()) {
-        defects.add(file, {number, column()}, "more than five fields");
-        fine = false;
-      }
+// Reads a row; nothing, and a defect, if it is not five numbers.
+std::optional<CounterRow> counter_row(const std::string& file, std::size_t number, std::string_view line,
+                                      Defects& defects) {
+  CounterRow row;
+  std::size_t from = 0;  // of a field
+  for (std::size_t read = 0; read < row.values.size(); ++read) {
+    const auto comma = line.find(',', from);
+    if (const auto defect = field_defect(line.substr(from, comma - from), read, row.values[read])) {
+      defects.add(file, {number, from + 1}, *defect);
+      return std::nullopt;
     }
-    if (fine && read < values.size()) {
-      defects.add(file, {number, 1}, fmt::format("{} fields where five are expected", read));
-      fine = false;
+    const bool last = read + 1 == row.values.size();
+    if (comma == std::string_view::npos && !last) {
+      defects.add(file, {number, 1}, fmt::format("{} fields where five are expected", read + 1));
+      return std::nullopt;
     }
-    if (!fine) continue;
-    const double time = values[0] * 1e-6;
-    if (begun && (time < last_time || values[2] < last_drum || values[4] < last_wheel)) {
-      const std::size_t which = time < last_time ? 0 : values[2] < last_drum ? 2 : 4;
-      defects.add(file, {number, 1}, fmt::format("{}: falls to {}", columns[which], values[which]));
-      continue;
+    from = comma + 1;
+    if (comma != std::string_view::npos && last) {
+      defects.add(file, {number, from + 1}, "more than five fields");
+      return std::nullopt;
     }
-    if (begun && values[2] > last_drum) {
-      if (!log.time.empty() && time <= log.time.back()) {
-        defects.add(file, {number, 1}, "time_us: two drum revolutions end at the same time");
-        continue;
-      }
-      log.time.push_back(time);
-      log.skipped.push_back(static_cast<int>(std::min(values[2] - last_drum, 1e9)) - 1);
-    }
-    begun = true;
-    last_time = time;
-    last_drum = values[2];
-    last_wheel = values[4];
   }
-  defects.check();
-  if (log.time.size() < 20)
-    throw InputError({fmt::format("{}: {} drum revolutions are too few, 20 are needed", file, log.time.size())});
-  return log;
+  row.time = row.values[0] * 1e-6;
+  row.drum = row.values[2];
+  row.wheel = row.values[4];
+  return row;
 }
 
-CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options) {
-  options.validate();
-  if (log.time.size() < least_block)
-    throw std::invalid_argument(
-        fmt::format("{}: {} ticks are too few, {} are needed", log.name, log.time.size(), least_block));
-  if (log.skipped.size() != log.time.size())
-    throw std::invalid_argument(
-        fmt::format("{}: skipped has {} entries for {} ticks", log.name, log.skipped.size(), log.time.size()));
-  std::vector<double> periods;
-  for (std::size_t k = 1; k < log.time.size(); ++k) periods.push_back(log.time[k] - log.time[k - 1]);
-  const std::vector<double> medians = running_median(periods, around);
-
-  CoastDownRun run;
-  run.name = log.name;
-  constexpr double turn = 2 * std::numbers::pi;
-  const double shortest = *std::min_element(medians.begin(), medians.end());
-  run.top = turn / shortest;
-  run.stop = options.stop;
-  if (!(run.top > options.stop))
-    throw std::invalid_argument(fmt::format("{}: the top speed, {:.3g} rad/s, is not above the stop, {:.3g} rad/s",
-                                            log.name, run.top, options.stop));
-  std::size_t first = 0;
-  for (std::size_t k = 0; k < medians.size(); ++k)
-    if (medians[k] <= shortest * 1.005) first = k + 1;
-  std::size_t end = first;
-  while (end < medians.size() && turn / medians[end] >= options.stop) ++end;
-  run.revolutions = end - first;
-
+// Cuts the revolutions first..end into blocks without a defect, and counts the defects.
+// @param periods, medians  of the revolutions [s]
+void fill_blocks(const CounterLog& log, const std::vector<double>& periods, const std::vector<double>& medians,
+                 std::size_t first, std::size_t end, int longest, CoastDownRun& run) {
   const std::vector<double> off = bends(periods, medians);
   const std::vector<double> usual = running_median(off, 25);
   bool displaced_before = false;
@@ -198,11 +135,82 @@ CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options) 
       close();
       continue;
     }
-    block.push_back({log.time[k + 1], turn / periods[k]});
-    if (static_cast<int>(block.size()) == options.block) close();
+    block.push_back({log.time[k + 1], whole_turn / periods[k]});
+    if (static_cast<int>(block.size()) == longest) close();
   }
   close();
   run.left_out = run.revolutions - kept;
+}
+
+}  // namespace
+
+void CoastDownOptions::validate() const {
+  if (!(stop > 0) || !std::isfinite(stop))
+    throw std::invalid_argument(fmt::format("stop: {} rad/s is outside (0, inf)", stop));
+  if (block < least_block || block > 100000)
+    throw std::invalid_argument(fmt::format("block: {} is outside {}..100000", block, least_block));
+}
+
+CounterLog parse_counter_log(const std::string& file, std::string_view text) {
+  Defects defects;
+  CounterLog log;
+  std::optional<CounterRow> last;
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const auto feed = text.find('\n');
+    std::string_view line = text.substr(0, feed);
+    text = feed == std::string_view::npos ? std::string_view{} : text.substr(feed + 1);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    if (line.empty() && text.find_first_not_of("\r\n") == std::string_view::npos) break;  // after the last row
+    const std::optional<CounterRow> row = counter_row(file, number, line, defects);
+    if (!row) continue;
+    if (last && (row->time < last->time || row->drum < last->drum || row->wheel < last->wheel)) {
+      const std::size_t which = row->time < last->time ? 0 : row->drum < last->drum ? 2 : 4;
+      defects.add(file, {number, 1}, fmt::format("{}: falls to {}", columns[which], row->values[which]));
+      continue;
+    }
+    if (last && row->drum > last->drum) {
+      if (!log.time.empty() && row->time <= log.time.back()) {
+        defects.add(file, {number, 1}, "time_us: two drum revolutions end at the same time");
+        continue;
+      }
+      log.time.push_back(row->time);
+      log.skipped.push_back(static_cast<int>(std::min(row->drum - last->drum, 1e9)) - 1);
+    }
+    last = row;
+  }
+  defects.check();
+  if (log.time.size() < 20)
+    throw InputError({fmt::format("{}: {} drum revolutions are too few, 20 are needed", file, log.time.size())});
+  return log;
+}
+
+CoastDownRun coast_down(const CounterLog& log, const CoastDownOptions& options) {
+  options.validate();
+  if (log.time.size() < least_block)
+    throw std::invalid_argument(
+        fmt::format("{}: {} ticks are too few, {} are needed", log.name, log.time.size(), least_block));
+  if (log.skipped.size() != log.time.size())
+    throw std::invalid_argument(
+        fmt::format("{}: skipped has {} entries for {} ticks", log.name, log.skipped.size(), log.time.size()));
+  std::vector<double> periods;
+  for (std::size_t k = 1; k < log.time.size(); ++k) periods.push_back(log.time[k] - log.time[k - 1]);
+  const std::vector<double> medians = running_median(periods, around);
+
+  CoastDownRun run;
+  run.name = log.name;
+  const double shortest = *std::min_element(medians.begin(), medians.end());
+  run.top = whole_turn / shortest;
+  run.stop = options.stop;
+  if (!(run.top > options.stop))
+    throw std::invalid_argument(fmt::format("{}: the top speed, {:.3g} rad/s, is not above the stop, {:.3g} rad/s",
+                                            log.name, run.top, options.stop));
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < medians.size(); ++k)
+    if (medians[k] <= shortest * 1.005) first = k + 1;
+  std::size_t end = first;
+  while (end < medians.size() && whole_turn / medians[end] >= options.stop) ++end;
+  run.revolutions = end - first;
+  fill_blocks(log, periods, medians, first, end, options.block, run);
   if (run.blocks.empty())
     throw std::invalid_argument(fmt::format("{}: no {} revolutions without a defect", log.name, least_block));
   return run;
