@@ -15,8 +15,8 @@
 #include "analysis/statistics/random.h"
 #include "analysis/wheel_model/wheel_columns.h"
 #include "dynamics/numerics/truncated_normal.h"
+#include "dynamics/settled/landing_grid.h"
 #include "dynamics/settled/settled_density.h"
-#include "dynamics/settled/share_grid.h"
 
 namespace metastable::analysis {
 namespace {
@@ -415,10 +415,10 @@ void tabulate_landings(WheelRuns& measured) {
       const auto same = std::find_if(measured.conditions.begin(), measured.conditions.begin() + static_cast<long>(c),
                                      [&](const Condition& other) { return other.slope_deg == slope; });
       const auto before = static_cast<std::size_t>(same - measured.conditions.begin());
-      measured.landings.push_back(before < c
-                                      ? measured.landings[before]
-                                      : dynamics::share_grid(dynamics::settled_wheel(measured.wheel, slope * degree),
-                                                             low, high, measured.contact, {}, measured.stands_by_plus));
+      measured.landings.push_back(
+          before < c ? measured.landings[before]
+                     : dynamics::landing_grid(dynamics::settled_wheel(measured.wheel, slope * degree), low, high,
+                                              measured.contact, {}, measured.stands_by_plus));
     }
   };
   tabulate();

@@ -1,6 +1,6 @@
 #pragma once
 // Holds landings of a rigid wheel (`settled`) on a coarse grid of speed, restitution and friction: fast enough for
-// likelihoods of whole experiments. dynamics/settled/share_grid fills it.
+// likelihoods of whole experiments. dynamics/settled/landing_grid fills it.
 
 #include <array>
 #include <cstddef>

@@ -10,7 +10,7 @@
 
 #include "dynamics/numerics/normal_table.h"
 #include "dynamics/numerics/truncated_normal.h"
-#include "dynamics/settled/touch_sum.h"
+#include "dynamics/settled/next_touch_sum.h"
 
 namespace metastable::dynamics {
 namespace {
@@ -161,7 +161,7 @@ struct Landings {
   std::array<One, nodes_of_restitution> list;
   std::size_t count = 0;
 
-  void add_to(TouchSum& sum, std::optional<double> first_edge = {}) const {
+  void add_to(NextTouchSum& sum, std::optional<double> first_edge = {}) const {
     if (count == 0) return;
     LandingCells cells{.count = count};
     for (std::size_t k = 0; k < count; ++k) {
@@ -217,7 +217,8 @@ std::optional<Edge> barrier(const Landings& along, double level, double to, Beyo
 
 // Adds landings whose first impact left omega+: cells around twelve restitutions, and the sticking foot. Where only
 // some go on, the cells start at the barrier and are finest there: omega_eq rises as a root from where feet rest.
-void add_along(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share, double omega_plus) {
+void add_along(NextTouchSum& sum, const SettledLanding& landing, const Weights& weights, double share,
+               double omega_plus) {
   const FirstImpact first(landing, omega_plus);
   const double eta_stuck = first.sticking_restitution(), critical = landing.sticking();
   const auto kept = [&](double eta, double mu) { return landing.carried({eta, mu}); };
@@ -260,7 +261,7 @@ constexpr std::array<int, LandingShares::parts / 2 + 1> cell_places = [] {
 static_assert(cell_places.back() == LandingShares::parts - 1);
 
 // Adds those of a foot that sticks, in cells of restitution.
-void add_sticking(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
+void add_sticking(NextTouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
   constexpr std::size_t count = 14;
   const double from = weights.least_restitution(), width = (weights.most_restitution() - from) / count;
   if (!(width > 0)) return;
@@ -281,7 +282,7 @@ void add_sticking(TouchSum& sum, const SettledLanding& landing, const Weights& w
 
 // Adds all landings: for each of some restitutions cells of friction between places of the grid, and for the sticking
 // foot cells of restitution.
-void add_all(TouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
+void add_all(NextTouchSum& sum, const SettledLanding& landing, const Weights& weights, double share) {
   const double critical = landing.sticking(), own = landing.place.leg().sticking, off = critical - own;
   LandingCells cells{.count = cell_places.size()};
   LandingCells::Values mu, above;
@@ -318,7 +319,7 @@ void of_each_friction(const SettledContact& contact, Add add) {
   if (contact.rare_share > 0) add(Weights(contact, contact.rare_ratio), contact.rare_share);
 }
 
-void add_landings(TouchSum& sum, const SettledLanding& landing, const SettledContact& contact,
+void add_landings(NextTouchSum& sum, const SettledLanding& landing, const SettledContact& contact,
                   std::optional<double> omega_plus) {
   if (omega_plus)
     of_each_friction(
@@ -375,13 +376,13 @@ SpeedDensity after_first_impact(const SettledLanding& landing, const SettledCont
 
 NextTouch at_next_touch(const SettledLanding& landing, const SettledContact& contact, const SeenOfLanding& seen,
                         double blur, double next) {
-  TouchSum sum(landing, seen, blur, next);
+  NextTouchSum sum(landing, seen, blur, next);
   add_landings(sum, landing, contact, seen.omega_plus);
   return sum.result();
 }
 
 double rest_share(const SettledLanding& landing, const SettledContact& contact, std::optional<double> omega_plus) {
-  TouchSum sum(landing, {}, 1, 0);
+  NextTouchSum sum(landing, {}, 1, 0);
   add_landings(sum, landing, contact, omega_plus);
   return sum.rest();
 }

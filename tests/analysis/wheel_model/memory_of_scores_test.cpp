@@ -9,7 +9,7 @@
 
 #include "analysis/wheel_model/speed_filter.h"
 #include "dynamics/numerics/truncated_normal.h"
-#include "dynamics/settled/share_grid.h"
+#include "dynamics/settled/landing_grid.h"
 
 namespace metastable::analysis {
 namespace {
@@ -23,7 +23,7 @@ dynamics::ExtendedWheel settled_wheel() {
   wheel.radius_of_gyration = 0.0424;
   const double slope = 7.02 * std::numbers::pi / 180;
   return {wheel, slope, dynamics::Law::settled,
-          usual, {},    share_grid(dynamics::settled_wheel(wheel, slope), 4, 6, usual)};
+          usual, {},    landing_grid(dynamics::settled_wheel(wheel, slope), 4, 6, usual)};
 }
 
 // Draws pairs of landings whose contacts' scores correlate by rho, and returns by how much their speeds' scores do.

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "dynamics/extended_wheel/extended_wheel.h"
+#include "dynamics/settled/landing_grid.h"
 #include "dynamics/settled/settled_motion.h"
-#include "dynamics/settled/share_grid.h"
 
 namespace metastable::dynamics {
 namespace {
@@ -34,7 +34,7 @@ Wheel equal_wheel() {
 SettledWheel rigid(const Wheel& wheel, double at = slope) { return settled_wheel(wheel, at); }
 
 std::shared_ptr<const LandingShares> grid() {
-  static const std::shared_ptr<const LandingShares> built = share_grid(rigid(equal_wheel()), 4, 6, usual);
+  static const std::shared_ptr<const LandingShares> built = landing_grid(rigid(equal_wheel()), 4, 6, usual);
   return built;
 }
 
@@ -153,7 +153,7 @@ TEST(SettledDensity, OfTheFirstImpactIsSmoothInTheLoss) {
 // just below the limit still moved: an engine's wheel without an effect had a gap by that.)
 TEST(SettledDensity, FeetStandUpToTwoSdsOfRestitution) {
   const auto settles_below = [](double mean, double sd) {
-    return share_grid(rigid(equal_wheel()), 4, 9, {mean, sd, 0.4, 0.03})->legs[2].settles_below;
+    return landing_grid(rigid(equal_wheel()), 4, 9, {mean, sd, 0.4, 0.03})->legs[2].settles_below;
   };
   EXPECT_DOUBLE_EQ(settles_below(0.4, 0.05), settles_below(0.5, 0));
   EXPECT_GT(settles_below(0.4, 0.02), settles_below(0.4, 0.05));

@@ -17,7 +17,7 @@ namespace metastable::dynamics {
 /// @param every_speed  tabulates speeds up to the fastest all the same, and says up to which restitution feet stand
 /// @param executor  calls the work for every index in [0, count), in any order, from any threads; none: in order
 /// @throws std::invalid_argument as SettledWheel::validate()
-std::shared_ptr<const LandingShares> share_grid(
+std::shared_ptr<const LandingShares> landing_grid(
     const SettledWheel& wheel, double slowest, double fastest, const ContactSpread& contact,
     const std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>& executor = {},
     bool every_speed = false);

@@ -22,10 +22,10 @@ struct LandingCells {
 
 /// Sums cells of one landing, for what was seen of it and of the next omega-. What is further off than eight blurs
 /// counts as eight.
-class TouchSum {
+class NextTouchSum {
  public:
   /// @param landing  must outlive the sum; @param blur, next  [rad/s]
-  TouchSum(const SettledLanding& landing, const SeenOfLanding& seen, double blur, double next);
+  NextTouchSum(const SettledLanding& landing, const SeenOfLanding& seen, double blur, double next);
 
   void add(const LandingCells& cells);
   void add_rest(double mass) {

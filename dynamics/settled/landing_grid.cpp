@@ -1,4 +1,4 @@
-#include "dynamics/settled/share_grid.h"
+#include "dynamics/settled/landing_grid.h"
 
 #include <algorithm>
 #include <cmath>
@@ -192,7 +192,7 @@ void copy_first_leg(LandingShares& grid) {
 
 }  // namespace
 
-std::shared_ptr<const LandingShares> share_grid(
+std::shared_ptr<const LandingShares> landing_grid(
     const SettledWheel& wheel, double slowest, double fastest, const ContactSpread& contact,
     const std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>& executor,
     bool every_speed) {

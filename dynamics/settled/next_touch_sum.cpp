@@ -1,4 +1,4 @@
-#include "dynamics/settled/touch_sum.h"
+#include "dynamics/settled/next_touch_sum.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,14 +19,14 @@ double slide_density(double z) {
 }
 
 METASTABLE_WIDE void find_next(const SettledLanding& landing, double at, double per_blur,
-                               const LandingCells::Values& squared, std::size_t count, TouchSum::Ends& ends) {
+                               const LandingCells::Values& squared, std::size_t count, NextTouchSum::Ends& ends) {
   for (std::size_t k = 0; k < count; ++k) {
     ends.next[k] = landing.next(squared[k]);
     ends.z[k] = (at - ends.next[k]) * per_blur;
   }
 }
 
-METASTABLE_WIDE void find_area(std::size_t count, TouchSum::Ends& ends) {
+METASTABLE_WIDE void find_area(std::size_t count, NextTouchSum::Ends& ends) {
   for (std::size_t k = 0; k < count; ++k) ends.area[k] = ends.z[k] * ends.below[k] + ends.density[k];
 }
 
@@ -35,8 +35,8 @@ struct OfCell {
   double middle, density, below, slope, curvature;  // the last two are the density's, in z
 };
 
-[[gnu::always_inline]] inline OfCell between(const TouchSum::Ends& ends, std::size_t k, const TouchSum::Ends& others,
-                                             std::size_t j) {
+[[gnu::always_inline]] inline OfCell between(const NextTouchSum::Ends& ends, std::size_t k,
+                                             const NextTouchSum::Ends& others, std::size_t j) {
   const double z = ends.z[k], other = others.z[j], width = z - other;
   const double phi = ends.density[k], its = others.density[j];
   const bool is_thin = std::abs(width) < thin;
@@ -52,7 +52,7 @@ struct OfCells {
   LandingCells::Values middle, density, below, slope, curvature;
 };
 
-METASTABLE_WIDE void weigh_cells(const TouchSum::Ends& ends, std::size_t count, OfCells& cells) {
+METASTABLE_WIDE void weigh_cells(const NextTouchSum::Ends& ends, std::size_t count, OfCells& cells) {
   for (std::size_t k = 0; k < count; ++k) {
     const OfCell cell = between(ends, k, ends, k + 1);
     cells.middle[k] = cell.middle;
@@ -67,7 +67,7 @@ constexpr std::size_t whole_vectors(std::size_t count) { return (count + 3) / 4 
 
 }  // namespace
 
-TouchSum::TouchSum(const SettledLanding& landing, const SeenOfLanding& seen, double blur, double next)
+NextTouchSum::NextTouchSum(const SettledLanding& landing, const SeenOfLanding& seen, double blur, double next)
     : landing_(landing),
       displacement_(seen.displacement),
       slide_error_(seen.displacement_error),
@@ -77,14 +77,14 @@ TouchSum::TouchSum(const SettledLanding& landing, const SeenOfLanding& seen, dou
 }
 
 // Finds what is at the first ends, rounded up to whole vectors.
-void TouchSum::find(const LandingCells::Values& squared, std::size_t count, Ends& ends) const {
+void NextTouchSum::find(const LandingCells::Values& squared, std::size_t count, Ends& ends) const {
   const std::size_t whole = whole_vectors(count);
   find_next(landing_, at_, 1 / blur_, squared, whole, ends);
   normals_at(ends.z.data(), whole, ends.below.data(), ends.density.data());
   find_area(whole, ends);
 }
 
-void TouchSum::add(const LandingCells& cells) {
+void NextTouchSum::add(const LandingCells& cells) {
   Ends ends;
   OfCells of;
   find(cells.squared, cells.count + 1, ends);
@@ -114,7 +114,7 @@ void TouchSum::add(const LandingCells& cells) {
   }
 }
 
-NextTouch TouchSum::result() const {
+NextTouch NextTouchSum::result() const {
   if (!(touch_ > 0)) return {{0, 1}, 1};
   // A slide is that of a foot whose next one touched: what it says is of those landings, beside the rests of all.
   const double width = std::hypot(blur_, unknown_error), z = (at_ - middle_ / touch_) / width;
