@@ -164,37 +164,42 @@ void say_cut_rests(Answer& answer, const analysis::ExperimentSource& source, con
       early.size(), limit, early.front());
 }
 
-}  // namespace
+// Holds what the folder tells.
+struct Filmed {
+  analysis::ExperimentSource source;
+  analysis::Experiment experiment;  // without trials
+  std::string angle_file;
+  analysis::MendedAngles mended;
+  std::optional<analysis::Experiment> known;  // with the collisions that are there already
+};
 
-void run_collisions(const CollisionsRequest& request) {
+Filmed read_filmed(const fs::path& folder) {
+  Filmed filmed{analysis::read_source(folder), {}, (folder / "angle.csv").string(), {}, {}};
+  filmed.experiment = analysis::parse_description(filmed.source);
+  if (filmed.experiment.system != analysis::System::rimless_wheel)
+    throw std::invalid_argument(fmt::format("{}: a coast-down has no collisions to find", folder.string()));
+  filmed.mended = analysis::mend_angles(analysis::parse_angles(filmed.source, filmed.experiment), filmed.experiment,
+                                        filmed.angle_file);
+  if (filmed.source.collisions_csv) filmed.known = analysis::parse_experiment(filmed.source);
+  return filmed;
+}
+
+// Returns the file of the collisions, "-" for standard output. @throws std::invalid_argument if it is one that is read
+fs::path collisions_path(const CollisionsRequest& request, bool known) {
   const fs::path folder = request.folder;
-  const analysis::ExperimentSource source = analysis::read_source(folder);
-  analysis::Experiment experiment = analysis::parse_description(source);
-  if (experiment.system != analysis::System::rimless_wheel)
-    throw std::invalid_argument(fmt::format("{}: a coast-down has no collisions to find", request.folder));
-  const std::string angle_file = (folder / "angle.csv").string();
-  const auto [angles, mended] =
-      analysis::mend_angles(analysis::parse_angles(source, experiment), experiment, angle_file);
-  std::optional<analysis::Experiment> known;
-  if (source.collisions_csv) known = analysis::parse_experiment(source);
   const fs::path out = !request.out.empty() ? fs::path(request.out)
                        : known              ? folder / "collisions-from-angle.csv"
                                             : folder / "collisions.csv";
-  const bool to_terminal = out == "-";
-  if (to_terminal && !request.json.empty())
+  if (out == "-" && !request.json.empty())
     throw std::invalid_argument("--json: there is none with --out -, which prints the collisions themselves");
   for (const char* read : {"experiment.toml", "angle.csv", "trials.csv"})
     if (same_file(out, folder / read))
       throw std::invalid_argument(fmt::format("--out: {} is what is read", out.string()));
-  Answer answer(request.json);
-  OutputFile collisions_file(out);
-  std::optional<OutputFile> details_file;
-  fs::path details;
-  if (!to_terminal) {
-    details = out.parent_path() / (out.stem().string() + "-details.csv");
-    details_file.emplace(details);
-  }
+  return out;
+}
 
+// Returns the nominal return map of each condition.
+std::vector<dynamics::WheelMap> condition_maps(const analysis::Experiment& experiment) {
   std::vector<dynamics::WheelMap> maps;
   for (const analysis::Condition& condition : experiment.conditions) {
     analysis::Setting setting;
@@ -204,30 +209,90 @@ void run_collisions(const CollisionsRequest& request) {
     setting.first_landing_leg = condition.first_landing_leg;
     maps.push_back(setting.map());
   }
+  return maps;
+}
+
+// Holds the trials in the order of their angles.
+struct FoundTrials {
+  std::vector<FoundTrial> trials;
+  std::vector<char> cut;  // whether a trial has more collisions than were asked for
+};
+
+// @throws analysis::InputError, a line for each trial that is refused
+FoundTrials find_trials(const Filmed& filmed, const std::vector<dynamics::WheelMap>& maps,
+                        analysis::FinderOptions finder, int threads) {
   // One more than asked for tells a trial that ends there from one that is cut.
-  analysis::FinderOptions finder = request.finder;
   const auto limit = static_cast<std::size_t>(finder.collisions++);
-  std::vector<FoundTrial> found(angles.size());
-  std::vector<char> cut(angles.size());
+  const std::vector<analysis::MeasuredAngle>& angles = filmed.mended.angles;
+  FoundTrials found{std::vector<FoundTrial>(angles.size()), std::vector<char>(angles.size())};
   std::vector<std::string> refused(angles.size());
-  markov::parallel_for(angles.size(), request.threads, [&, &angles = angles](std::size_t t) {
+  markov::parallel_for(angles.size(), threads, [&](std::size_t t) {
     const auto& [number, condition, recording] = angles[t];
     try {
-      found[t] = analysis::find_collisions(recording, maps[condition],
-                                           experiment.conditions[condition].first_landing_leg, finder);
-      cut[t] = found[t].collisions.size() > limit;
-      if (cut[t]) found[t].collisions.resize(limit);
+      FoundTrial& trial = found.trials[t];
+      trial = analysis::find_collisions(recording, maps[condition],
+                                        filmed.experiment.conditions[condition].first_landing_leg, finder);
+      found.cut[t] = trial.collisions.size() > limit;
+      if (found.cut[t]) trial.collisions.resize(limit);
     } catch (const std::invalid_argument& error) {
       refused[t] = fmt::format("trial {}: {}", number, error.what());
     }
   });
   analysis::Defects defects;
   for (const std::string& why : refused)
-    if (!why.empty()) defects.add(angle_file, {}, why);
+    if (!why.empty()) defects.add(filmed.angle_file, {}, why);
   defects.check();
+  return found;
+}
 
-  check_speeds(experiment, angles, found, angle_file);
-  const Files files = write_files(experiment, angles, found, maps, request.peak);
+// Counts what was found, over all trials.
+struct Counts {
+  std::size_t collisions = 0, bounces = 0, unfitted = 0;
+  std::map<std::string, std::size_t> stopped;  // trials without a collision, by reason
+};
+
+Counts count(const std::vector<FoundTrial>& found) {
+  Counts counts;
+  for (const FoundTrial& trial : found) {
+    counts.collisions += trial.collisions.size();
+    for (const FoundCollision& c : trial.collisions) {
+      counts.bounces += static_cast<std::size_t>(c.bounces);
+      counts.unfitted += !c.fit;
+    }
+    if (trial.collisions.empty()) ++counts.stopped[trial.stopped];
+  }
+  return counts;
+}
+
+void say_found(Answer& answer, const Counts& counts, const std::vector<FoundTrial>& found, bool peak) {
+  answer.say("omega_minus is the {}", peak ? "peak of the smoothed speed (biased low by the smoothing)"
+                                           : "stance motion extrapolated to the collision");
+  if (counts.unfitted > 0)
+    answer.say(
+        "{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
+        "empty",
+        counts.unfitted);
+  say_fits(answer, found);
+  for (const auto& [why, trials] : counts.stopped) answer.say("{} trials without a collision: {}", trials, why);
+}
+
+}  // namespace
+
+void run_collisions(const CollisionsRequest& request) {
+  const Filmed filmed = read_filmed(request.folder);
+  const std::vector<analysis::MeasuredAngle>& angles = filmed.mended.angles;
+  const fs::path out = collisions_path(request, filmed.known.has_value());
+  const bool to_terminal = out == "-";
+  Answer answer(request.json);
+  OutputFile collisions_file(out);
+  const fs::path details = out.parent_path() / (out.stem().string() + "-details.csv");
+  std::optional<OutputFile> details_file;
+  if (!to_terminal) details_file.emplace(details);
+
+  const std::vector<dynamics::WheelMap> maps = condition_maps(filmed.experiment);
+  const auto [found, cut] = find_trials(filmed, maps, request.finder, request.threads);
+  check_speeds(filmed.experiment, angles, found, filmed.angle_file);
+  const Files files = write_files(filmed.experiment, angles, found, maps, request.peak);
   collisions_file.stream() << files.collisions;
   if (details_file) {
     details_file->stream() << files.details;
@@ -235,41 +300,25 @@ void run_collisions(const CollisionsRequest& request) {
   }
   collisions_file.commit();
   if (to_terminal) {  // where the collisions themselves are
-    for (const std::string& sentence : mended) fmt::print(stderr, "mended: {}\n", sentence);
+    for (const std::string& sentence : filmed.mended.said) fmt::print(stderr, "mended: {}\n", sentence);
     return;
   }
 
-  std::size_t count = 0, bounces = 0, unfitted = 0;
-  std::map<std::string, std::size_t> stopped;
-  for (const FoundTrial& trial : found) {
-    count += trial.collisions.size();
-    for (const FoundCollision& c : trial.collisions) {
-      bounces += static_cast<std::size_t>(c.bounces);
-      unfitted += !c.fit;
-    }
-    if (trial.collisions.empty()) ++stopped[trial.stopped];
-  }
-  answer.say("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}", out.string(), count,
-             angles.size(), bounces, details.string());
-  for (const std::string& sentence : mended) answer.say("mended: {}", sentence);
-  answer.say("omega_minus is the {}", request.peak ? "peak of the smoothed speed (biased low by the smoothing)"
-                                                   : "stance motion extrapolated to the collision");
-  if (unfitted > 0)
-    answer.say(
-        "{} collisions have too few frames around them for the fit: omega_minus is their peak, omega_plus is left "
-        "empty",
-        unfitted);
-  say_fits(answer, found);
-  for (const auto& [why, trials] : stopped) answer.say("{} trials without a collision: {}", trials, why);
+  const Counts counts = count(found);
+  const auto limit = static_cast<std::size_t>(request.finder.collisions);
+  answer.say("{}: {} collisions of {} trials, {} bounces in between; apexes and bounces in {}", out.string(),
+             counts.collisions, angles.size(), counts.bounces, details.string());
+  for (const std::string& sentence : filmed.mended.said) answer.say("mended: {}", sentence);
+  say_found(answer, counts, found, request.peak);
   if (const auto trials = std::count(cut.begin(), cut.end(), 1); trials > 0)
     answer.say("{} trials roll on after collision {}, where --collisions stops them", trials, limit);
-  say_cut_rests(answer, source, files.collisions, angles, cut, limit);
-  if (known)
+  say_cut_rests(answer, filmed.source, files.collisions, angles, cut, limit);
+  if (filmed.known)
     say_comparison(answer,
-                   analysis::compare_collisions(*known, angles, found, request.peak, request.finder.collisions));
-  answer.fact("collisions", count);
+                   analysis::compare_collisions(*filmed.known, angles, found, request.peak, request.finder.collisions));
+  answer.fact("collisions", counts.collisions);
   answer.fact("trials", angles.size());
-  answer.fact("bounces", bounces);
+  answer.fact("bounces", counts.bounces);
   answer.file(out.string());
   answer.file(details.string());
   answer.finish({request.command, {}, 0, version()});
