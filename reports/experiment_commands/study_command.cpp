@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <iterator>
-#include <optional>
 #include <vector>
 
 #include "analysis/experiment/experiment.h"
@@ -48,37 +47,32 @@ void figure_section(PageFolder& pages, const std::string& id, const std::string&
                  {"In numbers", {}, {}, std::move(tables)}});
 }
 
-}  // namespace
-
-void run_study(const StudyRequest& request) {
-  const analysis::PaperStudyOptions& asked = request.options;
-  const PaperExperiments experiments = request.data.empty()
-                                           ? analysis::simulated_experiments(asked.seed, asked.threads)
-                                           : analysis::paper_experiments(analysis::read_experiment(request.data));
-  PageFolder pages(request.out);
-  Answer answer(request.json);
-  const std::vector<analysis::Variant> variants = analysis::paper_variants();
-  std::optional<Progress> progress(std::in_place, "study",
-                                   variants.size() * analysis::paper_study_units() + analysis::design_change_count());
-  analysis::PaperStudyOptions options = asked;
-  options.progress = [&] { progress->advance(); };
+Studies study_all(const std::vector<analysis::Variant>& variants, const PaperExperiments& experiments,
+                  const analysis::PaperStudyOptions& options) {
   Studies studies;
   for (const analysis::Variant& variant : variants)
     studies.push_back(analysis::study_variant(variant, experiments, options));
-  const analysis::Setting stops = analysis::stopping_setting();
-  const analysis::Stopping stopping = analysis::stopping(stops, options.trials, options.seed, options.threads);
-  const std::vector<analysis::DesignChange> designs =
-      analysis::design_changes(stops, options.trials, options.seed, options.threads, options.progress);
-  progress.reset();
+  return studies;
+}
 
-  const Provenance provenance{
-      request.command,
-      fmt::format(
-          "the paper's wheel; {} trials of 16 collisions a profile; {} samples a variance share (settled: an eighth); "
-          "experiment: {}",
-          options.trials, options.samples, experiments.title),
-      options.seed, version()};
-  Page& page = pages.page();
+// Holds what the page shows.
+struct Studied {
+  Studies studies;
+  analysis::Stopping stopping;
+  std::vector<analysis::DesignChange> designs;
+};
+
+Studied studied(const PaperExperiments& experiments, analysis::PaperStudyOptions options) {
+  const std::vector<analysis::Variant> variants = analysis::paper_variants();
+  Progress progress("study", variants.size() * analysis::paper_study_units() + analysis::design_change_count());
+  options.progress = [&progress] { progress.advance(); };
+  const analysis::Setting stops = analysis::stopping_setting();
+  return {study_all(variants, experiments, options),
+          analysis::stopping(stops, options.trials, options.seed, options.threads),
+          analysis::design_changes(stops, options.trials, options.seed, options.threads, options.progress)};
+}
+
+void begin_page(Page& page, const PaperExperiments& experiments, const Provenance& provenance) {
   page.title = "Dominant sources of variability in passive walking: the paper's study, regenerated";
   page.intro = {
       "T. Nanayakkara, K. Byl, H. Liu, X. Song, T. Villabona, “Dominant Sources of Variability in Passive Walking” "
@@ -88,8 +82,12 @@ void run_study(const StudyRequest& request) {
       experiments.stand_in ? "Its measurements are not public: what is called stand-in here is a simulation too."
                            : "Measured trials: " + experiments.title + "."};
   page.provenance = provenance;
+}
+
+void claims_section(PageFolder& pages, const Studies& studies, const PaperExperiments& experiments,
+                    const Provenance& provenance) {
   const std::vector<analysis::Claim> claims = analysis::paper_claims(studies, experiments);
-  page.lead = claims_sentences(claims, studies);
+  pages.page().lead = claims_sentences(claims, studies);
   pages.section(
       "claims", "Claim by claim",
       "Which of the paper’s claims come out under each law and reading. Empty: the simulation says nothing of it, "
@@ -103,6 +101,9 @@ void run_study(const StudyRequest& request) {
         {claims_table(claims, studies, experiments, provenance)}},
        {"What the law and the reading change", {}, {}, {changes_table(claims, studies, experiments, provenance)}},
        {"What counts as reproduced", {}, {}, {readings_table(claims, provenance)}}});
+}
+
+void hypotheses_section(PageFolder& pages, const Studies& studies, const Provenance& provenance) {
   const std::vector<analysis::Hypothesis> hypotheses = analysis::paper_hypotheses(studies);
   pages.section(
       "hypotheses", "The three hypotheses",
@@ -111,10 +112,19 @@ void run_study(const StudyRequest& request) {
       {hypotheses_figure(hypotheses, studies, provenance)}, {},
       {{"The verdicts, with intervals and for the steps", {}, {}, {hypotheses_table(hypotheses, studies, provenance)}},
        {"All shares of the variance", {}, {}, {variance_table(studies, provenance)}}});
+}
+
+void stopping_section(PageFolder& pages, const analysis::Stopping& stopping,
+                      const std::vector<analysis::DesignChange>& designs, const Provenance& provenance) {
   pages.section("stopping", "Why a wheel that rolls steadily stops: the law settled", stopping_story(stopping),
                 {sticking_figure(stopping, provenance), resting_figure(stopping, provenance)},
                 {design_table(designs, provenance)},
                 {{"Leg by leg in numbers", {}, {}, {stopping_table(stopping, provenance)}}});
+}
+
+// Adds the launches: Fig. 4, Fig. 6 and the leg lengths.
+void launch_sections(PageFolder& pages, const Studies& studies, const PaperExperiments& experiments,
+                     const Provenance& provenance) {
   Panels fig4 = all_variants(studies, [&](const auto& s) { return fig4_figures(s, provenance); });
   fig4.papers.insert(fig4.papers.begin(), fig4_experiment_figure(experiments, provenance));
   figure_section(pages, "fig4", "Fig. 4: two starts, one steady state",
@@ -128,6 +138,11 @@ void run_study(const StudyRequest& request) {
   pages.section("equal-legs", "Sec. IV-A: leg lengths",
                 "The runs of Fig. 6 with the measured legs and with eight equal ones.", {}, {},
                 {{"In numbers", {}, {}, {equal_legs_table(studies, provenance)}}});
+}
+
+// Adds the contact: Figs. 7 to 9.
+void contact_sections(PageFolder& pages, const Studies& studies, const PaperExperiments& experiments,
+                      const Provenance& provenance) {
   figure_section(pages, "fig7", "Fig. 7: spreads of restitution and friction",
                  "From panel to panel friction scatters more, from line to line restitution does.",
                  all_variants(studies, [&](const auto& s) { return fig7_figures(s, experiments, provenance); }),
@@ -139,6 +154,31 @@ void run_study(const StudyRequest& request) {
                  "From panel to panel friction grows, from line to line restitution does.",
                  all_variants(studies, [&](const auto& s) { return fig9_figures(s, experiments, provenance); }),
                  fig9_table(studies, provenance));
+}
+
+}  // namespace
+
+void run_study(const StudyRequest& request) {
+  const analysis::PaperStudyOptions& options = request.options;
+  const PaperExperiments experiments = request.data.empty()
+                                           ? analysis::simulated_experiments(options.seed, options.threads)
+                                           : analysis::paper_experiments(analysis::read_experiment(request.data));
+  PageFolder pages(request.out);
+  Answer answer(request.json);
+  const auto [studies, stopping, designs] = studied(experiments, options);
+  const Provenance provenance{
+      request.command,
+      fmt::format(
+          "the paper's wheel; {} trials of 16 collisions a profile; {} samples a variance share (settled: an eighth); "
+          "experiment: {}",
+          options.trials, options.samples, experiments.title),
+      options.seed, version()};
+  begin_page(pages.page(), experiments, provenance);
+  claims_section(pages, studies, experiments, provenance);
+  hypotheses_section(pages, studies, provenance);
+  stopping_section(pages, stopping, designs, provenance);
+  launch_sections(pages, studies, experiments, provenance);
+  contact_sections(pages, studies, experiments, provenance);
   pages.write_index();
   pages.finish(answer);
 }
