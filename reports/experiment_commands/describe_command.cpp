@@ -15,6 +15,58 @@
 
 namespace metastable::reports {
 
+namespace {
+
+void conditions_section(PageFolder& pages, const analysis::Description& description, const Table& conditions,
+                        const Provenance& provenance) {
+  std::vector<Fold> folds{{"Every condition in full", {}, {}, {conditions}},
+                          {"The speeds collision by collision", {}, {}, {profiles_table(description, provenance)}}};
+  if (!description.comparisons.empty())
+    folds.push_back(
+        {"Do they end in one steady state? The tests",
+         {"A large P says that two conditions cannot be told apart; the interval of the difference says how "
+          "far apart they may still be."},
+         {},
+         {tests_table(description, provenance)}});
+  pages.section("conditions", "How fast they roll",
+                "Mean speeds collision by collision; they meet where a steady state is reached.",
+                {profiles_figure(description, provenance)}, {short_table(description, provenance)}, std::move(folds));
+}
+
+// Adds what single steps, legs and trials show, as far as the data say it.
+void measured_sections(PageFolder& pages, const analysis::Description& description, const Provenance& provenance) {
+  std::vector<Figure> maps;
+  for (const analysis::ConditionDescription& c : description.conditions)
+    if (auto figure = measured_map_figure(c, provenance)) maps.push_back(std::move(*figure));
+  if (!maps.empty())
+    pages.section("return-maps", "Return maps", "Each dot is one step; a steady state is a cloud on the diagonal.",
+                  maps, {});
+  if (const auto figure = legs_figure(description, provenance))
+    pages.section("legs", "Leg by leg", "Legs of one length and one contact would give one level.", {*figure}, {},
+                  {{"The speeds of the legs in numbers", {}, {}, {legs_table(description, provenance)}}});
+  if (const auto figure = survival_curves_figure(description, provenance))
+    pages.section("survival", "How long trials last",
+                  "The curve falls where trials rest; bands are 95 % intervals, one collision at a time.", {*figure},
+                  {}, {{"The curve in numbers", {}, {}, {survival_table(description, provenance)}}});
+}
+
+void contact_section(PageFolder& pages, const Table& fits) {
+  pages.section("contact", "Restitution and friction",
+                "What the trials say about both distributions under the nominal law, and which of their numbers they "
+                "cannot tell apart.",
+                {}, {fits});
+}
+
+void laws_section(PageFolder& pages, const analysis::LawComparison& laws, const Provenance& provenance) {
+  std::vector<Table> beside{laws_table(laws, provenance)};
+  if (!laws.legs.empty()) beside.push_back(landings_table(laws.legs, provenance));
+  pages.section("laws", "The contact laws beside it",
+                "A law that describes this wheel gives its speed, its spread and its share of rests at once.", {},
+                std::move(beside));
+}
+
+}  // namespace
+
 DescribeAnswer answer_describe(const analysis::Experiment& experiment, const DescribeRequest& request,
                                const Provenance& provenance) {
   DescribeAnswer answer{analysis::describe(experiment, request.options), {}, {}};
@@ -53,44 +105,10 @@ void run_describe(const DescribeRequest& request) {
   page.title = experiment.title;
   page.lead = description_sentences(description);
   page.provenance = provenance;
-  std::vector<Fold> folds{{"Every condition in full", {}, {}, {tables[0]}},
-                          {"The speeds collision by collision", {}, {}, {profiles_table(description, provenance)}}};
-  if (!description.comparisons.empty())
-    folds.push_back(
-        {"Do they end in one steady state? The tests",
-         {"A large P says that two conditions cannot be told apart; the interval of the difference says how "
-          "far apart they may still be."},
-         {},
-         {tests_table(description, provenance)}});
-  pages->section("conditions", "How fast they roll",
-                 "Mean speeds collision by collision; they meet where a steady state is reached.",
-                 {profiles_figure(description, provenance)}, {short_table(description, provenance)}, std::move(folds));
-  std::vector<Figure> maps;
-  for (const analysis::ConditionDescription& c : description.conditions)
-    if (auto figure = measured_map_figure(c, provenance)) maps.push_back(std::move(*figure));
-  if (!maps.empty())
-    pages->section("return-maps", "Return maps", "Each dot is one step; a steady state is a cloud on the diagonal.",
-                   maps, {});
-  if (const auto figure = legs_figure(description, provenance))
-    pages->section("legs", "Leg by leg", "Legs of one length and one contact would give one level.", {*figure}, {},
-                   {{"The speeds of the legs in numbers", {}, {}, {legs_table(description, provenance)}}});
-  if (const auto figure = survival_curves_figure(description, provenance))
-    pages->section("survival", "How long trials last",
-                   "The curve falls where trials rest; bands are 95 % intervals, one collision at a time.", {*figure},
-                   {}, {{"The curve in numbers", {}, {}, {survival_table(description, provenance)}}});
-  if (!description.fits.empty())
-    pages->section(
-        "contact", "Restitution and friction",
-        "What the trials say about both distributions under the nominal law, and which of their numbers they "
-        "cannot tell apart.",
-        {}, {fits_table(description, experiment.contact.law, provenance)});
-  if (laws) {
-    std::vector<Table> beside{laws_table(*laws, provenance)};
-    if (!laws->legs.empty()) beside.push_back(landings_table(laws->legs, provenance));
-    pages->section("laws", "The contact laws beside it",
-                   "A law that describes this wheel gives its speed, its spread and its share of rests at once.", {},
-                   std::move(beside));
-  }
+  conditions_section(*pages, description, tables.front(), provenance);
+  measured_sections(*pages, description, provenance);
+  if (!description.fits.empty()) contact_section(*pages, fits_table(description, experiment.contact.law, provenance));
+  if (laws) laws_section(*pages, *laws, provenance);
   pages->write_index();
   pages->finish(answer);
 }
