@@ -8,7 +8,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <charconv>
 #include <chrono>
 #include <ctime>
@@ -171,6 +170,177 @@ std::string trimmed(std::string text) {
   return text;
 }
 
+// Says what a run was made with; equal texts make equal cases.
+std::string plan_text(const analysis::BlindSize& size, std::uint64_t seed) {
+  std::string text =
+      fmt::format("seed {}\neffect {}\nnone {}\npairs {}\noutside {}\nleft_out {}\n", seed,
+                  size.per_effect_and_strength, size.none, size.pairs, size.outside, size.left_out_per_effect);
+  // Plans without these kinds, or of one law, are written as they were before there were any.
+  if (size.mixed > 0) text += fmt::format("mixed {}\n", size.mixed);
+  if (size.many > 0) text += fmt::format("many {}\n", size.many);
+  if (size.laws != analysis::BlindSize{}.laws)
+    for (const dynamics::Law law : size.laws) text += fmt::format("law {}\n", dynamics::law_name(law));
+  return text;
+}
+
+// Makes the folders of a run, or finds that they are there; returns the run's seed.
+std::uint64_t begin_run(const Places& places, const BlindRequest& request) {
+  std::uint64_t seed = request.seed ? *request.seed : entropy();
+  if (analysis::blind_plan(request.size, seed).empty())
+    throw std::invalid_argument("blind make: no case of any kind is asked for");
+  make_folder(places.sealed);
+  make_folder(places.cases);
+  if (const std::optional<std::string> before = file_text(places.plan)) {
+    if (!request.seed) std::sscanf(before->c_str(), "seed %lu", &seed);
+    if (*before != plan_text(request.size, seed))
+      throw OutputError(places.sealed, "belongs to a run of another seed or size; choose another folder");
+  } else {
+    write_file(places.plan, plan_text(request.size, seed));
+  }
+  return seed;
+}
+
+void make_case(const Places& places, const analysis::BlindPlan& plan, int number, std::uint64_t seed) {
+  analysis::BlindCase made = analysis::blind_case(plan, number, seed, [](const auto& design, const auto& effects) {
+    // Under settled an experiment's likelihood takes seconds to set up.
+    const bool slow = design.conditions.front().setting.law == dynamics::Law::settled;
+    return analysis::expected_power(design, effects, slow ? 1 : 3);
+  });
+  analysis::complete_truth(made);
+  write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
+}
+
+// Returns those of the cases 1 to `planned` that are not complete.
+std::vector<int> missing_cases(const Places& places, std::size_t planned) {
+  std::vector<int> missing;
+  for (int number = 1; static_cast<std::size_t>(number) <= planned; ++number)
+    if (!fs::exists(places.case_folder(number) / "seal.txt")) missing.push_back(number);
+  return missing;
+}
+
+// Runs the tool on a case; returns its exit code. @throws Interrupted, with nothing left
+int run_tool(std::vector<std::string> words, const Places& places, int number, const fs::path& fresh,
+             const CaseProgress& progress) {
+  const fs::path folder = places.case_folder(number), errors = places.errors(number);
+  words.insert(words.end(), {"diagnose", folder.string(), "--json", fresh.string(), "--threads", "1"});
+  if (const std::optional<std::string> catalogue = file_text(folder / "catalogue.txt")) {
+    words.emplace_back("--catalogue");
+    words.push_back(trimmed(*catalogue));
+  }
+  const int code = run_program(words, errors);
+  try {
+    progress.check();
+    if (code == interrupted_code) throw Interrupted(SIGINT);  // Ctrl-C reached the tool first
+  } catch (...) {
+    fs::remove(errors);
+    throw;
+  }
+  return code;
+}
+
+// Enters what the tool wrote to `fresh` as the answer to a case. Returns whether it did; a failed tool's errors stay
+// beside where the answer would be.
+bool enter_answer(const Places& places, int number, int code, const fs::path& fresh,
+                  std::vector<RecordedAnswer>& record) {
+  const fs::path errors = places.errors(number);
+  const std::optional<std::string> text = file_text(fresh);
+  if (code != 0 || !text) {
+    write_file(errors, fmt::format("{}{}{}\n", file_text(errors).value_or(""), failed_line, code));
+    return false;
+  }
+  read_answer(fresh.string(), *text);
+  fs::rename(fresh, places.answer(number));
+  fs::remove(errors);
+  record.push_back(record_answer(record.empty() ? "" : record.back().chain, number, now(), *text));
+  std::string lines;
+  for (const RecordedAnswer& entry : record) lines += record_line(entry);
+  write_file(places.record, lines);
+  return true;
+}
+
+// Returns the truths of the cases, whose seals are whole.
+std::vector<analysis::BlindTruth> unsealed(const Places& places, const std::vector<int>& numbers) {
+  std::vector<analysis::BlindTruth> truths;
+  for (const int number : numbers) {
+    const fs::path path = places.truth(number);
+    const std::optional<std::string> text = file_text(path);
+    if (!text) throw OutputError(path, "there is no such sealed truth");
+    if (sha256(*text) != trimmed(file_text(places.case_folder(number) / "seal.txt").value_or("")))
+      throw std::invalid_argument(fmt::format("{}: the seal of case {} is broken", path.string(), number));
+    truths.push_back(read_truth(path.string(), *text));
+  }
+  return truths;
+}
+
+// Returns the recorded answers by the number of their case. They are as they were recorded.
+std::map<int, analysis::BlindAnswer> recorded_answers(const Places& places, const std::vector<RecordedAnswer>& record) {
+  std::map<int, analysis::BlindAnswer> given;
+  for (const RecordedAnswer& entry : record) {
+    const fs::path path = places.answer(entry.number);
+    const std::optional<std::string> text = file_text(path);
+    if (!text)
+      throw std::invalid_argument(fmt::format("{}: the answer to case {} is missing", path.string(), entry.number));
+    if (sha256(*text) != entry.digest)
+      throw std::invalid_argument(
+          fmt::format("{}: the answer to case {} was changed since it was recorded", path.string(), entry.number));
+    given[entry.number] = read_answer(path.string(), *text);
+  }
+  return given;
+}
+
+// Closes the record, from the first opening on. @throws std::invalid_argument if it has grown since
+void close_record(const Places& places, const std::vector<RecordedAnswer>& record) {
+  const std::string head = fmt::format("{},{}\n", record.size(), record.back().chain);
+  if (const std::optional<std::string> marker = file_text(places.marker)) {
+    if (*marker != head)
+      throw std::invalid_argument(
+          fmt::format("{}: answers were written after the truths had been opened", places.record.string()));
+  } else {
+    write_file(places.marker, head);
+  }
+}
+
+// Holds the cases that were reached, each with what was answered; nothing where the tool failed.
+struct Reached {
+  std::vector<analysis::BlindTruth> truths;
+  std::vector<std::optional<analysis::BlindAnswer>> answers;
+};
+
+// Leaves out the cases that were not reached; one that the tool failed on is an answer, and a wrong one.
+Reached reached_cases(const Places& places, const std::vector<analysis::BlindTruth>& truths,
+                      const std::map<int, analysis::BlindAnswer>& given) {
+  Reached reached;
+  for (const analysis::BlindTruth& truth : truths) {
+    const bool answered = given.contains(truth.number);
+    if (!answered && !tool_failed(places, truth.number)) continue;
+    reached.truths.push_back(truth);
+    reached.answers.push_back(answered ? std::optional(given.at(truth.number)) : std::nullopt);
+  }
+  return reached;
+}
+
+void complete_truths(const Places& places, std::vector<analysis::BlindTruth>& truths, int threads) {
+  markov::parallel_for(truths.size(), threads, [&places, &truths](std::size_t i) {
+    analysis::BlindTruth& truth = truths[i];
+    if (truth.effects.size() < 2 && truth.kind != analysis::BlindKind::mixed) return;
+    analysis::complete_each(truth, analysis::read_experiment(places.case_folder(truth.number)));
+  });
+}
+
+// Writes the page of the tables; returns its path.
+std::string write_page(const fs::path& out, const std::vector<Table>& tables, const Provenance& provenance) {
+  PageFolder folder(out);
+  Page& page = folder.page();
+  page.title = "Blind check of the diagnosis";
+  page.intro = {
+      "Cases from the virtual laboratories, which share no formula with the models. Truths were sealed before "
+      "the diagnosis saw the folders; seals and the record of answers were checked."};
+  page.provenance = provenance;
+  for (const Table& table : tables) folder.section(table.id + "-section", table.title, "", {}, {table});
+  folder.write_index();
+  return (out / "index.html").string();
+}
+
 }  // namespace
 
 BlindMade make_blind(const BlindRequest& request, const CaseProgress& progress) {
@@ -178,59 +348,20 @@ BlindMade make_blind(const BlindRequest& request, const CaseProgress& progress) 
   if (lies_in(places.sealed, places.run) || same_file(places.sealed, places.run))
     throw std::invalid_argument(
         fmt::format("--sealed: {} lies inside {}; truths must be kept apart", places.sealed.string(), request.folder));
-  std::uint64_t seed = request.seed ? *request.seed : entropy();
-  const analysis::BlindSize& size = request.size;
-  std::string laws;
-  for (const dynamics::Law law : size.laws) laws += fmt::format("law {}\n", dynamics::law_name(law));
-  if (size.laws == analysis::BlindSize{}.laws) laws.clear();  // as plans were written when there was one law
-  const auto plan_text = [&](std::uint64_t with) {
-    std::string text =
-        fmt::format("seed {}\neffect {}\nnone {}\npairs {}\noutside {}\nleft_out {}\n", with,
-                    size.per_effect_and_strength, size.none, size.pairs, size.outside, size.left_out_per_effect);
-    // Plans without these kinds are written as they were before there were any.
-    if (size.mixed > 0) text += fmt::format("mixed {}\n", size.mixed);
-    if (size.many > 0) text += fmt::format("many {}\n", size.many);
-    return text + laws;
-  };
-  if (analysis::blind_plan(size, seed).empty())
-    throw std::invalid_argument("blind make: no case of any kind is asked for");
-  make_folder(places.sealed);
-  make_folder(places.cases);
-  if (const std::optional<std::string> before = file_text(places.plan)) {
-    if (!request.seed) std::sscanf(before->c_str(), "seed %lu", &seed);
-    if (*before != plan_text(seed))
-      throw OutputError(places.sealed, "belongs to a run of another seed or size; choose another folder");
-  } else {
-    write_file(places.plan, plan_text(seed));
-  }
-  const std::vector<analysis::BlindPlan> plan = analysis::blind_plan(size, seed);
-  const auto made_before = [&](std::size_t i) {
-    return fs::exists(places.case_folder(static_cast<int>(i) + 1) / "seal.txt");
-  };
-  std::vector<std::size_t> open;
-  for (std::size_t i = 0; i < plan.size(); ++i)
-    if (!made_before(i)) open.push_back(i);
+  const std::uint64_t seed = begin_run(places, request);
+  const std::vector<analysis::BlindPlan> plan = analysis::blind_plan(request.size, seed);
+  const std::vector<int> open = missing_cases(places, plan.size());
   write_file(places.planned, fmt::format("{}\n", plan.size()));
   progress.begin(plan.size(), plan.size() - open.size());
-  const auto make = [&](std::size_t k) {
-    progress.check();
-    const std::size_t i = open[k];
-    const int number = static_cast<int>(i) + 1;
-    analysis::BlindCase made = analysis::blind_case(plan[i], number, seed, [](const auto& design, const auto& effects) {
-      // Under settled an experiment's likelihood takes seconds to set up.
-      const bool slow = design.conditions.front().setting.law == dynamics::Law::settled;
-      return analysis::expected_power(design, effects, slow ? 1 : 3);
-    });
-    analysis::complete_truth(made);
-    write_case(places, made, sha256(fmt::format("salt {} {}", seed, number)));
-    progress.done();
-  };
   try {
-    markov::parallel_for(open.size(), request.threads, make);
+    markov::parallel_for(open.size(), request.threads, [&](std::size_t k) {
+      progress.check();
+      make_case(places, plan[static_cast<std::size_t>(open[k] - 1)], open[k], seed);
+      progress.done();
+    });
   } catch (const Interrupted& interrupted) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < plan.size(); ++i) kept += made_before(i);
-    throw Interrupted(interrupted, fmt::format("{} of {} cases kept; the same command goes on", kept, plan.size()));
+    throw Interrupted(interrupted, fmt::format("{} of {} cases kept; the same command goes on",
+                                               plan.size() - missing_cases(places, plan.size()).size(), plan.size()));
   }
   return {plan.size(), places.sealed.string()};
 }
@@ -251,46 +382,18 @@ BlindAnswered answer_blind(const BlindRequest& request, const CaseProgress& prog
   const std::vector<std::string> tool =
       request.tool.empty() ? std::vector{fs::read_symlink("/proc/self/exe").string()} : request.tool;
   std::mutex mutex;
-  std::atomic<std::size_t> failed = 0;
+  std::size_t failed = 0;
   progress.begin(open.size(), 0);
-  const auto answer_one = [&](std::size_t i) {
-    progress.check();
-    const int number = open[i];
-    const fs::path folder = places.case_folder(number), answer = places.answer(number);
-    const fs::path fresh = answer.string() + ".new", errors = places.errors(number);
-    std::vector<std::string> words = tool;
-    words.insert(words.end(), {"diagnose", folder.string(), "--json", fresh.string(), "--threads", "1"});
-    if (const std::optional<std::string> catalogue = file_text(folder / "catalogue.txt")) {
-      words.emplace_back("--catalogue");
-      words.push_back(trimmed(*catalogue));
-    }
-    const int code = run_program(words, errors);
-    try {
-      progress.check();
-      if (code == interrupted_code) throw Interrupted(SIGINT);  // Ctrl-C reached the tool first
-    } catch (...) {
-      fs::remove(errors);
-      throw;
-    }
-    const std::lock_guard lock(mutex);
-    const std::optional<std::string> text = file_text(fresh);
-    if (code != 0 || !text) {
-      ++failed;  // its errors stay beside where the answer would be
-      write_file(errors, fmt::format("{}{}{}\n", file_text(errors).value_or(""), failed_line, code));
-    } else {
-      read_answer(fresh.string(), *text);
-      fs::rename(fresh, answer);
-      fs::remove(errors);
-      record.push_back(record_answer(record.empty() ? "" : record.back().chain, number, now(), *text));
-      std::string lines;
-      for (const RecordedAnswer& entry : record) lines += record_line(entry);
-      write_file(places.record, lines);
-    }
-    progress.done();
-  };
   const std::size_t planned = planned_cases(places, numbers.size());
   try {
-    markov::parallel_for(open.size(), request.threads, answer_one);
+    markov::parallel_for(open.size(), request.threads, [&](std::size_t i) {
+      progress.check();
+      const fs::path fresh = places.answer(open[i]).string() + ".new";
+      const int code = run_tool(tool, places, open[i], fresh, progress);
+      const std::lock_guard lock(mutex);
+      if (!enter_answer(places, open[i], code, fresh, record)) ++failed;
+      progress.done();
+    });
   } catch (const Interrupted& interrupted) {
     throw Interrupted(interrupted,
                       fmt::format("{} of {} cases answered; the same command goes on", record.size(), planned));
@@ -301,81 +404,32 @@ BlindAnswered answer_blind(const BlindRequest& request, const CaseProgress& prog
 BlindOpened open_blind(const BlindRequest& request, Unanswered unanswered) {
   const Places places(request);
   const std::vector<int> numbers = case_numbers(places);
-  std::vector<analysis::BlindTruth> truths;
-  for (const int number : numbers) {
-    const fs::path path = places.truth(number);
-    const std::optional<std::string> text = file_text(path);
-    if (!text) throw OutputError(path, "there is no such sealed truth");
-    if (sha256(*text) != trimmed(file_text(places.case_folder(number) / "seal.txt").value_or("")))
-      throw std::invalid_argument(fmt::format("{}: the seal of case {} is broken", path.string(), number));
-    truths.push_back(read_truth(path.string(), *text));
-  }
-  std::map<int, analysis::BlindAnswer> given;
+  const std::vector<analysis::BlindTruth> truths = unsealed(places, numbers);
   const std::optional<FileLock> alone =
       fs::is_directory(places.answers) ? std::optional(lock_answers(places)) : std::nullopt;
   const std::vector<RecordedAnswer> record = checked_record(places);
   if (record.empty()) throw OutputError(places.record, "no case is answered; `blind answer` does that");
-  for (const RecordedAnswer& entry : record) {
-    const fs::path path = places.answer(entry.number);
-    const std::optional<std::string> text = file_text(path);
-    if (!text)
-      throw std::invalid_argument(fmt::format("{}: the answer to case {} is missing", path.string(), entry.number));
-    if (sha256(*text) != entry.digest)
-      throw std::invalid_argument(
-          fmt::format("{}: the answer to case {} was changed since it was recorded", path.string(), entry.number));
-    given[entry.number] = read_answer(path.string(), *text);
-  }
-  const auto reached_cases = static_cast<std::size_t>(std::ranges::count_if(
-      numbers, [&](int number) { return given.contains(number) || tool_failed(places, number); }));
+  Reached reached = reached_cases(places, truths, recorded_answers(places, record));
   const std::size_t planned = planned_cases(places, numbers.size());
-  if (reached_cases < planned && unanswered == Unanswered::refused && !fs::exists(places.marker))
+  if (reached.truths.size() < planned && unanswered == Unanswered::refused && !fs::exists(places.marker))
     throw std::invalid_argument(fmt::format(
         "{}: {} of {} cases are answered, and opening the truths ends the run: answer the others first "
         "(`blind make` where they are not made yet, `blind answer`), or give --partial to grade these alone",
-        request.folder, reached_cases, planned));
-  // From the first opening on the record is closed.
-  const std::string head = fmt::format("{},{}\n", record.size(), record.back().chain);
-  if (const std::optional<std::string> marker = file_text(places.marker)) {
-    if (*marker != head)
-      throw std::invalid_argument(
-          fmt::format("{}: answers were written after the truths had been opened", places.record.string()));
-  } else {
-    write_file(places.marker, head);
-  }
-  // Cases that were not reached are left out; one that the tool failed on is an answer, and a wrong one.
-  std::vector<analysis::BlindTruth> reached;
-  std::vector<std::optional<analysis::BlindAnswer>> answers;
-  for (const analysis::BlindTruth& truth : truths) {
-    const bool answered = given.contains(truth.number);
-    if (!answered && !tool_failed(places, truth.number)) continue;
-    reached.push_back(truth);
-    answers.push_back(answered ? std::optional(given.at(truth.number)) : std::nullopt);
-  }
-  markov::parallel_for(reached.size(), request.threads, [&](std::size_t i) {
-    analysis::BlindTruth& truth = reached[i];
-    if (truth.effects.size() < 2 && truth.kind != analysis::BlindKind::mixed) return;
-    analysis::complete_each(truth, analysis::read_experiment(places.case_folder(truth.number)));
-  });
+        request.folder, reached.truths.size(), planned));
+  close_record(places, record);
+  complete_truths(places, reached.truths, request.threads);
 
-  const analysis::BlindGrades grades = analysis::grade(reached, answers);
   std::uint64_t seed = 0;
   std::sscanf(file_text(places.plan).value_or("seed 0").c_str(), "seed %lu", &seed);
   const Provenance provenance{
       request.command,
       fmt::format("{} cases, {} answered; record {}", numbers.size(), record.size(), record.back().chain), seed,
       version()};
-  const fs::path out = request.out.empty() ? places.run / "report" : fs::path(request.out);
-  PageFolder folder(out);
-  Page& page = folder.page();
-  page.title = "Blind check of the diagnosis";
-  page.intro = {
-      "Cases from the virtual laboratories, which share no formula with the models. Truths were sealed before "
-      "the diagnosis saw the folders; seals and the record of answers were checked."};
-  page.provenance = provenance;
-  std::vector<Table> tables = blind_tables(grades, reached, answers, provenance);
-  for (const Table& table : tables) folder.section(table.id + "-section", table.title, "", {}, {table});
-  folder.write_index();
-  return {std::move(tables), provenance, (out / "index.html").string()};
+  std::vector<Table> tables =
+      blind_tables(analysis::grade(reached.truths, reached.answers), reached.truths, reached.answers, provenance);
+  const std::string page =
+      write_page(request.out.empty() ? places.run / "report" : fs::path(request.out), tables, provenance);
+  return {std::move(tables), provenance, page};
 }
 
 namespace {
