@@ -106,68 +106,88 @@ std::optional<Series> rigid_bodies_of(const Table& table, const std::vector<doub
   return points;
 }
 
+bool any_finite(const std::vector<double>& values) {
+  return std::ranges::any_of(values, [](double value) { return std::isfinite(value); });
+}
+
+// Holds the two axes that are shown, the second as lines or rows of a map; further ones stay at their first value.
+class ShownPoints {
+ public:
+  ShownPoints(const std::vector<SweepFileAxis>& axes, const Table& table) : axes_(axes), table_(table) {
+    for (std::size_t a = 1; a < axes.size(); ++a) stride_ *= axes[a].values.size();
+    for (std::size_t a = 2; a < axes.size(); ++a) line_stride_ *= axes[a].values.size();
+  }
+  const SweepFileAxis& across() const { return axes_.front(); }
+  // The second axis; nothing where there is one alone, whose points are a single line.
+  const SweepFileAxis* down() const { return axes_.size() > 1 ? &axes_[1] : nullptr; }
+  std::size_t lines() const { return down() ? down()->values.size() : 1; }
+  // Returns the row of the table that holds point i of line k.
+  std::size_t row(std::size_t i, std::size_t k) const { return i * stride_ + (down() ? k * line_stride_ : 0); }
+  // Returns a column of line k behind the coordinates: 0 expected steps, 1 and 2 their interval.
+  std::vector<double> line(std::size_t k, std::size_t column) const {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < across().values.size(); ++i)
+      values.push_back(value_of(table_.rows[row(i, k)][axes_.size() + column]));
+    return values;
+  }
+
+ private:
+  const std::vector<SweepFileAxis>& axes_;
+  const Table& table_;
+  std::size_t stride_ = 1, line_stride_ = 1;
+};
+
+// Draws a map with a number in every cell. Returns whether one of them is finite.
+bool draw_map(Figure& figure, const ShownPoints& points) {
+  const SweepFileAxis &across = points.across(), &down = *points.down();
+  figure.y = {down.label, down.unit};
+  figure.width = 960;
+  HeatMap map{across.values, down.values, {}, "expected steps", true};
+  for (std::size_t k = 0; k < points.lines(); ++k) map.value.push_back(points.line(k, 0));
+  const bool finite = std::ranges::any_of(map.value, any_finite);
+  figure.heat_map = std::move(map);
+  return finite;
+}
+
+// Draws a line of steps for each value of the second axis, or some of them. Returns whether there is one.
+bool draw_lines(Figure& figure, const ShownPoints& points, const SweepFile& sweep, const Table& table) {
+  const SweepFileAxis& across = points.across();
+  figure.y = {"expected steps", "", true};
+  figure.legend = Legend::below;
+  const std::size_t shown = std::min(points.lines(), most_lines);
+  bool rolled = false;  // has its place in the legend
+  for (std::size_t j = 0; j < shown; ++j) {
+    const std::size_t k = shown > 1 ? j * (points.lines() - 1) / (shown - 1) : 0;
+    const int colour = static_cast<int>(j);
+    Series line{"", Style::line, across.values, points.line(k, 0), {}, {}, colour};
+    if (!any_finite(line.y)) continue;
+    if (points.down())
+      line.label = fmt::format("{} {}", points.down()->label, points.down()->values[k]);
+    else if (sweep.remark)
+      line.label = "law " + sweep.law;
+    figure.series.push_back({"", Style::band, across.values, {}, points.line(k, 1), points.line(k, 2), colour});
+    figure.series.push_back(std::move(line));
+    if (auto rigid = rigid_bodies_of(table, across.values, shown == 1 ? 1 : colour,
+                                     [&points, k](std::size_t i) { return points.row(i, k); })) {
+      if (rolled) rigid->label.clear();
+      rolled = true;
+      figure.series.push_back(std::move(*rigid));
+    }
+  }
+  return !figure.series.empty();
+}
+
 // Returns nothing if no point has a finite number of steps.
 std::optional<Figure> figure_of(const SweepFile& sweep, const Table& table) {
-  const std::vector<SweepFileAxis>& axes = sweep.axes;
+  const ShownPoints points(sweep.axes, table);
   Figure figure;
   figure.id = "sweep";
   figure.title = "Expected steps before failure" + by_law(sweep);
   figure.provenance = sweep.provenance;
-  // These two axes are shown; further ones stay at their first value.
-  const SweepFileAxis& across = axes.front();
-  const std::size_t second = axes.size() > 1 ? 1 : 0;
-  std::size_t stride = 1, stride_second = 1;
-  for (std::size_t a = 1; a < axes.size(); ++a) stride *= axes[a].values.size();
-  for (std::size_t a = 2; a < axes.size(); ++a) stride_second *= axes[a].values.size();
-  const std::size_t lines = second == 1 ? axes[1].values.size() : 1;
-  // Behind the coordinates: 0 expected steps, 1 and 2 their interval.
-  const auto number_at = [&](std::size_t i, std::size_t k, std::size_t column) {
-    return value_of(table.rows[i * stride + (second == 1 ? k * stride_second : 0)][axes.size() + column]);
-  };
-  figure.x = {across.label, across.unit};
-  const bool mapped = second == 1 && lines > 4 && lines <= most_map_rows && across.values.size() <= most_map_columns;
-  if (mapped) {
-    figure.y = {axes[1].label, axes[1].unit};
-    HeatMap map{across.values, axes[1].values, {}, "expected steps", true};
-    for (std::size_t k = 0; k < lines; ++k) {
-      map.value.emplace_back();
-      for (std::size_t i = 0; i < across.values.size(); ++i) map.value.back().push_back(number_at(i, k, 0));
-    }
-    const auto finite = [](const std::vector<double>& row) {
-      return std::any_of(row.begin(), row.end(), [](double value) { return std::isfinite(value); });
-    };
-    if (std::none_of(map.value.begin(), map.value.end(), finite)) return std::nullopt;
-    figure.heat_map = std::move(map);
-    figure.width = 960;
-    return figure;
-  }
-  figure.y = {"expected steps", "", true};
-  const std::size_t shown = std::min(lines, most_lines);
-  bool rolled = false;  // has its place in the legend
-  for (std::size_t j = 0; j < shown; ++j) {
-    const std::size_t k = shown > 1 ? j * (lines - 1) / (shown - 1) : 0;
-    Series band{"", Style::band, across.values, {}, {}, {}, static_cast<int>(j)};
-    Series line{"", Style::line, across.values, {}, {}, {}, static_cast<int>(j)};
-    if (sweep.remark && second != 1) line.label = "law " + sweep.law;
-    if (second == 1) line.label = fmt::format("{} {}", axes[1].label, axes[1].values[k]);
-    for (std::size_t i = 0; i < across.values.size(); ++i) {
-      line.y.push_back(number_at(i, k, 0));
-      band.lower.push_back(number_at(i, k, 1));
-      band.upper.push_back(number_at(i, k, 2));
-    }
-    if (std::none_of(line.y.begin(), line.y.end(), [](double value) { return std::isfinite(value); })) continue;
-    figure.series.push_back(std::move(band));
-    figure.series.push_back(std::move(line));
-    if (auto points = rigid_bodies_of(table, across.values, static_cast<int>(shown == 1 ? 1 : j), [&](std::size_t i) {
-          return i * stride + (second == 1 ? k * stride_second : 0);
-        })) {
-      if (rolled) points->label.clear();
-      rolled = true;
-      figure.series.push_back(std::move(*points));
-    }
-  }
-  if (figure.series.empty()) return std::nullopt;
-  figure.legend = Legend::below;
+  figure.x = {points.across().label, points.across().unit};
+  const bool mapped = points.down() && points.lines() > 4 && points.lines() <= most_map_rows &&
+                      points.across().values.size() <= most_map_columns;
+  if (!(mapped ? draw_map(figure, points) : draw_lines(figure, points, sweep, table))) return std::nullopt;
   return figure;
 }
 
@@ -177,71 +197,106 @@ std::size_t size_of(const SweepFile& sweep) {
   return size;
 }
 
-}  // namespace
+// Holds the files that a sweep writes beside its JSON.
+struct SweepPaths {
+  std::filesystem::path out, partial, picture;
+};
 
-void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
+// @throws std::invalid_argument, OutputError if one would be written over the other
+SweepPaths paths_of(const SweepFile& sweep) {
   if (sweep.out == "-")
     throw std::invalid_argument("--out: a sweep keeps its points in a file as they come; --json - prints them");
   // Of a link, what it leads to is written and locked.
   const std::filesystem::path out = std::filesystem::is_symlink(sweep.out)
                                         ? std::filesystem::weakly_canonical(sweep.out)
                                         : std::filesystem::path(sweep.out);
-  const std::filesystem::path partial = out.string() + ".partial";
-  const std::size_t size = size_of(sweep);
-  std::filesystem::path picture = out;
-  picture.replace_extension(".svg");
-  if (picture == out)
+  SweepPaths paths{out, out.string() + ".partial", out};
+  paths.picture.replace_extension(".svg");
+  if (paths.picture == out)
     throw OutputError(out, "the figure beside the numbers has that name; give the numbers another ending, .csv");
-  for (const std::filesystem::path& own : {picture, partial})
+  for (const std::filesystem::path& own : {paths.picture, paths.partial})
     if (same_file(sweep.json, own))
       throw std::invalid_argument(fmt::format("--json: {} is what --out {} writes too", sweep.json, sweep.out));
-  Answer answer(sweep.json);
-  std::vector<std::string> rows = rows_of(out, sweep.head, "holds another sweep");
-  std::size_t had = rows.size();
-  if (had < size) {
-    const FileLock lock(partial, FileLock::Missing::create);
-    if (!lock.held()) throw OutputError(partial, "another sweep is writing it");
-    // They are read again: the other one may have ended in between.
-    rows = rows_of(out, sweep.head, "holds another sweep");
-    if (rows.empty()) rows = rows_of(partial, sweep.head, "belongs to another sweep");
-    had = rows.size();
-    std::string so_far = sweep.head;
-    for (const std::string& one : rows) so_far += one;
-    const bool kept = read_file(partial).starts_with(so_far);
-    std::filesystem::resize_file(partial, kept ? so_far.size() : 0);
-    std::ofstream journal(partial, std::ios::binary | std::ios::app);
-    const auto append = [&](const std::string& text) {
-      errno = 0;
-      if (!(journal << text << std::flush))
-        throw OutputError(partial, errno != 0 ? std::strerror(errno) : "write error");
-    };
+  return paths;
+}
+
+// Holds the file that grows row by row until it takes its place.
+class Journal {
+ public:
+  // Keeps of the file what is `so_far`, the rest of it is none of the sweep's.
+  Journal(const std::filesystem::path& file, const std::string& so_far) : file_(file) {
+    const bool kept = read_file(file).starts_with(so_far);
+    std::filesystem::resize_file(file, kept ? so_far.size() : 0);
+    stream_.open(file, std::ios::binary | std::ios::app);
     if (!kept) append(so_far);
-    try {
-      compute(had, [&](const std::string& row) {
-        rows.push_back(row);
-        append(row);
-      });
-    } catch (const Interrupted& interrupted) {
-      throw Interrupted(interrupted, fmt::format("{} of {} points kept; the same command goes on", rows.size(), size));
-    }
-    journal.close();
+  }
+  void append(const std::string& text) {
+    errno = 0;
+    if (!(stream_ << text << std::flush)) throw OutputError(file_, errno != 0 ? std::strerror(errno) : "write error");
+  }
+  void rename(const std::filesystem::path& out) {
+    stream_.close();
     std::error_code error;
-    std::filesystem::rename(partial, out, error);
+    std::filesystem::rename(file_, out, error);
     if (error) throw OutputError(out, error.message());
   }
+
+ private:
+  std::filesystem::path file_;
+  std::ofstream stream_;
+};
+
+struct SweepPoints {
+  std::vector<std::string> rows;
+  std::size_t had;  // taken over
+};
+
+// Takes over the points that are there and computes the others.
+SweepPoints complete_points(const SweepFile& sweep, const SweepPaths& paths, const SweepRows& compute) {
+  const std::size_t size = size_of(sweep);
+  std::vector<std::string> rows = rows_of(paths.out, sweep.head, "holds another sweep");
+  if (rows.size() >= size) return {rows, rows.size()};
+  const FileLock lock(paths.partial, FileLock::Missing::create);
+  if (!lock.held()) throw OutputError(paths.partial, "another sweep is writing it");
+  // They are read again: the other one may have ended in between.
+  rows = rows_of(paths.out, sweep.head, "holds another sweep");
+  if (rows.empty()) rows = rows_of(paths.partial, sweep.head, "belongs to another sweep");
+  const std::size_t had = rows.size();
+  std::string so_far = sweep.head;
+  for (const std::string& one : rows) so_far += one;
+  Journal journal(paths.partial, so_far);
+  try {
+    compute(had, [&rows, &journal](const std::string& row) {
+      rows.push_back(row);
+      journal.append(row);
+    });
+  } catch (const Interrupted& interrupted) {
+    throw Interrupted(interrupted, fmt::format("{} of {} points kept; the same command goes on", rows.size(), size));
+  }
+  journal.rename(paths.out);
+  return {rows, had};
+}
+
+}  // namespace
+
+void run_sweep_file(const SweepFile& sweep, const SweepRows& compute) {
+  const SweepPaths paths = paths_of(sweep);
+  Answer answer(sweep.json);
+  const auto [rows, had] = complete_points(sweep, paths, compute);
   Table table = table_of(sweep, rows);
-  const bool none = std::all_of(rows.begin(), rows.end(),
-                                [&](const std::string& row) { return fields_of(row)[sweep.axes.size()].empty(); });
+  const bool none =
+      std::ranges::all_of(rows, [&sweep](const std::string& row) { return fields_of(row)[sweep.axes.size()].empty(); });
   const std::optional<Figure> drawn = figure_of(sweep, table);
-  if (drawn) write_file(picture, render_svg(*drawn));
-  answer.say("{}: {} points ({} taken over); {}", out.string(), size, had,
-             drawn ? picture.string() : "no figure: no point has a finite number of steps");
+  if (drawn) write_file(paths.picture, render_svg(*drawn));
+  answer.say("{}: {} points ({} taken over); {}", paths.out.string(), size_of(sweep), had,
+             drawn ? paths.picture.string() : "no figure: no point has a finite number of steps");
   if (sweep.remark) answer.say("{}", sweep.remark(table));
   answer.table(std::move(table));
-  answer.file(out.string());
-  if (drawn) answer.file(picture.string());
+  answer.file(paths.out.string());
+  if (drawn) answer.file(paths.picture.string());
   answer.finish(sweep.provenance);
-  if (none) throw std::runtime_error(fmt::format("no point has a number; {} says why, point by point", out.string()));
+  if (none)
+    throw std::runtime_error(fmt::format("no point has a number; {} says why, point by point", paths.out.string()));
 }
 
 void share_sweep_file(const SweepFile& sweep, const Sharing& sharing,
