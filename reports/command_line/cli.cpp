@@ -291,46 +291,94 @@ std::string command_line(int argc, const char* const* argv) {
   return line;
 }
 
+// Declares the commands of a program; holds what is given to each.
+class Declared {
+ public:
+  // @param manual  of all commands; it is filled, and read when help is asked for
+  Declared(CLI::App& app, const Program& program, std::vector<ManualCommand>& manual) : program_(program) {
+    for (const Command& command : program.commands) {
+      const std::size_t index = subcommands_.size();
+      CLI::App* sub = subcommands_.emplace_back(app.add_subcommand(command.name, command.summary));
+      sub->formatter_fn([&manual, &program, index](const CLI::App*, const std::string&, CLI::AppFormatMode) {
+        return command_help(manual[index], program.name, help_width());
+      });
+      sub->set_help_flag("-h,--help", "Prints this text")->group("Files and help");
+      command.declare(options_.emplace_back(*sub));
+      add_config(*sub, config_files_.emplace_back());
+    }
+    manual = manual_of(program.commands, subcommands_);
+  }
+
+  // Names the first option that a command does not have: before what may be missing because of it.
+  // @throws std::invalid_argument
+  void refuse_unknown_options(const std::vector<ManualCommand>& manual) const {
+    for (std::size_t i = 0; i < subcommands_.size(); ++i)
+      for (const std::string& word : subcommands_[i]->remaining())
+        if (word.starts_with("-")) {
+          std::vector<std::string> names;
+          for (const ManualOption& option : manual[i].options)
+            if (!option.place) names.push_back(option.name);
+          throw std::invalid_argument(fmt::format("{}: is no option of '{}'{}", word, manual[i].name,
+                                                  analysis::did_you_mean(word.substr(0, word.find('=')), names)));
+        }
+  }
+
+  void run_parsed(const std::string& line) {
+    for (std::size_t i = 0; i < subcommands_.size(); ++i)
+      if (subcommands_[i]->parsed()) run(program_.commands[i], options_[i], config_files_[i], line);
+  }
+
+ private:
+  static void add_config(CLI::App& sub, std::string& file) {
+    sub.add_option("--config", file, "TOML file with any of these options as keys")
+        ->type_name("FILE")
+        ->group("Files and help")
+        ->check(
+            [](const std::string& given) {
+              return given.empty() ? std::string("what is given is empty") : value_objection(given, "FILE");
+            },
+            "");
+  }
+
+  static void run(const Command& command, Options& options, const std::string& config, const std::string& line) {
+    if (!config.empty()) options.read(config);
+    try {
+      options.check_given();
+      check_written_paths(options, config);
+      command.run(options, line);
+    } catch (const analysis::InputError&) {
+      throw;
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(options.placed(error.what()));
+    }
+  }
+
+  const Program& program_;
+  std::deque<Options> options_;
+  std::vector<CLI::App*> subcommands_;
+  std::deque<std::string> config_files_;
+};
+
+// @throws std::invalid_argument with the nearest name if the first word names none
+void check_command_named(const std::vector<Command>& all, int argc, const char* const* argv) {
+  std::vector<std::string> names;
+  for (const Command& command : all) names.push_back(command.name);
+  if (argc < 2) throw std::invalid_argument(fmt::format("a subcommand is needed: {}", fmt::join(names, ", ")));
+  if (argv[1][0] != '-' && std::ranges::find(names, argv[1]) == names.end())
+    throw std::invalid_argument(fmt::format("'{}' is none of the subcommands {}{}", argv[1], fmt::join(names, ", "),
+                                            analysis::did_you_mean(argv[1], names)));
+}
+
 // @param manual  is filled with all commands
 int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, int argc, const char* const* argv) {
   CLI::App app(program.summary, program.name);
   app.require_subcommand(1);
   app.set_version_flag("--version", version_text());
-  app.formatter_fn([&](const CLI::App*, const std::string&, CLI::AppFormatMode) {
+  app.formatter_fn([&manual, &program](const CLI::App*, const std::string&, CLI::AppFormatMode) {
     return program_help(manual, program.name, program.summary, help_width());
   });
-  const std::vector<Command>& all = program.commands;
-  std::deque<Options> options;
-  std::vector<CLI::App*> subcommands;
-  std::deque<std::string> config_files;
-  for (const Command& command : all) {
-    CLI::App* sub = app.add_subcommand(command.name, command.summary);
-    const std::size_t index = subcommands.size();
-    sub->formatter_fn([&manual, &program, index](const CLI::App*, const std::string&, CLI::AppFormatMode) {
-      return command_help(manual[index], program.name, help_width());
-    });
-    sub->set_help_flag("-h,--help", "Prints this text")->group("Files and help");
-    options.emplace_back(*sub);
-    command.declare(options.back());
-    sub->add_option("--config", config_files.emplace_back(), "TOML file with any of these options as keys")
-        ->type_name("FILE")
-        ->group("Files and help")
-        ->check(
-            [](const std::string& file) {
-              return file.empty() ? std::string("what is given is empty") : value_objection(file, "FILE");
-            },
-            "");
-    subcommands.push_back(sub);
-  }
-  manual = manual_of(all, subcommands);
-  if (argc < 2 || (argv[1][0] != '-' &&
-                   std::none_of(all.begin(), all.end(), [&](const Command& c) { return c.name == argv[1]; }))) {
-    std::vector<std::string> names;
-    for (const Command& command : all) names.push_back(command.name);
-    throw std::invalid_argument(argc < 2 ? fmt::format("a subcommand is needed: {}", fmt::join(names, ", "))
-                                         : fmt::format("'{}' is none of the subcommands {}{}", argv[1],
-                                                       fmt::join(names, ", "), analysis::did_you_mean(argv[1], names)));
-  }
+  Declared declared(app, program, manual);
+  check_command_named(program.commands, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {  // --help, --version
@@ -339,33 +387,13 @@ int parse_and_run(const Program& program, std::vector<ManualCommand>& manual, in
     say("{}", text.view());
     return code;
   } catch (const CLI::ParseError& error) {
-    for (std::size_t i = 0; i < all.size(); ++i)  // before what may be missing because of it
-      for (const std::string& word : subcommands[i]->remaining())
-        if (word.starts_with("-")) {
-          std::vector<std::string> names;
-          for (const ManualOption& option : manual[i].options)
-            if (!option.place) names.push_back(option.name);
-          throw std::invalid_argument(fmt::format("{}: is no option of '{}'{}", word, all[i].name,
-                                                  analysis::did_you_mean(word.substr(0, word.find('=')), names)));
-        }
+    declared.refuse_unknown_options(manual);
     if (argv[1][0] == '-')
       throw std::invalid_argument(
           fmt::format("{}: is no option before a subcommand; --help and --version are", argv[1]));
     throw std::invalid_argument(fmt::format("{}; see '{} {} --help'", error.what(), program.name, argv[1]));
   }
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!subcommands[i]->parsed()) continue;
-    if (!config_files[i].empty()) options[i].read(config_files[i]);
-    try {
-      options[i].check_given();
-      check_written_paths(options[i], config_files[i]);
-      all[i].run(options[i], command_line(argc, argv));
-    } catch (const analysis::InputError&) {
-      throw;
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(options[i].placed(error.what()));
-    }
-  }
+  declared.run_parsed(command_line(argc, argv));
   return 0;
 }
 
