@@ -114,8 +114,11 @@ py::dict compare(const py::list& settings, const py::dict& options, const Comman
   return answer(compare_answer_json(request, found), compare_answer_text(request, found), html);
 }
 
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
 // Holds the columns of a sweep, as the command line names them.
 struct Columns {
+  std::vector<std::string> names;  // of the axes
   std::vector<std::vector<double>> at;
   std::vector<double> steps, low, high, quasi, rate, mean, sd, reach_end, rigid, rigid_low, rigid_high;
   std::vector<analysis::BesideRigidBodies> beside;
@@ -123,8 +126,7 @@ struct Columns {
 };
 
 // Adds what rolled wheels show at the point, NaN where none were rolled.
-void add_rigid_bodies(Columns& c, const std::vector<std::string>& names, const analysis::SweepPoint& point) {
-  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+void add_rigid_bodies(Columns& c, const analysis::SweepPoint& point) {
   const bool known = point.rigid_bodies && point.rigid_bodies->reason.empty();
   const analysis::RigidBodyCheck check = known ? *point.rigid_bodies : analysis::RigidBodyCheck{};
   c.rigid.push_back(known && !check.at_least ? check.steps.value : unknown);
@@ -132,59 +134,31 @@ void add_rigid_bodies(Columns& c, const std::vector<std::string>& names, const a
   c.rigid_high.push_back(known ? check.steps.upper : unknown);
   if (!known || point.failure) return;
   std::string name;
-  for (std::size_t a = 0; a < names.size(); ++a)
-    name += fmt::format("{}{} {}", a == 0 ? "" : ", ", names[a], point.at[a]);
+  for (std::size_t a = 0; a < c.names.size(); ++a)
+    name += fmt::format("{}{} {}", a == 0 ? "" : ", ", c.names[a], point.at[a]);
   c.beside.push_back({name, analysis::answered_steps(point.study), check});
 }
 
-py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& options, const py::object& progress) {
-  const LooseOptions asked = options_of(declare_sweep, Arguments(options));
-  analysis::StudyOptions study = study_options(*asked);
-  analysis::Setting base = setting_of(Arguments(setting));
-  // One rule for all slopes: the paper's launch is that of one of them.
-  if (axes.contains("slope_deg") && !Arguments(setting).given("initial_speed")) base.steady_launch = true;
-  const bool asked_rigid = !Arguments(setting).given("law");
-  std::vector<analysis::SweepAxis> all;
-  std::vector<std::string> names;
-  for (const auto& [key, value] : axes) {
-    names.push_back(py::str(key).cast<std::string>());
-    all.push_back(axis_of(*asked, names.back(), Arguments(axes).numbers(names.back().c_str()), base));
-  }
-  if (all.empty()) throw std::invalid_argument("sweep: no range given");
-  const std::size_t size = analysis::sweep_size(all);
-  for (std::size_t i = 0; i < size; ++i) analysis::check_setting(analysis::sweep_setting(base, all, i), study.method);
-  Columns c;
-  c.at.resize(all.size());
-  Call call(progress);
-  std::atomic<std::size_t> done = 0;
-  study.progress = [&](double, const std::string&) {
-    call.tell(static_cast<double>(done.load()) / static_cast<double>(size), "sweep");
+// Adds the point, NaN for the numbers of one whose solver failed.
+void add_point(Columns& c, const analysis::SweepPoint& point) {
+  const analysis::Metastability& s = point.study;
+  const auto add = [failed = point.failure != nullptr](std::vector<double>& column, double value) {
+    column.push_back(failed ? unknown : value);
   };
-  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  call.run([&] {
-    analysis::sweep(
-        base, all, 0, study,
-        [&](std::size_t, const analysis::SweepPoint& point) {
-          const analysis::Metastability& s = point.study;
-          const bool failed = point.failure != nullptr;
-          const auto add = [&](std::vector<double>& column, double value) {
-            column.push_back(failed ? unknown : value);
-          };
-          for (std::size_t a = 0; a < all.size(); ++a) c.at[a].push_back(point.at[a]);
-          add(c.steps, s.steps.from_start.value), add(c.low, s.steps.from_start.lower);
-          add(c.high, s.steps.from_start.upper), add(c.quasi, s.steps.from_quasi_stationary.value);
-          add(c.rate, s.spectrum.failure_rate.value), add(c.mean, s.survivors.mean), add(c.sd, s.survivors.sd);
-          add(c.reach_end, s.steps.reach_end.value_or(unknown));
-          c.status.push_back(analysis::status_text(s.status));
-          c.message.push_back(s.message);
-          add_rigid_bodies(c, names, point);
-          ++done;
-          study.progress(0, "");
-        },
-        asked_rigid ? analysis::RigidBodies::asked : analysis::RigidBodies::left_out);
-  });
+  for (std::size_t a = 0; a < c.at.size(); ++a) c.at[a].push_back(point.at[a]);
+  add(c.steps, s.steps.from_start.value), add(c.low, s.steps.from_start.lower);
+  add(c.high, s.steps.from_start.upper), add(c.quasi, s.steps.from_quasi_stationary.value);
+  add(c.rate, s.spectrum.failure_rate.value), add(c.mean, s.survivors.mean), add(c.sd, s.survivors.sd);
+  add(c.reach_end, s.steps.reach_end.value_or(unknown));
+  c.status.push_back(analysis::status_text(s.status));
+  c.message.push_back(s.message);
+  add_rigid_bodies(c, point);
+}
+
+// @param rigid  with the columns of rolled wheels
+py::dict columns_of(Columns&& c, bool rigid) {
   py::dict columns;
-  for (std::size_t a = 0; a < all.size(); ++a) columns[names[a].c_str()] = array_of(std::move(c.at[a]));
+  for (std::size_t a = 0; a < c.at.size(); ++a) columns[c.names[a].c_str()] = array_of(std::move(c.at[a]));
   columns["expected_steps"] = array_of(std::move(c.steps));
   columns["expected_steps_low95"] = array_of(std::move(c.low));
   columns["expected_steps_high95"] = array_of(std::move(c.high));
@@ -195,15 +169,49 @@ py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& op
   columns["reach_ramp_end"] = array_of(std::move(c.reach_end));
   columns["status"] = py::cast(c.status);
   columns["message"] = py::cast(c.message);
+  if (!rigid) return columns;
+  columns["rigid_bodies_steps"] = array_of(std::move(c.rigid));
+  columns["rigid_bodies_steps_low95"] = array_of(std::move(c.rigid_low));
+  columns["rigid_bodies_steps_high95"] = array_of(std::move(c.rigid_high));
+  return columns;
+}
+
+py::dict sweep(const py::dict& setting, const py::dict& axes, const py::dict& options, const py::object& progress) {
+  const LooseOptions asked = options_of(declare_sweep, Arguments(options));
+  analysis::StudyOptions study = study_options(*asked);
+  analysis::Setting base = setting_of(Arguments(setting));
+  // One rule for all slopes: the paper's launch is that of one of them.
+  if (axes.contains("slope_deg") && !Arguments(setting).given("initial_speed")) base.steady_launch = true;
+  const bool asked_rigid = !Arguments(setting).given("law");
+  std::vector<analysis::SweepAxis> all;
+  Columns c;
+  for (const auto& [key, value] : axes) {
+    c.names.push_back(py::str(key).cast<std::string>());
+    all.push_back(axis_of(*asked, c.names.back(), Arguments(axes).numbers(c.names.back().c_str()), base));
+  }
+  if (all.empty()) throw std::invalid_argument("sweep: no range given");
+  const std::size_t size = analysis::sweep_size(all);
+  for (std::size_t i = 0; i < size; ++i) analysis::check_setting(analysis::sweep_setting(base, all, i), study.method);
+  c.at.resize(all.size());
+  Call call(progress);
+  std::atomic<std::size_t> done = 0;
+  study.progress = [&call, &done, size](double, const std::string&) {
+    call.tell(static_cast<double>(done.load()) / static_cast<double>(size), "sweep");
+  };
+  call.run([&] {
+    analysis::sweep(
+        base, all, 0, study,
+        [&c, &done, &study](std::size_t, const analysis::SweepPoint& point) {
+          add_point(c, point);
+          ++done;
+          study.progress(0, "");
+        },
+        asked_rigid ? analysis::RigidBodies::asked : analysis::RigidBodies::left_out);
+  });
   py::dict result;
   result["rigid_bodies"] = py::none();
-  if (asked_rigid) {
-    columns["rigid_bodies_steps"] = array_of(std::move(c.rigid));
-    columns["rigid_bodies_steps_low95"] = array_of(std::move(c.rigid_low));
-    columns["rigid_bodies_steps_high95"] = array_of(std::move(c.rigid_high));
-    result["rigid_bodies"] = analysis::rigid_body_sentence(c.beside, base.law);
-  }
-  result["columns"] = columns;
+  if (asked_rigid) result["rigid_bodies"] = analysis::rigid_body_sentence(c.beside, base.law);
+  result["columns"] = columns_of(std::move(c), asked_rigid);
   return result;
 }
 
