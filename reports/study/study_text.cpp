@@ -76,6 +76,93 @@ std::string total_line(const std::string& name, const analysis::Accumulated& tot
                                 quantiles_text(total, std::max(error, 0.002))));
 }
 
+// Says how long wheels roll, where there is a number.
+std::string steps_lines(const analysis::Metastability& study, const std::string& beside, double error) {
+  const analysis::StepsToRest& steps = study.steps;
+  const bool followed = study.method == analysis::Method::followed;
+  std::string text = line("expected steps before failure", estimate_text(steps.from_start));
+  if (!followed) text += line("  from the metastable regime", estimate_text(steps.from_quasi_stationary));
+  if (std::isfinite(steps.worst_start.upper)) text += line("  from the worst start", estimate_text(steps.worst_start));
+  text += beside;
+  if (!followed) text += line("failure rate per step", estimate_text(study.spectrum.failure_rate));
+  text += line("steps",
+               fmt::format("sd {}, {}", show(steps.distribution.sd, error), quantiles_text(steps.distribution, error)));
+  if (steps.seconds) text += total_line("seconds", *steps.seconds, error);
+  if (steps.metres) text += total_line("metres", *steps.metres, error);
+  return text;
+}
+
+std::string end_line(double reached, double ramp_length, double error) {  // about exp(-n / steps)
+  return line(fmt::format("reaches the end of {} m", ramp_length),
+              show(reached, reached > 0 ? -std::log(reached) * std::max(error, 0.001) : 0));
+}
+
+std::string speed_lines(const analysis::Metastability& study) {
+  const analysis::Survivors& survivors = study.survivors;
+  const bool endless = study.status == analysis::Status::rest_unreachable;
+  const bool followed = study.method == analysis::Method::followed;
+  std::string text;
+  if (endless || !followed)
+    text += line(endless ? "stationary speed" : "quasi-stationary speed",
+                 speed_text(survivors.mean, survivors.sd, survivors.error));
+  if (!endless && !(followed && study.samples > 0))
+    text += line("stationary speed, relaunched",
+                 std::isnan(survivors.restart_mean)
+                     ? "none: every launch rests at its first collision"
+                     : speed_text(survivors.restart_mean, survivors.restart_sd, survivors.restart_error));
+  return text;
+}
+
+std::string spectrum_lines(const analysis::Metastability& study) {
+  const analysis::Spectrum& spectrum = study.spectrum;
+  std::string text, mixing;
+  if (study.method != analysis::Method::followed)
+    text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(spectrum.moduli, ", ")));
+  if (spectrum.moduli.size() > 1) mixing = fmt::format("{:.4g} steps (spectral)", spectrum.mixing_steps);
+  if (spectrum.total_variation_steps)
+    mixing += fmt::format("{}{} {}from the launch (total variation)", mixing.empty() ? "" : ", ",
+                          *spectrum.total_variation_steps, mixing.empty() ? "steps " : "");
+  if (!mixing.empty()) text += line("mixing", mixing);
+  return text;
+}
+
+std::string violation_line(const analysis::ViolationShare& share, bool endless) {
+  return line(fmt::format("collisions with '{}'", share.name),
+              fmt::format("{} in the {} regime, {} {}", percent(share.quasi_stationary, share.quasi_stationary_error),
+                          endless ? "stationary" : "metastable", percent(share.until_rest, share.until_rest_error),
+                          endless ? "on the ramp" : "until rest"));
+}
+
+std::string resolution_text(const analysis::Metastability& study) {
+  if (study.method == analysis::Method::followed)
+    return study.samples > 0 ? fmt::format("none: {} trials were followed", study.samples)
+                             : "none: without noise launches are followed";
+  const std::string legs = study.phases > 1 ? fmt::format(" for each of {} legs", study.phases) : "";
+  if (study.method == analysis::Method::integrated) return fmt::format("{} nodes{}, integrated", study.cells, legs);
+  return fmt::format("{} cells{}, {} draws a cell, {}", study.cells, legs, study.samples,
+                     study.replicates > 1 ? fmt::format("{} replicates", study.replicates) : "one randomisation");
+}
+
+// Says how far the numbers may be off, and by what.
+std::string error_lines(const analysis::Metastability& study) {
+  const analysis::StepsToRest& steps = study.steps;
+  std::string text = line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)",
+                                                        steps.discretization_error, steps.sampling_error));
+  if (steps.landing_error > 0)
+    text += line("landings", fmt::format("read from a table, which moves the steps by {:.2g} at most (in the interval)",
+                                         steps.landing_error));
+  if (steps.memory.upper > steps.memory.lower)
+    text += line("feet still moving at the next touch",
+                 fmt::format("move the steps by {:.2g} ({:.2g} to {:.2g}, in the interval)", steps.memory.value,
+                             steps.memory.lower, steps.memory.upper));
+  constexpr double rounding = 1e-9;  // what is below it differs from processor to processor
+  const double apart = steps.solver_disagreement;
+  if (study.method != analysis::Method::followed)
+    text += line("solvers", apart < rounding ? "elimination and KLU agree to nine digits"
+                                             : fmt::format("elimination and KLU differ by {:.2g} at most", apart));
+  return text;
+}
+
 }  // namespace
 
 std::string words_text(const analysis::Metastability& study, bool more, std::size_t width) {
@@ -140,84 +227,20 @@ std::string study_text(const analysis::Metastability& study, const analysis::Res
                        const analysis::BesideRigidBodies* rigid_bodies) {
   const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
-  const bool followed = study.method == analysis::Method::followed;
   const double error = relative_error(study.steps.from_start);
   std::string text = setting.describe() + "\n\n";
   const std::string beside =
       rigid_bodies ? line("  of rigid bodies (law settled)", analysis::rigid_body_steps_text(rigid_bodies->check)) : "";
   if (study.status == analysis::Status::rest_unresolved) return text + "  " + study.message + "\n" + beside;
-  if (endless) {
-    text += line("expected steps before failure", study.message) + beside;
-  } else {
-    text += line("expected steps before failure", estimate_text(study.steps.from_start));
-    if (!followed) text += line("  from the metastable regime", estimate_text(study.steps.from_quasi_stationary));
-    if (std::isfinite(study.steps.worst_start.upper))
-      text += line("  from the worst start", estimate_text(study.steps.worst_start));
-    text += beside;
-    if (!followed) text += line("failure rate per step", estimate_text(study.spectrum.failure_rate));
-    text += line("steps", fmt::format("sd {}, {}", show(study.steps.distribution.sd, error),
-                                      quantiles_text(study.steps.distribution, error)));
-    if (study.steps.seconds) text += total_line("seconds", *study.steps.seconds, error);
-    if (study.steps.metres) text += total_line("metres", *study.steps.metres, error);
-  }
-  if (study.steps.reach_end) {  // about exp(-n / steps)
-    const double reached = *study.steps.reach_end;
-    text += line(fmt::format("reaches the end of {} m", setting.ramp_length),
-                 show(reached, reached > 0 ? -std::log(reached) * std::max(error, 0.001) : 0));
-  }
-  const analysis::Survivors& survivors = study.survivors;
-  if (endless || !followed)
-    text += line(endless ? "stationary speed" : "quasi-stationary speed",
-                 speed_text(survivors.mean, survivors.sd, survivors.error));
-  if (!endless && !(followed && study.samples > 0))
-    text += line("stationary speed, relaunched",
-                 std::isnan(survivors.restart_mean)
-                     ? "none: every launch rests at its first collision"
-                     : speed_text(survivors.restart_mean, survivors.restart_sd, survivors.restart_error));
-  if (!followed)
-    text += line("eigenvalue moduli per step", fmt::format("{:.6g}", fmt::join(study.spectrum.moduli, ", ")));
-  std::string mixing;
-  if (study.spectrum.moduli.size() > 1) mixing = fmt::format("{:.4g} steps (spectral)", study.spectrum.mixing_steps);
-  if (study.spectrum.total_variation_steps)
-    mixing += fmt::format("{}{} {}from the launch (total variation)", mixing.empty() ? "" : ", ",
-                          *study.spectrum.total_variation_steps, mixing.empty() ? "steps " : "");
-  if (!mixing.empty()) text += line("mixing", mixing);
-  text += "\n";
+  text += endless ? line("expected steps before failure", study.message) + beside : steps_lines(study, beside, error);
+  if (study.steps.reach_end) text += end_line(*study.steps.reach_end, setting.ramp_length, error);
+  text += speed_lines(study) + spectrum_lines(study) + "\n";
   text += line("rest", thresholds_text(thresholds));
-  for (const analysis::ViolationShare& share : study.violations)
-    text +=
-        line(fmt::format("collisions with '{}'", share.name),
-             fmt::format("{} in the {} regime, {} {}", percent(share.quasi_stationary, share.quasi_stationary_error),
-                         endless ? "stationary" : "metastable", percent(share.until_rest, share.until_rest_error),
-                         endless ? "on the ramp" : "until rest"));
-  if (followed)
-    text += line("resolution", study.samples > 0 ? fmt::format("none: {} trials were followed", study.samples)
-                                                 : std::string("none: without noise launches are followed"));
-  const std::string legs = study.phases > 1 ? fmt::format(" for each of {} legs", study.phases) : "";
-  if (!followed)
-    text += line("resolution", study.method == analysis::Method::integrated
-                                   ? fmt::format("{} nodes{}, integrated", study.cells, legs)
-                                   : fmt::format("{} cells{}, {} draws a cell, {}", study.cells, legs, study.samples,
-                                                 study.replicates > 1 ? fmt::format("{} replicates", study.replicates)
-                                                                      : std::string("one randomisation")));
-  if (!endless) {
-    text += line("relative error", fmt::format("discretization {:.2g}, sampling {:.2g} (95 %)",
-                                               study.steps.discretization_error, study.steps.sampling_error));
-    if (study.steps.landing_error > 0)
-      text +=
-          line("landings", fmt::format("read from a table, which moves the steps by {:.2g} at most (in the interval)",
-                                       study.steps.landing_error));
-    if (study.steps.memory.upper > study.steps.memory.lower)
-      text += line("feet still moving at the next touch",
-                   fmt::format("move the steps by {:.2g} ({:.2g} to {:.2g}, in the interval)", study.steps.memory.value,
-                               study.steps.memory.lower, study.steps.memory.upper));
-    constexpr double rounding = 1e-9;  // what is below it differs from processor to processor
-    const double apart = study.steps.solver_disagreement;
-    if (!followed)
-      text += line("solvers", apart < rounding ? "elimination and KLU agree to nine digits"
-                                               : fmt::format("elimination and KLU differ by {:.2g} at most", apart));
-    if (!study.message.empty()) text += "\n" + study.message + "\n";
-  }
+  for (const analysis::ViolationShare& share : study.violations) text += violation_line(share, endless);
+  text += line("resolution", resolution_text(study));
+  if (endless) return text;
+  text += error_lines(study);
+  if (!study.message.empty()) text += "\n" + study.message + "\n";
   return text;
 }
 
