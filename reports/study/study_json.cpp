@@ -94,10 +94,54 @@ Json provenance_json(const Provenance& provenance) {
           {"version", provenance.version}};
 }
 
+Json expected_steps_json(const analysis::StepsToRest& steps) {
+  const double median = steps.distribution.quantile(0.5).value_or(steps.from_start.value);
+  return {{"from_start", number(steps.from_start.value)},
+          {"interval_95", interval(steps.from_start)},
+          {"from_quasi_stationary", number(steps.from_quasi_stationary.value)},
+          {"from_quasi_stationary_interval_95", interval(steps.from_quasi_stationary)},
+          {"worst_start", number(steps.worst_start.value)},
+          {"worst_start_interval_95", interval(steps.worst_start)},
+          {"sd", number(steps.distribution.sd)},
+          {"median", number(median)},
+          {"quantiles", accumulated(steps.distribution)["quantiles"]}};
+}
+
+// What has no total is without end, or not known.
+Json total_json(const std::optional<analysis::Accumulated>& total, bool endless) {
+  if (total) return accumulated(*total);
+  return endless ? Json("infinite") : Json(nullptr);
+}
+
+Json regime_json(const analysis::Survivors& survivors) {
+  Json legs = Json::array();
+  for (const analysis::PhaseDistribution& phase : survivors.by_phase)
+    legs.push_back({{"mean_rad_s", phase.mean}, {"sd_rad_s", phase.sd}});
+  return {
+      {"mean_rad_s", survivors.mean}, {"sd_rad_s", survivors.sd}, {"error_rad_s", survivors.error}, {"per_leg", legs}};
+}
+
+Json violations_json(const std::vector<analysis::ViolationShare>& violations) {
+  Json shares = Json::object();
+  for (const analysis::ViolationShare& share : violations)
+    shares[share.name] = {{"quasi_stationary", share.quasi_stationary},
+                          {"quasi_stationary_standard_error", share.quasi_stationary_error},
+                          {"until_rest", share.until_rest},
+                          {"until_rest_standard_error", share.until_rest_error}};
+  return shares;
+}
+
+Json error_json(const analysis::StepsToRest& steps) {
+  Json json = {{"discretization", number(steps.discretization_error)}, {"sampling", number(steps.sampling_error)}};
+  if (steps.landing_error > 0) json["landings"] = steps.landing_error;
+  if (steps.memory.upper > steps.memory.lower)
+    json["moving_feet"] = {{"value", steps.memory.value}, {"interval_95", {steps.memory.lower, steps.memory.upper}}};
+  return json;
+}
+
 Json study_json(const analysis::Metastability& study, const analysis::RestThresholds& thresholds) {
   const analysis::Setting& setting = study.setting.value();
   const bool endless = study.status == analysis::Status::rest_unreachable;
-  const double median = study.steps.distribution.quantile(0.5).value_or(study.steps.from_start.value);
   Json json;
   json["slope_deg"] = setting.slope_deg;
   json["law"] = dynamics::law_name(setting.law);
@@ -107,52 +151,25 @@ Json study_json(const analysis::Metastability& study, const analysis::RestThresh
   json["method"] = analysis::method_name(study.method);
   json["status"] = analysis::status_text(study.status);
   if (!study.message.empty()) json["message"] = study.message;
-  json["expected_steps"] = {{"from_start", number(study.steps.from_start.value)},
-                            {"interval_95", interval(study.steps.from_start)},
-                            {"from_quasi_stationary", number(study.steps.from_quasi_stationary.value)},
-                            {"from_quasi_stationary_interval_95", interval(study.steps.from_quasi_stationary)},
-                            {"worst_start", number(study.steps.worst_start.value)},
-                            {"worst_start_interval_95", interval(study.steps.worst_start)},
-                            {"sd", number(study.steps.distribution.sd)},
-                            {"median", number(median)},
-                            {"quantiles", accumulated(study.steps.distribution)["quantiles"]}};
+  json["expected_steps"] = expected_steps_json(study.steps);
   json["failure_rate_per_step"] = study.spectrum.failure_rate.value;
   json["failure_rate_interval_95"] = interval(study.spectrum.failure_rate);
-  json["seconds_before_failure"] =
-      study.steps.seconds ? accumulated(*study.steps.seconds) : Json(endless ? "infinite" : Json(nullptr));
-  json["metres_before_failure"] =
-      study.steps.metres ? accumulated(*study.steps.metres) : Json(endless ? "infinite" : Json(nullptr));
+  json["seconds_before_failure"] = total_json(study.steps.seconds, endless);
+  json["metres_before_failure"] = total_json(study.steps.metres, endless);
   json["survival"] = study.steps.survival;
   json["eigenvalue_moduli"] = study.spectrum.moduli;
   json["mixing_steps"] = number(study.spectrum.mixing_steps);
   json["total_variation_mixing_steps"] =
       study.spectrum.total_variation_steps ? Json(*study.spectrum.total_variation_steps) : Json(nullptr);
-  Json legs = Json::array();
-  for (const analysis::PhaseDistribution& phase : study.survivors.by_phase)
-    legs.push_back({{"mean_rad_s", phase.mean}, {"sd_rad_s", phase.sd}});
-  json["quasi_stationary"] = {{"mean_rad_s", study.survivors.mean},
-                              {"sd_rad_s", study.survivors.sd},
-                              {"error_rad_s", study.survivors.error},
-                              {"per_leg", legs}};
+  json["quasi_stationary"] = regime_json(study.survivors);
   json["stationary_with_restart"] = {{"mean_rad_s", study.survivors.restart_mean},
                                      {"sd_rad_s", study.survivors.restart_sd},
                                      {"error_rad_s", study.survivors.restart_error}};
   json["reach_ramp_end"] = optional_number(study.steps.reach_end);
-  Json shares = Json::object();
-  for (const analysis::ViolationShare& share : study.violations)
-    shares[share.name] = {{"quasi_stationary", share.quasi_stationary},
-                          {"quasi_stationary_standard_error", share.quasi_stationary_error},
-                          {"until_rest", share.until_rest},
-                          {"until_rest_standard_error", share.until_rest_error}};
-  json["outside_assumptions"] = shares;
+  json["outside_assumptions"] = violations_json(study.violations);
   json["rest_unreachable_above"] = {{"speed_rad_s", optional_number(thresholds.safe_speed)},
                                     {"slope_deg", optional_number(thresholds.safe_slope_deg)}};
-  json["error"] = {{"discretization", number(study.steps.discretization_error)},
-                   {"sampling", number(study.steps.sampling_error)}};
-  if (study.steps.landing_error > 0) json["error"]["landings"] = study.steps.landing_error;
-  if (study.steps.memory.upper > study.steps.memory.lower)
-    json["error"]["moving_feet"] = {{"value", study.steps.memory.value},
-                                    {"interval_95", {study.steps.memory.lower, study.steps.memory.upper}}};
+  json["error"] = error_json(study.steps);
   json["resolution"] = {{"cells", study.cells},
                         {"samples", study.samples},
                         {"replicates", study.replicates},
