@@ -30,6 +30,83 @@ std::vector<std::size_t> heaviest(const std::vector<analysis::SectionPoint>& poi
   return order;
 }
 
+// Rates go with angles: their ratio spreads what would else lie along one line.
+void add_state(Series& series, const std::vector<double>& state) {
+  series.x.push_back(state[0]);
+  series.y.push_back(state[1] / state[0]);
+}
+
+// Shows which states near the plane of the section are bound to fall, in three classes.
+std::vector<Series> basin_series(const analysis::WalkerFalls& falls) {
+  const auto near_plane = [&falls](const analysis::SectionPoint& point) {
+    return std::all_of(point.place.begin() + 2, point.place.end(),
+                       [&falls](double u) { return std::abs(u) <= 0.75 * falls.spacing; });
+  };
+  struct Class {
+    const char* label;
+    double low, high;
+    int colour;
+  };
+  std::vector<Series> all;
+  for (const Class& of : {Class{"recovers (falls first: below 10 %)", 0, 0.1, 2}, Class{"10 to 90 %", 0.1, 0.9, 4},
+                          Class{"bound to fall (above 90 %)", 0.9, 2, 1}}) {
+    Series series{of.label, Style::dots, {}, {}, {}, {}, of.colour};
+    for (const analysis::SectionPoint& point : falls.section)
+      if (near_plane(point) && point.state[0] > 0 && point.bound_to_fail >= of.low && point.bound_to_fail < of.high)
+        add_state(series, point.state);
+    if (!series.x.empty()) all.push_back(std::move(series));
+  }
+  return all;
+}
+
+// Shows where most steps begin, and most of the last ones.
+std::vector<Series> density_series(const std::vector<analysis::SectionPoint>& points) {
+  std::vector<Series> all;
+  for (const auto& [label, colour, weight] :
+       {std::tuple("90 % of the last steps before a fall", 1, &analysis::SectionPoint::last),
+        std::tuple("90 % of all steps", 0, &analysis::SectionPoint::regime)}) {
+    Series series{label, Style::dots, {}, {}, {}, {}, colour};
+    for (const std::size_t i : heaviest(points, weight))
+      if (points[i].state[0] > 0) add_state(series, points[i].state);
+    all.push_back(std::move(series));
+  }
+  return all;
+}
+
+Series path_series(const analysis::LastMoments& moments) {
+  Series path{"most likely last steps", Style::line, {}, {}, {}, {}, 6};
+  for (const analysis::PathStep& step : moments.likeliest) add_state(path, step.state);
+  return path;
+}
+
+// Cuts an axis to twice the range of the series.
+void cut_axis(FigureAxis& axis, const std::vector<Series>& all, std::vector<double> Series::*values) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Series& series : all)
+    for (const double value : series.*values) {
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+  axis.low = low - 0.5 * (high - low);
+  axis.high = high + 0.5 * (high - low);
+}
+
+// Draws the series, and the most likely last steps over them.
+Figure section_figure(const StudiedWalker& walker, const std::string& id, const std::string& title,
+                      std::vector<Series> series, const Provenance& provenance) {
+  Figure figure;
+  figure.id = id;
+  figure.title = fmt::format("{}: {}", title, walker_label(walker));
+  figure.x = {walker.falls.moments.state_names[0]};
+  figure.y = {"stance rate / half angle"};
+  figure.series = std::move(series);
+  figure.series.push_back(path_series(walker.falls.moments));
+  figure.legend = Legend::below;
+  figure.height = 470;
+  figure.provenance = provenance;
+  return figure;
+}
+
 }  // namespace
 
 std::string walker_label(const StudiedWalker& walker) {
@@ -125,68 +202,12 @@ Figure walker_survival_figure(const std::vector<StudiedWalker>& walkers, const P
 }
 
 std::vector<Figure> section_figures(const StudiedWalker& walker, const std::string& id, const Provenance& provenance) {
-  const std::vector<analysis::SectionPoint>& points = walker.falls.section;
-  const auto near_plane = [&](const analysis::SectionPoint& point) {
-    return std::all_of(point.place.begin() + 2, point.place.end(),
-                       [&](double u) { return std::abs(u) <= 0.75 * walker.falls.spacing; });
-  };
-  // Rates go with angles: their ratio spreads what would else lie along one line.
-  const auto add = [](Series& series, const std::vector<double>& state) {
-    series.x.push_back(state[0]);
-    series.y.push_back(state[1] / state[0]);
-  };
-  const auto figure = [&](const std::string& name, const std::string& title) {
-    Figure one;
-    one.id = id + name;
-    one.title = fmt::format("{}: {}", title, walker_label(walker));
-    one.x = {walker.falls.moments.state_names[0]};
-    one.y = {"stance rate / half angle"};
-    one.legend = Legend::below;
-    one.height = 470;
-    one.provenance = provenance;
-    return one;
-  };
-  const auto finish = [&](Figure& one) {
-    Series path{"most likely last steps", Style::line, {}, {}, {}, {}, 6};
-    for (const analysis::PathStep& step : walker.falls.moments.likeliest) add(path, step.state);
-    one.series.push_back(std::move(path));
-  };
-  Figure basin = figure("-basin", "Basin and failure");
-  struct Class {
-    const char* label;
-    double low, high;
-    int colour;
-  };
-  for (const Class& of : {Class{"recovers (falls first: below 10 %)", 0, 0.1, 2}, Class{"10 to 90 %", 0.1, 0.9, 4},
-                          Class{"bound to fall (above 90 %)", 0.9, 2, 1}}) {
-    Series series{of.label, Style::dots, {}, {}, {}, {}, of.colour};
-    for (const analysis::SectionPoint& point : points)
-      if (near_plane(point) && point.state[0] > 0 && point.bound_to_fail >= of.low && point.bound_to_fail < of.high)
-        add(series, point.state);
-    if (!series.x.empty()) basin.series.push_back(std::move(series));
-  }
-  finish(basin);
-  Figure density = figure("-density", "Where steps begin");
-  for (const auto& [label, colour, weight] :
-       {std::tuple("90 % of the last steps before a fall", 1, &analysis::SectionPoint::last),
-        std::tuple("90 % of all steps", 0, &analysis::SectionPoint::regime)}) {
-    Series series{label, Style::dots, {}, {}, {}, {}, colour};
-    for (const std::size_t i : heaviest(points, weight))
-      if (points[i].state[0] > 0) add(series, points[i].state);
-    density.series.push_back(std::move(series));
-  }
-  finish(density);
+  Figure basin = section_figure(walker, id + "-basin", "Basin and failure", basin_series(walker.falls), provenance);
+  Figure density =
+      section_figure(walker, id + "-density", "Where steps begin", density_series(walker.falls.section), provenance);
   // What lies far from where steps begin says nothing: the basin is cut to twice their range.
-  for (const auto& [axis, values] : {std::pair(&basin.x, &Series::x), std::pair(&basin.y, &Series::y)}) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Series& series : density.series)
-      for (const double value : series.*values) {
-        low = std::min(low, value);
-        high = std::max(high, value);
-      }
-    axis->low = low - 0.5 * (high - low);
-    axis->high = high + 0.5 * (high - low);
-  }
+  cut_axis(basin.x, density.series, &Series::x);
+  cut_axis(basin.y, density.series, &Series::y);
   return {basin, density};
 }
 
