@@ -81,18 +81,18 @@ std::string list(const std::vector<std::string>& names) {
   return text;
 }
 
-}  // namespace
+using Truths = std::vector<analysis::BlindTruth>;
+using Answers = std::vector<std::optional<analysis::BlindAnswer>>;
 
-std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::vector<analysis::BlindTruth>& truths,
-                                const std::vector<std::optional<analysis::BlindAnswer>>& answers,
-                                const Provenance& provenance) {
-  std::vector<Table> tables{measures(grades, "", provenance), ways(grades, provenance)};
+// Returns the measures of the cases of each law, where there are several.
+std::vector<Table> measures_by_law(const Truths& truths, const Answers& answers, const Provenance& provenance) {
   std::set<dynamics::Law> laws;
   for (const analysis::BlindTruth& truth : truths) laws.insert(truth.law);
+  if (laws.size() < 2) return {};
+  std::vector<Table> tables;
   for (const dynamics::Law law : laws) {
-    if (laws.size() == 1) break;
-    std::vector<analysis::BlindTruth> some;
-    std::vector<std::optional<analysis::BlindAnswer>> theirs;
+    Truths some;
+    Answers theirs;
     for (std::size_t i = 0; i < truths.size(); ++i)
       if (truths[i].law == law) {
         some.push_back(truths[i]);
@@ -100,36 +100,54 @@ std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::
       }
     tables.push_back(measures(analysis::grade(some, theirs), std::string(dynamics::law_name(law)), provenance));
   }
-  Table confusion{.id = "blind-confusion",
-                  .title = "What was true and what was said",
-                  .notes = {"Counts. An explained gap is entered under the first name of its set."},
-                  .columns = {{"truth"}, {"said"}, {"cases"}},
-                  .provenance = provenance};
-  for (const auto& [truth, row] : grades.confusion)
-    for (const auto& [said, count] : row) confusion.rows.push_back({truth, said, count});
-  tables.push_back(std::move(confusion));
+  return tables;
+}
 
-  Table calibration{.id = "blind-calibration",
-                    .title = "Probability of the first cause and how often it is right",
-                    .notes = {"Explained cases with one effect of the catalogue."},
-                    .columns = {{"from"}, {"to"}, {"cases"}, {"mean probability"}, {"share right"}},
-                    .provenance = provenance};
+Table confusion(const analysis::BlindGrades& grades, const Provenance& provenance) {
+  Table table{.id = "blind-confusion",
+              .title = "What was true and what was said",
+              .notes = {"Counts. An explained gap is entered under the first name of its set."},
+              .columns = {{"truth"}, {"said"}, {"cases"}},
+              .provenance = provenance};
+  for (const auto& [truth, row] : grades.confusion)
+    for (const auto& [said, count] : row) table.rows.push_back({truth, said, count});
+  return table;
+}
+
+Table calibration(const analysis::BlindGrades& grades, const Provenance& provenance) {
+  Table table{.id = "blind-calibration",
+              .title = "Probability of the first cause and how often it is right",
+              .notes = {"Explained cases with one effect of the catalogue."},
+              .columns = {{"from"}, {"to"}, {"cases"}, {"mean probability"}, {"share right"}},
+              .provenance = provenance};
   for (const analysis::CalibrationBin& bin : grades.calibration) {
     if (bin.count == 0) continue;
     const auto [low, high] = analysis::wilson(bin.right);
-    calibration.rows.push_back({bin.from, bin.to, bin.count, bin.mean_probability,
-                                Estimate{static_cast<double>(bin.right.right) / bin.right.of, low, high}});
+    table.rows.push_back({bin.from, bin.to, bin.count, bin.mean_probability,
+                          Estimate{static_cast<double>(bin.right.right) / bin.right.of, low, high}});
   }
-  tables.push_back(std::move(calibration));
+  return table;
+}
 
-  Table alike{.id = "blind-alike",
+Table alike(const analysis::BlindGrades& grades, const Provenance& provenance) {
+  Table table{.id = "blind-alike",
               .title = "Ambiguity groups: effects in a quarter or more of another one's 95 % sets",
               .columns = {{"effect"}, {"shares its sets with"}},
               .provenance = provenance};
-  for (const auto& [effect, others] : grades.alike) alike.rows.push_back({effect, list(others)});
-  tables.push_back(std::move(alike));
+  for (const auto& [effect, others] : grades.alike) table.rows.push_back({effect, list(others)});
+  return table;
+}
 
-  Table cases{
+std::string truth_text(const analysis::BlindTruth& truth) {
+  std::string text = truth.outside ? fmt::format("{}:{:.3g}", truth.outside->id, truth.outside->size) : "";
+  for (const dynamics::Effect& effect : truth.effects)
+    text += (text.empty() ? "" : " ") + dynamics::effect_text(effect);
+  if (!text.empty()) return text;
+  return truth.nominal_is_true ? "nominal contact" : "other contact";
+}
+
+Table all_cases(const Truths& truths, const Answers& answers, const Provenance& provenance) {
+  Table table{
       .id = "blind-cases",
       .title = "Every case",
       .notes = {"power: expected 2 Delta log likelihood with the true contact known; left: what recalibration "
@@ -138,15 +156,25 @@ std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::
       .provenance = provenance};
   for (std::size_t i = 0; i < truths.size(); ++i) {
     const analysis::BlindTruth& t = truths[i];
-    std::string what = t.outside ? fmt::format("{}:{:.3g}", t.outside->id, t.outside->size) : "";
-    for (const dynamics::Effect& effect : t.effects) what += (what.empty() ? "" : " ") + dynamics::effect_text(effect);
-    if (what.empty()) what = t.nominal_is_true ? "nominal contact" : "other contact";
-    cases.rows.push_back({t.number, std::string(dynamics::law_name(t.law)),
-                          std::string(analysis::blind_kind_name(t.kind)), what, t.strength, t.power, t.left,
+    table.rows.push_back({t.number, std::string(dynamics::law_name(t.law)),
+                          std::string(analysis::blind_kind_name(t.kind)), truth_text(t), t.strength, t.power, t.left,
                           answers[i] ? analysis::verdict_name(answers[i]->verdict) : "no answer",
                           answers[i] ? list(answers[i]->cause_set) : ""});
   }
-  tables.push_back(std::move(cases));
+  return table;
+}
+
+}  // namespace
+
+std::vector<Table> blind_tables(const analysis::BlindGrades& grades, const std::vector<analysis::BlindTruth>& truths,
+                                const std::vector<std::optional<analysis::BlindAnswer>>& answers,
+                                const Provenance& provenance) {
+  std::vector<Table> tables{measures(grades, "", provenance), ways(grades, provenance)};
+  for (Table& table : measures_by_law(truths, answers, provenance)) tables.push_back(std::move(table));
+  tables.push_back(confusion(grades, provenance));
+  tables.push_back(calibration(grades, provenance));
+  tables.push_back(alike(grades, provenance));
+  tables.push_back(all_cases(truths, answers, provenance));
   return tables;
 }
 
