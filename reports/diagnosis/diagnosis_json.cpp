@@ -215,26 +215,37 @@ Json list_json(const Values& values, Convert convert) {
   return list;
 }
 
+Json gap_json(const analysis::Diagnosis::Gap& gap) {
+  return {{"p_value_as_given", number(gap.p_as_given)},
+          {"p_value", number(gap.p_value)},
+          {"p_value_recalibration", number(gap.p_recalibration)},
+          {"p_value_effects", number(gap.p_effects)},
+          {"p_value_where", number(gap.p_where)},
+          {"p_value_facets", number(gap.p_facets)},
+          {"p_value_variations", number(gap.p_variations)}};
+}
+
+Json missing_json(const analysis::MissingColumn& missing) {
+  return {{"column", missing.column}, {"effects", list_json(missing.effects, [](const auto& effect) {
+                                         return Json{{"effect", effect.effect},
+                                                     {"parameter", effect.parameter},
+                                                     {"smallest", number(effect.smallest)},
+                                                     {"smallest_with_it", number(effect.smallest_with_it)},
+                                                     {"not_told_from", effect.not_told_from}};
+                                       })}};
+}
+
 }  // namespace
 
 std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& provenance) {
-  const std::vector<analysis::GapCell> as_given = beyond_chance(d.gap.as_given),
-                                       recalibrated = beyond_chance(d.gap.recalibrated),
-                                       left = beyond_chance(d.gap.left);
   Json json;
   json["schema"] = 1;
   json["verdict"] = analysis::verdict_name(d.verdict);
   json["sentences"] = d.sentences;
-  json["gap"] = {{"p_value_as_given", number(d.gap.p_as_given)},
-                 {"p_value", number(d.gap.p_value)},
-                 {"p_value_recalibration", number(d.gap.p_recalibration)},
-                 {"p_value_effects", number(d.gap.p_effects)},
-                 {"p_value_where", number(d.gap.p_where)},
-                 {"p_value_facets", number(d.gap.p_facets)},
-                 {"p_value_variations", number(d.gap.p_variations)}};
-  json["where"] = where_json(recalibrated);
-  json["where_as_given"] = where_json(as_given);
-  json["where_left"] = where_json(left);
+  json["gap"] = gap_json(d.gap);
+  json["where"] = where_json(beyond_chance(d.gap.recalibrated));
+  json["where_as_given"] = where_json(beyond_chance(d.gap.as_given));
+  json["where_left"] = where_json(beyond_chance(d.gap.left));
   json["causes"] = causes_json(d);
   json["cause_set"] = d.causes.set;
   json["cause_set_alike"] = d.causes.alike;
@@ -254,15 +265,7 @@ std::string diagnosis_json(const analysis::Diagnosis& d, const Provenance& prove
   json["shrinkage_by_measure"] = list_json(d.shrinkage.measures, shrinkage_json);
   json["steps_before_failure"] = steps_json(d.shrinkage.steps);
   json["visibility"] = list_json(d.limits.visible, visibility_json);
-  json["missing_columns"] = list_json(d.limits.missing, [](const analysis::MissingColumn& missing) {
-    return Json{{"column", missing.column}, {"effects", list_json(missing.effects, [](const auto& effect) {
-                                               return Json{{"effect", effect.effect},
-                                                           {"parameter", effect.parameter},
-                                                           {"smallest", number(effect.smallest)},
-                                                           {"smallest_with_it", number(effect.smallest_with_it)},
-                                                           {"not_told_from", effect.not_told_from}};
-                                             })}};
-  });
+  json["missing_columns"] = list_json(d.limits.missing, missing_json);
   json["not_possible"] = list_json(d.limits.not_possible, [](const analysis::NotPossible& n) {
     return Json{
         {"statement", n.statement}, {"because", n.because}, {"trials", n.trials ? Json(*n.trials) : Json(nullptr)}};
