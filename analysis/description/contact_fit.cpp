@@ -368,7 +368,7 @@ ContactFit fit_contact(const Experiment& experiment, const std::vector<std::size
   if (fit.status == ContactFit::Status::converged && !bound.empty())
     fit.message = fmt::format("{} is at {}, the least value: likeliest is no such spread at all", bound, least_sd);
   if (fit.status == ContactFit::Status::converged && !best.settled && fit.message.empty())
-    fit.message = "the search for the maximum did not settle: the likelihood is nearly flat along its ridge";
+    fit.message = "the search for the maximum did not converge: the likelihood is nearly flat along its ridge";
   if (fit.impossible > 0)
     fit.message += fmt::format("{}{} transitions are outside what {} can do and are left out",
                                fit.message.empty() ? "" : "; ", fit.impossible, dynamics::law_name(options.law));

@@ -34,9 +34,9 @@ namespace {
 
 constexpr std::size_t most_rivals = 3;  // hypotheses that compete in each fold of the cross-validation:
 constexpr double rival_evidence = 4;    //   those no further behind the best. Saves time
-// Beyond this rise another optimum of the recalibration is taken for one, and a recalibration that did not settle is
+// Beyond this rise another optimum of the recalibration is taken for one, and a recalibration that did not converge is
 // mentioned if its slope still promises it.
-constexpr double settled_rise = 0.5, settled_share = 0.005;  // of the log likelihood; of the largest gain found
+constexpr double converged_rise = 0.5, converged_share = 0.005;  // of the log likelihood; of the largest gain found
 
 using Progress = std::function<void(double, const char*)>;
 
@@ -159,11 +159,11 @@ std::vector<std::string> notes_on_roughness(const Fitted& fitted, const Diagnosi
   const Fit& recalibrated = fitted.recalibrated;
   double largest_gain = fitted.gain();
   for (const RankedCause& cause : fitted.ranking.singles) largest_gain = std::max(largest_gain, cause.gain);
-  if (!recalibrated.converged && recalibrated.promised > settled_rise + settled_share * largest_gain)
-    notes.push_back(
-        fmt::format("the recalibrated parameters did not settle ({}): by its slope the likelihood could rise by {:.2g} "
-                    "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
-                    recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
+  if (!recalibrated.converged && recalibrated.promised > converged_rise + converged_share * largest_gain)
+    notes.push_back(fmt::format(
+        "the recalibrated parameters did not converge ({}): by its slope the likelihood could rise by {:.2g} "
+        "more, and gains over them (2 Δ ln L) may be {:.2g} too large",
+        recalibrated.reason, recalibrated.promised, 2 * recalibrated.promised));
   if (!fitted.ranking.scan.trials_suffice)
     notes.push_back(fmt::format(
         "{} {} of {:.2g} transitions: chance levels come from the model's information alone; from {} trials "
@@ -182,7 +182,7 @@ std::optional<Fit> other_recalibration(const TransitionModel& model, const Fit& 
     if (cause.fitted() && (!leader || cause.gain > leader->gain)) leader = &cause;
   if (!leader) return {};
   Fit other = fit(model, leader->fit.nuisance, {});
-  if (other.penalised > recalibrated.penalised + settled_rise + settled_share * std::max(0.0, leader->gain))
+  if (other.penalised > recalibrated.penalised + converged_rise + converged_share * std::max(0.0, leader->gain))
     return other;
   return {};
 }

@@ -116,6 +116,60 @@ void say_what_stays(std::vector<std::string>& s, const Diagnosis& d) {
                           d.causes.p_unnamed, where));
 }
 
+void say_explained(std::vector<std::string>& s, const Diagnosis& d) {
+  const Cause& likeliest = d.causes.ranked.front();
+  if (d.causes.set.size() == 1) {
+    s.push_back(fmt::format("There is a gap that recalibration does not remove, and {} it: {}.",
+                            likeliest.effects.size() == 1 ? "one cause explains"
+                            : likeliest.effects.size() == 2
+                                ? "two effects together explain"
+                                : fmt::format("{} effects together explain", likeliest.effects.size()),
+                            with_parameters(likeliest)));
+  } else {
+    s.push_back(
+        fmt::format("There is a gap that recalibration does not remove. These data cannot tell {} causes apart: {}.",
+                    d.causes.set.size(), grouped_set(d)));
+    s.push_back(
+        fmt::format("The likeliest is {} with probability {:.2f}.", with_parameters(likeliest), likeliest.probability));
+  }
+  if (!d.causes.size.empty()) s.push_back(d.causes.size);
+  if (const auto left =
+          std::ranges::count_if(d.gap.left.cells, [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
+    s.push_back(
+        fmt::format("It leaves {} {} of the map beyond chance, by no more than the {:.0f} % of its own size "
+                    "that the form of a cause is allowed to be off.",
+                    left, left == 1 ? "cell" : "cells", 100 * d.rules.model_error));
+}
+
+void say_unexplained(std::vector<std::string>& s, const Diagnosis& d) {
+  if (const auto would_do = trials_to_explain(d.data)) {
+    s.push_back(
+        fmt::format("There is a gap as given, and {} {} with {} {} of a speed are too few to say what causes it: {} "
+                    "trials like these would do.",
+                    d.data.trials, d.data.trials == 1 ? "trial" : "trials", d.data.collisions,
+                    d.data.collisions == 1 ? "transition" : "transitions", *would_do));
+    return;
+  }
+  const bool any = !d.causes.ranked.empty();
+  if (any && d.causes.ranked.front().probability > d.causes.p_none) {
+    s.push_back(
+        fmt::format("There is a gap that recalibration does not remove. The nearest of the catalogue is {}; "
+                    "that it is none of the catalogue has probability {:.2f}, too much for a name.",
+                    with_parameters(d.causes.ranked.front()), d.causes.p_none));
+  } else {
+    s.push_back("There is a gap that no effect of the catalogue, nor several, removes: something else is at work.");
+    if (d.causes.together > d.rules.most_together)
+      s.push_back(
+          fmt::format("The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: two "
+                      "causes would add up, these bend each other into the shape of something else.",
+                      d.causes.ranked.front().name(), d.causes.together));
+    else if (any && d.causes.ranked.front().gain > worth_naming)
+      s.push_back(fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.",
+                              d.causes.ranked.front().name()));
+  }
+  say_unnamed(s, d);
+}
+
 void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::no_gap:
@@ -126,23 +180,7 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
           fmt::format("There is a gap as given, and other {} remove it: no missing physics shows.", d.gap.refitted));
       break;
     case Verdict::explained:
-      if (d.causes.set.size() == 1)
-        s.push_back(fmt::format("There is a gap that recalibration does not remove, and one cause explains it: {}.",
-                                with_parameters(d.causes.ranked.front())));
-      else {
-        s.push_back(fmt::format(
-            "There is a gap that recalibration does not remove. These data cannot tell {} causes apart: {}.",
-            d.causes.set.size(), grouped_set(d)));
-        s.push_back(fmt::format("The likeliest is {} with probability {:.2f}.",
-                                with_parameters(d.causes.ranked.front()), d.causes.ranked.front().probability));
-      }
-      if (!d.causes.size.empty()) s.push_back(d.causes.size);
-      if (const auto left = std::count_if(d.gap.left.cells.begin(), d.gap.left.cells.end(),
-                                          [](const GapCell& cell) { return cell.p_adjusted < shown_level; }))
-        s.push_back(
-            fmt::format("It leaves {} {} of the map beyond chance, by no more than the {:.0f} % of its own size "
-                        "that the form of a cause is allowed to be off.",
-                        left, left == 1 ? "cell" : "cells", 100 * d.rules.model_error));
+      say_explained(s, d);
       break;
     case Verdict::partly_explained:
       s.push_back("There is a gap that recalibration does not remove, and part of it has a name.");
@@ -150,32 +188,7 @@ void say_verdict(std::vector<std::string>& s, const Diagnosis& d) {
       say_what_stays(s, d);
       break;
     case Verdict::unexplained:
-      if (const auto would_do = trials_to_explain(d.data)) {
-        s.push_back(fmt::format(
-            "There is a gap as given, and {} {} with {} {} of a speed are too few to say what causes it: {} trials "
-            "like these would do.",
-            d.data.trials, d.data.trials == 1 ? "trial" : "trials", d.data.collisions,
-            d.data.collisions == 1 ? "transition" : "transitions", *would_do));
-        break;
-      }
-      if (!d.causes.ranked.empty() && d.causes.ranked.front().probability > d.causes.p_none) {
-        s.push_back(fmt::format(
-            "There is a gap that recalibration does not remove. The nearest of the catalogue is {}; that it is "
-            "none of the catalogue has probability {:.2f}, too much for a name.",
-            with_parameters(d.causes.ranked.front()), d.causes.p_none));
-        say_unnamed(s, d);
-        break;
-      }
-      s.push_back("There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
-      if (d.causes.together > d.rules.most_together)
-        s.push_back(fmt::format(
-            "The nearest of the catalogue is {}, but these gain {:.1f} times as much together as alone: two "
-            "causes would add up, these bend each other into the shape of something else.",
-            d.causes.ranked.front().name(), d.causes.together));
-      else if (!d.causes.ranked.empty() && d.causes.ranked.front().gain > worth_naming)
-        s.push_back(fmt::format("The nearest of the catalogue is {}; what it leaves is in the map.",
-                                d.causes.ranked.front().name()));
-      say_unnamed(s, d);
+      say_unexplained(s, d);
       break;
   }
 }

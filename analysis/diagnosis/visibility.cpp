@@ -16,20 +16,69 @@ double taken_up(const EffectScan& scan, Eigen::Index first, Eigen::Index count, 
   return (root.transpose() * cross).squaredNorm();
 }
 
+// Returns the information on an effect's first parameter, the others free to follow.
+double information_on_first(const EffectScan& scan, const Eigen::MatrixXd& own, Eigen::Index first) {
+  const Eigen::Index others = own.rows() - 1;
+  if (others == 0) return own(0, 0);
+  const Eigen::VectorXd cross = own.block(1, 0, others, 1);
+  const Eigen::MatrixXd rest =
+      markov::resolved_root(own.block(1, 1, others, others), scan.whole.segment(first + 1, others), resolved_share);
+  return own(0, 0) - (rest.transpose() * cross).squaredNorm();
+}
+
+// Says how large the effect is, in the number that it reports, at a size of its first parameter.
+void set_smallest(Visibility& v, const ScannedEffect& scanned, double size) {
+  const FreeParameter& p = scanned.candidate->parameters[0];
+  std::vector<double> values;
+  for (const FreeParameter& one : scanned.candidate->parameters) values.push_back(one.neutral);
+  const std::vector<double>& variant = scanned.candidate->variants[scanned.best];
+  const auto neutral = scanned.candidate->report(variant, values);
+  values[0] = std::clamp(p.neutral + size, p.lower, p.upper);
+  const auto seen = scanned.candidate->report(variant, values);
+  for (std::size_t k = 0; k < seen.size(); ++k)
+    if (seen[k].second != neutral[k].second) {
+      v.parameter = seen[k].first;
+      v.smallest = std::abs(seen[k].second - neutral[k].second);
+      break;
+    }
+  v.times_more = std::pow(size / (p.upper - p.neutral), 2);
+  if (p.neutral + size > p.upper) v.undecidable = "it would have to pass its range to be seen";
+}
+
+// Asks along the direction in which the effect was found (or its first parameter) what others explain of it.
+std::vector<std::pair<std::string, double>> alike_to(const EffectScan& scan, const ScannedEffect& scanned,
+                                                     const Eigen::MatrixXd& own) {
+  const Eigen::Index count = own.rows();
+  Eigen::VectorXd direction = scanned.start[scanned.best];
+  if (count == 1 || !(direction.norm() > 0)) direction = Eigen::VectorXd::Unit(count, 0);
+  const double strength = direction.dot(own * direction);
+  std::vector<std::pair<std::string, double>> alike;
+  for (const ScannedEffect& other : scan.effects) {
+    if (other.candidate == scanned.candidate) continue;
+    double share = 0;
+    const auto size_of = static_cast<Eigen::Index>(other.candidate->parameters.size());
+    for (const Eigen::Index at : other.first) {
+      const Eigen::VectorXd cross = scan.information.block(at, scanned.first[scanned.best], size_of, count) * direction;
+      share = std::max(share, taken_up(scan, at, size_of, cross) / strength);
+    }
+    if (share > 0.5) alike.emplace_back(other.candidate->id, std::min(1.0, share));
+  }
+  std::sort(alike.begin(), alike.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  return alike;
+}
+
 }  // namespace
 
 std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<const Candidate*>& candidates,
                                    const Rules& rules) {
   std::vector<Visibility> all;
   for (const Candidate* candidate : candidates) {
-    Visibility v;
+    Visibility& v = all.emplace_back();
     v.effect = candidate->id;
     v.undecidable = candidate->undecidable;
-    const auto found = std::find_if(scan.effects.begin(), scan.effects.end(),
-                                    [&](const ScannedEffect& e) { return e.candidate == candidate; });
-    if (found == scan.effects.end()) {
+    const ScannedEffect* found = scan.find(candidate);
+    if (!found) {
       if (v.undecidable.empty() && !candidate->parameters.empty()) v.undecidable = "not scanned";
-      all.push_back(std::move(v));
       continue;
     }
     const auto count = static_cast<Eigen::Index>(candidate->parameters.size());
@@ -38,49 +87,10 @@ std::vector<Visibility> visibility(const EffectScan& scan, const std::vector<con
     const double least = resolved_share * scan.whole[first];
     if (!(own(0, 0) > least)) {
       v.undecidable = "these data hold no information on it";
-      all.push_back(std::move(v));
       continue;
     }
-    // This is the first parameter's size, the others free to follow.
-    double information = own(0, 0);
-    if (count > 1) {
-      const Eigen::VectorXd cross = own.block(1, 0, count - 1, 1);
-      const Eigen::MatrixXd rest = markov::resolved_root(own.block(1, 1, count - 1, count - 1),
-                                                         scan.whole.segment(first + 1, count - 1), resolved_share);
-      information -= (rest.transpose() * cross).squaredNorm();
-    }
-    const FreeParameter& p = candidate->parameters[0];
-    const double size = std::sqrt(rules.seen_gain / std::max(information, least));
-    std::vector<double> values;
-    for (const FreeParameter& one : candidate->parameters) values.push_back(one.neutral);
-    const auto neutral = candidate->report(candidate->variants[found->best], values);
-    values[0] = std::clamp(p.neutral + size, p.lower, p.upper);
-    const auto seen = candidate->report(candidate->variants[found->best], values);
-    for (std::size_t k = 0; k < seen.size(); ++k)
-      if (seen[k].second != neutral[k].second) {
-        v.parameter = seen[k].first;
-        v.smallest = std::abs(seen[k].second - neutral[k].second);
-        break;
-      }
-    v.times_more = std::pow(size / (p.upper - p.neutral), 2);
-    if (p.neutral + size > p.upper) v.undecidable = "it would have to pass its range to be seen";
-
-    // This asks along the direction in which it was found (or its first parameter) what others explain of it.
-    Eigen::VectorXd direction = found->start[found->best];
-    if (count == 1 || !(direction.norm() > 0)) direction = Eigen::VectorXd::Unit(count, 0);
-    const double strength = direction.dot(own * direction);
-    for (const ScannedEffect& other : scan.effects) {
-      if (other.candidate == candidate) continue;
-      double share = 0;
-      const auto size_of = static_cast<Eigen::Index>(other.candidate->parameters.size());
-      for (const Eigen::Index at : other.first) {
-        const Eigen::VectorXd cross = scan.information.block(at, first, size_of, count) * direction;
-        share = std::max(share, taken_up(scan, at, size_of, cross) / strength);
-      }
-      if (share > 0.5) v.alike.emplace_back(other.candidate->id, std::min(1.0, share));
-    }
-    std::sort(v.alike.begin(), v.alike.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
-    all.push_back(std::move(v));
+    set_smallest(v, *found, std::sqrt(rules.seen_gain / std::max(information_on_first(scan, own, first), least)));
+    v.alike = alike_to(scan, *found, own);
   }
   return all;
 }

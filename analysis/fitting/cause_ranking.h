@@ -24,7 +24,7 @@ struct RankedCause {
   double evidence = 0;  ///< log Bayes factor against the recalibrated model, prior odds of several effects included
   /// Of several effects: its gain over what they gain alone, beside what each hides of the others.
   double together = 1;
-  std::string not_decided;  ///< why, where the data cannot tell or the fit did not settle
+  std::string not_decided;  ///< why, where the data cannot tell or the fit did not converge
   bool candidate_undecided() const { return !terms[0].candidate->undecidable.empty(); }
   bool fitted() const { return !fit.nuisance.empty(); }
   /// Takes a better fit of the same effects: the likelihoods of their other variants, and so the prior, stay what they

@@ -207,19 +207,19 @@ class Climb {
   double best() const { return best_; }
 
   // Moves all parameters together; where that fails, the effects' and the nuisances' by themselves, and all of them
-  // by steps that are damped more. @param settled  a promise below it is not resolved
-  Stride stride(const FreeParts& parts, double settled, bool both_sides) {
+  // by steps that are damped more. @param resolved  a promise below it is not resolved
+  Stride stride(const FreeParts& parts, double resolved, bool both_sides) {
     const double before = best_;
     Stride stride;
     step_of(parts.all, 0, stride);
     stride.promised = stride.foretold;
     stride.better = !(stride.promised > worth_a_step) || rises(parts.all, level_, most_halvings, before, stride);
-    const bool at_the_top = both_sides && stride.promised < settled;
+    const bool at_the_top = both_sides && stride.promised < resolved;
     if (!stride.better && !at_the_top)
       stride.better = rises(parts.of_terms, 0, most_halvings, before, stride) ||
                       rises(parts.of_nuisances, 0, most_halvings, before, stride);
     for (std::size_t damped = 0; !stride.better && !at_the_top && damped < std::size(dampings); ++damped)
-      if (damped != level_ && (damped == 0 || stride.promised > settled) &&
+      if (damped != level_ && (damped == 0 || stride.promised > resolved) &&
           rises(parts.all, damped, few_halvings, before, stride)) {
         stride.better = true;
         level_ = damped;
@@ -306,14 +306,14 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
       break;
     }
     // What is promised below this differences do not resolve.
-    const double settled = unresolved + unresolved_share * (climb.best() - start);
-    const Stride stride = climb.stride(parts, settled, both_sides);
+    const double resolved = unresolved + unresolved_share * (climb.best() - start);
+    const Stride stride = climb.stride(parts, resolved, both_sides);
     result.promised = stride.promised;
     if (options.from && stride.better && std::abs(stride.risen - stride.foretold) < as_foretold * stride.foretold) {
       result.converged = true;
       break;
     }
-    if (!stride.better && stride.promised >= settled && !both_sides) {
+    if (!stride.better && stride.promised >= resolved && !both_sides) {
       both_sides = true;
       continue;
     }
@@ -325,7 +325,7 @@ Fit fit(const TransitionModel& model, const std::vector<double>& nuisance, const
     }
     if (!stride.better) {
       // This is the optimum, up to what the differences resolve.
-      result.converged = stride.promised < settled;
+      result.converged = stride.promised < resolved;
       if (!result.converged) result.reason = "no step along the gradient improves the likelihood";
       break;
     }

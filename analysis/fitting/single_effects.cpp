@@ -19,18 +19,19 @@ constexpr double overlooked_margin = 12;  // evidence by the scores below the be
 constexpr double leader_evidence = 2;     // of an effect that is refined, and that pairs are built on
 constexpr double refined_share = 0.7;     // of the best evidence, less
 constexpr double refined_margin = 10;     //   this much, for an effect worth refining and another start
-constexpr double refit_margin = 60;       // evidence below the best, for a fit that did not settle to be tried again
-constexpr double pair_share = 2.8;        // of the gain of its stronger effect, most that a pair gains, more or less,
-constexpr double pair_margin = 12;        //   this much: below the best gain, none is built on it
+constexpr double refit_margin = 60;       // evidence below the best, for a fit that did not converge to be tried again
+// A pair gains up to 2.8 times what the stronger of its effects gains alone, and 12 more: an effect for which that is
+// less than the best gain of all leads no pair.
+constexpr double pair_share = 2.8, pair_margin = 12;
 
 // These numbers say how fits are run.
 constexpr int law_steps = 12;          // of another law's fit, from either start
 constexpr int more_law_steps = 60;     // where it may still come near
-constexpr int more_steps = 4;          // times as many, where a fit near the top did not settle
+constexpr int more_steps = 4;          // times as many, where a fit near the top did not converge
 constexpr double law_hopeless = -100;  // log likelihood below the recalibrated model's that no more steps make good
 constexpr double strained = 2;         // cost of its priors [log likelihood], for a fit to be tried from what is stated
 
-// These numbers say when a fit that did not settle is decided all the same.
+// These numbers say when a fit that did not converge is decided all the same.
 constexpr double law_refuted = -30;     // gain of another law: so far below that what it could still rise is nothing
 constexpr double small_gain = 10;       // by fit and by scores: at the optimum up to what differences resolve
 constexpr double rise_weight = 3;       // of the rise that the slope still promises, as evidence, and
@@ -131,9 +132,9 @@ void refit_from_stated(const RankingProblem& problem, SingleEffects& singles) {
   singles.update_top();
 }
 
-// Fits once more where a fit did not settle near the top: further along its own way, and from the nuisances that suit
+// Fits once more where a fit did not converge near the top: further along its own way, and from the nuisances that suit
 // the leader.
-void refit_unsettled(const RankingProblem& problem, SingleEffects& singles) {
+void refit_unconverged(const RankingProblem& problem, SingleEffects& singles) {
   if (singles.causes.empty()) return;
   const auto best = std::ranges::max_element(singles.causes, {}, &RankedCause::evidence);
   const std::vector<double> leaders_nuisance = best->fit.nuisance;
@@ -155,8 +156,8 @@ void refit_unsettled(const RankingProblem& problem, SingleEffects& singles) {
   singles.update_top();
 }
 
-// A fit that did not settle is decided where all it could still rise leaves it far behind, or is next to nothing.
-void decide_unsettled(SingleEffects& singles) {
+// A fit that did not converge is decided where all it could still rise leaves it far behind, or is next to nothing.
+void decide_unconverged(SingleEffects& singles) {
   for (RankedCause& cause : singles.causes)
     if (!cause.candidate_undecided() && cause.fitted() && std::isfinite(cause.evidence) &&
         (cause.evidence + rise_weight * cause.fit.promised < singles.top - far_behind ||
@@ -243,8 +244,8 @@ SingleEffects rank_single_effects(const RankingProblem& problem, const RankingOp
   halfway();
   refit_from_stated(problem, singles);
   refine_leaders(problem, singles);
-  refit_unsettled(problem, singles);
-  decide_unsettled(singles);
+  refit_unconverged(problem, singles);
+  decide_unconverged(singles);
   return singles;
 }
 

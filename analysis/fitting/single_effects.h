@@ -28,7 +28,7 @@ struct SingleEffects {
   void update_top();
 };
 
-/// Scans and fits single effects, tries again the fits that did not settle, and refines the variants of the leading
+/// Scans and fits single effects, tries again the fits that did not converge, and refines the variants of the leading
 /// ones.
 /// @param halfway  called when all are fitted once
 SingleEffects rank_single_effects(const RankingProblem& problem, const RankingOptions& options,

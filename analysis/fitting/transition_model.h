@@ -38,7 +38,7 @@ struct Event {
   std::optional<double> since_previous = {};  ///< collision [s]; none where it may not judge
   double speed = 0;                           ///< given, the condition of the density [rad/s]
   std::optional<bool> rested = {};            ///< after this collision; none: not known, or no collision
-  double added = 0;                           ///< known error that a score judges with the speed observed [rad/s]
+  double added = 0;                           ///< known part of the measurement error, in the observed speed [rad/s]
 };
 
 /// Holds the logarithm of each event's density [events] and the normal score of its probability integral transform,

@@ -23,7 +23,7 @@ struct LeftInFacet {
 
 /// Judges the facets of the map; and what no effect of a catalogue does: every other trial, slow swings over the
 /// trials, smooth changes along them, trends of single legs, memory beyond the last collision, the change of speed
-/// since then. What the fit's parameters could take up is projected out. Empty of a fit that did not settle.
+/// since then. What the fit's parameters could take up is projected out. Empty of a fit that did not converge.
 /// @param forgiven  2 Delta log likelihood that an error of form may leave in a facet
 std::vector<LeftInFacet> left_by_facet(const TransitionModel& model, const Fit& fit, const PhaseGain& forgiven,
                                        const Rules& rules);

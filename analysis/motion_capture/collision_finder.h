@@ -28,7 +28,7 @@ struct FoundCollision {
   double peak = 0;            ///< that speed [rad/s]: the paper's omega_minus
   double peak_angle_rad = 0;  ///< of the wheel then
   /// The stance motion fitted to the samples before and after the drop, extrapolated to the collision. Nothing where
-  /// samples are too few or the fit did not settle.
+  /// samples are too few or the fit did not converge.
   std::optional<StanceFit> fit;
   double apex_time = 0;  ///< of the smallest smoothed speed before the next collision, mid-stance [s]
   double apex = 0;       ///< that speed [rad/s]

@@ -11,10 +11,11 @@
 
 namespace metastable::analysis {
 
-/// Says what each event of one trial says, given those before it. A friction of the trial's own is integrated over by
-/// nodes: every node follows the trial, weighted by what it has explained, and is left behind where that is next to
-/// nothing. Where no event leads up to a collision (no launch is stated, or the stances are left out), its reported
-/// speed is where the trial goes on from.
+/// Computes the density of each event of one trial, given the events before it. Where the friction differs from trial
+/// to trial, the density is averaged over nodes of that friction: each node follows the trial with its own friction and
+/// has the weight of what it has explained so far, and nodes of negligible weight are dropped. Where no event leads up
+/// to a collision (no launch is stated, or the stances are left out), the trial goes on from the collision's reported
+/// speed.
 class TrialFollower {
  public:
   /// All references must outlive the follower.

@@ -23,15 +23,24 @@ namespace {
 
 using dynamics::ExtendedWheel;
 
-constexpr double assumed_noise = 0.01;     // sd of reported speeds where neither text nor stances say it [rad/s]
-constexpr std::size_t least_stances = 20;  // to take the noise from them
-constexpr std::size_t least_exact = 2;     // to say that they repeat the model: by chance one in 1e5 of two does
-constexpr double two_speeds = 1.2;         // sd of a stance's residual, in noises: of two speeds, one damped to 0.65
-constexpr double rounding = 1e-5;          // residuals below are those of printed digits [rad/s]
-constexpr double finest_noise = 1e-5;      // finer, and the model's own numbers would have to be exact [rad/s]
+constexpr double assumed_noise = 0.01;  // sd of reported speeds where neither text nor stances say it [rad/s]
+// Fewer stances than these do not tell the noise of the speeds.
+constexpr std::size_t least_stances = 20;
+// So many stances without a residual show that the speeds were computed by the model: of two measured ones that happens
+// by chance once in 1e5 experiments.
+constexpr std::size_t least_exact = 2;
+// A stance's residual is the difference of two reported speeds, the earlier one damped to 0.65 on the way: its sd is
+// sqrt(1 + 0.65^2) times the noise of one.
+constexpr double two_speeds = 1.2;
+// Residuals below this come from the printed digits [rad/s].
+constexpr double rounding = 1e-5;
+// The noise is taken to be at least this: with less, the model's own numbers would have to be exact [rad/s].
+constexpr double finest_noise = 1e-5;
 constexpr const char* repeat_the_model =
     "the stances repeat the model to rounding, as simulated ones do: they are left out";
-constexpr double chance_of_deviation = 4;  // in shares of a median deviation times root n: three and a half of its sds
+// The median deviation of n values has a standard error of 1.17 / sqrt(n) of itself: 4 / sqrt(n) is three and a half of
+// these.
+constexpr double chance_of_deviation = 4;
 
 std::vector<ExtendedWheel> stated_wheels(const WheelRuns& measured) { return wheels_on_ramps(measured, {}, {}); }
 

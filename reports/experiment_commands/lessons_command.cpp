@@ -83,7 +83,7 @@ void add_answer(Table& table, const std::string& what, const Diagnosis& d) {
   row.push_back(steps_cell(s.with_effect));
   table.rows.push_back(std::move(row));
   for (const std::string& note : d.data.notes)
-    if (note.find("did not settle") != std::string::npos) table.notes.push_back(fmt::format("{}: {}.", what, note));
+    if (note.find("did not converge") != std::string::npos) table.notes.push_back(fmt::format("{}: {}.", what, note));
 }
 
 Table said(const std::string& id, const std::string& title, const Diagnosis& d) {

@@ -139,7 +139,7 @@ TEST(Verdict, SaysThatTheNearestIsTooUnsureForAName) {
       "There is a gap that recalibration does not remove. The nearest of the catalogue is friction_patch; that it "
       "is none of the catalogue has probability 0.30, too much for a name.");
   EXPECT_EQ(first_sentence(4),
-            "There is a gap that no effect of the catalogue, nor a pair, removes: something else is at work.");
+            "There is a gap that no effect of the catalogue, nor several, removes: something else is at work.");
 }
 
 // A drift beside one of three, two of which the design hardly tells apart.

@@ -115,7 +115,7 @@ class Cusped : public test::Line {
   double at_;
 };
 
-// Seen from one side a cusp promises a rise that is not there: such fits did not settle, and their effects were not
+// Seen from one side a cusp promises a rise that is not there: such fits did not converge, and their effects were not
 // decided.
 TEST(ModelFit, SettlesOnACusp) {
   const Line straight = line(0, 1);

@@ -50,13 +50,13 @@ class RoughTerrain {
  public:
   explicit RoughTerrain(double sd_degrees) : sd_(sd_degrees * pi / 180) {}
 
-  double fixed_point() const { return (kReach * std::cos(kMean - kPhi) - (1 - kC) * kG) / (1 - kC); }
+  double fixed_point() const { return (amplitude * std::cos(kMean - kPhi) - (1 - kC) * kG) / (1 - kC); }
   /// Returns the density of the next state.
   double density(double from, double to) const {
     const double cosine = level(from, to);
     if (std::abs(cosine) >= 1) return 0;
     const double z = (kPhi - std::acos(cosine) - kMean) / sd_;
-    return std::exp(-0.5 * z * z) / (sd_ * std::sqrt(2 * pi) * kReach * std::sqrt(1 - cosine * cosine));
+    return std::exp(-0.5 * z * z) / (sd_ * std::sqrt(2 * pi) * amplitude * std::sqrt(1 - cosine * cosine));
   }
   /// Returns the probability of x' <= 0, from the error function.
   double kill(double from) const {
@@ -67,11 +67,11 @@ class RoughTerrain {
  private:
   static constexpr double kG = 2 * 9.8, kC = 0.5;
   static inline const double kA = pi / 8, kMean = 8 * pi / 180;
-  static inline const double kReach = kG * std::hypot((1 - kC) * std::cos(kA), (1 + kC) * std::sin(kA));
+  static inline const double amplitude = kG * std::hypot((1 - kC) * std::cos(kA), (1 + kC) * std::sin(kA));
   static inline const double kPhi = std::atan2((1 + kC) * std::sin(kA), (1 - kC) * std::cos(kA));
 
   /// Returns cos(slope - phi) of the slope that leads there.
-  static double level(double from, double to) { return (to - kC * from + (1 - kC) * kG) / kReach; }
+  static double level(double from, double to) { return (to - kC * from + (1 - kC) * kG) / amplitude; }
 
   double sd_;
 };
