@@ -10,11 +10,10 @@
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/fitting/cause_ranking.h"
 #include "analysis/gap/held_out.h"
+#include "analysis/statistics/interval_95.h"
 
 namespace metastable::analysis {
 namespace {
-
-constexpr double half_90 = 1.6448536269514722;  // of a two-sided interval of a normal estimate, in sds
 
 bool holds(const Cause& cause, const std::string& effect) {
   return std::ranges::find(cause.effects, effect) != cause.effects.end();
@@ -43,7 +42,7 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
     if (own.empty() || !same_variant()) continue;
     weights += cause.probability;
     for (std::size_t k = 0; k < own.size(); ++k) {
-      const double sd = (own[k].upper - own[k].lower) / (2 * half_90);
+      const double sd = (own[k].upper - own[k].lower) / (2 * normal_90);
       mean[k].value += cause.probability * own[k].value;
       variance[k] += cause.probability * (sd * sd + own[k].value * own[k].value);
     }
@@ -52,7 +51,7 @@ std::vector<EstimatedParameter> averaged(const std::vector<Cause>& ranked, const
     EstimatedParameter& p = mean[k];
     if (weights > 0) p.value /= weights;
     if (!p.fitted) continue;
-    const double half = half_90 * std::sqrt(std::max(0.0, variance[k] / weights - p.value * p.value));
+    const double half = normal_90 * std::sqrt(std::max(0.0, variance[k] / weights - p.value * p.value));
     p.lower = p.value - half;
     p.upper = p.value + half;
   }

@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <tuple>
@@ -15,6 +13,7 @@
 #include "analysis/diagnosis/at_work.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/diagnosis/gap_tests.h"
+#include "analysis/diagnosis/machine_steps.h"
 #include "analysis/diagnosis/missing_columns.h"
 #include "analysis/diagnosis/parameter_estimates.h"
 #include "analysis/diagnosis/too_few.h"
@@ -32,8 +31,9 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr std::size_t most_rivals = 3;  // hypotheses that compete in each fold of the cross-validation:
-constexpr double rival_evidence = 4;    //   those no further behind the best. Saves time
+constexpr std::size_t most_rivals = 3;   // hypotheses that compete in each fold of the cross-validation:
+constexpr double rival_evidence = 4;     //   those no further behind the best. Saves time
+constexpr std::size_t most_telling = 6;  // hypotheses that say what steps are expected. Saves time
 // Beyond this rise another optimum of the recalibration is taken for one, and a recalibration that did not converge is
 // mentioned if its slope still promises it.
 constexpr double converged_rise = 0.5, converged_share = 0.005;  // of the log likelihood; of the largest gain found
@@ -43,22 +43,21 @@ using Progress = std::function<void(double, const char*)>;
 StepsBeforeFailure steps_before_failure(const TransitionModel& model, const std::vector<double>& nominal,
                                         const Fit& recalibrated, const Fit& chosen, std::uint64_t seed) {
   StepsBeforeFailure steps;
-  const auto [at_risk, rests] = model.rests();
-  if (at_risk > 0) {
-    // Rests are counts: these are exact limits of a Poisson mean.
-    const auto limit = [](double degrees, double p) {
-      return degrees > 0 ? boost::math::quantile(boost::math::chi_squared(degrees), p) / 2 : 0.0;
-    };
-    const double most = limit(2 * rests + 2, 0.95), least = limit(2 * rests, 0.05);
-    const double infinity = std::numeric_limits<double>::infinity();
-    steps.observed = rests > 0 ? at_risk / rests : infinity;
-    steps.observed_lower = at_risk / most;
-    steps.observed_upper = least > 0 ? at_risk / least : infinity;
-  }
+  set_observed(steps, model.rests());
   steps.baseline = model.expected_steps(nominal, {}, seed);
   steps.recalibrated = model.expected_steps(recalibrated.nuisance, {}, seed);
   steps.with_effect = model.expected_steps(chosen.nuisance, chosen.terms, seed);
   return steps;
+}
+
+// Lists the hypotheses that say what the machine's expected steps are: the likeliest with its rivals, by probability.
+std::vector<WeighedFit> telling(const std::vector<const RankedCause*>& ordered, const Diagnosis& d) {
+  std::vector<WeighedFit> fits;
+  for (std::size_t i = 0; i < ordered.size() && fits.size() < most_telling; ++i)
+    if (ordered[i]->fitted() &&
+        d.causes.ranked[i].probability >= d.rules.least_of_first * d.causes.ranked.front().probability)
+      fits.push_back({&ordered[i]->fit, d.causes.ranked[i].probability});
+  return fits;
 }
 
 // Returns the one or two effects that an entry of the options names.
@@ -74,6 +73,7 @@ std::vector<std::string> effects_of(const std::string& entry) {
 void check(const TransitionModel& model, const DiagnosisOptions& options) {
   if (options.draws < 200) throw std::invalid_argument(fmt::format("draws: {} is below 200", options.draws));
   if (options.folds < 2) throw std::invalid_argument(fmt::format("folds: {} is below 2", options.folds));
+  if (!options.elsewhere.empty()) model.elsewhere(options.elsewhere);
   if (!(options.level > 0 && options.level < 0.5))
     throw std::invalid_argument(fmt::format("level: {} is outside (0, 0.5)", options.level));
   const std::vector<std::string> known = model.effect_ids();
@@ -352,7 +352,8 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   progress(0.68, "what is left");
   Hypotheses ranked = hypotheses(model, fitted.ranking);
   const RankedCause* best = ranked.best();
-  const RankedCause* second = ranked.ordered.size() > 1 ? ranked.ordered[1] : nullptr;
+  const std::vector<const RankedCause*> ordered = ranked.ordered;
+  const RankedCause* second = ordered.size() > 1 ? ordered[1] : nullptr;
   Chosen chosen = best_hypothesis(model, fitted, ranked, std::move(found), tested.gap, options);
   const Fit& cause = *chosen.fit;
   d.gap.left = chosen.left;
@@ -370,6 +371,10 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   d.shrinkage.steps = steps_before_failure(model, fitted.given.nuisance, fitted.recalibrated, cause, options.seed);
   if (const auto [at_risk, rests] = model.rests(); at_risk > 0 && !d.shrinkage.measures.empty())
     d.shrinkage.measures.push_back(rest_shrinkage(at_risk, rests, d.shrinkage.steps));
+  add_machine_steps(
+      d, model, {&fitted.recalibrated, 1},
+      is_gap(d.verdict) && &cause != &fitted.recalibrated ? telling(ordered, d) : std::vector<WeighedFit>{}, options,
+      [&] { progress(0.9, "steps before failure"); });
   d.shrinkage.profile = collision_profile(model, fitted.given.nuisance, cause, options.seed);
   progress(0.93, "what could not be seen");
   d.limits.missing = missing_columns(model, fitted.recalibrated, candidates, d.rules, options.threads, options.seed);

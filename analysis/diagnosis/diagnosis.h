@@ -31,6 +31,7 @@ struct DiagnosisOptions {
   double level = 0.02;  ///< of the tests for a gap, before and after recalibration, in (0, 0.5)
   int folds = 5;        ///< of the cross-validation by trial, >= 2
   Rules rules = {};     ///< that decide
+  std::vector<NamedValue> elsewhere = {};  ///< place whose expected steps are asked, see TransitionModel::elsewhere()
   /// It is called now and then with the share done, 0..1, and what is being done, and may throw to stop.
   std::function<void(double, const std::string&)> progress = {};
 };

@@ -224,6 +224,23 @@ void say_what_closes(std::vector<std::string>& s, const Diagnosis& d) {
   }
 }
 
+// Says the expected steps of the machine itself, as measured and where they were asked.
+void say_machine_steps(std::vector<std::string>& s, const Diagnosis& d) {
+  for (const MachineSteps& machine : d.shrinkage.steps.machine) {
+    if (!(machine.steps.lower > 0)) continue;
+    const std::string where =
+        &machine == &d.shrinkage.steps.machine.front() ? "" : fmt::format(" at {}", machine.where);
+    if (machine.at_least) {
+      s.push_back(fmt::format("This machine takes at least {:.2g} {}s before failure{} (95 %).", machine.steps.lower,
+                              d.data.step_name, where));
+      continue;
+    }
+    const DecimalEstimate steps = to_decimal(machine.steps, NumberFormat::general, 3);
+    s.push_back(fmt::format("This machine takes {} {}s before failure{} (90 %: {} to {}).", plain_text(steps.value),
+                            d.data.step_name, where, plain_text(steps.lower), plain_text(steps.upper)));
+  }
+}
+
 void say_what_is_hidden(std::vector<std::string>& s, const Diagnosis& d) {
   for (const MissingColumn& missing : d.limits.missing) {
     std::vector<std::string> hidden;
@@ -309,6 +326,7 @@ std::vector<std::string> sentences(const Diagnosis& d) {
     all.push_back(fmt::format("It stands on defects that were accepted: {}.", d.data.accepted_defects));
   say_where(all, d);
   say_what_closes(all, d);
+  say_machine_steps(all, d);
   say_what_is_hidden(all, d);
   return all;
 }

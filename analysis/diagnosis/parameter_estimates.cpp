@@ -6,15 +6,15 @@
 
 #include "analysis/fitting/cause_ranking.h"
 #include "analysis/fitting/effect_scan.h"
+#include "analysis/statistics/interval_95.h"
 #include "dynamics/numerics/truncated_normal.h"
 #include "markov/dense_matrix.h"
 
 namespace metastable::analysis {
 namespace {
 
-constexpr double score_90 = 1.6448536269514722;  // half-width of a two-sided interval
-constexpr double surely_there = 6;               // gain of an effect whose interval does not hold none of it
-constexpr double least_weight = 1e-3;            // of a variant, to widen an interval
+constexpr double surely_there = 6;     // gain of an effect whose interval does not hold none of it
+constexpr double least_weight = 1e-3;  // of a variant, to widen an interval
 
 std::vector<EstimatedParameter> as_reported(const EffectTerm& term) {
   std::vector<EstimatedParameter> all;
@@ -42,7 +42,7 @@ std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::M
                                           Eigen::Index first = 0) {
   const auto count = term.values.size();
   if (count == 1) {
-    const double half = score_90 * std::sqrt(std::max(0.0, covariance(first, first)));
+    const double half = normal_90 * std::sqrt(std::max(0.0, covariance(first, first)));
     return between(term, term.values[0] - half, term.values[0] + half);
   }
   const std::vector<NamedValue> here = term.candidate->report(term.variant, term.values);
@@ -58,7 +58,7 @@ std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::M
           (term.candidate->report(term.variant, moved)[k].second - here[k].second) / step;
     }
     const auto block = covariance.block(first, first, slope.size(), slope.size());
-    const double half = score_90 * std::sqrt(std::max(0.0, slope.dot(block * slope)));
+    const double half = normal_90 * std::sqrt(std::max(0.0, slope.dot(block * slope)));
     all[k].lower -= half;
     all[k].upper += half;
     all[k].fitted = half > 0;
@@ -71,7 +71,7 @@ std::vector<EstimatedParameter> estimates(const EffectTerm& term, const Eigen::M
 std::vector<EstimatedParameter> off_neutral(const TransitionModel& model, const RankedCause& ranked, double half) {
   const EffectTerm& term = ranked.terms[0];
   const double neutral = term.candidate->parameters[0].neutral;
-  const double allowed = score_90 * score_90 / 2;  // fall of the log likelihood
+  const double allowed = normal_90 * normal_90 / 2;  // fall of the log likelihood
   double out = neutral, in = term.values[0];
   for (int halving = 0; halving < 12; ++halving) {
     EffectTerm tried = term;
@@ -102,7 +102,7 @@ double quantile(const std::vector<VariantSays>& all, std::size_t number, double 
     for (const VariantSays& one : all) {
       const EstimatedParameter& e = one.numbers[number];
       const double half = x < e.value ? e.value - e.lower : e.upper - e.value;
-      sum += one.weight * (half > 0 ? dynamics::normal_cdf(score_90 * (x - e.value) / half) : x >= e.value);
+      sum += one.weight * (half > 0 ? dynamics::normal_cdf(normal_90 * (x - e.value) / half) : x >= e.value);
     }
     return sum / weights;
   };
@@ -147,7 +147,7 @@ void keep_positive(const TransitionModel& model, const Fit& fit, const Eigen::Ma
   Eigen::Index p = 0;
   slope.cwiseAbs().maxCoeff(&p);
   const Nuisance& n = model.nuisances()[static_cast<std::size_t>(p)];
-  const double half = score_90 * std::sqrt(std::max(0.0, covariance(p, p)));
+  const double half = normal_90 * std::sqrt(std::max(0.0, covariance(p, p)));
   const auto at = [&](double value) {
     std::vector<double> moved = fit.nuisance;
     moved[static_cast<std::size_t>(p)] = std::clamp(value, n.lower, n.upper);
@@ -178,7 +178,7 @@ Cause described_cause(const TransitionModel& model, const RankedCause& ranked, c
   }
   if (ranked.terms.size() == 1 && ranked.terms[0].values.size() == 1) {
     const EffectTerm& term = ranked.terms[0];
-    const double half = score_90 * std::sqrt(std::max(0.0, covariance(first - 1, first - 1)));
+    const double half = normal_90 * std::sqrt(std::max(0.0, covariance(first - 1, first - 1)));
     if (std::abs(term.values[0] - term.candidate->parameters[0].neutral) < half && ranked.gain > surely_there)
       cause.parameters[0] = off_neutral(model, ranked, half);
   }
@@ -203,7 +203,7 @@ std::vector<EstimatedParameter> contact_estimates(const TransitionModel& model, 
       slope[static_cast<Eigen::Index>(p)] =
           (model.report_nuisances(moved)[k].second - here[k].second) / model.nuisances()[p].step;
     }
-    const double half = score_90 * std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
+    const double half = normal_90 * std::sqrt(std::max(0.0, slope.dot(covariance * slope)));
     all.push_back({here[k].first, here[k].second, here[k].second - half, here[k].second + half, true});
     if (here[k].second > 0 && all.back().lower < 0) keep_positive(model, fit, covariance, slope, k, all.back());
   }

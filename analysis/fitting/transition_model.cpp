@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 #include <utility>
 
 namespace metastable::analysis {
@@ -38,6 +39,13 @@ std::vector<std::string> TransitionModel::effect_ids() const {
 const std::vector<Variation>& TransitionModel::variations() const {
   static const std::vector<Variation> none;
   return none;
+}
+
+std::pair<std::string, std::unique_ptr<TransitionModel>> TransitionModel::elsewhere(
+    const std::vector<NamedValue>& place) const {
+  throw std::invalid_argument(
+      place.empty() ? std::string("elsewhere: no place is named")
+                    : place.front().first + ": this system's expected steps are known where it was measured alone");
 }
 
 std::string TransitionModel::size_in_words(std::span<const EffectTerm>) const { return {}; }

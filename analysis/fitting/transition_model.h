@@ -186,6 +186,11 @@ class TransitionModel {
   /// launch speed, more columns, more trials.
   virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(
       std::span<const double> nuisance, std::uint64_t seed) const = 0;
+  /// Returns the same design at another place, by the names of what differs there (a slope, a launch), for its expected
+  /// steps alone, and says in words where that is. The default knows none.
+  /// @throws std::invalid_argument for a name that this system does not have, or a value out of its range
+  virtual std::pair<std::string, std::unique_ptr<TransitionModel>> elsewhere(
+      const std::vector<NamedValue>& place) const;
   /// Returns the same design with each column not measured, by the column's name, with data drawn from the model.
   /// The default has none.
   virtual std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(

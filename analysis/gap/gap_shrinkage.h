@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/fitting/transition_model.h"
+#include "analysis/statistics/estimate.h"
 
 namespace metastable::analysis {
 
@@ -25,10 +26,20 @@ struct Shrinkage {
   double with_effect_least = 0;  ///< of with_effect when trials are drawn anew, some hundred times
 };
 
+/// The expected steps of the machine itself: what its models leave open and what was counted, joined.
+struct MachineSteps {
+  std::string where;      ///< "as measured", or the place that was asked about
+  Estimate steps;         ///< 90 %
+  bool at_least = false;  ///< neither the count nor the models bound them above: the lower end alone holds, with 95 %
+};
+
 struct StepsBeforeFailure {
   double observed = 0, observed_lower = 0,
          observed_upper = 0;  ///< collisions at risk by rests, exact 90 %; 0: not known
   double baseline = 0, recalibrated = 0, with_effect = 0;
+  /// What the fitted parameters, and the hypotheses by their probability, leave open of the last two (90 %).
+  std::optional<Estimate> recalibrated_90, with_effect_90;
+  std::vector<MachineSteps> machine;  ///< as measured; then the place that was asked about
 };
 
 /// The measures, and what of the first each trial says.

@@ -10,6 +10,9 @@ namespace metastable::analysis {
 
 using markov::normal_95;
 
+/// The same of a 90 % interval.
+inline constexpr double normal_90 = 1.6448536269514722;
+
 /// Returns count/of with its exact binomial 95 % interval (Clopper and Pearson 1934). O(1).
 /// @param count  <= of
 /// @param of     >= 1

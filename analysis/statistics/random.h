@@ -19,7 +19,8 @@ enum class DrawStream : std::uint64_t {
   chance_on_map = 2,      ///< multipliers of the map's scores
   held_out_weights = 3,   ///< weights of held-out trials
   folds = 4,              ///< the order in which trials go to folds
-  blur = 5                ///< errors added to speeds that are more exact than the law
+  blur = 5,               ///< errors added to speeds that are more exact than the law
+  steps = 6               ///< parameters of a fit, for its expected steps
 };
 
 /// Returns the standard normals by which a bootstrap multiplies scores: those of draw number `draw`.

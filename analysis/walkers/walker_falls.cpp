@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/statistics/interval_95.h"
 #include "markov/mesh/batch_map.h"
 #include "markov/mesh/coupled_passage.h"
 #include "markov/mesh/mesh.h"
@@ -209,7 +210,6 @@ class Falls {
   }
 
   Estimate noise_profile(std::size_t which, std::optional<std::size_t> k) const {
-    constexpr double normal_90 = 1.6448536269514722;
     if (!k) return {noise(which, 0), noise(which, -normal_90), noise(which, normal_90)};
     std::vector<double> values, weights;
     for (const Tried& tried : tried_)

@@ -69,6 +69,10 @@ std::vector<EffectGroup> wheel_groups() {
           {"trials that differ", {"trial_drift", "trial_spread"}}};
 }
 
+constexpr const char* slope_name = "slope_deg";
+constexpr const char* launch_name = "initial_speed_rad_s";
+constexpr double fastest_launch = 100;  // [rad/s]
+
 class WheelTransitions : public TransitionModel {
  public:
   explicit WheelTransitions(const Experiment& experiment);
@@ -97,6 +101,8 @@ class WheelTransitions : public TransitionModel {
                                             std::uint64_t seed) const override;
   std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> alternatives(std::span<const double> nuisance,
                                                                                      std::uint64_t seed) const override;
+  std::pair<std::string, std::unique_ptr<TransitionModel>> elsewhere(
+      const std::vector<NamedValue>& place) const override;
   std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> completed(std::span<const double> nuisance,
                                                                                   std::uint64_t seed) const override;
   std::pair<double, double> rests() const override;
@@ -310,6 +316,34 @@ std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTrans
     }
   });
   return all;
+}
+
+std::pair<std::string, std::unique_ptr<TransitionModel>> WheelTransitions::elsewhere(
+    const std::vector<NamedValue>& place) const {
+  auto there = std::make_unique<WheelTransitions>(*this);
+  WheelRuns& runs = there->measured_;
+  const double steepest = dynamics::steepest_slope(runs.wheel.legs()) * 180 / std::numbers::pi;
+  std::vector<std::string> words;
+  for (const auto& [name, value] : place) {
+    if (name == slope_name) {
+      if (!(value > 0 && value < steepest))
+        throw std::invalid_argument(fmt::format("{}: {} is outside (0, {:.4g}) deg", name, value, steepest));
+      for (Condition& condition : runs.conditions) condition.slope_deg = value;
+      words.push_back(fmt::format("a slope of {:.6g} deg", value));
+    } else if (name == launch_name) {
+      if (!(value > 0 && value < fastest_launch))
+        throw std::invalid_argument(fmt::format("{}: {} is outside (0, {}) rad/s", name, value, fastest_launch));
+      for (Condition& condition : runs.conditions)
+        if (condition.initial_speed) condition.initial_speed->mean = value;
+      for (WheelRun& run : runs.runs) run.collisions.front().before = value;
+      words.push_back(fmt::format("a launch at {:.6g} rad/s", value));
+    } else {
+      throw std::invalid_argument(
+          fmt::format("{}: a wheel's place is told by {} and {}", name, slope_name, launch_name));
+    }
+  }
+  tabulate_landings(runs);
+  return {fmt::format("{}", fmt::join(words, " and ")), std::move(there)};
 }
 
 std::vector<std::pair<std::string, std::unique_ptr<TransitionModel>>> WheelTransitions::completed(

@@ -190,11 +190,20 @@ analysis::Shrinkage unknown_shrinkage() {
 }
 
 Json steps_json(const analysis::StepsBeforeFailure& s) {
+  Json machine = Json::array();
+  for (const analysis::MachineSteps& one : s.machine)
+    machine.push_back({{"where", one.where},
+                       {"steps", positive_or_null(one.steps.value)},
+                       {"interval_90", {positive_or_null(one.steps.lower), positive_or_null(one.steps.upper)}},
+                       {"at_least", one.at_least}});
   return {{"observed", positive_or_null(s.observed)},
           {"observed_interval_90", {positive_or_null(s.observed_lower), positive_or_null(s.observed_upper)}},
           {"baseline", positive_or_null(s.baseline)},
           {"recalibrated", positive_or_null(s.recalibrated)},
-          {"with_effect", positive_or_null(s.with_effect)}};
+          {"recalibrated_interval_90", interval_json(s.recalibrated_90)},
+          {"with_effect", positive_or_null(s.with_effect)},
+          {"with_effect_interval_90", interval_json(s.with_effect_90)},
+          {"machine", machine}};
 }
 
 Json visibility_json(const analysis::Visibility& v) {

@@ -267,11 +267,32 @@ Table shrinkage_table(const Diagnosis& d) {
 
 Table steps_table(const Diagnosis& d) {
   const analysis::StepsBeforeFailure& s = d.shrinkage.steps;
-  return {.id = "steps",
-          .title = "Expected steps before failure",
-          .columns = {{.name = "observed (90 %)", .level = 90}, {"as given"}, {"recalibrated"}, {"with effect"}},
-          .rows = {{s.observed > 0 ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
-                    positive(s.baseline), positive(s.recalibrated), positive(s.with_effect)}}};
+  Table table{.id = "steps",
+              .title = "Expected steps before failure",
+              .notes = {"This machine: what its models leave open and what was counted, joined; what the models lack "
+                        "widens it."},
+              .columns = {{.name = "place"},
+                          {.name = "observed (90 %)", .level = 90},
+                          {"as given"},
+                          {.name = "recalibrated (90 %)", .level = 90},
+                          {.name = "with effect (90 %)", .level = 90},
+                          {.name = "this machine (90 %)", .level = 90}}};
+  const auto model = [](double value, const std::optional<Estimate>& interval) {
+    return interval ? Cell(Estimate{value, interval->lower, interval->upper}) : positive(value);
+  };
+  for (const analysis::MachineSteps& machine : s.machine) {
+    const bool here = &machine == &s.machine.front();
+    const Cell own =
+        machine.at_least ? Cell(fmt::format("at least {:.3g} (95 %)", machine.steps.lower)) : Cell(machine.steps);
+    if (here)
+      table.rows.push_back({machine.where,
+                            s.observed > 0 ? Cell(Estimate{s.observed, s.observed_lower, s.observed_upper}) : Cell(""),
+                            positive(s.baseline), model(s.recalibrated, s.recalibrated_90),
+                            model(s.with_effect, s.with_effect_90), own});
+    else
+      table.rows.push_back({machine.where, Cell(""), Cell(""), Cell(""), Cell(""), own});
+  }
+  return table;
 }
 
 Table profile_table(const Diagnosis& d) {

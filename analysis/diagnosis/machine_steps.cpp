@@ -1,0 +1,211 @@
+#include "analysis/diagnosis/machine_steps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <stdexcept>
+
+#include "analysis/statistics/interval_95.h"
+#include "analysis/statistics/random.h"
+#include "markov/dense_matrix.h"
+#include "markov/parallel.h"
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr int draws_of_steps = 48;         // of each model
+constexpr double steps_of_endless = 1e15;  // what stands for a draw that never rests
+constexpr int error_nodes = 81;            // of the grid of a model's error,
+constexpr double error_reach = 4;          //   out to so many sds
+
+// Says whether the fit's information holds all of its parameters.
+bool has_information(const Fit& fit) {
+  std::size_t count = fit.nuisance.size();
+  for (const EffectTerm& term : fit.terms) count += term.values.size();
+  return count > 0 && fit.information.rows() == static_cast<Eigen::Index>(count);
+}
+
+// Returns a fit's parameters drawn from the normal distribution that the information leaves, inside their bounds.
+Fit drawn_fit(const TransitionModel& model, const Fit& fit, std::uint64_t seed, std::uint64_t draw) {
+  Fit drawn;
+  drawn.nuisance = fit.nuisance;
+  drawn.terms = fit.terms;
+  if (!has_information(fit)) return drawn;
+  Eigen::MatrixXd covariance = markov::floored_inverse(fit.information, resolved_share);
+  for (std::size_t p = 0; p < fit.nuisance.size(); ++p) {
+    const double form = model.nuisances()[p].form_sd;
+    covariance(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(p)) += form * form;
+  }
+  const markov::SymmetricEigen split = markov::symmetric_eigen(covariance);
+  const std::vector<double> normals =
+      normal_multipliers(seed, draw, DrawStream::steps, static_cast<std::size_t>(covariance.rows()));
+  Eigen::VectorXd shift = Eigen::VectorXd::Zero(covariance.rows());
+  for (Eigen::Index k = 0; k < shift.size(); ++k)
+    shift += std::sqrt(std::max(0.0, split.values[k])) * normals[static_cast<std::size_t>(k)] * split.vectors.col(k);
+  Eigen::Index at = 0;
+  for (std::size_t p = 0; p < drawn.nuisance.size(); ++p) {
+    const Nuisance& n = model.nuisances()[p];
+    drawn.nuisance[p] = std::clamp(drawn.nuisance[p] + shift[at++], n.lower, n.upper);
+  }
+  for (EffectTerm& term : drawn.terms)
+    for (std::size_t k = 0; k < term.values.size(); ++k) {
+      const FreeParameter& p = term.candidate->parameters[k];
+      term.values[k] = std::clamp(term.values[k] + shift[at++], p.lower, p.upper);
+    }
+  return drawn;
+}
+
+// Moments of the logarithms of draws that come to rest, and the share of those that never do.
+struct LogMoments {
+  double mean = 0, sd = 0, endless = 0;
+};
+LogMoments log_moments(const std::vector<double>& draws) {
+  LogMoments log;
+  double count = 0, squares = 0;
+  for (const double one : draws)
+    if (std::isfinite(one)) log.mean += std::log(one), ++count;
+  log.endless = 1 - count / static_cast<double>(draws.size());
+  if (count == 0) return log;
+  log.mean /= count;
+  for (const double one : draws)
+    if (std::isfinite(one)) squares += std::pow(std::log(one) - log.mean, 2);
+  log.sd = count > 1 ? std::sqrt(squares / (count - 1)) : 0;
+  return log;
+}
+
+// Returns the value below which a share of the weights lies. @param sorted  values with weights, rising
+double weighted_quantile(const std::vector<std::pair<double, double>>& sorted, double share) {
+  double all = 0, sum = 0;
+  for (const auto& [value, weight] : sorted) all += weight;
+  for (const auto& [value, weight] : sorted) {
+    sum += weight;
+    if (sum >= share * all) return value;
+  }
+  return sorted.back().first;
+}
+
+double bounded(double steps) { return std::min(steps, steps_of_endless); }
+double unbounded(double steps) { return steps < steps_of_endless / 2 ? steps : infinity; }
+
+// Says what of the gap the chosen model leaves, in the logarithm of the expected steps. A gap in nats is a square of
+// its size: of what the effect changes, as much may be wrong as the root of the share that stays. Where nothing says
+// how large that is, a factor of e.
+ModelError model_error(const Diagnosis& d) {
+  const StepsBeforeFailure& s = d.shrinkage.steps;
+  const bool known = !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed;
+  const double changed = std::isfinite(s.with_effect) && std::isfinite(s.baseline) && s.with_effect > 0
+                             ? std::abs(std::log(s.with_effect / s.baseline))
+                             : 1;
+  double stays = 0;
+  if (d.verdict == Verdict::unexplained) stays = 1;
+  if (d.verdict == Verdict::partly_explained)
+    stays = known ? std::clamp(1 - *d.shrinkage.measures.front().closed, d.rules.square_error(), 1.0) : 1;
+  ModelError error;
+  error.here = stays > 0 ? std::sqrt(stays) * std::max(1.0, changed) : d.rules.model_error * changed;
+  error.elsewhere = std::sqrt(stays);
+  return error;
+}
+
+}  // namespace
+
+void set_observed(StepsBeforeFailure& steps, std::pair<double, double> rests) {
+  const auto [at_risk, rested] = rests;
+  if (!(at_risk > 0)) return;
+  const auto limit = [](double degrees, double p) {
+    return degrees > 0 ? boost::math::quantile(boost::math::chi_squared(degrees), p) / 2 : 0.0;
+  };
+  const double most = limit(2 * rested + 2, 0.95), least = limit(2 * rested, 0.05);
+  steps.observed = rested > 0 ? at_risk / rested : infinity;
+  steps.observed_lower = at_risk / most;
+  steps.observed_upper = least > 0 ? at_risk / least : infinity;
+}
+
+std::vector<double> drawn_steps(const TransitionModel& model, const TransitionModel& at,
+                                const std::vector<WeighedFit>& fits, int draws, std::uint64_t seed, int threads,
+                                const std::function<void()>& heartbeat) {
+  double all = 0;
+  for (const WeighedFit& one : fits) all += one.weight;
+  std::vector<double> steps(static_cast<std::size_t>(draws));
+  std::mutex speaking;
+  markov::parallel_for(steps.size(), threads, [&](std::size_t i) {
+    {
+      const std::lock_guard lock(speaking);
+      heartbeat();
+    }
+    // Each fit has its share of the draws, in their order.
+    const double place = (static_cast<double>(i) + 0.5) / static_cast<double>(draws) * all;
+    std::size_t k = 0;
+    for (double sum = fits[0].weight; sum < place && k + 1 < fits.size(); sum += fits[k].weight) ++k;
+    const Fit drawn = drawn_fit(model, *fits[k].fit, seed, i);
+    steps[i] = at.expected_steps(drawn.nuisance, drawn.terms, seed + 1 + i);
+  });
+  return steps;
+}
+
+Estimate interval_of_draws(const std::vector<double>& draws) {
+  if (draws.empty()) throw std::invalid_argument("interval_of_draws: there are no draws");
+  const LogMoments log = log_moments(draws);
+  if (log.endless > 0.5)
+    return {infinity, log.endless > 0.95 ? infinity : std::exp(log.mean - normal_90 * log.sd), infinity};
+  const double half = normal_90 * log.sd;
+  return {std::exp(log.mean), std::exp(log.mean - half), log.endless > 0.05 ? infinity : std::exp(log.mean + half)};
+}
+
+Estimate joined_steps(const std::vector<double>& here, const std::vector<double>& there, const ModelError& error,
+                      double at_risk, double rests) {
+  if (here.empty() || here.size() != there.size())
+    throw std::invalid_argument(fmt::format("joined_steps: {} draws here and {} there", here.size(), there.size()));
+  // A few draws stand for all: each is spread by the bandwidth of a normal kernel (Silverman's rule).
+  const double spread =
+      std::hypot(error.here, 1.06 * log_moments(here).sd * std::pow(static_cast<double>(here.size()), -0.2));
+  std::vector<std::pair<double, double>> weighed;
+  double most = -infinity;
+  for (std::size_t i = 0; i < here.size(); ++i)
+    for (int k = 0; k < error_nodes; ++k) {
+      const double z = error_reach * (2.0 * k / (error_nodes - 1) - 1);
+      const double expected = at_risk / (bounded(here[i]) * std::exp(spread * z));
+      const double log_weight = -0.5 * z * z + (at_risk > 0 ? rests * std::log(expected) - expected : 0);
+      const double further = std::log(bounded(there[i]) / bounded(here[i]));
+      // How the error differs elsewhere grows with what the model says that is different there.
+      for (const double more : {-1.0, 1.0})
+        weighed.emplace_back(bounded(there[i]) * std::exp(spread * z + more * error.elsewhere * std::abs(further)),
+                             log_weight);
+      most = std::max(most, log_weight);
+    }
+  for (auto& [steps, weight] : weighed) weight = std::exp(weight - most);
+  std::ranges::sort(weighed);
+  return {unbounded(weighted_quantile(weighed, 0.5)), unbounded(weighted_quantile(weighed, 0.05)),
+          unbounded(weighted_quantile(weighed, 0.95))};
+}
+
+void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
+                       const std::vector<WeighedFit>& fits, const DiagnosisOptions& options,
+                       const std::function<void()>& heartbeat) {
+  StepsBeforeFailure& s = d.shrinkage.steps;
+  const std::vector<WeighedFit> plain{recalibrated};
+  const auto draw = [&](const TransitionModel& at, const std::vector<WeighedFit>& of) {
+    return drawn_steps(model, at, of, draws_of_steps, options.seed, options.threads, heartbeat);
+  };
+  const std::vector<double> of_plain = draw(model, plain);
+  const std::vector<double> of_effects = fits.empty() ? of_plain : draw(model, fits);
+  s.recalibrated_90 = interval_of_draws(of_plain);
+  s.with_effect_90 = interval_of_draws(of_effects);
+  const auto [at_risk, rests] = model.rests();
+  const ModelError error = model_error(d);
+  const auto add = [&](std::string where, const std::vector<double>& there) {
+    MachineSteps machine{std::move(where), joined_steps(of_effects, there, error, at_risk, rests), false};
+    machine.at_least = !std::isfinite(machine.steps.upper);
+    s.machine.push_back(std::move(machine));
+  };
+  add("as measured", of_effects);
+  if (options.elsewhere.empty()) return;
+  auto [words, there] = model.elsewhere(options.elsewhere);
+  add(std::move(words), draw(*there, fits.empty() ? plain : fits));
+}
+
+}  // namespace metastable::analysis

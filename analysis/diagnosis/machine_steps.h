@@ -1,0 +1,56 @@
+#pragma once
+// The expected steps of the machine that was measured: what its models say and what was counted, joined.
+
+#include <cstdint>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "analysis/diagnosis/diagnosis.h"
+#include "analysis/fitting/model_fit.h"
+
+namespace metastable::analysis {
+
+/// A fitted model with its probability.
+struct WeighedFit {
+  const Fit* fit = nullptr;
+  double weight = 1;
+};
+
+/// Counts what was seen: rests among the collisions at risk, with exact 90 % limits of a Poisson mean.
+/// @param rests  TransitionModel::rests()
+void set_observed(StepsBeforeFailure& steps, std::pair<double, double> rests);
+
+/// Draws the expected steps that a mixture of fits leaves open: parameters from the normal distribution that their
+/// information has, and each draw's own simulation. Infinite where a draw never rests.
+/// @param at  the experiment that is asked about, of the same parameters as the fits
+/// @param draws  >= 1
+std::vector<double> drawn_steps(const TransitionModel& model, const TransitionModel& at,
+                                const std::vector<WeighedFit>& fits, int draws, std::uint64_t seed, int threads,
+                                const std::function<void()>& heartbeat);
+
+/// Returns the median of draws with their 5 and 95 % quantiles, by the moments of their logarithms; infinite ends where
+/// more than so many never rest. @param draws  not empty
+Estimate interval_of_draws(const std::vector<double>& draws);
+
+/// What a model lacks, in the logarithm of the expected steps: the sd of its error here, and of how that error differs
+/// elsewhere.
+struct ModelError {
+  double here = 0, elsewhere = 0;
+};
+
+/// Joins the draws of a model with the count, by Bayes's rule on a grid of the model's error: that multiplies what the
+/// model says here and there alike.
+/// @param here  draws for the experiment that was counted  @param there  for the one asked about, draw by draw
+/// @param at_risk, rests  at_risk 0: nothing was counted
+Estimate joined_steps(const std::vector<double>& here, const std::vector<double>& there, const ModelError& error,
+                      double at_risk, double rests);
+
+/// Fills in the intervals of the models' expected steps, and the machine's own.
+/// @param fits  the recalibrated model, then those of the hypotheses with their probabilities (none: that model alone)
+/// @param d  with its verdict, its held-out measures and the steps observed and expected
+void add_machine_steps(Diagnosis& d, const TransitionModel& model, const WeighedFit& recalibrated,
+                       const std::vector<WeighedFit>& fits, const DiagnosisOptions& options,
+                       const std::function<void()>& heartbeat);
+
+}  // namespace metastable::analysis

@@ -1,0 +1,97 @@
+#include "analysis/diagnosis/machine_steps.h"
+
+#include <gtest/gtest.h>
+
+#include <boost/math/distributions/gamma.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+namespace metastable::analysis {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// Draws at the middle of equally likely parts of a lognormal distribution.
+std::vector<double> lognormal(double median, double sd) {
+  std::vector<double> draws;
+  for (const double z : {-1.645, -1.036, -0.674, -0.385, -0.126, 0.126, 0.385, 0.674, 1.036, 1.645})
+    draws.push_back(median * std::exp(sd * z));
+  return draws;
+}
+
+TEST(MachineSteps, ObservedLimitsAreThoseOfAPoissonMean) {
+  StepsBeforeFailure steps;
+  set_observed(steps, {1000, 0});
+  EXPECT_EQ(steps.observed, infinity);
+  EXPECT_NEAR(steps.observed_lower, 1000 / -std::log(0.05), 1e-9);  // no event has a mean below ln 20
+  EXPECT_EQ(steps.observed_upper, infinity);
+  set_observed(steps, {1000, 10});
+  EXPECT_EQ(steps.observed, 100);
+  EXPECT_NEAR(steps.observed_lower, 1000 / 16.962, 1e-2);  // tables of the Poisson distribution
+  EXPECT_NEAR(steps.observed_upper, 1000 / 5.4254, 1e-2);
+  StepsBeforeFailure unknown;
+  set_observed(unknown, {0, 0});
+  EXPECT_EQ(unknown.observed, 0);
+}
+
+TEST(MachineSteps, IntervalsOfDrawsFollowTheirLogarithms) {
+  const Estimate e = interval_of_draws({50, 100, 200});
+  EXPECT_NEAR(e.value, 100, 1e-9);
+  EXPECT_NEAR(e.lower, 100 * std::exp(-1.6448536 * std::log(2.0)), 1e-6);
+  EXPECT_NEAR(e.upper, 100 * std::exp(1.6448536 * std::log(2.0)), 1e-4);
+  EXPECT_EQ(interval_of_draws({50, 100, 200, infinity}).upper, infinity);
+  EXPECT_EQ(interval_of_draws({infinity, infinity}).lower, infinity);
+  EXPECT_THROW(interval_of_draws({}), std::invalid_argument);
+}
+
+// A model that says nothing leaves the count: with a flat prior on the logarithm of the steps the rate has the gamma
+// distribution of as many events.
+TEST(MachineSteps, AModelThatLacksEverythingLeavesTheCountAlone) {
+  const std::vector<double> draws(10, 100.0);
+  const Estimate e = joined_steps(draws, draws, {8, 0}, 4000, 20);
+  const boost::math::gamma_distribution rate(20.0, 1 / 4000.0);
+  EXPECT_NEAR(e.value, 1 / quantile(rate, 0.5), 0.25 * e.value);  // the grid's nodes are so far apart
+  EXPECT_GT(e.lower, 0.7 / quantile(rate, 0.95));
+  EXPECT_LT(e.upper, 1.4 / quantile(rate, 0.05));
+}
+
+// Where nothing was counted, or much less than the model knows, the model's own interval stands.
+TEST(MachineSteps, ACountThatSaysLittleLeavesTheModel) {
+  const std::vector<double> draws = lognormal(300, 0.1);
+  const Estimate alone = joined_steps(draws, draws, {0.01, 0}, 0, 0), with = joined_steps(draws, draws, {0.01, 0}, 600, 2);
+  EXPECT_NEAR(alone.value, 300, 15);
+  EXPECT_NEAR(with.value / alone.value, 1, 0.02);
+  EXPECT_NEAR(with.lower / alone.lower, 1, 0.05);
+}
+
+// Two witnesses that agree say more than either.
+TEST(MachineSteps, AModelAndACountThatAgreeNarrowOneAnother) {
+  const std::vector<double> draws = lognormal(200, 0.3);
+  const Estimate model = interval_of_draws(draws), joined = joined_steps(draws, draws, {0.02, 0}, 4000, 20);
+  StepsBeforeFailure counted;
+  set_observed(counted, {4000, 20});
+  EXPECT_LT(std::log(joined.upper / joined.lower), std::log(model.upper / model.lower));
+  EXPECT_LT(std::log(joined.upper / joined.lower), std::log(counted.observed_upper / counted.observed_lower));
+  EXPECT_NEAR(joined.value, 200, 20);
+}
+
+// An error that the count shows here multiplies what the model says there; how it differs there widens the interval.
+TEST(MachineSteps, WhatTheCountShowsHereHoldsElsewhere) {
+  const std::vector<double> here(10, 100.0), there(10, 1000.0);
+  const Estimate known = joined_steps(here, there, {1, 0}, 20000, 100);  // 200 were counted where the model has 100
+  EXPECT_NEAR(known.value, 2000, 200);
+  const Estimate differs = joined_steps(here, there, {1, 0.5}, 20000, 100);
+  EXPECT_LT(differs.lower, known.lower);
+  EXPECT_GT(differs.upper, known.upper);
+}
+
+TEST(MachineSteps, WhatNeverRestsHasNoUpperEnd) {
+  const std::vector<double> draws{infinity, infinity, 1e6};
+  EXPECT_EQ(joined_steps(draws, draws, {0.1, 0}, 500, 0).upper, infinity);
+  EXPECT_THROW(joined_steps(draws, {}, {0.1, 0}, 500, 0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace metastable::analysis
