@@ -17,6 +17,10 @@ inline std::string read(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+inline void write(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
+
 /// Returns what f prints on standard output. What it throws is passed on.
 template <class F>
 std::string printed(F f) {
@@ -43,6 +47,11 @@ class InFolder : public testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  /// Writes a file into the folder; returns its path.
+  std::string file(const std::string& name, const std::string& text) const {
+    write(folder_ / name, text);
+    return path(name);
+  }
 
   std::filesystem::path folder_;
 };

@@ -46,10 +46,6 @@ class EveryCommand : public test::InFolder {
     before_ = names();
   }
 
-  std::string file(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-    return path(name);
-  }
   std::set<std::string> names() const {
     std::set<std::string> all;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_)) all.insert(entry.path().string());

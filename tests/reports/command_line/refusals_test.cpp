@@ -31,13 +31,7 @@ void expect_refused(const std::vector<Case>& cases) {
   }
 }
 
-class Refusals : public test::InFolder {
- protected:
-  std::string file(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-    return path(name);
-  }
-};
+using Refusals = test::InFolder;
 
 TEST_F(Refusals, OfWheelsThatSettledDoesNotHold) {
   const auto steps = [](std::vector<std::string> more) {

@@ -69,11 +69,6 @@ class Import : public test::InFolder {
     known_ = analysis::read_experiment(folder_ / "known");
   }
 
-  std::string file(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-    return path(name);
-  }
-
   Ran import(Words more) const {
     std::filesystem::remove_all(folder_ / "out");
     Words words{"import"};

@@ -1,0 +1,32 @@
+// What `metastable verify` prints.
+
+#include "reports/commands/verify_command.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/reports/program.h"
+
+namespace metastable::reports {
+namespace {
+using test::metastable;
+using test::Ran;
+using VerifyCommand = test::CommandLine;
+
+TEST_F(VerifyCommand, SaysOnceWhoseFailureNegativeTimesAre) {
+  const Ran ran = metastable({"verify", "--nodes", "128"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto count = [&](const std::string& part) {
+    int found = 0;
+    for (std::size_t at = ran.out.find(part); at != std::string::npos; at = ran.out.find(part, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("negative time"), 1) << ran.out;
+  EXPECT_LT(ran.out.find("negative time"), ran.out.find("The rough-terrain wheel")) << ran.out;
+  EXPECT_EQ(count("version: "), 1) << ran.out;
+  EXPECT_EQ(count("seed: "), 1) << ran.out;
+}
+
+}  // namespace
+}  // namespace metastable::reports

@@ -1,0 +1,94 @@
+// What `metastable diagnose` finds in small experiments, and what it refuses.
+
+#include "reports/experiment_commands/diagnose_command.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/reports/program.h"
+
+namespace metastable::reports {
+namespace {
+using test::metastable;
+using test::Ran;
+using test::read;
+using test::with;
+using DiagnoseCommand = test::CommandLine;
+
+// A small experiment with a leg that grips more gives the same bytes on any number of threads, in every form.
+TEST_F(DiagnoseCommand, FindsWhatTheLaboratoryPutIn) {
+  ASSERT_EQ(metastable({"simulate", "--reality", "--slope", "9.59", "--friction", "0.352,0.043", "--restitution",
+                        "0.54,0.045", "--trials", "40", "--effect", "leg_contact:leg=3,friction_ratio=0.8",
+                        "--sensor-noise", "0.01", "--no-flight", "--out", path("wheel")})
+                .code,
+            0);
+  const Ran one = metastable({"diagnose", path("wheel"), "--catalogue", "leg_contact,slope_offset", "--threads", "1",
+                              "--json", path("one.json"), "--out", path("page")});
+  ASSERT_EQ(one.code, 0) << one.err;
+  const auto json = nlohmann::json::parse(read(path("one.json")));
+  EXPECT_EQ(json.at("verdict"), "explained");
+  EXPECT_EQ(json.at("cause_set"), std::vector<std::string>{"leg_contact"});
+  EXPECT_EQ(json.at("causes").at(0).at("parameters").at("leg"), 3);
+  const auto interval = json.at("causes").at(0).at("interval_90").at("friction_ratio");
+  EXPECT_LT(interval.at(0), 0.8);
+  EXPECT_GT(interval.at(1), 0.8);
+  EXPECT_TRUE(std::filesystem::exists(path("page/index.html")));
+  EXPECT_EQ(one.out.find("verdict: explained"), 0U);
+
+  const Ran two = metastable({"diagnose", path("wheel"), "--catalogue",
+                              file("ids.txt", "leg_contact # a leg\nslope_offset\n"), "--threads", "2", "--json", "-"});
+  ASSERT_EQ(two.code, 0) << two.err;
+  auto again = nlohmann::json::parse(two.out), first = json;
+  again.erase("provenance"), first.erase("provenance");
+  EXPECT_EQ(again, first);
+}
+
+// The second system is a drum that loses a tenth more than stated.
+TEST_F(DiagnoseCommand, TakesACoastDown) {
+  std::string rows = "trial,collision,time_s,omega_minus_rad_s\n";
+  double x = 10000, time = 0, noise = 0.5;
+  for (int k = 0; k < 1500; ++k) {
+    const double omega = std::sqrt(x);
+    rows += fmt::format("{},{},{:.6f},{:.9g}\n", 1 + k / 50, 1 + k % 50, time, omega);
+    time += 2 * 3.141592653589793 / omega;
+    noise = 3.99 * noise * (1 - noise);  // in (0, 1), mean about a half
+    x -= 0.6 + 0.00165 * x + 0.4 * (noise - 0.5);
+  }
+  std::filesystem::create_directories(path("drum"));
+  std::ofstream(path("drum/collisions.csv")) << rows;
+  std::ofstream(path("drum/experiment.toml"))
+      << "system = \"coast_down\"\ntitle = \"Drum\"\n[rotor]\ninertia_kg_m2 = 1.0\n[loss]\nconstant = 0.15\n"
+         "linear = 0.0\nquadratic = 0.00165\nnoise_sd = 0.14\n[[condition]]\nid = \"drum\"\n";
+  const Ran ran = metastable({"diagnose", path("drum"), "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const auto json = nlohmann::json::parse(ran.out);
+  EXPECT_NE(json.at("verdict"), "no_gap");
+  EXPECT_LT(json.at("gap").at("p_value_as_given"), 1e-6);
+}
+
+TEST_F(DiagnoseCommand, NamesTheKnownEffects) {
+  const Ran ran = metastable({"diagnose", path("none"), "--catalogue", "lag_contact"});
+  EXPECT_EQ(ran.code, 2);
+  for (const char* part : {"'lag_contact'", "leg_contact", "slip_reversal"})
+    EXPECT_NE(ran.err.find(part), std::string::npos) << part << "\n" << ran.err;
+}
+
+// A wrong option, key or value gives exit code 2 and one line that names it and what is allowed.
+TEST_F(DiagnoseCommand, WrongInputIsOneLineAndCodeTwo) {
+  expect_refused({
+      {{"diagnose"}, "DIR"},
+      {{"diagnose", path("none")}, "none: there is no such folder"},
+      {{"diagnose", path("none"), "--catalogue", "leg_contact,lag_contact"}, "--catalogue: "},
+      {{"diagnose", path("none"), "--catalogue", file("ids.csv", "leg_contact\n# more\nlag_contact\n")}, "ids.csv:3: "},
+  });
+}
+
+}  // namespace
+}  // namespace metastable::reports

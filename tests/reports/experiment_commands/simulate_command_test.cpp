@@ -1,0 +1,69 @@
+// What `metastable simulate` writes, and what it refuses.
+
+#include "reports/experiment_commands/simulate_command.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/reports/program.h"
+
+namespace metastable::reports {
+namespace {
+using test::metastable;
+using test::Ran;
+using test::read;
+using SimulateCommand = test::CommandLine;
+
+TEST_F(SimulateCommand, WritesAnExperimentOnce) {
+  const std::vector<std::string> words{"simulate", "--trials", "5", "--out", path("trials")};
+  const Ran ran = metastable(words);
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  for (const char* name : {"experiment.toml", "collisions.csv", "trials.csv"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "trials" / name)) << name;
+  const Ran again = metastable(words);
+  EXPECT_EQ(again.code, 2);
+  EXPECT_NE(again.err.find("already holds"), std::string::npos);
+}
+
+// What it understands gives the same trials on one thread and on two.
+TEST_F(SimulateCommand, RealityLeavesNothingBehindWhenItIsMisunderstood) {
+  const auto refused = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "simulate");
+    words.insert(words.end(), {"--out", path("lab")});
+    const Ran ran = metastable(words);
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1);
+    return ran.err;
+  };
+  EXPECT_EQ(refused({"--effect", "bounce"}), "metastable: --effect: needs --reality\n");
+  EXPECT_EQ(refused({"--reality", "--effect", "inertia:ratio=9"}),
+            "metastable: effect inertia: ratio: 9 is outside [0.5, 2]\n");
+  EXPECT_EQ(refused({"--reality", "--outside", "planks"}),
+            "metastable: --outside: 'planks' is not of the form ID:SIZE\n");
+  EXPECT_EQ(refused({"--reality", "--outside", "planks:7"}), "metastable: effect planks: size 7 is outside [0, 0.9]\n");
+  EXPECT_TRUE(left_behind().empty());
+  const std::vector<std::string> fine{"simulate",          "--reality", "--effect",
+                                      "inertia:ratio=1.1", "--effect",  "leg_contact:leg=3,friction_ratio=1.4",
+                                      "--trials",          "3",         "--out"};
+  std::vector<std::string> one = fine, two = fine;
+  one.push_back(path("one")), two.push_back(path("two"));
+  two.insert(two.end(), {"--threads", "2"});
+  EXPECT_EQ(metastable(one).code, 0);
+  EXPECT_EQ(metastable(two).code, 0);
+  EXPECT_EQ(read(folder_ / "one" / "collisions.csv"), read(folder_ / "two" / "collisions.csv"));
+}
+
+// A wrong option, key or value gives exit code 2 and one line that names it and what is allowed.
+TEST_F(SimulateCommand, WrongInputIsOneLineAndCodeTwo) {
+  expect_refused({
+      {{"simulate"}, "--out: a folder must be given"},
+      {{"simulate", "--trials", "0", "--out", path("t")}, "--trials: 0 is outside 1..1000000"},
+  });
+}
+
+}  // namespace
+}  // namespace metastable::reports
