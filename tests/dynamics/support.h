@@ -9,6 +9,7 @@
 
 #include "dynamics/return_map/wheel_map.h"
 #include "dynamics/wheel/contact_law.h"
+#include "tests/message_of.h"  // for all who include this
 
 namespace metastable::dynamics::test {
 
@@ -50,17 +51,6 @@ inline Collision make_collision(double first, double second, double omega, doubl
   c.tangential_speed = tangential;
   c.slope_rad = slope;
   return c;
-}
-
-/// Returns the message of the invalid_argument that f throws; a note if it throws nothing.
-template <class F>
-std::string message_of(F f) {
-  try {
-    f();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
 }
 
 }  // namespace metastable::dynamics::test

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "dynamics/wheel/wheel.h"
+#include "tests/message_of.h"
 
 namespace metastable::dynamics::test {
 namespace {
@@ -13,12 +14,7 @@ namespace {
 const NominalValues nominal{0.4, 0.1, 0.3, 0.05, paper_leg_lengths()};
 
 std::string message(const std::string& text) {
-  try {
-    effect_from_text(text, nominal);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "accepted";
+  return message_of([&text] { effect_from_text(text, nominal); });
 }
 
 TEST(EffectCatalogue, HoldsTwentyThreeEffectsWithNeutralValuesInRange) {

@@ -263,9 +263,9 @@ TEST(CollisionDensity, ChangesMeanWhatTheySay) {
 }
 
 TEST(CollisionDensity, RefusesWhatHasNoDistribution) {
-  EXPECT_EQ(test::message_of([] { CollisionDensity(contact_model(Wheel{}, Law::plastic), {}); }),
+  EXPECT_EQ(message_of([] { CollisionDensity(contact_model(Wheel{}, Law::plastic), {}); }),
             "law: plastic has no restitution and no friction that could be distributed");
-  EXPECT_EQ(test::message_of([] {
+  EXPECT_EQ(message_of([] {
               CollisionDensity(contact_model(Wheel{}, Law::published), {0.4, 0, 0.4, 0.1});
             }),
             "contact: the sds of restitution and friction must be > 0");

@@ -4,13 +4,11 @@
 
 #include <limits>
 
-#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
-
-using testing::message_of;
 
 TEST(Chain, KeepsRowsDropsZerosAndImpliesStaying) {
   const Chain chain({0, 2, 3, 4}, {1, 2, 0, 1}, {0.25, 0.0, 0.5, 1.0}, {0.125, 0.0, 0.0});

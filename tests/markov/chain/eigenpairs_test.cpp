@@ -6,13 +6,11 @@
 #include <numbers>
 #include <numeric>
 
-#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
-
-using testing::message_of;
 
 // Belongs to a walk with rest at both ends: lambda_k = stay + 2 sqrt(up down) cos(k pi / (n + 1)).
 double walk_eigenvalue(std::size_t n, double up, double down, int k) {

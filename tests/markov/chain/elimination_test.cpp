@@ -6,13 +6,11 @@
 #include <numeric>
 
 #include "tests/markov/exact_answers.h"
-#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
-
-using testing::message_of;
 
 std::vector<double> ones(std::size_t n) { return std::vector<double>(n, 1.0); }
 

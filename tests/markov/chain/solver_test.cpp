@@ -9,13 +9,11 @@
 
 #include "markov/passage/first_passage.h"
 #include "markov/passage/quasi_stationary.h"
-#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
-
-using testing::message_of;
 
 TEST(ChainSolver, CyclicChainsSolveAsTheWholeChainDoes) {
   for (const std::size_t period : {2, 3, 8}) {

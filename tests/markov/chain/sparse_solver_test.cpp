@@ -3,13 +3,11 @@
 #include <gtest/gtest.h>
 
 #include "tests/markov/exact_answers.h"
-#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
-
-using testing::message_of;
 
 TEST(SparseSolver, SymmetricWalkInClosedForm) {
   constexpr std::size_t n = 1000;

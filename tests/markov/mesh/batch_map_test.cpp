@@ -10,14 +10,13 @@
 #include "markov/mesh/mesh_passage.h"
 #include "markov/mesh/mesh_study.h"
 #include "tests/markov/mesh/maps.h"
-#include "tests/markov/message.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
 
 using testing::linear_batch;
 using testing::linear_steps;
-using testing::message_of;
 
 TEST(BatchMap, NamesTheStateThatLeadsToNoNumber) {
   BatchMap map = linear_batch(0.3);

@@ -8,13 +8,11 @@
 #include <random>
 
 #include "tests/markov/exact_answers.h"
-#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
-
-using testing::message_of;
 
 Chain one_state(double kill) { return Chain::from_dense(1, std::vector<double>{0}, std::vector<double>{kill}); }
 

@@ -6,13 +6,11 @@
 #include <numeric>
 
 #include "markov/passage/first_passage.h"
-#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
-
-using testing::message_of;
 
 /// Solves gambler's ruin: from i (0 is one above ruin), the chance of reaching `top` first, and of ruin first.
 double reaches(double i, double top, double ratio) {

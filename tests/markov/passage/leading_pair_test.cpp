@@ -12,12 +12,11 @@
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
 #include "tests/markov/exact_answers.h"
-#include "tests/markov/message.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
 
-using testing::message_of;
 using Digits = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<400>, boost::multiprecision::et_off>;
 using Matrix = std::vector<std::vector<Digits>>;
 

@@ -7,13 +7,11 @@
 
 #include "markov/passage/first_passage.h"
 #include "markov/passage/quasi_stationary.h"
-#include "tests/markov/message.h"
 #include "tests/markov/reference_chains.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
-
-using testing::message_of;
 
 constexpr double ever = std::numeric_limits<double>::infinity();
 

@@ -5,8 +5,8 @@
 #include "markov/passage/first_passage.h"
 #include "markov/passage/quasi_stationary.h"
 #include "tests/markov/mesh/maps.h"
-#include "tests/markov/message.h"
 #include "tests/markov/ranks/ranks_of_tests.h"
+#include "tests/message_of.h"
 
 namespace metastable::markov {
 namespace {
