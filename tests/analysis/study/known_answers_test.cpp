@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <ostream>
 #include <string>
 
 #include "analysis/study/metastability.h"
@@ -20,6 +21,9 @@ constexpr double degree = std::numbers::pi / 180;
 
 struct Row {
   double slope_deg, friction_mean, friction_sd, steps, relative_error;
+  friend void PrintTo(const Row& row, std::ostream* out) {
+    *out << row.slope_deg << " deg, friction " << row.friction_mean;
+  }
 };
 
 class PublishedWheel : public testing::TestWithParam<Row> {};
@@ -59,6 +63,7 @@ TEST(KnownAnswers, CoulombOnAGentleSlope) {
 // with numbers of sixty digits. tests/markov/rows/rough_terrain_test.cpp solves it once more, in double precision.
 struct Rough {
   double sd_deg, rate, from_quasi_stationary, from_fixed_point;
+  friend void PrintTo(const Rough& rough, std::ostream* out) { *out << "sd " << rough.sd_deg << " deg"; }
 };
 
 class RoughTerrain : public testing::TestWithParam<Rough> {

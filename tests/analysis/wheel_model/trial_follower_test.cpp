@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -76,6 +77,9 @@ TEST(TrialFollower, SeesExactSpeedsAsTheModelsOwnDensities) {
 
 struct SpreadOfScores {
   double sd, odd;  // of the trial's friction; omega+ of one collision in the middle of its trial
+  friend void PrintTo(const SpreadOfScores& s, std::ostream* out) {
+    *out << "sd " << s.sd << ", odd speed " << s.odd << " rad/s";
+  }
 };
 class OwnFriction : public testing::TestWithParam<SpreadOfScores> {};
 

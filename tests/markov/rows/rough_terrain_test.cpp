@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <ostream>
 #include <string>
 
 #include "markov/chain/solver.h"
@@ -106,6 +107,9 @@ Answer solve(double sd_degrees, int nodes) {
 struct Reference {
   double sd_degrees;
   double failure_rate, from_quasi_stationary, from_fixed_point;
+  friend void PrintTo(const Reference& reference, std::ostream* out) {
+    *out << "sd " << reference.sd_degrees << " deg";
+  }
 };
 
 class RoughTerrainTest : public ::testing::TestWithParam<Reference> {};
