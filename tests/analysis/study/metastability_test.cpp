@@ -45,67 +45,82 @@ Sample sample(const std::vector<double>& values) {
   return s;
 }
 
+// Holds what whole trials came to, all of which rest.
+struct WholeTrials {
+  std::vector<double> steps, seconds, metres;
+  double beyond_end = 0;  // trials of more than the 32 collisions on 3.66 m
+  double lifted = 0;      // share of the collisions beside which gravity alone does not hold the standing foot
+};
+
+bool lifts(const dynamics::WheelMap& map, const dynamics::Wheel& wheel, const dynamics::TrialCollision& c) {
+  const int stance = (c.leg + 7) % 8;
+  const auto beyond = [](double omega, double length, double angle) {
+    return omega * omega * length > 9.81 * std::sin(angle);
+  };
+  return beyond(c.omega_minus, wheel.leg_length[static_cast<std::size_t>(stance)],
+                map.triangle(c.leg).beta_first_rad - map.slope()) ||
+         beyond(c.omega_plus, wheel.leg_length[static_cast<std::size_t>(c.leg)],
+                map.triangle(c.leg).beta_second_rad + map.slope());
+}
+
+WholeTrials whole_trials(const Setting& setting, int count) {
+  WholeTrials all;
+  const dynamics::WheelMap map = setting.map();
+  double collisions = 0;
+  for (const dynamics::Trial& trial : simulate_trials(setting, {.trials = count, .collisions = 100000, .seed = 5})) {
+    EXPECT_EQ(trial.outcome, dynamics::Outcome::rest);
+    all.steps.push_back(static_cast<double>(trial.collisions.size()));
+    all.seconds.push_back(trial.collisions.back().time);
+    all.metres.push_back(trial.collisions.back().position);
+    all.beyond_end += trial.collisions.size() > 32;
+    collisions += all.steps.back();
+    for (const dynamics::TrialCollision& c : trial.collisions) all.lifted += lifts(map, setting.wheel, c);
+  }
+  all.lifted /= collisions;
+  return all;
+}
+
+// The chain's quantile has the level it claims among the trials, up to sampling and the lumps of whole steps.
+void expect_accumulated(const Accumulated& total, std::vector<double> values) {
+  const Sample s = sample(values);
+  EXPECT_NEAR(total.mean, s.mean, 4 * s.error + 0.002 * s.mean);
+  EXPECT_NEAR(total.sd, s.sd, 0.03 * s.sd);
+  std::sort(values.begin(), values.end());
+  const auto below = [&values](double v) {
+    return static_cast<double>(std::upper_bound(values.begin(), values.end(), v) - values.begin()) /
+           static_cast<double>(values.size());
+  };
+  ASSERT_EQ(total.quantiles.size(), 5u);
+  for (const auto& [level, value] : total.quantiles) {
+    EXPECT_GE(below(value * (1 + 1e-3) + 1e-6), level - 0.02);
+    EXPECT_LE(below(value * (1 - 1e-3) - 1e-6), level + 0.02);
+  }
+}
+
 // The chain agrees with whole trials that share nothing with it but the map: uneven legs, defaults of the program.
 TEST(Metastability, AgreesWithMonteCarloTrials) {
   Setting setting = paper_setting(9.59, false);
+  setting.ramp_length = 3.66;
+  const Metastability chain = study(setting);
   setting.ramp_length = std::numeric_limits<double>::infinity();  // trials go on to rest
-  const Metastability chain = [&] {
-    Setting on_ramp = setting;
-    on_ramp.ramp_length = 3.66;
-    return study(on_ramp);
-  }();
   constexpr int count = 40000;
-  const auto trials = simulate_trials(setting, {.trials = count, .collisions = 100000, .seed = 5});
-  std::vector<double> steps, seconds, metres;
-  double beyond_end = 0, lifted = 0, collisions = 0;
-  const dynamics::WheelMap map = setting.map();
-  for (const dynamics::Trial& trial : trials) {
-    ASSERT_EQ(trial.outcome, dynamics::Outcome::rest);
-    steps.push_back(static_cast<double>(trial.collisions.size()));
-    seconds.push_back(trial.collisions.back().time);
-    metres.push_back(trial.collisions.back().position);
-    beyond_end += trial.collisions.size() > 32;
-    collisions += steps.back();
-    for (const dynamics::TrialCollision& c : trial.collisions) {
-      const double before = c.omega_minus * c.omega_minus, after = c.omega_plus * c.omega_plus;
-      const int leg = c.leg, stance = (leg + 7) % 8;
-      lifted += before * setting.wheel.leg_length[static_cast<std::size_t>(stance)] >
-                    9.81 * std::sin(map.triangle(leg).beta_first_rad - map.slope()) ||
-                after * setting.wheel.leg_length[static_cast<std::size_t>(leg)] >
-                    9.81 * std::sin(map.triangle(leg).beta_second_rad + map.slope());
-    }
-  }
-  const auto check = [](const Accumulated& total, std::vector<double> values, double slack) {
-    const Sample s = sample(values);
-    EXPECT_NEAR(total.mean, s.mean, 4 * s.error + slack * s.mean);
-    EXPECT_NEAR(total.sd, s.sd, 0.03 * s.sd);
-    std::sort(values.begin(), values.end());
-    ASSERT_EQ(total.quantiles.size(), 5u);
-    for (const auto& [level, value] : total.quantiles) {
-      // The chain's quantile has the level it claims among the trials, up to sampling and the lumps of whole steps.
-      const auto below = [&](double v) {
-        return static_cast<double>(std::upper_bound(values.begin(), values.end(), v) - values.begin()) / count;
-      };
-      EXPECT_GE(below(value * (1 + 1e-3) + 1e-6), level - 0.02);
-      EXPECT_LE(below(value * (1 - 1e-3) - 1e-6), level + 0.02);
-    }
-  };
-  check(chain.steps.distribution, steps, 0.002);
+  const WholeTrials trials = whole_trials(setting, count);
+  expect_accumulated(chain.steps.distribution, trials.steps);
   ASSERT_TRUE(chain.steps.seconds && chain.steps.metres);
-  check(*chain.steps.seconds, seconds, 0.002);
-  check(*chain.steps.metres, metres, 0.002);
-  const Sample s = sample(steps);
+  expect_accumulated(*chain.steps.seconds, trials.seconds);
+  expect_accumulated(*chain.steps.metres, trials.metres);
+  const Sample s = sample(trials.steps);
   EXPECT_NEAR(chain.steps.from_start.value, s.mean, 4 * s.error + 0.002 * s.mean);
   ASSERT_TRUE(chain.steps.reach_end);
-  EXPECT_NEAR(*chain.steps.reach_end, beyond_end / count, 4 * std::sqrt(beyond_end) / count + 1e-4);
+  EXPECT_NEAR(*chain.steps.reach_end, trials.beyond_end / count, 4 * std::sqrt(trials.beyond_end) / count + 1e-4);
   for (const int n : {1, 3, 10}) {
     const double alive =
-        static_cast<double>(std::count_if(steps.begin(), steps.end(), [&](double v) { return v > n; })) / count;
+        static_cast<double>(std::ranges::count_if(trials.steps, [n](double v) { return v > n; })) / count;
     EXPECT_NEAR(chain.steps.survival[static_cast<std::size_t>(n)], alive,
                 4 * std::sqrt(alive * (1 - alive) / count) + 5e-4);
   }
   ASSERT_FALSE(chain.violations.empty());
-  EXPECT_NEAR(chain.violations[0].until_rest, lifted / collisions, 0.01);
+  EXPECT_NEAR(chain.violations[0].until_rest, trials.lifted, 0.01);
 }
 
 // With uneven legs it holds the one-revolution product against elimination on the full (leg, omega^2) chain.
