@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "reports/description/describe_tables.h"
+#include "reports/description/speed_cells.h"
 
 namespace metastable::reports {
 

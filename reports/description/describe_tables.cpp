@@ -6,25 +6,14 @@
 #include <array>
 #include <cmath>
 
-#include "analysis/statistics/t_interval.h"
 #include "dynamics/wheel/contact_law.h"
+#include "reports/description/speed_cells.h"
 
 namespace metastable::reports {
 namespace {
 
-Cell mean_cell(const analysis::SpeedSummary& s) {
-  if (s.count == 0) return "";
-  if (s.count == 1) return s.mean;
-  return mean_interval(s);
-}
-
 Cell cell(const analysis::Estimate& e) {
   if (std::isinf(e.value)) return std::isinf(e.upper) ? Cell(fmt::format("> {:.4g}", e.lower)) : Cell(Infinite{});
-  return Estimate{e.value, e.lower, e.upper};
-}
-
-Cell effect(const analysis::EffectSize& e) {
-  if (!std::isfinite(e.value)) return Infinite{};
   return Estimate{e.value, e.lower, e.upper};
 }
 
@@ -38,13 +27,6 @@ Cell log_likelihood_cell(const analysis::ContactFit& fit) {
 }
 
 }  // namespace
-
-Estimate mean_interval(const analysis::SpeedSummary& s) {
-  const double half = analysis::t_half_width(s.standard_error, s.count);
-  return {s.mean, s.mean - half, s.mean + half};
-}
-
-Cell p_cell(double p) { return std::isnan(p) ? Cell("") : Cell(p); }
 
 std::vector<std::string> description_sentences(const analysis::Description& description) {
   std::vector<std::string> sentences;
@@ -96,26 +78,25 @@ Table short_table(const analysis::Description& description, const Provenance& pr
 }
 
 Table conditions_table(const analysis::Description& description, const Provenance& provenance) {
-  Table table;
-  table.id = "conditions";
-  table.title = "The conditions";
-  table.provenance = provenance;
-  table.columns = {{"condition"},
-                   {"slope", "deg", NumberFormat::general, 4},
-                   {"trials"},
-                   {"collisions"},
-                   {"steady speed", "rad/s", NumberFormat::significant, 4},
-                   {"sd between trials", "rad/s", NumberFormat::fixed, 3},
-                   {"sd between collisions", "rad/s", NumberFormat::fixed, 3},
-                   {"return-map slope", "", NumberFormat::fixed, 3},
-                   {"its fixed point", "rad/s", NumberFormat::significant, 4},
-                   {"trials that rest"},
-                   {"expected steps before failure", "", NumberFormat::significant, 3}};
+  Table table{.id = "conditions",
+              .title = "The conditions",
+              .columns = {{"condition"},
+                          {"slope", "deg", NumberFormat::general, 4},
+                          {"trials"},
+                          {"collisions"},
+                          {"steady speed", "rad/s", NumberFormat::significant, 4},
+                          {"sd between trials", "rad/s", NumberFormat::fixed, 3},
+                          {"sd between collisions", "rad/s", NumberFormat::fixed, 3},
+                          {"return-map slope", "", NumberFormat::fixed, 3},
+                          {"its fixed point", "rad/s", NumberFormat::significant, 4},
+                          {"trials that rest"},
+                          {"expected steps before failure", "", NumberFormat::significant, 3}},
+              .provenance = provenance};
   for (const analysis::ConditionDescription& c : description.conditions) {
     std::vector<Cell> row{c.id, c.slope_deg, c.trials, c.collisions};
     row.push_back(mean_cell(c.steady));
-    row.push_back(c.steady.count > 1 ? Cell(c.steady.sd) : Cell(""));
-    row.push_back(c.steady_collisions.count > 1 ? Cell(c.steady_collisions.sd) : Cell(""));
+    row.push_back(sd_cell(c.steady));
+    row.push_back(sd_cell(c.steady_collisions));
     row.push_back(c.line ? Cell(with_error(c.line->slope, c.line->slope_error)) : Cell(""));
     row.push_back(c.line && c.line->fixed_point ? Cell(*c.line->fixed_point) : Cell(""));
     row.push_back(c.survival ? Cell(c.survival->rests) : Cell(""));
@@ -138,11 +119,10 @@ Table conditions_table(const analysis::Description& description, const Provenanc
 }
 
 Table profiles_table(const analysis::Description& description, const Provenance& provenance) {
-  Table table;
-  table.id = "profiles";
-  table.title = "Speed just before each collision, mean and standard error";
-  table.provenance = provenance;
-  table.columns = {{"collision"}};
+  Table table{.id = "profiles",
+              .title = "Speed just before each collision, mean and standard error",
+              .columns = {{"collision"}},
+              .provenance = provenance};
   std::size_t longest = 0;
   for (const analysis::ConditionDescription& c : description.conditions) {
     table.columns.push_back({c.id + " trials"});
@@ -168,11 +148,8 @@ Table profiles_table(const analysis::Description& description, const Provenance&
 }
 
 Table legs_table(const analysis::Description& description, const Provenance& provenance) {
-  Table table;
-  table.id = "legs";
-  table.title = "Speed before the collision of each leg";
-  table.provenance = provenance;
-  table.columns = {{"leg"}};
+  Table table{
+      .id = "legs", .title = "Speed before the collision of each leg", .columns = {{"leg"}}, .provenance = provenance};
   std::size_t legs = 0;
   for (const analysis::ConditionDescription& c : description.conditions) {
     table.columns.push_back({c.id, "rad/s", NumberFormat::significant, 4});
@@ -194,30 +171,30 @@ Table legs_table(const analysis::Description& description, const Provenance& pro
 }
 
 Table tests_table(const analysis::Description& description, const Provenance& provenance) {
-  Table table;
-  table.id = "tests";
-  table.title = "Steady speeds of two conditions: the same distribution?";
-  table.provenance = provenance;
-  table.columns = {{"conditions"},
-                   {"values"},
-                   {"n"},
-                   {"difference of means", "rad/s", NumberFormat::fixed, 3},
-                   {"P Welch", "", NumberFormat::p_value, 2},
-                   {"P pooled t", "", NumberFormat::p_value, 2},
-                   {"P Kolmogorov-Smirnov", "", NumberFormat::p_value, 2},
-                   {"P Anderson-Darling", "", NumberFormat::p_value, 2},
-                   {"Hedges' g", "", NumberFormat::fixed, 2},
-                   {"P(first > second)", "", NumberFormat::fixed, 3},
-                   {"distance D", "", NumberFormat::fixed, 3},
-                   {"not told apart from collision"}};
+  Table table{.id = "tests",
+              .title = "Steady speeds of two conditions: the same distribution?",
+              .columns = {{"conditions"},
+                          {"values"},
+                          {"n"},
+                          {"difference of means", "rad/s", NumberFormat::fixed, 3},
+                          {"P Welch", "", NumberFormat::p_value, 2},
+                          {"P pooled t", "", NumberFormat::p_value, 2},
+                          {"P Kolmogorov-Smirnov", "", NumberFormat::p_value, 2},
+                          {"P Anderson-Darling", "", NumberFormat::p_value, 2},
+                          {"Hedges' g", "", NumberFormat::fixed, 2},
+                          {"P(first > second)", "", NumberFormat::fixed, 3},
+                          {"distance D", "", NumberFormat::fixed, 3},
+                          {"not told apart from collision"}},
+              .provenance = provenance};
   for (const analysis::ConditionComparison& c : description.comparisons) {
     const std::string pair = description.conditions[c.a].id + ", " + description.conditions[c.b].id;
     const auto add = [&](const std::optional<analysis::SampleComparison>& s, const char* values, bool meet) {
       if (!s) return;
-      table.rows.push_back({pair, values, fmt::format("{}, {}", s->count_a, s->count_b), effect(s->welch.difference),
-                            p_cell(s->welch.p), p_cell(s->pooled.p), p_cell(s->kolmogorov_smirnov.p),
-                            p_cell(s->anderson_darling.p), effect(s->hedges), effect(s->superiority),
-                            effect(s->distance), meet ? (c.meet ? Cell(*c.meet) : Cell("never")) : Cell("")});
+      table.rows.push_back({pair, values, fmt::format("{}, {}", s->count_a, s->count_b),
+                            effect_cell(s->welch.difference), p_cell(s->welch.p), p_cell(s->pooled.p),
+                            p_cell(s->kolmogorov_smirnov.p), p_cell(s->anderson_darling.p), effect_cell(s->hedges),
+                            effect_cell(s->superiority), effect_cell(s->distance),
+                            meet ? meet_cell(c.meet) : Cell("")});
     };
     add(c.trial_means, "trial means", true);
     add(c.all_collisions, "all collisions", false);
@@ -232,11 +209,10 @@ Table tests_table(const analysis::Description& description, const Provenance& pr
 }
 
 Table survival_table(const analysis::Description& description, const Provenance& provenance) {
-  Table table;
-  table.id = "survival";
-  table.title = "Probability of surviving n collisions (Kaplan-Meier)";
-  table.provenance = provenance;
-  table.columns = {{"n"}};
+  Table table{.id = "survival",
+              .title = "Probability of surviving n collisions (Kaplan-Meier)",
+              .columns = {{"n"}},
+              .provenance = provenance};
   std::size_t longest = 0;
   for (const analysis::ConditionDescription& c : description.conditions) {
     table.columns.push_back({c.id + " at risk"});
@@ -264,11 +240,10 @@ Table survival_table(const analysis::Description& description, const Provenance&
 }
 
 Table fits_table(const analysis::Description& description, dynamics::Law law, const Provenance& provenance) {
-  Table table;
-  table.id = "contact";
-  table.title = fmt::format("Restitution and friction by maximum likelihood under {}", dynamics::law_name(law));
-  table.provenance = provenance;
-  table.columns = {{"fitted to"}, {"transitions"}, {"rests"}, {"left out"}};
+  Table table{.id = "contact",
+              .title = fmt::format("Restitution and friction by maximum likelihood under {}", dynamics::law_name(law)),
+              .columns = {{"fitted to"}, {"transitions"}, {"rests"}, {"left out"}},
+              .provenance = provenance};
   for (const char* name : {"η mean", "η sd", "μ mean", "μ sd"})
     table.columns.push_back({name, "", NumberFormat::fixed, 3});
   table.columns.push_back({"log-likelihood", "", NumberFormat::fixed, 1});
@@ -296,27 +271,25 @@ Table fits_table(const analysis::Description& description, dynamics::Law law, co
 }
 
 Table laws_table(const analysis::LawComparison& comparison, const Provenance& provenance) {
-  Table table;
-  table.id = "laws";
-  table.title = "Measured beside what the contact laws predict";
-  table.provenance = provenance;
-  table.columns = {{"condition"},
-                   {"source"},
-                   {"trials"},
-                   {"steady speed", "rad/s", NumberFormat::significant, 4},
-                   {"sd between trials", "rad/s", NumberFormat::fixed, 3},
-                   {"sd between collisions", "rad/s", NumberFormat::fixed, 3},
-                   {"share that rests", "", NumberFormat::fixed, 3},
-                   {"P same speed", "", NumberFormat::p_value, 2}};
+  Table table{.id = "laws",
+              .title = "Measured beside what the contact laws predict",
+              .columns = {{"condition"},
+                          {"source"},
+                          {"trials"},
+                          {"steady speed", "rad/s", NumberFormat::significant, 4},
+                          {"sd between trials", "rad/s", NumberFormat::fixed, 3},
+                          {"sd between collisions", "rad/s", NumberFormat::fixed, 3},
+                          {"share that rests", "", NumberFormat::fixed, 3},
+                          {"P same speed", "", NumberFormat::p_value, 2}},
+              .provenance = provenance};
   for (const analysis::LawRow& r : comparison.rows) {
     if (r.trials == 0) {
       table.rows.push_back({r.condition, r.source, "", "no fit", "", "", "", ""});
       continue;
     }
-    table.rows.push_back({r.condition, r.source, r.trials, mean_cell(r.steady),
-                          r.steady.count > 1 ? Cell(r.steady.sd) : Cell(""),
+    table.rows.push_back({r.condition, r.source, r.trials, mean_cell(r.steady), sd_cell(r.steady),
                           r.steady.count > 0 ? Cell(r.collision_sd) : Cell(""),
-                          r.outcomes_known ? cell(r.rest_share) : Cell(""), r.p_speed ? p_cell(*r.p_speed) : Cell("")});
+                          r.outcomes_known ? cell(r.rest_share) : Cell(""), p_cell(r.p_speed)});
   }
   table.notes = {
       "Steady: from the 13th collision on, by the trials that got there; empty if none did. Brackets: 95 %. P: Welch's "
@@ -335,27 +308,25 @@ Table laws_table(const analysis::LawComparison& comparison, const Provenance& pr
 }
 
 Table landings_table(const std::vector<analysis::LegRow>& legs, const Provenance& provenance) {
-  Table table;
-  table.id = "landings";
-  table.title = "Landings leg by leg, measured beside settled as given";
-  table.provenance = provenance;
-  table.columns = {{"condition"},
-                   {"leg"},
-                   {"landings"},
-                   {"kept, measured", "", NumberFormat::fixed, 4},
-                   {"kept, settled", "", NumberFormat::fixed, 4},
-                   {"P same kept", "", NumberFormat::p_value, 2},
-                   {"slide, measured", "mm", NumberFormat::fixed, 2},
-                   {"slide, settled", "mm", NumberFormat::fixed, 2},
-                   {"P same slide", "", NumberFormat::p_value, 2}};
+  Table table{.id = "landings",
+              .title = "Landings leg by leg, measured beside settled as given",
+              .columns = {{"condition"},
+                          {"leg"},
+                          {"landings"},
+                          {"kept, measured", "", NumberFormat::fixed, 4},
+                          {"kept, settled", "", NumberFormat::fixed, 4},
+                          {"P same kept", "", NumberFormat::p_value, 2},
+                          {"slide, measured", "mm", NumberFormat::fixed, 2},
+                          {"slide, settled", "mm", NumberFormat::fixed, 2},
+                          {"P same slide", "", NumberFormat::p_value, 2}},
+              .provenance = provenance};
   const auto in_mm = [](const analysis::SpeedSummary& s) {
     return s.count < 2 ? Cell("") : mean_cell({s.count, 1e3 * s.mean, 1e3 * s.sd, 1e3 * s.standard_error});
   };
-  const auto p = [](const std::optional<double>& value) { return value ? p_cell(*value) : Cell(""); };
   std::size_t told_apart = 0, tests = 0;
   for (const analysis::LegRow& r : legs) {
     table.rows.push_back({r.condition, r.leg, r.kept_measured.count, mean_cell(r.kept_measured), mean_cell(r.kept),
-                          p(r.p_kept), in_mm(r.slide_measured), in_mm(r.slide), p(r.p_slide)});
+                          p_cell(r.p_kept), in_mm(r.slide_measured), in_mm(r.slide), p_cell(r.p_slide)});
     for (const std::optional<double>& value : {r.p_kept, r.p_slide})
       if (value) ++tests, told_apart += *value < 0.05;
   }

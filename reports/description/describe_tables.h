@@ -33,9 +33,4 @@ Table laws_table(const analysis::LawComparison& comparison, const Provenance& pr
 /// Says what landings leave, leg by leg, beside `settled`.
 Table landings_table(const std::vector<analysis::LegRow>& legs, const Provenance& provenance);
 
-/// Returns the mean of two values or more with its t-interval.
-Estimate mean_interval(const analysis::SpeedSummary& s);
-/// Shows a p-value; empty where the test has none.
-Cell p_cell(double p);
-
 }  // namespace metastable::reports

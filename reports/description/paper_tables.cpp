@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "reports/description/describe_tables.h"
+#include "reports/description/speed_cells.h"
 
 namespace metastable::reports {
 namespace {
@@ -57,12 +57,17 @@ analysis::ClaimVerdict verdict_of(const analysis::Claim& claim, const Studies& s
   return claim.findings.at(at).verdict;
 }
 
-Table start(const char* id, const std::string& title, const Provenance& provenance) {
-  Table table;
-  table.id = id;
-  table.title = title;
-  table.provenance = provenance;
-  return table;
+// Says what the verdict on a claim changes with: "reading", "law", "reading and law"; "" if it is one throughout.
+std::string changes_with(const analysis::Claim& claim, const Studies& studies) {
+  using enum analysis::RestReading;
+  const analysis::ClaimVerdict published_goes_on = verdict_of(claim, studies, dynamics::Law::published, goes_on),
+                               published_rests = verdict_of(claim, studies, dynamics::Law::published, rests),
+                               coulomb = verdict_of(claim, studies, dynamics::Law::coulomb, rests),
+                               settled = verdict_of(claim, studies, dynamics::Law::settled, rests);
+  const auto of_its_own = [&](analysis::ClaimVerdict v) { return v != published_goes_on && v != published_rests; };
+  const bool law = of_its_own(coulomb) || of_its_own(settled);
+  if (published_goes_on == published_rests) return law ? "law" : "";
+  return law ? "reading and law" : "reading";
 }
 
 std::size_t count(const std::vector<analysis::Claim>& claims, std::size_t variant, analysis::ClaimVerdict verdict) {
@@ -83,8 +88,10 @@ std::vector<std::string> claims_sentences(const std::vector<analysis::Claim>& cl
 Table claims_count_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
                          const Provenance& provenance) {
   using enum analysis::ClaimVerdict;
-  Table table = start("claim-counts", "Claims by verdict, under each law and reading", provenance);
-  table.columns = {{"law and reading"}};
+  Table table{.id = "claim-counts",
+              .title = "Claims by verdict, under each law and reading",
+              .columns = {{"law and reading"}},
+              .provenance = provenance};
   for (const analysis::ClaimVerdict verdict : {reproduced, partly, not_reproduced, not_applicable})
     table.columns.push_back({analysis::verdict_text(verdict)});
   for (std::size_t v = 0; v < studies.size(); ++v) {
@@ -99,8 +106,10 @@ Table claims_count_table(const std::vector<analysis::Claim>& claims, const Studi
 
 Table claims_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
                    const analysis::PaperExperiments& experiments, const Provenance& provenance) {
-  Table table = start("claims", "The paper's claims", provenance);
-  table.columns = {{"where"}, {"claim"}, {"paper"}};
+  Table table{.id = "claims",
+              .title = "The paper's claims",
+              .columns = {{"where"}, {"claim"}, {"paper"}},
+              .provenance = provenance};
   for (const VariantStudy& s : studies) table.columns.push_back({s.variant.name});
   table.columns.push_back({experiment_name(experiments)});
   for (const analysis::Claim& claim : claims) {
@@ -115,8 +124,8 @@ Table claims_table(const std::vector<analysis::Claim>& claims, const Studies& st
 
 Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& studies,
                     const analysis::PaperExperiments& experiments, const Provenance& provenance) {
-  Table table = start("changes", "What the law and the reading change", provenance);
-  table.columns = {{"what"}};
+  Table table{
+      .id = "changes", .title = "What the law and the reading change", .columns = {{"what"}}, .provenance = provenance};
   for (const VariantStudy& s : studies) table.columns.push_back({s.variant.name});
   table.columns.push_back({"changes with"});
   const auto add = [&](const std::string& what, const auto& of) {
@@ -150,20 +159,14 @@ Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& s
   });
   std::size_t kept = 0;
   for (const analysis::Claim& claim : claims) {
-    using enum analysis::RestReading;
-    const analysis::ClaimVerdict published_goes_on = verdict_of(claim, studies, dynamics::Law::published, goes_on),
-                                 published_rests = verdict_of(claim, studies, dynamics::Law::published, rests),
-                                 coulomb = verdict_of(claim, studies, dynamics::Law::coulomb, rests),
-                                 settled = verdict_of(claim, studies, dynamics::Law::settled, rests);
-    const auto of_its_own = [&](analysis::ClaimVerdict v) { return v != published_goes_on && v != published_rests; };
-    const bool reading = published_goes_on != published_rests, law = of_its_own(coulomb) || of_its_own(settled);
-    if (!reading && !law) {
+    const std::string changed_by = changes_with(claim, studies);
+    if (changed_by.empty()) {
       ++kept;
       continue;
     }
     std::vector<Cell> row{claim.where + ": " + claim.claim};
     for (const analysis::Finding& finding : claim.findings) row.emplace_back(analysis::verdict_text(finding.verdict));
-    row.emplace_back(reading && law ? "reading and law" : law ? "law" : "reading");
+    row.emplace_back(changed_by);
     table.rows.push_back(std::move(row));
   }
   table.notes = {
@@ -176,16 +179,18 @@ Table changes_table(const std::vector<analysis::Claim>& claims, const Studies& s
 }
 
 Table readings_table(const std::vector<analysis::Claim>& claims, const Provenance& provenance) {
-  Table table = start("readings", "What counts as reproduced", provenance);
-  table.columns = {{"where"}, {"claim"}, {"reading"}};
+  Table table{.id = "readings",
+              .title = "What counts as reproduced",
+              .columns = {{"where"}, {"claim"}, {"reading"}},
+              .provenance = provenance};
   for (const analysis::Claim& claim : claims) table.rows.push_back({claim.where, claim.claim, claim.reading});
   return table;
 }
 
 Table hypotheses_table(const std::vector<analysis::Hypothesis>& hypotheses, const Studies& studies,
                        const Provenance& provenance) {
-  Table table = start("hypotheses", "The three hypotheses", provenance);
-  table.columns = {{""}, {"hypothesis"}};
+  Table table{
+      .id = "hypotheses", .title = "The three hypotheses", .columns = {{""}, {"hypothesis"}}, .provenance = provenance};
   for (const VariantStudy& s : studies) table.columns.push_back({s.variant.name});
   for (const analysis::Hypothesis& h : hypotheses) {
     std::vector<Cell> row{h.name, h.text};
@@ -208,12 +213,14 @@ Table hypotheses_table(const std::vector<analysis::Hypothesis>& hypotheses, cons
 }
 
 Table variance_table(const Studies& studies, const Provenance& provenance) {
-  Table table = start("variance", "Where the variance comes from: Sobol' indices at 7.02 deg", provenance);
-  table.columns = {{"law"},
-                   {"output"},
-                   {"mean of μ", "", NumberFormat::fixed, 2},
-                   {"mean", "", NumberFormat::significant, 4},
-                   {"sd", "", NumberFormat::significant, 3}};
+  Table table{.id = "variance",
+              .title = "Where the variance comes from: Sobol' indices at 7.02 deg",
+              .columns = {{"law"},
+                          {"output"},
+                          {"mean of μ", "", NumberFormat::fixed, 2},
+                          {"mean", "", NumberFormat::significant, 4},
+                          {"sd", "", NumberFormat::significant, 3}},
+              .provenance = provenance};
   for (const char* source : analysis::variance_sources) {
     table.columns.push_back({fmt::format("{}, first", source), "", NumberFormat::fixed, 3});
     table.columns.push_back({fmt::format("{}, total", source), "", NumberFormat::fixed, 3});
@@ -231,8 +238,7 @@ Table variance_table(const Studies& studies, const Provenance& provenance) {
             continue;
           }
           const analysis::SobolIndex& index = result.group[g];
-          row.emplace_back(Estimate{index.first.value, index.first.lower, index.first.upper});
-          row.emplace_back(Estimate{index.total.value, index.total.lower, index.total.upper});
+          row.insert(row.end(), {index.first, index.total});
         }
         table.rows.push_back(std::move(row));
       }
@@ -249,26 +255,27 @@ Table variance_table(const Studies& studies, const Provenance& provenance) {
 }
 
 Table fig4_table(const Studies& studies, const analysis::PaperExperiments& experiments, const Provenance& provenance) {
-  Table table = start("fig4", "Fig. 4: fast and slow start at 9.59 deg", provenance);
-  table.columns = {{"source"},
-                   {"fast, steady", "rad/s", NumberFormat::significant, 4},
-                   {"slow, steady", "rad/s", NumberFormat::significant, 4},
-                   {"difference", "rad/s", NumberFormat::fixed, 3},
-                   {"P, trial means", "", NumberFormat::p_value, 2},
-                   {"P, all collisions", "", NumberFormat::p_value, 2},
-                   {"not told apart from collision"}};
+  Table table{.id = "fig4",
+              .title = "Fig. 4: fast and slow start at 9.59 deg",
+              .columns = {{"source"},
+                          {"fast, steady", "rad/s", NumberFormat::significant, 4},
+                          {"slow, steady", "rad/s", NumberFormat::significant, 4},
+                          {"difference", "rad/s", NumberFormat::fixed, 3},
+                          {"P, trial means", "", NumberFormat::p_value, 2},
+                          {"P, all collisions", "", NumberFormat::p_value, 2},
+                          {"not told apart from collision"}},
+              .provenance = provenance};
   const auto add = [&](const std::string& source, const analysis::TrialSpeeds& fast,
                        const analysis::TrialSpeeds& slow) {
     const analysis::ConditionComparison c = analysis::compare_conditions(fast, slow);
     std::vector<Cell> row{source, steady_cell(analysis::steady_trial_means(fast)),
                           steady_cell(analysis::steady_trial_means(slow))};
     if (c.trial_means)
-      row.insert(row.end(), {Estimate{c.trial_means->welch.difference.value, c.trial_means->welch.difference.lower,
-                                      c.trial_means->welch.difference.upper},
-                             p_cell(c.trial_means->welch.p), p_cell(c.all_collisions->pooled.p)});
+      row.insert(row.end(), {effect_cell(c.trial_means->welch.difference), p_cell(c.trial_means->welch.p),
+                             p_cell(c.all_collisions->pooled.p)});
     else
       row.insert(row.end(), {"", "", ""});
-    row.push_back(c.meet ? Cell(*c.meet) : Cell("never"));
+    row.push_back(meet_cell(c.meet));
     table.rows.push_back(std::move(row));
   };
   add(experiment_name(experiments), experiments.fast_959, experiments.slow_959);
@@ -281,8 +288,10 @@ Table fig4_table(const Studies& studies, const analysis::PaperExperiments& exper
 }
 
 Table fig6_table(const Studies& studies, const Provenance& provenance) {
-  Table table = start("fig6", "Fig. 6: three launch speeds, constant friction, η ~ N(0.4, 0.2²), 7.02 deg", provenance);
-  table.columns = {{"variant"}, {"μ", "", NumberFormat::fixed, 2}};
+  Table table{.id = "fig6",
+              .title = "Fig. 6: three launch speeds, constant friction, η ~ N(0.4, 0.2²), 7.02 deg",
+              .columns = {{"variant"}, {"μ", "", NumberFormat::fixed, 2}},
+              .provenance = provenance};
   if (!studies.empty())
     for (const analysis::LaunchRun& run : studies.front().fig6.front().runs)
       table.columns.push_back({fmt::format("steady, launch {}", run.launch), "rad/s", NumberFormat::significant, 4});
@@ -316,14 +325,16 @@ Table fig6_table(const Studies& studies, const Provenance& provenance) {
 }
 
 Table equal_legs_table(const Studies& studies, const Provenance& provenance) {
-  Table table = start("equal-legs", "Sec. IV-A: the measured legs against eight of mean length", provenance);
-  table.columns = {{"variant"},
-                   {"μ", "", NumberFormat::fixed, 2},
-                   {"launch", "rad/s", NumberFormat::fixed, 2},
-                   {"measured legs", "rad/s", NumberFormat::significant, 4},
-                   {"equal legs", "rad/s", NumberFormat::significant, 4},
-                   {"P", "", NumberFormat::p_value, 2},
-                   {"P by trial", "", NumberFormat::p_value, 2}};
+  Table table{.id = "equal-legs",
+              .title = "Sec. IV-A: the measured legs against eight of mean length",
+              .columns = {{"variant"},
+                          {"μ", "", NumberFormat::fixed, 2},
+                          {"launch", "rad/s", NumberFormat::fixed, 2},
+                          {"measured legs", "rad/s", NumberFormat::significant, 4},
+                          {"equal legs", "rad/s", NumberFormat::significant, 4},
+                          {"P", "", NumberFormat::p_value, 2},
+                          {"P by trial", "", NumberFormat::p_value, 2}},
+              .provenance = provenance};
   for (const VariantStudy& s : studies)
     for (const analysis::LaunchPanel& panel : s.fig6)
       for (const auto& [launch, measured, equal, alike] : panel.runs) {
@@ -341,23 +352,24 @@ Table equal_legs_table(const Studies& studies, const Provenance& provenance) {
 }
 
 Table fig7_table(const Studies& studies, const analysis::PaperExperiments& experiments, const Provenance& provenance) {
-  Table table = start("fig7", "Fig. 7: spreads of η and μ, 7.02 deg", provenance);
-  table.columns = {{"variant"},
-                   {"sd of μ", "", NumberFormat::fixed, 2},
-                   {"sd of η", "", NumberFormat::fixed, 2},
-                   {"steady speed", "rad/s", NumberFormat::significant, 4},
-                   {"sd of a collision", "rad/s", NumberFormat::fixed, 3},
-                   {"trials that rest", "", NumberFormat::fixed, 3},
-                   {fmt::format("{} less simulated", experiment_name(experiments)), "rad/s", NumberFormat::fixed, 3},
-                   {"P", "", NumberFormat::p_value, 2}};
+  Table table{
+      .id = "fig7",
+      .title = "Fig. 7: spreads of η and μ, 7.02 deg",
+      .columns = {{"variant"},
+                  {"sd of μ", "", NumberFormat::fixed, 2},
+                  {"sd of η", "", NumberFormat::fixed, 2},
+                  {"steady speed", "rad/s", NumberFormat::significant, 4},
+                  {"sd of a collision", "rad/s", NumberFormat::fixed, 3},
+                  {"trials that rest", "", NumberFormat::fixed, 3},
+                  {fmt::format("{} less simulated", experiment_name(experiments)), "rad/s", NumberFormat::fixed, 3},
+                  {"P", "", NumberFormat::p_value, 2}},
+      .provenance = provenance};
   for (const VariantStudy& s : studies)
     for (const analysis::SpreadPanel& panel : s.fig7)
       for (const auto& [restitution_sd, profile, test] : panel.runs)
-        table.rows.push_back(
-            {s.variant.name, panel.friction_sd, restitution_sd, steady_cell(profile.trial_means),
-             sd_cell(profile.steady_sd()), profile.rest_share,
-             test ? Cell(Estimate{test->difference.value, test->difference.lower, test->difference.upper}) : Cell(""),
-             test ? p_cell(test->p) : Cell("")});
+        table.rows.push_back({s.variant.name, panel.friction_sd, restitution_sd, steady_cell(profile.trial_means),
+                              sd_cell(profile.steady_sd()), profile.rest_share,
+                              test ? effect_cell(test->difference) : Cell(""), test ? p_cell(test->p) : Cell("")});
   table.notes = {
       "η ~ N(0.4, sd²), μ ~ N(0.4, sd²), launch N(7.35, 0.19²) rad/s. P: pooled t-test of all collisions from the 13th "
       "on "
@@ -367,15 +379,17 @@ Table fig7_table(const Studies& studies, const analysis::PaperExperiments& exper
 }
 
 Table fig8_table(const Studies& studies, const Provenance& provenance) {
-  Table table = start("fig8", "Fig. 8: energy lost in a collision, 7.02 deg", provenance);
-  table.columns = {{"variant"},
-                   {"sd of η and μ", "", NumberFormat::fixed, 2},
-                   {"tangential net, mean", "J", NumberFormat::fixed, 3},
-                   {"tangential net, sd", "J", NumberFormat::fixed, 3},
-                   {"paper"},
-                   {"normal, mean", "J", NumberFormat::fixed, 3},
-                   {"normal, sd", "J", NumberFormat::fixed, 3},
-                   {"paper"}};
+  Table table{.id = "fig8",
+              .title = "Fig. 8: energy lost in a collision, 7.02 deg",
+              .columns = {{"variant"},
+                          {"sd of η and μ", "", NumberFormat::fixed, 2},
+                          {"tangential net, mean", "J", NumberFormat::fixed, 3},
+                          {"tangential net, sd", "J", NumberFormat::fixed, 3},
+                          {"paper"},
+                          {"normal, mean", "J", NumberFormat::fixed, 3},
+                          {"normal, sd", "J", NumberFormat::fixed, 3},
+                          {"paper"}},
+              .provenance = provenance};
   for (const VariantStudy& s : studies)
     for (const auto& [sd, losses] : s.fig8) {
       const analysis::MeanSpread &t = losses.tangential_net, &n = losses.normal;
@@ -397,14 +411,16 @@ Table fig8_table(const Studies& studies, const Provenance& provenance) {
 }
 
 Table fig9_table(const Studies& studies, const Provenance& provenance) {
-  Table table = start("fig9", "Fig. 9: means of η and μ, both with sd 0.15, 7.02 deg", provenance);
-  table.columns = {{"variant"},
-                   {"mean of μ", "", NumberFormat::fixed, 1},
-                   {"mean of η", "", NumberFormat::fixed, 1},
-                   {"sd at collisions 2-6", "rad/s", NumberFormat::fixed, 3},
-                   {"sd at collisions 13-16", "rad/s", NumberFormat::fixed, 3},
-                   {"steady speed", "rad/s", NumberFormat::significant, 4},
-                   {"trials that rest", "", NumberFormat::fixed, 3}};
+  Table table{.id = "fig9",
+              .title = "Fig. 9: means of η and μ, both with sd 0.15, 7.02 deg",
+              .columns = {{"variant"},
+                          {"mean of μ", "", NumberFormat::fixed, 1},
+                          {"mean of η", "", NumberFormat::fixed, 1},
+                          {"sd at collisions 2-6", "rad/s", NumberFormat::fixed, 3},
+                          {"sd at collisions 13-16", "rad/s", NumberFormat::fixed, 3},
+                          {"steady speed", "rad/s", NumberFormat::significant, 4},
+                          {"trials that rest", "", NumberFormat::fixed, 3}},
+              .provenance = provenance};
   for (const VariantStudy& s : studies)
     for (const analysis::MeanPanel& panel : s.fig9)
       for (const auto& [restitution, profile] : panel.runs)

@@ -144,18 +144,17 @@ Figure resting_figure(const Stopping& stopping, const Provenance& provenance) {
 }
 
 Table stopping_table(const Stopping& stopping, const Provenance& provenance) {
-  Table table;
-  table.id = "stopping";
-  table.title = "Where the wheel stops under settled, leg by leg";
-  table.provenance = provenance;
-  table.columns = {{"leg"},
-                   {"longer than the leg before it", "mm", NumberFormat::fixed, 1},
-                   {"μ_c", "", NumberFormat::fixed, 4},
-                   {"landings that slide", "%", NumberFormat::fixed, 0},
-                   {"steady ω−", "rad/s", NumberFormat::fixed, 2},
-                   {"μ_r there", "", NumberFormat::fixed, 4},
-                   {"landings that rest", "%", NumberFormat::fixed, 2},
-                   {"share of the rests", "%", NumberFormat::fixed, 0}};
+  Table table{.id = "stopping",
+              .title = "Where the wheel stops under settled, leg by leg",
+              .columns = {{"leg"},
+                          {"longer than the leg before it", "mm", NumberFormat::fixed, 1},
+                          {"μ_c", "", NumberFormat::fixed, 4},
+                          {"landings that slide", "%", NumberFormat::fixed, 0},
+                          {"steady ω−", "rad/s", NumberFormat::fixed, 2},
+                          {"μ_r there", "", NumberFormat::fixed, 4},
+                          {"landings that rest", "%", NumberFormat::fixed, 2},
+                          {"share of the rests", "%", NumberFormat::fixed, 0}},
+              .provenance = provenance};
   for (const StoppingLeg& leg : stopping.legs)
     table.rows.push_back({leg.leg, 1e3 * leg.longer, leg.sticking, 100 * leg.slides, leg.speed, leg.resting,
                           100 * share(leg.rests, leg.landings), 100 * share(leg.rests, stopping.rests())});
@@ -167,11 +166,10 @@ Table stopping_table(const Stopping& stopping, const Provenance& provenance) {
 }
 
 Table design_table(const std::vector<analysis::DesignChange>& changes, const Provenance& provenance) {
-  Table table;
-  table.id = "designs";
-  table.title = "What a designer changes to walk longer, under settled";
-  table.provenance = provenance;
-  table.columns = {{"change"}, {"from"}, {"to"}, {"expected steps"}, {"times as many"}};
+  Table table{.id = "designs",
+              .title = "What a designer changes to walk longer, under settled",
+              .columns = {{"change"}, {"from"}, {"to"}, {"expected steps"}, {"times as many"}},
+              .provenance = provenance};
   for (const analysis::DesignChange& change : changes)
     table.rows.push_back({change.what, change.from, change.to, change.steps, change.times});
   table.notes = {

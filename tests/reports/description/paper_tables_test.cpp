@@ -6,8 +6,8 @@
 #include <string>
 
 #include "analysis/description/description.h"
-#include "reports/description/describe_tables.h"
 #include "reports/description/paper_figures.h"
+#include "reports/description/speed_cells.h"
 #include "tests/reports/cells.h"
 
 namespace metastable::reports {
