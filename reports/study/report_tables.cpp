@@ -29,70 +29,89 @@ Cell cell(const std::optional<double>& value) {
 // Of what there may be none, NaN then.
 Cell known(double value) { return std::isnan(value) ? Cell("") : Cell(value); }
 
+// Holds a quantity, with its unit, and its number in a study.
+struct Quantity {
+  std::string name, unit;
+  std::function<Cell(const Studied&)> of;
+};
+
+Cell mean_cell(const std::optional<analysis::Accumulated>& total) {
+  return total ? Cell(total->mean) : Cell(Infinite{});
+}
+
+const std::vector<Quantity>& quantities() {
+  using S = const Studied&;
+  static const std::vector<Quantity> all = {
+      {"expected steps before failure, from the launch", "steps", [](S s) { return cell(s.study.steps.from_start); }},
+      {"the same from the metastable regime", "steps", [](S s) { return cell(s.study.steps.from_quasi_stationary); }},
+      {"the same from the worst start", "steps", [](S s) { return cell(s.study.steps.worst_start); }},
+      {"standard deviation of the steps", "steps", [](S s) { return Cell(s.study.steps.distribution.sd); }},
+      {"median of the steps", "steps",
+       [](S s) {
+         const std::optional<double> median = s.study.steps.distribution.quantile(0.5);
+         return median ? Cell(*median) : Cell(Infinite{});
+       }},
+      {"mean time to failure", "s", [](S s) { return mean_cell(s.study.steps.seconds); }},
+      {"mean distance to failure", "m", [](S s) { return mean_cell(s.study.steps.metres); }},
+      {"failure rate per step, 1 − λ₁", "1", [](S s) { return Cell(s.study.spectrum.failure_rate.value); }},
+      {"mixing, spectral", "steps", [](S s) { return Cell(s.study.spectrum.mixing_steps); }},
+      {"mixing from the launch, total variation", "steps",
+       [](S s) {
+         return s.study.spectrum.total_variation_steps ? Cell(*s.study.spectrum.total_variation_steps) : Cell("");
+       }},
+      {"reaches the end of the ramp", "1", [](S s) { return cell(s.study.steps.reach_end); }},
+      {"speed before a collision, long-run mean", "rad/s", [](S s) { return known(s.study.survivors.mean); }},
+      {"its standard deviation", "rad/s", [](S s) { return known(s.study.survivors.sd); }},
+      {"the same mean with a new launch after each rest", "rad/s",
+       [](S s) { return known(s.study.survivors.restart_mean); }},
+      {"rest is unreachable for launches from", "rad/s", [](S s) { return cell(s.thresholds.safe_speed); }},
+      {"slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); }}};
+  return all;
+}
+
+// Returns the names of the assumptions of any law, in their order.
+std::vector<std::string> assumptions_of(const std::vector<Studied>& columns) {
+  std::vector<std::string> names;
+  for (const Studied& one : columns)
+    for (const analysis::ViolationShare& share : one.study.violations)
+      if (std::find(names.begin(), names.end(), share.name) == names.end()) names.push_back(share.name);
+  return names;
+}
+
+// Shows how often an assumption is left, with the interval of a share that was drawn; "" where the law has none such.
+Cell share_cell(const Studied& study, const std::string& assumption, double analysis::ViolationShare::*which,
+                double analysis::ViolationShare::*error) {
+  const std::vector<analysis::ViolationShare>& all = study.study.violations;
+  const auto one = std::ranges::find(all, assumption, &analysis::ViolationShare::name);
+  if (one == all.end() || std::isnan((*one).*which)) return "";
+  if (!((*one).*error > 0)) return (*one).*which;
+  const analysis::Estimate drawn = with_error((*one).*which, (*one).*error);
+  return analysis::Estimate{drawn.value, std::max(0.0, drawn.lower), std::min(1.0, drawn.upper)};
+}
+
 }  // namespace
 
 Table ramps_table(const std::vector<Studied>& columns, const Provenance& provenance) {
-  Table table;
-  table.id = "ramps";
-  table.title = columns.size() == 1 ? "How long the wheel rolls" : "The ramps side by side under each contact law";
-  table.provenance = provenance;
-  table.columns = {{"quantity"}, {"unit"}};
+  Table table{
+      .id = "ramps",
+      .title = columns.size() == 1 ? "How long the wheel rolls" : "The ramps side by side under each contact law",
+      .columns = {{"quantity"}, {"unit"}},
+      .provenance = provenance};
   for (const Studied& one : columns)
     table.columns.push_back({law_and_ramp(*one.study.setting), "", NumberFormat::general, 4});
-  const auto add = [&](const std::string& name, const std::string& unit,
-                       const std::function<Cell(const Studied&)>& of) {
+  const auto add = [&table, &columns](const std::string& name, const std::string& unit, const auto& of) {
     std::vector<Cell> row{name, unit};
     for (const Studied& one : columns) row.push_back(of(one));
     table.rows.push_back(std::move(row));
   };
-  using S = const Studied&;
-  add("expected steps before failure, from the launch", "steps", [](S s) { return cell(s.study.steps.from_start); });
-  add("the same from the metastable regime", "steps", [](S s) { return cell(s.study.steps.from_quasi_stationary); });
-  add("the same from the worst start", "steps", [](S s) { return cell(s.study.steps.worst_start); });
-  add("standard deviation of the steps", "steps", [](S s) { return Cell(s.study.steps.distribution.sd); });
-  add("median of the steps", "steps", [](S s) {
-    const std::optional<double> median = s.study.steps.distribution.quantile(0.5);
-    return median ? Cell(*median) : Cell(Infinite{});
-  });
-  add("mean time to failure", "s",
-      [](S s) { return s.study.steps.seconds ? Cell(s.study.steps.seconds->mean) : Cell(Infinite{}); });
-  add("mean distance to failure", "m",
-      [](S s) { return s.study.steps.metres ? Cell(s.study.steps.metres->mean) : Cell(Infinite{}); });
-  add("failure rate per step, 1 − λ₁", "1", [](S s) { return Cell(s.study.spectrum.failure_rate.value); });
-  add("mixing, spectral", "steps", [](S s) { return Cell(s.study.spectrum.mixing_steps); });
-  add("mixing from the launch, total variation", "steps", [](S s) {
-    return s.study.spectrum.total_variation_steps ? Cell(*s.study.spectrum.total_variation_steps) : Cell("");
-  });
-  add("reaches the end of the ramp", "1", [](S s) { return cell(s.study.steps.reach_end); });
-  add("speed before a collision, long-run mean", "rad/s", [](S s) { return known(s.study.survivors.mean); });
-  add("its standard deviation", "rad/s", [](S s) { return known(s.study.survivors.sd); });
-  add("the same mean with a new launch after each rest", "rad/s",
-      [](S s) { return known(s.study.survivors.restart_mean); });
-  add("rest is unreachable for launches from", "rad/s", [](S s) { return cell(s.thresholds.safe_speed); });
-  add("slope above which such launches exist", "deg", [](S s) { return cell(s.thresholds.safe_slope_deg); });
-  std::vector<std::string> assumptions;  // of any law, in their order
-  for (const Studied& one : columns)
-    for (const analysis::ViolationShare& share : one.study.violations)
-      if (std::find(assumptions.begin(), assumptions.end(), share.name) == assumptions.end())
-        assumptions.push_back(share.name);
-  for (const std::string& name : assumptions) {
-    using Share = analysis::ViolationShare;
-    const auto share = [&](double Share::*which, double Share::*error) {
-      return [name, which, error](S s) {
-        for (const Share& one : s.study.violations) {
-          if (one.name != name) continue;
-          if (std::isnan(one.*which)) break;
-          if (!(one.*error > 0)) return Cell(one.*which);
-          const analysis::Estimate drawn = with_error(one.*which, one.*error);
-          return Cell(analysis::Estimate{drawn.value, std::max(0.0, drawn.lower), std::min(1.0, drawn.upper)});
-        }
-        return Cell("");
-      };
-    };
-    add(fmt::format("“{}”, share of collisions, long run", name), "1",
-        share(&Share::quasi_stationary, &Share::quasi_stationary_error));
+  for (const Quantity& one : quantities()) add(one.name, one.unit, one.of);
+  using Share = analysis::ViolationShare;
+  for (const std::string& name : assumptions_of(columns)) {
+    add(fmt::format("“{}”, share of collisions, long run", name), "1", [&name](const Studied& s) {
+      return share_cell(s, name, &Share::quasi_stationary, &Share::quasi_stationary_error);
+    });
     add(fmt::format("“{}”, share of all collisions until rest", name), "1",
-        share(&Share::until_rest, &Share::until_rest_error));
+        [&name](const Studied& s) { return share_cell(s, name, &Share::until_rest, &Share::until_rest_error); });
   }
   table.notes = {
       "Brackets hold 95 % intervals: replicated randomisations plus the estimated discretization error. An empty cell "
@@ -280,11 +299,10 @@ std::string sensitivity_sentence(const Hanging& one) {
 
 Table grid_table(const std::string& id, const std::string& title, const analysis::SweepAxis& down,
                  const analysis::SweepAxis& across, const std::vector<Estimate>& steps, const Provenance& provenance) {
-  Table table;
-  table.id = id;
-  table.title = title;
-  table.provenance = provenance;
-  table.columns = {{std::string(analysis::parameter_label(down.parameter)), "", NumberFormat::general, 3}};
+  Table table{.id = id,
+              .title = title,
+              .columns = {{std::string(analysis::parameter_label(down.parameter)), "", NumberFormat::general, 3}},
+              .provenance = provenance};
   for (const double value : across.values)
     table.columns.push_back({fmt::format("{} {}", analysis::parameter_label(across.parameter), value), "steps",
                              NumberFormat::significant, 3});
@@ -310,12 +328,11 @@ Table energy_table(const std::vector<analysis::EnergyLosses>& losses, dynamics::
     if (k + 1 == losses.size()) return {"0.11", "0.19", "0.17", "0.1"};
     return {"", "", "0.17", ""};
   };
-  Table table;
-  table.id = "energy-losses";
-  table.title = fmt::format("Energy lost in a collision under {}, beside the figures of the paper's Fig. 8",
-                            dynamics::law_name(law));
-  table.provenance = provenance;
-  table.columns = {{"sd of η and μ", "", NumberFormat::fixed, 2}};
+  Table table{.id = "energy-losses",
+              .title = fmt::format("Energy lost in a collision under {}, beside the figures of the paper's Fig. 8",
+                                   dynamics::law_name(law)),
+              .columns = {{"sd of η and μ", "", NumberFormat::fixed, 2}},
+              .provenance = provenance};
   for (const char* name : {"tangential net mean", "tangential net sd", "normal mean", "normal sd"}) {
     table.columns.push_back({name, "J", NumberFormat::fixed, 3});
     table.columns.push_back({fmt::format("paper: {}", name), "J"});
