@@ -21,39 +21,46 @@ analysis::SpeedSummary summary(std::size_t count, double mean, double sd) {
   return {count, mean, sd, sd / std::sqrt(static_cast<double>(count))};
 }
 
-// No number occurs twice: a value in the wrong column shows.
-analysis::Description description() {
-  analysis::Description d;
-  analysis::ConditionDescription& fast = d.conditions.emplace_back();
-  fast.id = "fast";
-  fast.slope_deg = 9.59;
-  fast.trials = 51;
-  fast.collisions = 790;
-  fast.profile = {summary(51, 5.83, 0.28), summary(1, 5.6, 0)};
-  fast.steady = summary(4, 5.51, 0.12);
-  fast.steady_collisions = summary(188, 5.52, 0.31);
-  fast.legs = {{summary(4, 5.41, 0.02), {}, summary(5, 5.43, 0.03)}};
-  fast.line = {100, 0.61, 0.04, 2.1, 5.38, 0.2};
-  fast.survival.emplace();
-  fast.survival->trials = 51;
-  fast.survival->rests = 7;
-  fast.survival->curve = {{1, 51, 3, 0.94, 0.03, 0.83, 0.98}, {2, 48, 4, 0.86, 0.05, 0.73, 0.93}};
-  fast.survival->expected.from_start = {62, 40, 95};
-  fast.survival->expected.message = "seven trials rest";
-  analysis::ConditionDescription& flat = d.conditions.emplace_back();
-  flat.id = "flat";
-  flat.slope_deg = 7.02;
-  flat.trials = 50;
-  flat.collisions = 641;
-  flat.profile = {summary(50, 7.35, 0.19)};
-  flat.steady = summary(1, 4.71, 0);
-  flat.survival.emplace();
-  flat.survival->trials = 50;
-  flat.survival->rests = 0;
-  flat.survival->curve = {{1, 50, 0, 1, 0, 0.92, 1}};
-  flat.survival->expected.from_start = {infinity, 210, infinity};
+// No number occurs twice below: a value in the wrong column shows.
 
-  analysis::ConditionComparison& pair = d.comparisons.emplace_back();
+analysis::ConditionDescription fast() {
+  analysis::ConditionDescription c;
+  c.id = "fast";
+  c.slope_deg = 9.59;
+  c.trials = 51;
+  c.collisions = 790;
+  c.profile = {summary(51, 5.83, 0.28), summary(1, 5.6, 0)};
+  c.steady = summary(4, 5.51, 0.12);
+  c.steady_collisions = summary(188, 5.52, 0.31);
+  c.legs = {{summary(4, 5.41, 0.02), {}, summary(5, 5.43, 0.03)}};
+  c.line = {100, 0.61, 0.04, 2.1, 5.38, 0.2};
+  c.survival.emplace();
+  c.survival->trials = 51;
+  c.survival->rests = 7;
+  c.survival->curve = {{1, 51, 3, 0.94, 0.03, 0.83, 0.98}, {2, 48, 4, 0.86, 0.05, 0.73, 0.93}};
+  c.survival->expected.from_start = {62, 40, 95};
+  c.survival->expected.message = "seven trials rest";
+  return c;
+}
+
+analysis::ConditionDescription flat() {
+  analysis::ConditionDescription c;
+  c.id = "flat";
+  c.slope_deg = 7.02;
+  c.trials = 50;
+  c.collisions = 641;
+  c.profile = {summary(50, 7.35, 0.19)};
+  c.steady = summary(1, 4.71, 0);
+  c.survival.emplace();
+  c.survival->trials = 50;
+  c.survival->rests = 0;
+  c.survival->curve = {{1, 50, 0, 1, 0, 0.92, 1}};
+  c.survival->expected.from_start = {infinity, 210, infinity};
+  return c;
+}
+
+analysis::ConditionComparison fast_and_flat() {
+  analysis::ConditionComparison pair;
   pair.a = 0;
   pair.b = 1;
   pair.meet = 9;
@@ -73,8 +80,11 @@ analysis::Description description() {
   means.welch.p = 1e-9;
   means.hedges.value = infinity;
   pair.all_collisions = means;
+  return pair;
+}
 
-  analysis::DescribedFit& fit = d.fits.emplace_back();
+analysis::DescribedFit fit_of_all() {
+  analysis::DescribedFit fit;
   fit.of = "all conditions";
   fit.fit.transitions = 1400;
   fit.fit.rests = 8;
@@ -83,9 +93,16 @@ analysis::Description description() {
   fit.fit.value = {0.54, 0.045, 0.352, 0.043};
   fit.fit.lower_95 = {0.53, 0.041, 0.349, 0.039};
   fit.fit.upper_95 = {0.55, 0.049, 0.355, 0.047};
-  analysis::DescribedFit& none = d.fits.emplace_back();
-  none.of = "flat";
-  none.fit.status = analysis::ContactFit::Status::impossible;
+  return fit;
+}
+
+analysis::Description description() {
+  analysis::Description d;
+  d.conditions = {fast(), flat()};
+  d.comparisons = {fast_and_flat()};
+  d.fits = {fit_of_all(), {}};
+  d.fits.back().of = "flat";
+  d.fits.back().fit.status = analysis::ContactFit::Status::impossible;
   return d;
 }
 
