@@ -52,7 +52,7 @@ std::vector<double> bends(const std::vector<double>& periods, const std::vector<
   return off;
 }
 
-// One row of a log, and its columns by what they are.
+// One row of a log: its five columns, and three of them by name.
 struct CounterRow {
   std::array<double, 5> values{};
   double time = 0, drum = 0, wheel = 0;  // [s], revolutions

@@ -190,7 +190,7 @@ FreeParts free_parts(const std::vector<Point::Slot>& slots, const Eigen::VectorX
   return parts;
 }
 
-// What one iteration of a climb came to; rises of the penalised likelihood.
+// The result of one iteration of a climb, in rises of the penalised likelihood.
 struct Stride {
   double promised = 0;  // by an undamped step of all parameters, to first order
   double foretold = 0;  // by the last step that was tried

@@ -110,7 +110,7 @@ void ContactVariation::apply(const CollisionPlace& place, const EffectTerm& term
 
 namespace {
 
-// What of the measured trials the variations are scaled by.
+// The scales of the measured trials by which places are told: how many they are, how long, how far, how fast.
 struct VariedDesign {
   explicit VariedDesign(const WheelRuns& measured)
       : trials(static_cast<double>(std::max<std::size_t>(1, measured.runs.size()))),

@@ -130,7 +130,7 @@ void report(const Simulation& s, const RunCollision& like, const DrawnCollision&
     m.slide = drawn.landed.displacement + s.measured.slide_error * dynamics::slide_score(error[3]);
 }
 
-// Leaves of a drawn run what is known of a measured one, with the times that its speeds give.
+// Reduces a drawn run to what is known of a measured one, with the times that its speeds give.
 void make_as_measured(const Simulation& s, const WheelRun& design, const ExtendedWheel& wheel, WheelRun& run) {
   for (std::size_t k = 1; k < run.collisions.size(); ++k) {
     const RunCollision& previous = run.collisions[k - 1];

@@ -76,7 +76,8 @@ ExtendedWheel::Leg ExtendedWheel::leg_of(const Wheel& stated, const Wheel& wheel
   return leg;
 }
 
-// Notes of each leg what the stated wheel has, and how much more torques take off a landing than off a standing foot.
+// Stores for each leg the stated wheel's gain and barrier, and how much more the torques take off a landing than off a
+// standing foot.
 void ExtendedWheel::hold_against_stated(const ExtendedWheel& stated) {
   const Extension::Torques& torques = extension_.torques;
   for (std::size_t k = 0; k < geometry_.size(); ++k) {

@@ -17,11 +17,11 @@ struct Extension {
   /// Changes of the wheel's shape and mass and of the ramp's surface.
   struct Geometry {
     std::vector<double> leg_change;  ///< added to each leg's length [m]; empty: none
-    double hub_forward = 0,
-           hub_aside = 0;          ///< centre of mass off the hub [m]: towards leg 0, and a right angle further
-    double inertia_ratio = 1;      ///< of the inertia about the foot
-    double hub_inertia_ratio = 1;  ///< of J about the hub; `settled`
-    double slope_offset_rad = 0;   ///< true minus stated slope [rad]
+    double hub_forward = 0;          ///< centre of mass off the hub, towards leg 0 [m]
+    double hub_aside = 0;            ///< the same, a right angle further [m]
+    double inertia_ratio = 1;        ///< of the inertia about the foot
+    double hub_inertia_ratio = 1;    ///< of J about the hub; `settled`
+    double slope_offset_rad = 0;     ///< true minus stated slope [rad]
     enum class Shape { parabola, sine, step };
     Shape sag_shape = Shape::parabola;  ///< of the surface between sag_from and sag_to
     double sag = 0;                     ///< depth in the middle of that stretch [m]
@@ -60,7 +60,7 @@ struct Extension {
     double launch_shift = 0;                 ///< added to the stated mean launch speed [rad/s]
     double launch_widening = 0;              ///< added to its sd [rad/s]
   };
-  /// How far the law `settled` may be off.
+  /// Errors of the law `settled` itself.
   struct LawError {
     double sticking_ratio = 1;  ///< of every mu_c, a little off in engines that move by time steps
     double plus_ratio = 1;      ///< of every omega+, which is seen a little after the impact

@@ -18,7 +18,7 @@ namespace detail {
 
 inline bool same_sign(double a, double b) { return (a < 0) == (b < 0); }
 
-/// Adds the root of f between a and b to `roots`, if f has other signs there.
+/// Adds the root of f between a and b to `roots`, if f changes sign between them.
 template <class F>
 void add_root(const F& f, double a, double fa, double b, double fb, std::vector<double>& roots) {
   if (same_sign(fa, fb)) return;

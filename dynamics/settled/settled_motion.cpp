@@ -389,7 +389,7 @@ void SettledRoll::follow(const GroundedFoot& foot) {
   velocity_ = {foot.state.slip + foot.state.spin * height_, -foot.state.spin * ahead, foot.state.spin};
 }
 
-// Lets the foot of a leg strike, while the one that carried may be on the ground.
+// Hands over to the foot of a leg, which strikes; the foot that carried may stay on the ground.
 SettledRoll::Event SettledRoll::strikes(int leg) {
   has_other_ = leg != foot_;
   other_ = foot_;
@@ -497,8 +497,8 @@ struct SettledRoll::Flight {
   bool high = false;   // the hub is higher than legs are long
 };
 
-// While the wheel turns by one leg no others may touch than those looked at, and none before a hub that is higher
-// than legs are long is down again.
+// Returns a stretch of flight in which no legs but those looked at may touch: while the wheel turns by one leg none of
+// the others does, and none at all before a hub that is higher than legs are long is down again.
 SettledRoll::Flight SettledRoll::flight(double longest_leg) const {
   const SettledWheel& wheel = motion_->wheel();
   const double spin = velocity_.spin, out = velocity_.out;

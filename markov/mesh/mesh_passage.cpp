@@ -66,8 +66,9 @@ double distance_of(const std::vector<double>& x, const std::vector<double>& befo
   return moved;
 }
 
-// The distance falls by |lambda_2 / lambda_1| a step, oscillating: its decline over the second half tells. Returns 0
-// where it does not fall. @param distances  between distributions a revolution apart
+// Returns in how many steps the distance from the quasi-stationary distribution falls by a factor of e; 0 where it does
+// not fall. It falls by |lambda_2 / lambda_1| a step, oscillating: its decline over the second half tells.
+// @param distances  between distributions a revolution apart
 double mixing_steps_of(const std::vector<double>& distances, int phases) {
   const std::size_t last = distances.size() - 1, first = last / 2;
   if (!(distances[last] > 0 && distances[first] > distances[last])) return 0;
