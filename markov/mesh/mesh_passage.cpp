@@ -28,9 +28,12 @@ std::array<double, 2> total(const MassRows& rows, std::array<double, 2> own) {
 }
 
 // Follows survivors over one revolution. @param x  their distribution, before and after @param y  of the same size
-Revolution revolve(const MassRows& rows, std::vector<double>& x, std::vector<double>& y) {
+// @param turn  what becomes of them; its lists are used again
+void revolve(const MassRows& rows, std::vector<double>& x, std::vector<double>& y, Revolution& turn) {
   const std::size_t n = x.size();
-  Revolution turn;
+  turn.survival.clear();
+  turn.failures = turn.steps = turn.failures_lower = turn.steps_lower = 0;
+  turn.alive_lower = 1;
   turn.distribution.assign(n, 0.0);
   turn.visits.assign(n, 0.0);
   double here = 1;
@@ -53,10 +56,9 @@ Revolution revolve(const MassRows& rows, std::vector<double>& x, std::vector<dou
     rows.apply_left(x, y);
     const double mass = total(rows, {std::accumulate(y.begin(), y.end(), 0.0), 0})[0];
     turn.extinct = !(mass > 0);
-    if (turn.extinct) return turn;
+    if (turn.extinct) return;
     for (std::size_t i = 0; i < n; ++i) x[i] = y[i] / mass;
   }
-  return turn;
 }
 
 // Returns the total variation between two distributions, as far as a process holds them.
@@ -83,25 +85,26 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
   const std::size_t n = rows.kill.size();
   MeshPassage passage;
   double alive = 1, alive_lower = 1, steps_lower = 0, last_failures = 0;
-  std::vector<double> y(n), distances;
+  std::vector<double> y(n), before, distances;
+  Revolution turn;
   int settled = 0;
   passage.visits.assign(n, 0.0);
-  const auto visit = [&](const Revolution& turn, double times) {
+  const auto visit = [&](double times) {
     for (std::size_t i = 0; i < n; ++i) passage.visits[i] += times * turn.visits[i];
   };
   while (settled < kInARow) {
     if (passage.products >= most_products && !or_stop)
       throw ConvergenceError("mesh", last_failures,
                              "survivors still change after " + std::to_string(most_products) + " products");
-    const std::vector<double> before = x;
-    Revolution turn = revolve(rows, x, y);
+    before = x;
+    revolve(rows, x, y, turn);
     passage.products += static_cast<int>(turn.survival.size());
     for (const double share : turn.survival) passage.survival.push_back(alive * share);
     if (turn.extinct) {
       passage.steps = passage.steps_upper = passage.steps + alive * turn.steps;
       passage.steps_lower = steps_lower + alive_lower * turn.steps_lower;
       passage.failure_rate = 1;
-      visit(turn, alive);
+      visit(alive);
       passage.distribution = std::move(turn.distribution);
       return passage;
     }
@@ -117,9 +120,9 @@ MeshPassage follow_survivors(const MassRows& rows, std::vector<double> x, double
       passage.steps = std::sqrt(passage.steps_upper * passage.steps_lower);
       passage.failure_rate = rows.phases == 1 ? turn.failures : -std::expm1(std::log1p(-turn.failures) / rows.phases);
       passage.distribution = std::move(turn.distribution);
-      visit(turn, alive / turn.failures);
+      visit(alive / turn.failures);
     } else {
-      visit(turn, alive);
+      visit(alive);
       passage.steps += alive * turn.steps;
       steps_lower += alive_lower * turn.steps_lower;
       alive *= turn.survival.back();
