@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "analysis/diagnosis/at_work.h"
+#include "analysis/diagnosis/beside_unnamed.h"
 #include "analysis/diagnosis/diagnosis_sentences.h"
 #include "analysis/diagnosis/gap_tests.h"
 #include "analysis/diagnosis/machine_steps.h"
@@ -314,12 +315,19 @@ HeldOutGap hold_out(const TransitionModel& model, const Fitted& fitted, const Hy
 // Says which effects cause the gap, with what probability.
 std::pair<Verdict, Diagnosis::Causes> name_causes(const TransitionModel& model, const Fitted& fitted,
                                                   Hypotheses hypotheses, Chosen chosen, std::size_t candidates,
-                                                  const Diagnosis& d, const Tested& tested) {
+                                                  const Diagnosis& d, const Tested& tested,
+                                                  const DiagnosisOptions& options, const Progress& progress) {
   Diagnosis::Causes causes;
   Probabilities probabilities =
       share_probabilities(model, fitted.ranking, hypotheses.ordered, candidates, tested, chosen.unnamed, d.rules);
   Named named =
       give_verdict(probabilities, chosen.unnamed, tested, d.limits.visible, d.data, d.gap.recalibration_id, d.rules);
+  if (named.verdict == Verdict::partly_explained)
+    named = corrected(std::move(named),
+                      probabilities_beside_unnamed(model, fitted.ranking, *hypotheses.best(), fitted.recalibrated,
+                                                   chosen.supposed.front().facets, candidates, options,
+                                                   [&] { progress(0.86, "what stands beside the unnamed"); }),
+                      chosen.unnamed.of_unnamed(), d.rules);
   if (!named.at_work.empty()) causes.unnamed_facets = facets_by_probability(chosen, named.p_unnamed, d.rules);
   causes.ranked = std::move(probabilities.ranked);
   causes.not_decided = std::move(hypotheses.not_decided);
@@ -362,7 +370,7 @@ Diagnosis answer(const TransitionModel& model, const Fitted& fitted, const std::
   d.shrinkage.measures = held_out.measures;
   if (tested.gap && trials_to_explain(d.data)) chosen.unnamed.alone = std::max(chosen.unnamed.alone, d.rules.even_odds);
   std::tie(d.verdict, d.causes) =
-      name_causes(model, fitted, std::move(ranked), std::move(chosen), candidates.size(), d, tested);
+      name_causes(model, fitted, std::move(ranked), std::move(chosen), candidates.size(), d, tested, options, progress);
   if (best && !d.shrinkage.measures.empty() && d.shrinkage.measures.front().closed)
     add_closed_shares(d.causes.at_work, model, fitted.ranking, *best, fitted.given, fitted.recalibrated, held_out.gap,
                       options, [&] { progress(0.86, "what each effect closes"); });

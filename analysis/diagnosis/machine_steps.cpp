@@ -18,7 +18,8 @@ namespace metastable::analysis {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr int draws_of_steps = 48;         // of each model
+// Draws of what stands for the machine, and of the recalibrated model: fewer save time.
+constexpr int draws_of_machine = 16, draws_of_recalibrated = 10;
 constexpr double steps_of_endless = 1e15;  // what stands for a draw that never rests
 constexpr int error_nodes = 81;            // of the grid of a model's error,
 constexpr double error_reach = 4;          //   out to so many sds
@@ -188,11 +189,11 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
                        const std::function<void()>& heartbeat) {
   StepsBeforeFailure& s = d.shrinkage.steps;
   const std::vector<WeighedFit> plain{recalibrated};
-  const auto draw = [&](const TransitionModel& at, const std::vector<WeighedFit>& of) {
-    return drawn_steps(model, at, of, draws_of_steps, options.seed, options.threads, heartbeat);
+  const auto draw = [&](const TransitionModel& at, const std::vector<WeighedFit>& of, int draws) {
+    return drawn_steps(model, at, of, draws, options.seed, options.threads, heartbeat);
   };
-  const std::vector<double> of_plain = draw(model, plain);
-  const std::vector<double> of_effects = fits.empty() ? of_plain : draw(model, fits);
+  const std::vector<double> of_plain = draw(model, plain, fits.empty() ? draws_of_machine : draws_of_recalibrated);
+  const std::vector<double> of_effects = fits.empty() ? of_plain : draw(model, fits, draws_of_machine);
   s.recalibrated_90 = interval_of_draws(of_plain);
   s.with_effect_90 = interval_of_draws(of_effects);
   const auto [at_risk, rests] = model.rests();
@@ -205,7 +206,7 @@ void add_machine_steps(Diagnosis& d, const TransitionModel& model, const Weighed
   add("as measured", of_effects);
   if (options.elsewhere.empty()) return;
   auto [words, there] = model.elsewhere(options.elsewhere);
-  add(std::move(words), draw(*there, fits.empty() ? plain : fits));
+  add(std::move(words), draw(*there, fits.empty() ? plain : fits, draws_of_machine));
 }
 
 }  // namespace metastable::analysis

@@ -260,4 +260,18 @@ Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, cons
   return named;
 }
 
+Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed, const Rules& rules) {
+  for (AtWork& one : named.at_work)
+    for (const std::string& effect : one.effects)
+      if (const auto known = beside.find(effect); known != beside.end())
+        one.probability *= 1 - unnamed * (1 - known->second);
+  std::ranges::stable_sort(named.at_work, std::ranges::greater{}, &AtWork::probability);
+  if (std::ranges::any_of(named.at_work, [&](const AtWork& one) { return one.probability >= rules.least_at_work; }))
+    return named;
+  named.verdict = Verdict::unexplained;
+  named.set.clear();
+  named.alike.clear();
+  return named;
+}
+
 }  // namespace metastable::analysis

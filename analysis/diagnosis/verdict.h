@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -92,5 +93,11 @@ struct Named {
 Named give_verdict(const Probabilities& probabilities, const Odds& unnamed, const Tested& tested,
                    const std::vector<Visibility>& visible, const Diagnosis::Data& data,
                    const std::string& recalibration_id, const Rules& rules);
+
+/// Corrects the probabilities of a partly explained gap by what each effect gains beside the unnamed: an effect that
+/// only takes its shape is not at work, and where none is left the gap is unexplained.
+/// @param beside  probabilities_beside_unnamed(); effects that it lacks stay as they are
+/// @param unnamed  probability that something without a name is at work, given the gap
+Named corrected(Named named, const std::map<std::string, double>& beside, double unnamed, const Rules& rules);
 
 }  // namespace metastable::analysis

@@ -38,8 +38,8 @@ struct StepsBeforeFailure {
          observed_upper = 0;  ///< collisions at risk by rests, exact 90 %; 0: not known
   double baseline = 0, recalibrated = 0, with_effect = 0;
   /// What the fitted parameters, and the hypotheses by their probability, leave open of the last two (90 %).
-  std::optional<Estimate> recalibrated_90, with_effect_90;
-  std::vector<MachineSteps> machine;  ///< as measured; then the place that was asked about
+  std::optional<Estimate> recalibrated_90 = {}, with_effect_90 = {};
+  std::vector<MachineSteps> machine = {};  ///< as measured; then the place that was asked about
 };
 
 /// The measures, and what of the first each trial says.
