@@ -29,6 +29,12 @@ class NotTabulated : public markov::ConvergenceError {
       : ConvergenceError("not known: law settled: " + why + "; simulate follows trials") {}
 };
 
+/// Says that what survives goes ever faster: there is no regime to tell numbers of.
+class RunsAway : public markov::ConvergenceError {
+ public:
+  explicit RunsAway(const std::string& what) : ConvergenceError("not known: " + what) {}
+};
+
 /// Survival starts at 1, does not rise, and sums to no more than the expected steps; every interval holds its value;
 /// expected steps are at least 1, rates lie in [0, 1]; and all of Metastability::agreements hold.
 /// study() asks this of every result. @throws Contradiction

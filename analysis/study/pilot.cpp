@@ -1,10 +1,13 @@
 #include "analysis/study/pilot.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "analysis/study/consistency.h"
 #include "markov/chain/solver.h"
 #include "markov/passage/quasi_stationary.h"
 
@@ -14,6 +17,11 @@ namespace {
 constexpr std::size_t pilot_cells = 96;
 constexpr std::size_t pilot_samples = 4096;
 constexpr double beyond_regime = 1e-13;  // share of the survivors
+constexpr double held = 1e-10;           // share of the survivors in the highest cells: the cells hold the others
+constexpr double farthest_reach = 1e6;   // of the cells, in widths of the bulk of a step's landings
+// The share of the survivors in the highest cells, at that reach, from which there is no regime. Where a map only now
+// and then gains energy, shares fall with a power of the distance, and 1e-6 and less are left there.
+constexpr double without_end = 1e-3;
 
 // Finds the lowest state with less than 1e-13 of the survivors above it, at any phase.
 double top_of(const markov::StateSpace& space, const std::vector<double>& nu) {
@@ -69,7 +77,15 @@ std::optional<Pilot> solve_pilot(const Problem& problem, const StudyOptions& opt
     const markov::ChainSolver solver(sampled.chain);
     const markov::QuasiStationary quasi = markov::quasi_stationary(solver, markov::FewSurvivors::unsettled);
     const std::vector<double> nu = markov::shares_in_classes(solver.period(), quasi.distribution);
-    if (markov::top_share(space, nu) < 1e-10 || reach > 1e6)
+    const double beyond = markov::top_share(space, nu);
+    if (reach > farthest_reach && beyond > without_end) {
+      const markov::Grid& grid = space.grid(0);
+      throw RunsAway(fmt::format(
+          "survivors gain from step to step without end: {:.3g} % of them come to {} above {:.3g}{}, so that there is "
+          "no metastable regime, and the expected steps are infinite or of no wheel that steps from foot to foot",
+          100 * beyond, problem.observed, problem.observable(grid.lower(space.cells() - 1)), problem.observed_unit));
+    }
+    if (beyond < held || reach > farthest_reach)
       return Pilot{space,
                    nu,
                    quasi.survival_weight,

@@ -51,7 +51,8 @@ std::function<Run(double, int)> rolls(std::shared_ptr<const dynamics::SettledMot
   };
 }
 
-// Returns where the wheel without noise comes to at that phase; the last state there, or a fast one, where it rests.
+// Returns where the wheel without noise comes to at that phase; the last state there, or a fast one, where it rests, and
+// the fastest launch that a setting may have where it goes ever faster.
 template <typename Map>
 double noise_free_state(const Map& map, int phase) {
   constexpr int fewest_steps = 512;  // after which a wheel without noise has settled on its orbit
@@ -61,7 +62,7 @@ double noise_free_state(const Map& map, int phase) {
   for (int step = 0; step < std::max(fewest_steps, 64 * map.phases()) || step % map.phases() != 0; ++step) {
     const std::optional<double> next = map.landing(state, (phase + step) % map.phases(), no_noise);
     if (!next) return at_phase;
-    state = *next;
+    state = std::min(*next, dynamics::range::speed.high * dynamics::range::speed.high);
     if ((step + 1) % map.phases() == 0) at_phase = state;
   }
   return at_phase;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -19,6 +20,14 @@ constexpr double still_share = 4.8e-4, deep_share = 4.8e-3;
 // The time for which a foot that lifts without speed is let go [s]; how far the wheel turns between two looks at
 // where its tips are [rad].
 constexpr double lift_off = 1e-6, steady_turn = 0.1;
+
+// The kinetic energy up to which a wheel is followed, in M g (leg length): twelve times that of the fastest launch that
+// a setting may ask of the paper's legs (1000 rad/s). A wheel that gains energy in flight passes any bound.
+constexpr double most_energy = 1e6;
+
+// The looks at one tip in one flight. 10 to 20 find where it touches; more than this many say that numbers do not
+// resolve it.
+constexpr int most_looks = 10000;
 
 // Returns sine and cosine, without the library's where the angle is small: hops ask for many.
 std::pair<double, double> sine_cosine(double angle) {
@@ -234,6 +243,11 @@ Step SettledRoll::step() {
 }
 
 SettledRoll::Event SettledRoll::run(bool until_settled) {
+  if (kinetic() > most_energy * motion_->wheel().gravity * motion_->wheel().length(leg_))
+    throw RunsAway(
+        fmt::format("law settled: the wheel runs away: it flies down the slope of {:.4g} deg faster and faster, and "
+                    "turns at {:.3g} rad/s",
+                    motion_->wheel().slope_rad * 180 / std::numbers::pi, velocity_.spin));
   landing_ = {};
   touch_along_ = tip_along(leg_);
   touch_time_ = time_;
@@ -495,6 +509,7 @@ struct SettledRoll::Flight {
   double slowing = 0;  // [rad/s^2]
   double lasts = 0;    // [s]: no leg but those looked at touches before
   bool high = false;   // the hub is higher than legs are long
+  bool lost = false;   // numbers do not resolve where a tip touches
 };
 
 // Returns a stretch of flight in which no legs but those looked at may touch: while the wheel turns by one leg none of
@@ -517,10 +532,11 @@ SettledRoll::Flight SettledRoll::flight(double longest_leg) const {
   return flight;
 }
 
-// Finds when the tip of a leg touches; a time that is not before flight.lasts if it does not. The tip can fall no
-// faster than at `fall` for a while; advancing by the time that takes never misses a touch.
+// Finds when the tip of a leg touches; a time that is not before flight.lasts if it does not, and nothing where too
+// many looks do not find it. The tip can fall no faster than at `fall` for a while; advancing by the time that takes
+// never misses a touch.
 // @param lifts  the tip is leaving the plane, where it is exactly
-double SettledRoll::touch_in(const Flight& flight, int leg, bool lifts) const {
+std::optional<double> SettledRoll::touch_in(const Flight& flight, int leg, bool lifts) const {
   const SettledWheel& wheel = motion_->wheel();
   const double spin = velocity_.spin, out = velocity_.out, press = cosine_;
   const double slowing = flight.slowing, lasts = flight.lasts;
@@ -528,7 +544,8 @@ double SettledRoll::touch_in(const Flight& flight, int leg, bool lifts) const {
   const double sine = std::sin(angle), cosine = std::cos(angle);
   const double gap0 = lifts ? 0 : std::max(0.0, height_ - length * cosine - wheel.tip_radius);
   double t = 0;
-  while (t < lasts) {
+  for (int looks = 0; t < lasts; ++looks) {
+    if (looks == most_looks) return std::nullopt;
     const double by = t * (spin + slowing * t / 2);
     const auto [half_sine, half_cosine] = sine_cosine(by / 2);
     const double gap =
@@ -559,8 +576,11 @@ std::optional<int> SettledRoll::first_touch(Flight& flight, bool leaves) const {
   const int reach = wheel.legs() < 5 ? 1 : 2;
   std::optional<int> touches;
   const auto look = [&](int leg, bool lifts) {
-    const double when = touch_in(flight, leg, lifts);
-    if (when < flight.lasts) flight.lasts = when, touches = leg;
+    const std::optional<double> when = touch_in(flight, leg, lifts);
+    if (!when)
+      flight.lost = true;
+    else if (*when < flight.lasts)
+      flight.lasts = *when, touches = leg;
   };
   if (leaves) {
     look(foot_, true);
@@ -577,10 +597,13 @@ std::optional<int> SettledRoll::first_touch(Flight& flight, bool leaves) const {
 SettledRoll::Event SettledRoll::fly() {
   const SettledWheel& wheel = motion_->wheel();
   const double longest_leg = *std::max_element(wheel.leg_length.begin(), wheel.leg_length.end());
-  if (++events_ >= wheel.max_events) return Event::given_up;
   for (bool leaves = true;; leaves = false) {
     Flight way = flight(longest_leg);
     const std::optional<int> touches = first_touch(way, leaves);
+    if (way.lost || ++events_ >= wheel.max_events) {
+      events_ = wheel.max_events;
+      return Event::given_up;
+    }
     const double lasts = way.lasts, spin = velocity_.spin;
     along_ += lasts * (velocity_.along + sine_ * lasts / 2);
     height_ += lasts * (velocity_.out - cosine_ * lasts / 2);

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "dynamics/settled/foot_strike.h"
@@ -18,6 +19,13 @@ enum class LandingEnd {
   rest,       ///< turned back on a standing foot, or stands on two
   unsettled,  ///< the next leg touches while the landed foot hops or slides: an assumption of the chain is broken
   given_up    ///< more events than allowed (two feet that chatter at high eta)
+};
+
+/// Says that a wheel gains speed from landing to landing without end: on a steep slope it is thrown up, falls further
+/// down the longer it flies, and lands with more energy than it took off with.
+class RunsAway : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 /// Says what one landing does.
@@ -69,7 +77,8 @@ class SettledMotion {
   /// rest_speed.
   /// @param leg that lands; @param omega_minus [rad/s], > 0
   /// @param landed, old contact of the landing foot and of those behind it: eta in [0, 1), mu >= 0
-  /// @throws std::invalid_argument for a speed or contact out of range, naming it
+  /// @throws std::invalid_argument for a speed or contact out of range, naming it; RunsAway for a wheel that lands with
+  /// a kinetic energy of more than a million times M g (leg length)
   Landing land(int leg, double omega_minus, const Contact& landed, const Contact& old) const;
   Landing land(int leg, double omega_minus, const Contact& contact) const {
     return land(leg, omega_minus, contact, contact);
@@ -96,6 +105,7 @@ class SettledRoll {
   SettledRoll(const SettledMotion& motion, int leg, double omega_minus, const Contact& landed, const Contact& old);
 
   /// Goes from the touch of leg() to the next one, which then is leg(): its contact has to be set before the next call.
+  /// @throws RunsAway as SettledMotion::land
   Step step();
   /// Follows the landing alone, until its foot has settled. Ends the roll unless it is `settled`.
   Landing land();
@@ -128,7 +138,7 @@ class SettledRoll {
   std::optional<Event> after_piece(const PieceEnd& end, GroundedFoot& foot);
   Event fly();
   Flight flight(double longest_leg) const;
-  double touch_in(const Flight& flight, int leg, bool lifts) const;
+  std::optional<double> touch_in(const Flight& flight, int leg, bool lifts) const;
   std::optional<int> first_touch(Flight& flight, bool leaves) const;
   const Contact& contact_of(int leg) const;
   double angle_of(int leg) const;

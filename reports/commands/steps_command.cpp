@@ -44,7 +44,7 @@ StepsAnswer answer_steps(const StepsRequest& request, const BeginPart& begin_par
   }
   if (request.rigid_bodies) {
     options.progress = begin("rigid bodies");
-    extras.rigid_bodies = analysis::beside_rigid_bodies(study, "", options);
+    extras.rigid_bodies = rolled_within_limit(study, "", options);
   }
   return answer;
 }

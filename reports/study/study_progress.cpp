@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <utility>
 
 namespace metastable::reports {
 
@@ -21,7 +22,8 @@ TimeLimitReached::TimeLimitReached(double seconds, double share, const std::stri
     : std::runtime_error(
           fmt::format("the time limit of {:.6g} s is reached at {:.0f} % of '{}', and there is no number "
                       "yet: raise the limit, or ask for less (a larger tolerance)",
-                      seconds, 100 * std::clamp(share, 0.0, 1.0), what)) {}
+                      seconds, 100 * std::clamp(share, 0.0, 1.0), what)),
+      seconds_(seconds) {}
 
 BeginPart within(double seconds, const BeginPart& begin) {
   const auto began = std::chrono::steady_clock::now();
@@ -32,6 +34,16 @@ BeginPart within(double seconds, const BeginPart& begin) {
         throw TimeLimitReached(seconds, share, name);
     };
   };
+}
+
+analysis::BesideRigidBodies rolled_within_limit(const analysis::Metastability& study, std::string name,
+                                                const analysis::StudyOptions& options) {
+  try {
+    return analysis::beside_rigid_bodies(study, name, options);
+  } catch (const TimeLimitReached& limit) {
+    return {std::move(name), analysis::answered_steps(study),
+            {.reason = fmt::format("the time limit of {:.6g} s ended it", limit.seconds())}};
+  }
 }
 
 BeginPart ProgressParts::begin() {

@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
 #include <string>
+#include <utility>
 
 #include "tests/analysis/settings.h"
 
@@ -104,6 +108,30 @@ TEST(Consistency, SampledAndIntegratedOverlapAtEveryLaunchSpeed) {
     EXPECT_NO_THROW(
         require_overlap("expected steps", "sampled", of(Method::sampled), "integrated", of(Method::integrated)))
         << speed;
+  }
+}
+
+// Gains energy at almost every step, and fails once in twenty.
+struct Accelerating {
+  int phases() const { return 1; }
+  int noise_dimension() const { return 2; }
+  std::pair<double, double> state_interval(int) const { return {0, std::numeric_limits<double>::infinity()}; }
+  std::optional<double> landing(double state, int, std::span<const double> score) const {
+    if (score[1] > 1.645) return std::nullopt;
+    return state * std::exp(0.3 + 0.1 * score[0]);
+  }
+  double duration(double, int) const { return 1; }
+  double advance(int) const { return 1; }
+};
+
+TEST(Consistency, SurvivorsThatGainWithoutEndHaveNoAnswer) {
+  Problem problem{Accelerating{}, {[](double) { return 1.0; }, 0}};
+  try {
+    study(problem, {.tolerance = 0.05, .brief = true});
+    FAIL();
+  } catch (const RunsAway& error) {
+    EXPECT_NE(std::string(error.what()).find("survivors gain from step to step without end"), std::string::npos)
+        << error.what();
   }
 }
 

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <string>
 
 #include "dynamics/wheel/plastic_law.h"
 #include "tests/dynamics/support.h"
@@ -262,6 +264,33 @@ TEST(SettledMotion, AWheelThrownUpComesDownAsMillisecondByMillisecond) {
     EXPECT_NEAR(step.duration, slow.duration, 1e-9) << omega;
     EXPECT_NEAR(one.energy(), other.energy(), 1e-7) << omega;
   }
+}
+
+// Six legs on a slope of 20 deg are thrown up, fall further down the longer they fly, and gain more than impacts take.
+// The motion is followed up to a bound of energy, and every landing up to there ends.
+TEST(SettledMotion, AWheelThatGainsInFlightIsSaidToRunAway) {
+  SettledWheel wheel;
+  wheel.leg_length.assign(6, 0.26);
+  wheel.slope_rad = 20 * degree;
+  const SettledMotion motion(wheel);
+  std::mt19937 generator(1);
+  std::normal_distribution<double> eta(0.4, 0.1), mu(0.8, 0.1);
+  const auto contact = [&] {
+    return Contact{std::clamp(eta(generator), 0.0, 0.95), std::max(0.0, mu(generator))};
+  };
+  const Contact first = contact();
+  SettledRoll roll(motion, 0, 6, first, first);
+  std::string said;
+  for (int n = 0; n < 2000 && said.empty(); ++n) {
+    try {
+      ASSERT_TRUE(roll.step().touched) << n;
+      roll.set_contact(contact());
+    } catch (const RunsAway& error) {
+      said = error.what();
+    }
+  }
+  EXPECT_NE(said.find("law settled: the wheel runs away: it flies down the slope of 20 deg"), std::string::npos) << said;
+  EXPECT_THROW(motion.land(0, 1e17, {0.4, 0.8}), RunsAway);
 }
 
 TEST(SettledMotion, IllegalInputIsNamed) {
