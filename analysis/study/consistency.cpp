@@ -12,7 +12,8 @@
 namespace metastable::analysis {
 namespace {
 
-constexpr double rounding = 1e-9;  // relative, of sums over a chain without negative entries
+constexpr double nearly_done = 0.999;  // share of a study
+constexpr double rounding = 1e-9;      // relative, of sums over a chain without negative entries
 
 void require(bool holds, const std::string& what) {
   if (!holds) throw Contradiction(what);
@@ -65,8 +66,11 @@ void require_followed(const Problem& problem, const Metastability& study, const 
   if (!problem.follow || !(moved > much)) return;
   const std::size_t most = study.steps.survival.size();
   std::vector<double> steps(launches);
-  markov::parallel_for(launches, options.threads,
-                       [&](std::size_t i) { steps[i] = static_cast<double>(problem.follow(options.seed, i, most)); });
+  markov::Share told;
+  if (options.progress) told = [&](double) { options.progress(nearly_done, "trials followed beside the chain"); };
+  markov::parallel_for(
+      launches, options.threads,
+      [&](std::size_t i) { steps[i] = static_cast<double>(problem.follow(options.seed, i, most)); }, told);
   double sum = 0, square = 0, expected = 0;
   for (const double n : steps) {
     sum += n;

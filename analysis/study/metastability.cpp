@@ -398,7 +398,9 @@ Metastability study(const Setting& setting, const StudyOptions& options) {
     second.progress = [&](double share, const std::string& what) { own.progress(0.5 + 0.5 * share, what); };
   }
   const Setting launched = steadily_launched(setting, first);
-  Metastability result = study(launched.problem({options.direct, options.threads, {}}), second);
+  if (by_table)  // of faster launches it may be another one
+    table_progress = [&](double) { own.progress(0.5, "table of landings"); };
+  Metastability result = study(launched.problem({options.direct, options.threads, table_progress}), second);
   result.setting = launched;
   return result;
 }

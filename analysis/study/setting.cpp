@@ -51,8 +51,8 @@ std::function<Run(double, int)> rolls(std::shared_ptr<const dynamics::SettledMot
   };
 }
 
-// Returns where the wheel without noise comes to at that phase; the last state there, or a fast one, where it rests, and
-// the fastest launch that a setting may have where it goes ever faster.
+// Returns where the wheel without noise comes to at that phase; the last state there, or a fast one, where it rests,
+// and the fastest launch that a setting may have where it goes ever faster.
 template <typename Map>
 double noise_free_state(const Map& map, int phase) {
   constexpr int fewest_steps = 512;  // after which a wheel without noise has settled on its orbit

@@ -20,8 +20,9 @@ constexpr double unbounded = std::numeric_limits<double>::infinity();
 constexpr double unasked = std::numeric_limits<double>::quiet_NaN();
 
 constexpr std::size_t checked_trials = 4096, checked_steps = 64;
-constexpr double surprising = 4;     // standard errors
-constexpr double few_failures = 16;  // a count of as many is normal: 4 standard errors reach to none
+constexpr double surprising = 4;           // standard errors
+constexpr double after_the_study = 0.999;  // share of the work
+constexpr double few_failures = 16;        // a count of as many is normal: 4 standard errors reach to none
 constexpr std::size_t unresolved_trials = 64, unresolved_steps = 2000;
 constexpr double most_events = 2e7, most_rolled = 2e5;  // of a trial study: by the map, by Problem::follow
 constexpr std::uint32_t of_trials = 1u << 24;           // the first of their randomisations
@@ -34,50 +35,58 @@ struct Trials {
   double events = 0;
 };
 
-// Follows trials first .. first + count - 1.
+// Follows trials first .. first + count - 1. @param done  share of the study that is told while they are followed
 Trials follow_trials(const Problem& problem, const StudyOptions& options, std::size_t first, std::size_t count,
-                     std::size_t most, bool by_map) {
+                     std::size_t most, bool by_map, double done) {
+  markov::Share told;
+  if (options.progress) told = [&](double) { options.progress(done, "following trials"); };
   Trials trials;
   trials.steps.assign(count, 0.0);
   std::vector<std::uint8_t> rests(count);
   if (!by_map && problem.follow) {
-    markov::parallel_for(count, options.threads, [&](std::size_t k) {
-      // One event more than asked for: a trial that is cut off there has not rested within them.
-      const std::uint64_t steps = problem.follow(options.seed, first + k, most + 1);
-      rests[k] = steps <= most;
-      trials.steps[k] = static_cast<double>(std::min<std::uint64_t>(steps, most));
-    });
+    markov::parallel_for(
+        count, options.threads,
+        [&](std::size_t k) {
+          // One event more than asked for: a trial that is cut off there has not rested within them.
+          const std::uint64_t steps = problem.follow(options.seed, first + k, most + 1);
+          rests[k] = steps <= most;
+          trials.steps[k] = static_cast<double>(std::min<std::uint64_t>(steps, most));
+        },
+        told);
   } else {
     const auto dimension = static_cast<std::size_t>(problem.map.noise_dimension());
     constexpr std::size_t block = 256;  // trials that share a set of draws
-    markov::parallel_for((count + block - 1) / block, options.threads, [&](std::size_t b) {
-      const std::size_t from = b * block, size = std::min(block, count - from);
-      std::vector<double> state(size);
-      std::vector<std::size_t> rolling(size);
-      std::iota(rolling.begin(), rolling.end(), std::size_t{0});
-      const markov::DrawOptions draws{.count = block,
-                                      .seed = options.seed + 0x9e3779b97f4a7c15u * (first / block + b + 1),
-                                      .replicate = of_trials,
-                                      .sequence = markov::Sequence::random,
-                                      .weighting = markov::Weighting::plain};
-      const markov::Draws launch = markov::make_draws(1, draws);
-      for (std::size_t k = 0; k < size; ++k) state[k] = problem.launch.state(launch.score[k]);
-      for (std::size_t n = 0; n < most && !rolling.empty(); ++n) {
-        markov::DrawOptions own = draws;
-        own.replicate = of_trials + 1 + static_cast<std::uint32_t>(n);
-        const markov::Draws noise = markov::make_draws(static_cast<int>(dimension), own);
-        const int phase = static_cast<int>((static_cast<std::size_t>(problem.launch.phase) + n) %
-                                           static_cast<std::size_t>(problem.map.phases()));
-        std::erase_if(rolling, [&](std::size_t k) {
-          ++trials.steps[from + k];
-          const std::optional<double> next =
-              problem.map.landing(state[k], phase, std::span(noise.score).subspan(k * dimension, dimension));
-          if (next) state[k] = *next;
-          rests[from + k] = !next;
-          return !next;
-        });
-      }
-    });
+    markov::parallel_for(
+        (count + block - 1) / block, options.threads,
+        [&](std::size_t b) {
+          const std::size_t from = b * block, size = std::min(block, count - from);
+          std::vector<double> state(size);
+          std::vector<std::size_t> rolling(size);
+          std::iota(rolling.begin(), rolling.end(), std::size_t{0});
+          const markov::DrawOptions draws{.count = block,
+                                          .seed = options.seed + 0x9e3779b97f4a7c15u * (first / block + b + 1),
+                                          .replicate = of_trials,
+                                          .sequence = markov::Sequence::random,
+                                          .weighting = markov::Weighting::plain};
+          const markov::Draws launch = markov::make_draws(1, draws);
+          for (std::size_t k = 0; k < size; ++k) state[k] = problem.launch.state(launch.score[k]);
+          for (std::size_t n = 0; n < most && !rolling.empty(); ++n) {
+            markov::DrawOptions own = draws;
+            own.replicate = of_trials + 1 + static_cast<std::uint32_t>(n);
+            const markov::Draws noise = markov::make_draws(static_cast<int>(dimension), own);
+            const int phase = static_cast<int>((static_cast<std::size_t>(problem.launch.phase) + n) %
+                                               static_cast<std::size_t>(problem.map.phases()));
+            std::erase_if(rolling, [&](std::size_t k) {
+              ++trials.steps[from + k];
+              const std::optional<double> next =
+                  problem.map.landing(state[k], phase, std::span(noise.score).subspan(k * dimension, dimension));
+              if (next) state[k] = *next;
+              rests[from + k] = !next;
+              return !next;
+            });
+          }
+        },
+        told);
   }
   for (std::size_t k = 0; k < count; ++k) {
     trials.all_rest = trials.all_rest && rests[k] != 0;
@@ -105,9 +114,10 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
   MeanError found;
   double events = 0, half = 0;
   for (std::size_t count = first_trials;; count = steps.size()) {
-    if (options.progress) options.progress(std::min(0.9, events / budget), "following trials");
+    const double done = std::min(0.9, events / budget);
+    if (options.progress) options.progress(done, "following trials");
     const auto most = static_cast<std::size_t>((budget - events) / static_cast<double>(count) * 8);
-    Trials more = follow_trials(problem, options, steps.size(), count, most, false);
+    Trials more = follow_trials(problem, options, steps.size(), count, most, false, done);
     if (!more.all_rest) return std::nullopt;
     steps.insert(steps.end(), more.steps.begin(), more.steps.end());
     events += more.events;
@@ -142,13 +152,14 @@ std::optional<Metastability> trial_study(const Problem& problem, const StudyOpti
 Metastability held_against_trials(const Problem& problem, Metastability study, const StudyOptions& options) {
   if (study.method == Method::followed || study.status == Status::rest_unreachable) return study;
   if (study.status == Status::rest_unresolved) {
-    const Trials trials = follow_trials(problem, options, 0, unresolved_trials, unresolved_steps, true);
+    const Trials trials =
+        follow_trials(problem, options, 0, unresolved_trials, unresolved_steps, true, after_the_study);
     if (!trials.all_rest) return study;
     std::optional<Metastability> answer = trial_study(problem, options);
     return answer ? *std::move(answer) : study;
   }
   const std::size_t most = std::min<std::size_t>(study.steps.survival.size(), checked_steps);
-  const Trials trials = follow_trials(problem, options, 0, checked_trials, most, true);
+  const Trials trials = follow_trials(problem, options, 0, checked_trials, most, true, after_the_study);
   const MeanError found = mean_of(trials.steps);
   const Estimate& all = study.steps.from_start;
   // Survival is that of the finest chain, whose own mean is not extrapolated. What that moves goes into the hazard

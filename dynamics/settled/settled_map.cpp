@@ -22,9 +22,10 @@ constexpr double rough_step = 0.05;         // between rows there
 constexpr std::size_t most_kept = 32;       // maps, of some 8 MB
 // Of a processor: the table of the paper's wheel takes 8 s of its landings of 20 us, those of slopes of 15 deg or of a
 // radius of gyration of 0.4 m a minute; where it is 5 mm, feet slide for milliseconds of computing.
-constexpr double longest_build = 900;  // [s]
-constexpr int foreseen_from = 96;      // landings
-constexpr double landings_a_node = 2;  // beside those kept, mu_r and the kinks are solved for
+constexpr double longest_build = 900;                    // [s]
+constexpr int foreseen_from = 96;                        // landings
+constexpr double landings_a_node = 2;                    // beside those kept, mu_r and the kinks are solved for
+constexpr double bends_found = 0.05, rows_found = 0.95;  // share of the work once these are known
 
 // Says how far a landing gets beyond the barrier: the settled foot's omega_eq^2 less the barrier's; its sign says rest.
 double beyond_barrier(const Landing& landing, double barrier) {
@@ -143,6 +144,24 @@ struct Found {
       error.resting_friction = resting_off.back(), error.resting_friction_median = resting_off[resting_off.size() / 2];
     return error;
   }
+};
+
+// Tells a listener, one thread at a time, how far a part of the work has come.
+class Told {
+ public:
+  Told(const std::function<void(double)>& progress, double from, double to, std::size_t count)
+      : progress_(progress), from_(from), to_(to), count_(count) {}
+  void one_more() {
+    const std::lock_guard lock(mutex_);
+    ++done_;
+    if (progress_) progress_(from_ + (to_ - from_) * static_cast<double>(done_) / static_cast<double>(count_));
+  }
+
+ private:
+  const std::function<void(double)>& progress_;
+  double from_, to_;
+  std::size_t count_, done_ = 0;
+  std::mutex mutex_;
 };
 
 void in_order(std::size_t count, const std::function<void(std::size_t)>& work) {
@@ -414,6 +433,7 @@ void SettledMap::foresee() const {
     const double omega = still + (range.omega_high - still) * std::max(0.05, spread(i, 1));
     if (!(omega > 0)) return;
     motion_.land(leg, omega, {eta, sticking_[static_cast<std::size_t>(leg)] * spread(i, 2)});
+    if (options_.progress) options_.progress(0);
     const double spent = processor_seconds() - from, each = spent / static_cast<double>(i + 1);
     if (each * landings > longest_build && (spent > enough || i + 1 == foreseen_from))
       throw TableTooLong(fmt::format(
@@ -436,6 +456,7 @@ void SettledMap::build() {
   const std::vector<double>& length = motion_.wheel().leg_length;
   const bool alike = std::all_of(length.begin(), length.end(), [&](double one) { return one == length.front(); });
   table_.assign(alike ? 1 : length.size(), empty);
+  Told bends(options_.progress, 0, bends_found, table_.size());
   options_.executor(table_.size(), [&](std::size_t leg) {
     SettledTable& table = table_[leg];
     table.sticking = sticking_[leg];
@@ -444,17 +465,15 @@ void SettledMap::build() {
     const double highest = *std::max_element(table.standstill.begin(), table.standstill.end());
     table.usable = highest + SettledTable::clear_of_rest < range.omega_high;
     if (table.usable) find_bend(table, static_cast<int>(leg));
+    bends.one_more();
   });
-  std::mutex mutex;
-  std::size_t rows_done = 0;
   const auto per_leg = static_cast<std::size_t>(empty.rows);
   const std::size_t rows = table_.size() * per_leg;
+  Told told(options_.progress, bends_found, rows_found, rows);
   options_.executor(rows, [&](std::size_t row) {
     SettledTable& table = table_[row / per_leg];
     if (table.usable) tabulate(table, static_cast<int>(row / per_leg), static_cast<int>(row % per_leg));
-    const std::lock_guard lock(mutex);
-    ++rows_done;
-    if (options_.progress) options_.progress(static_cast<double>(rows_done) / static_cast<double>(rows));
+    told.one_more();
   });
 }
 
@@ -496,7 +515,9 @@ void SettledMap::check() {
   const auto per_leg = static_cast<std::size_t>(options_.checks);
   std::mutex mutex;
   Found sliding, sticking, slow, rough;
+  Told told(options_.progress, rows_found, 1, table_.size() * per_leg);
   options_.executor(table_.size() * per_leg, [&](std::size_t index) {
+    told.one_more();
     const int leg = static_cast<int>(index / per_leg);
     const SettledTable& table = table_[static_cast<std::size_t>(leg)];
     if (!table.usable) return;

@@ -53,7 +53,7 @@ CompareAnswer answer_compare(const CompareRequest& request, const BeginPart& beg
     answer.thresholds.push_back(analysis::rest_thresholds(study));
     if (!request.rigid_bodies) continue;
     options.progress = begin("rigid bodies");
-    answer.extras.rigid_bodies.push_back(rolled_within_limit(study, answer.comparison.labels[i], options));
+    answer.extras.rigid_bodies.push_back(analysis::beside_rigid_bodies(study, answer.comparison.labels[i], options));
   }
   return answer;
 }

@@ -142,7 +142,7 @@ SolveAnswer answer_solve(const SolveRequest& request, const BeginPart& begin) {
   for (std::size_t i = 0; i < answer.solution.studies.size(); ++i) {
     analysis::StudyOptions study = request.study;
     study.progress = begin("rigid bodies");
-    answer.rigid_bodies.push_back(rolled_within_limit(
+    answer.rigid_bodies.push_back(analysis::beside_rigid_bodies(
         answer.solution.studies[i],
         fmt::format("{} {:.6g}", answer.solution.parameter, answer.solution.found[i].at.value), study));
   }

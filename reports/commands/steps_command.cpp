@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 
 #include "analysis/study/certify.h"
 #include "analysis/study/consistency.h"
@@ -16,6 +17,20 @@
 #include "reports/study/study_text.h"
 
 namespace metastable::reports {
+namespace {
+
+// Rolls wheels beside a study, which is complete without them: a limit that ends it is the reason for no answer.
+analysis::BesideRigidBodies rolled_within_limit(const analysis::Metastability& study,
+                                                const analysis::StudyOptions& options) {
+  try {
+    return analysis::beside_rigid_bodies(study, "", options);
+  } catch (const TimeLimitReached& limit) {
+    const std::string reason = fmt::format("the time limit of {:.6g} s ended the check", limit.seconds());
+    return {"", analysis::answered_steps(study), {.reason = reason}};
+  }
+}
+
+}  // namespace
 
 StepsAnswer answer_steps(const StepsRequest& request, const BeginPart& begin_part) {
   const BeginPart begin = within(request.time_limit, begin_part);
@@ -44,7 +59,7 @@ StepsAnswer answer_steps(const StepsRequest& request, const BeginPart& begin_par
   }
   if (request.rigid_bodies) {
     options.progress = begin("rigid bodies");
-    extras.rigid_bodies = rolled_within_limit(study, "", options);
+    extras.rigid_bodies = rolled_within_limit(study, options);
   }
   return answer;
 }

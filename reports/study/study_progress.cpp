@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
-#include <utility>
 
 namespace metastable::reports {
 
@@ -34,16 +33,6 @@ BeginPart within(double seconds, const BeginPart& begin) {
         throw TimeLimitReached(seconds, share, name);
     };
   };
-}
-
-analysis::BesideRigidBodies rolled_within_limit(const analysis::Metastability& study, std::string name,
-                                                const analysis::StudyOptions& options) {
-  try {
-    return analysis::beside_rigid_bodies(study, name, options);
-  } catch (const TimeLimitReached& limit) {
-    return {std::move(name), analysis::answered_steps(study),
-            {.reason = fmt::format("the time limit of {:.6g} s ended it", limit.seconds())}};
-  }
 }
 
 BeginPart ProgressParts::begin() {

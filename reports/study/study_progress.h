@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "analysis/sensitivity/rigid_body_check.h"
 #include "reports/output/progress.h"
 
 namespace metastable::reports {
@@ -40,11 +39,6 @@ constexpr double usual_time_limit = 900;  ///< of one question [s]: as long as s
 /// ends work and changes no number. @param seconds > 0
 /// @throws TimeLimitReached from the listeners of the parts, saying how far the work was
 BeginPart within(double seconds, const BeginPart& begin);
-
-/// Does as analysis::beside_rigid_bodies(), but a time limit that ends it is its reason for having no answer: the study
-/// is complete without it.
-analysis::BesideRigidBodies rolled_within_limit(const analysis::Metastability& study, std::string name,
-                                                const analysis::StudyOptions& options);
 
 /// Shows the parts of a command on one progress line after another, of study_units each.
 class ProgressParts {

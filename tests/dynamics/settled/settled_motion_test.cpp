@@ -275,9 +275,7 @@ TEST(SettledMotion, AWheelThatGainsInFlightIsSaidToRunAway) {
   const SettledMotion motion(wheel);
   std::mt19937 generator(1);
   std::normal_distribution<double> eta(0.4, 0.1), mu(0.8, 0.1);
-  const auto contact = [&] {
-    return Contact{std::clamp(eta(generator), 0.0, 0.95), std::max(0.0, mu(generator))};
-  };
+  const auto contact = [&] { return Contact{std::clamp(eta(generator), 0.0, 0.95), std::max(0.0, mu(generator))}; };
   const Contact first = contact();
   SettledRoll roll(motion, 0, 6, first, first);
   std::string said;
@@ -289,7 +287,8 @@ TEST(SettledMotion, AWheelThatGainsInFlightIsSaidToRunAway) {
       said = error.what();
     }
   }
-  EXPECT_NE(said.find("law settled: the wheel runs away: it flies down the slope of 20 deg"), std::string::npos) << said;
+  EXPECT_NE(said.find("law settled: the wheel runs away: it flies down the slope of 20 deg"), std::string::npos)
+      << said;
   EXPECT_THROW(motion.land(0, 1e17, {0.4, 0.8}), RunsAway);
 }
 

@@ -180,5 +180,24 @@ TEST_F(StepsCommand, WrongInputIsOneLineAndCodeTwo) {
   });
 }
 
+TEST_F(StepsCommand, ALimitThatEndsTheCheckOfRigidBodiesLeavesTheAnswer) {
+  StepsRequest request;
+  request.setting.wheel.leg_length.assign(8, 0.15);
+  request.setting.slope_deg = 7;
+  request.setting.initial_speed = {6, 0.2};
+  request.study.tolerance = 0.3;
+  request.rigid_bodies = true;
+  const StepsAnswer answer = answer_steps(request, [](const std::string& name) -> Tell {
+    if (name != "rigid bodies") return {};
+    return [](double share, const std::string& what) { throw TimeLimitReached(7, share, what); };
+  });
+  EXPECT_GE(answer.study.steps.from_start.value, 1);
+  const std::string text = steps_answer_text(request, answer, 120);
+  for (const char* said : {"expected steps before failure", "none: the time limit of 7 s ended the check",
+                           "that of rigid bodies (settled) has no answer: the time limit of 7 s ended the check."})
+    EXPECT_NE(text.find(said), std::string::npos) << text;
+  EXPECT_NE(steps_answer_json(request, answer).find("the time limit of 7 s ended the check"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace metastable::reports
