@@ -174,6 +174,7 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
   const Arguments given(options);
   markov::MeshStudyOptions study = mesh_options_of(given);
   const bool how_it_fails = given.flag("how_it_fails");
+  const double time_limit = time_limit_of(given);
   MapStudy found{python.name, python.names, {}};
   for (int k = static_cast<int>(found.names.size()); k < python.dimension; ++k)
     found.names.push_back(fmt::format("x{}", k + 1));
@@ -181,7 +182,7 @@ py::dict study_map(const py::dict& fields, const py::dict& options, const std::s
   Call call(progress);
   const markov::BatchMap map = batch_of(python, call);
   call.run([&] {
-    const Tell tell = within(time_limit_of(given), parts_of(call))("steps");
+    const Tell tell = within(time_limit, parts_of(call))("steps");
     study.progress = [&](double share) { tell(share, "steps"); };
     found.passage = markov::mesh_study(map, python.start, study);
     markov::require_agreement(found.passage, python.name);

@@ -47,6 +47,13 @@ class Steps(unittest.TestCase):
         self.assertEqual(len(simulated.steps), 2000)
         self.assertLess(abs(simulated.mean - one.expected_steps.value), 4 * simulated.standard_error + 0.01)
 
+    def test_take_a_whole_number_of_seconds_as_their_limit(self):
+        limited = line(drift).study(spacing=0.8, simulated_steps=0, time_limit=600)
+        self.assertEqual(limited.survival[1], line(drift).study(spacing=0.8, simulated_steps=0).survival[1])
+        for limit in (np.float64(1e-9), 1e-9):
+            with self.assertRaisesRegex(metastable.ComputationError, "the time limit of 1e-09 s is reached"):
+                line(drift).study(time_limit=limit)
+
     def test_run_in_the_thread_that_called_and_may_keep_what_they_get(self):
         import threading
         kept, threads = [], set()
