@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "analysis/study/certify.h"
 #include "analysis/study/consistency.h"
@@ -25,8 +26,9 @@ analysis::BesideRigidBodies rolled_within_limit(const analysis::Metastability& s
   try {
     return analysis::beside_rigid_bodies(study, "", options);
   } catch (const TimeLimitReached& limit) {
-    const std::string reason = fmt::format("the time limit of {:.6g} s ended the check", limit.seconds());
-    return {"", analysis::answered_steps(study), {.reason = reason}};
+    analysis::RigidBodyCheck check;
+    check.reason = fmt::format("the time limit of {:.6g} s ended the check", limit.seconds());
+    return {"", analysis::answered_steps(study), std::move(check)};
   }
 }
 
