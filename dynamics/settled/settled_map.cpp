@@ -151,13 +151,16 @@ class Told {
  public:
   Told(const std::function<void(double)>& progress, double from, double to, std::size_t count)
       : progress_(progress), from_(from), to_(to), count_(count) {}
-  void one_more() {
+  void one_more() { tell(1); }
+  void still() { tell(0); }
+
+ private:
+  void tell(std::size_t more) {
     const std::lock_guard lock(mutex_);
-    ++done_;
+    done_ += more;
     if (progress_) progress_(from_ + (to_ - from_) * static_cast<double>(done_) / static_cast<double>(count_));
   }
 
- private:
   const std::function<void(double)>& progress_;
   double from_, to_;
   std::size_t count_, done_ = 0;
@@ -332,12 +335,14 @@ void SettledMap::find_bend(SettledTable& table, int leg) const {
   parabola(rate, &table.bend[3]);
 }
 
-// Finds the frictions where the landing has kinks, and mu_r, at all speeds of one restitution.
-void SettledMap::find_edges(SettledTable& table, int leg, int row) const {
+// Finds the frictions where the landing has kinks, and mu_r, at all speeds of one restitution. Calls tell() at each: in
+// a row of feet that chatter a speed takes a second.
+void SettledMap::find_edges(SettledTable& table, int leg, int row, const std::function<void()>& tell) const {
   constexpr int stops = SettledTable::stops;
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
   std::array<Trend, stops + 1> trend;
   for (int i = 0; i < table.speeds; ++i) {
+    tell();
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     double* edge = &table.edges[static_cast<std::size_t>((row * table.speeds + i) * (stops + 1))];
     double resting = solve_resting(leg, omega, eta, trend[stops].next(), trend[stops].off());
@@ -355,13 +360,14 @@ void SettledMap::find_edges(SettledTable& table, int leg, int row) const {
 }
 
 // Tabulates one row of a leg's table: all speeds and frictions at one restitution.
-void SettledMap::tabulate(SettledTable& table, int leg, int row) const {
+void SettledMap::tabulate(SettledTable& table, int leg, int row, const std::function<void()>& tell) const {
   constexpr int stops = SettledTable::stops, piece = SettledTable::piece;
   const double eta = table.eta(row), still = table.standstill[static_cast<std::size_t>(row)];
   const bool smooth = row < table.smooth_rows;
-  find_edges(table, leg, row);
+  find_edges(table, leg, row, tell);
   int* known = &table.known[static_cast<std::size_t>(row) * (stops + 1)];
   for (int i = 0; i < table.speeds; ++i) {
+    tell();
     const double omega = table.speed(still, static_cast<double>(i) / (table.speeds - 1));
     const auto at = static_cast<std::size_t>(row * table.speeds + i);
     const double* edge = &table.edges[at * (stops + 1)];
@@ -472,7 +478,8 @@ void SettledMap::build() {
   Told told(options_.progress, bends_found, rows_found, rows);
   options_.executor(rows, [&](std::size_t row) {
     SettledTable& table = table_[row / per_leg];
-    if (table.usable) tabulate(table, static_cast<int>(row / per_leg), static_cast<int>(row % per_leg));
+    if (table.usable)
+      tabulate(table, static_cast<int>(row / per_leg), static_cast<int>(row % per_leg), [&] { told.still(); });
     told.one_more();
   });
 }

@@ -97,8 +97,8 @@ class SettledMap {
   SettledMap(SettledMotion motion, SettledMapOptions options);
   void foresee() const;
   void build();
-  void find_edges(SettledTable& table, int leg, int row) const;
-  void tabulate(SettledTable& table, int leg, int row) const;
+  void find_edges(SettledTable& table, int leg, int row, const std::function<void()>& tell) const;
+  void tabulate(SettledTable& table, int leg, int row, const std::function<void()>& tell) const;
   void find_bend(SettledTable& table, int leg) const;
   void check();
   double standstill(int leg, double eta) const;
